@@ -23,6 +23,7 @@ from groundstation.results.inertial import (
     ChannelResult,
     Difference,
     InertialResult,
+    NavigationStart,
     OwnInnovation,
     RealOutage,
     StateEstimate,
@@ -151,6 +152,12 @@ def inertial_result(duration_s: float = LONG_S, **changes: Any) -> InertialResul
         radial_error_rate_95_nmiph=1.32,
         velocity_error_rms_mps=0.87,
         largest_radial_error_m=2140.0,
+        navigation_start=NavigationStart(
+            0.0, "standstill", "the log begins at a standstill, with the INS 3 m from GNSS"
+        ),
+        radial_error_first_m=3.0,
+        radial_error_last_m=1900.0,
+        compared_hours=duration_s / 3600.0,
         outages=(
             RealOutage(start, end, end - start, 212.0, 260.0),
             RealOutage(0.97 * duration_s, duration_s, 0.03 * duration_s, None, None, "gnss"),
@@ -174,6 +181,10 @@ AIDED: dict[str, Any] = {
     "radial_error_rate_95_nmiph": None,
     "velocity_error_rms_mps": None,
     "largest_radial_error_m": None,
+    "navigation_start": None,
+    "radial_error_first_m": None,
+    "radial_error_last_m": None,
+    "compared_hours": None,
     "differences": (
         Difference("position", "north", "m", 600, 0.2, 1.0, 2.5, 9.0),
         Difference("position", "horizontal", "m", 600, 1.3, 1.2, 3.0, 10.0),

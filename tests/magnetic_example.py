@@ -8,13 +8,13 @@ import numpy as np
 from scipy.signal import lfilter
 
 from groundstation.base.angles import wrap_180, wrap_360
+from groundstation.base.declination import declination_along
 from groundstation.base.records import Column
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import MPS2_PER_G, NS_PER_S
 from groundstation.estimators.magnetic.attitude import field_in_body, levelled_heading_deg
 from groundstation.estimators.magnetic.harmonics import fit
 from groundstation.results.heading import HeadingResult
-from groundstation.tables.declination import declination_along
 from groundstation.tables.phases import Interval, Phases
 from groundstation.tables.table import Flight, Table
 

@@ -7,7 +7,7 @@ import pytest
 
 from groundstation.base.errors import UsageError
 from groundstation.base.geodesy import north_east_m
-from groundstation.base.records import Item, RecordBatch, Remark
+from groundstation.base.records import Damage, Item, RecordBatch, Remark
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.verbs.describe import describe, suggest_icd
@@ -85,6 +85,15 @@ def test_a_transfer_between_terminals_is_the_same_message(tmp_path: Path, receiv
         load(icd_file(tmp_path, receive)),
     )
     assert rows(items, "ins")["roll_deg"].tolist() == [200 * 180 / 2**15, 300 * 180 / 2**15]
+
+
+def test_zeros_of_a_unit_without_a_position_are_none(tmp_path: Path) -> None:
+    words = [(1, 200_000, made.word_429(label, 4_000 * (at > 2))) for at in range(5) for label in (0o310, 0o311, 0o314)]
+    items = read(tmp_path, made.packet(4, 0x38, made.words_429(words), 0), shipped("arinc429_inertial"))
+    found = rows(items, "ins")
+    assert np.isfinite(found["latitude_deg"]).sum() == 2 and np.isfinite(found["true_heading_deg"]).sum() == 5
+    (damage,) = [item for item in items if isinstance(item, Damage)]
+    assert (damage.kind, damage.topic, damage.count, damage.loses_data) == ("no_position", "ins", 3, False)
 
 
 def test_one_terminal_on_two_channels_is_two_units(tmp_path: Path) -> None:

@@ -10,9 +10,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from groundstation.base import compile as compiling
 from groundstation.cli.application import EXAMPLES, VERBS, examples
 from groundstation.cli.main import app
 from tests.dataflash_writer import flight_log
+from tests.receiver_writer import nmea
 
 HEAVY = (
     "cattrs",
@@ -104,6 +106,14 @@ def test_a_log_in_which_nothing_survives_has_one_answer(tmp_path: Path) -> None:
         assert err.count("\n") == 1 and ("format:" in out) == (verb == ["info"])
 
 
+def test_records_without_a_time_are_said_to_be_there_by_every_verb(tmp_path: Path) -> None:
+    log = tmp_path / "compass.nmea"
+    log.write_bytes(b"".join(nmea(f"HEHDT,{at}.0,T") for at in range(60)))
+    for verb in (["info"], ["check"], ["run", "-o", str(tmp_path / "out")]):
+        code, _out, err = groundstation(*verb, str(log))
+        assert code == 1 and err.startswith("error: compass.nmea: no readable record has a time, of 60"), (verb, err)
+
+
 def test_a_foreign_file_in_a_folder_is_skipped_and_listed(tmp_path: Path) -> None:
     (tmp_path / "logs").mkdir()
     (tmp_path / "logs/readme.txt").write_text("notes", encoding="utf-8")
@@ -165,3 +175,16 @@ def test_an_output_that_is_not_ours_needs_force(tmp_path: Path) -> None:
     assert groundstation(*arguments, "-f")[0] == 0
     assert (tmp_path / "out/precious.txt").read_text(encoding="utf-8") == "mine"
     assert groundstation(*arguments)[0] == 0, "an own OUT is continued"
+
+
+def test_verbose_says_why_compiled_code_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    log = tmp_path / "a.csv"
+    log.write_text("time_s,ins.true_heading_deg\n0,1\n1,1\n2,1\n")
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(shared))
+    monkeypatch.setattr(compiling, "hand_of_others", lambda folder: f"others may write into {folder}")
+    monkeypatch.setattr(compiling, "_cache_folder", compiling._cache_folder.__wrapped__)
+    words = f"compiled code is not kept ({shared}: others may write into {shared})"
+    assert groundstation("check", str(log), "--progress", "none", "-v")[2].count(words) == 1
+    assert words not in groundstation("check", str(log), "--progress", "none")[2]

@@ -18,6 +18,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.verbs.clip import Wanted, clip
+from groundstation.pipeline.verbs.describe import describe
 from groundstation.store.reader import Part, read, read_info
 from tests.recording_contents import Contents
 from tests.saved import load
@@ -105,9 +106,16 @@ def test_log_mcap_and_flight_folder_give_the_same_part(whole: Path, tmp_path: Pa
     parts = [
         part_of(source, tmp_path / f"{number}.mcap", "10", "20").read_bytes() for number, source in enumerate(sources)
     ]
-    names = [part.replace(f"{number}.mcap".encode(), b"x") for number, part in enumerate(parts)]
-    assert len({len(name) for name in names}) == 1
+    assert len(set(parts)) == 1, "to the byte, whatever the part is called"
     assert len(list(tmp_path.iterdir())) == 4, "a temporary file stayed behind"
+
+
+def test_a_part_has_the_name_of_its_file(whole: Path, tmp_path: Path) -> None:
+    part = part_of(whole, tmp_path / "part.mcap", "10", "20")
+    assert read_info(part).source_name == "part.mcap" and b"part.mcap" not in part.read_bytes()
+    moved = part.rename(tmp_path / "moved.mcap")
+    assert read_info(moved).source_name == "moved.mcap" and open_log(moved).source.name == "moved.mcap"
+    assert describe(moved).facts["log"] == "moved.mcap, read as flat-csv"
 
 
 def test_metadata_says_what_it_was_cut_from(whole: Path, tmp_path: Path) -> None:

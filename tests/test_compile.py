@@ -2,8 +2,11 @@
 
 import os
 import pickle
+import shutil
 import subprocess
 import sys
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,6 +16,7 @@ import pytest
 from groundstation.base import compile as compiling
 from groundstation.base.compile import SMALL_BYTES, Loop, compiled, in_place, scanner
 from groundstation.base.machine_code import KeptCode, digest_of, forms_of
+from groundstation.base.own_files import hand_of_others, read_own, write_own
 
 WEIGHT = 3
 
@@ -235,3 +239,112 @@ def test_what_a_loop_calls_and_its_constants_tell_its_code_apart(monkeypatch: py
     before = digest_of(_narrow.py_func, ())
     monkeypatch.setitem(globals(), "Limits", NamedTuple("Limits", [("highs", float), ("low", float)]))
     assert digest_of(_narrow.py_func, ()) != before
+
+
+NOBODY = 65_534
+needs_root = pytest.mark.skipif(
+    getattr(os, "geteuid", lambda: 1)() != 0, reason="only root gives a file to another user"
+)
+
+
+@pytest.fixture
+def passed() -> Iterator[Path]:
+    """A folder that others may pass, on a path that they may not write to."""
+    folder = Path(tempfile.mkdtemp()).resolve()
+    folder.chmod(0o755)
+    if reason := hand_of_others(folder):
+        pytest.skip(reason)
+    yield folder
+    shutil.rmtree(folder)
+
+
+def test_a_folder_of_our_own_serves_and_one_that_others_may_write_does_not(passed: Path) -> None:
+    folder = passed / "kept"
+    folder.mkdir(mode=0o755)
+    assert hand_of_others(folder) == ""
+    for mode in (0o770, 0o707, 0o1777):
+        folder.chmod(mode)
+        assert hand_of_others(folder) == f"others may write into {folder}"
+    inside = folder / "inside"
+    inside.mkdir()
+    inside.chmod(0o777)
+    folder.chmod(0o700)
+    assert hand_of_others(inside) == ""  # others cannot pass the folder above it
+
+
+def test_a_folder_that_others_may_exchange_does_not_serve(passed: Path) -> None:
+    kept, link = passed / "kept", passed.with_name(f"{passed.name}-link")
+    kept.mkdir(mode=0o755)
+    passed.chmod(0o777)
+    assert hand_of_others(kept) == f"others may write into {passed}"
+    passed.chmod(0o1777)  # as /tmp: entries of others cannot be exchanged
+    assert hand_of_others(kept) == ""
+    link.symlink_to(kept)
+    try:
+        assert hand_of_others(link) == ""
+        passed.chmod(0o777)
+        assert hand_of_others(link) == f"others may write into {passed}"
+    finally:
+        link.unlink()
+
+
+@needs_root
+def test_nothing_is_kept_in_the_folder_of_another_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "kept"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
+    assert compiling._cache_folder.__wrapped__() == folder
+    os.chown(folder, NOBODY, NOBODY)
+    assert compiling._cache_folder.__wrapped__() is None
+    monkeypatch.setattr(compiling, "_cache_folder", lambda: None)
+    assert f"{folder} is another user's" in compiling.why_nothing_is_kept()
+
+
+@pytest.mark.parametrize("harm", ["owner", "mode", "link"])
+def test_code_that_another_may_have_written_is_not_loaded(kept_here: Path, harm: str) -> None:
+    kept = KeptCode(kept_here, total.py_func, forms_of((np.zeros((1, 1), np.int64), 0, np.zeros(1))))
+    total(np.ones((2, 2), np.int64), 0, np.zeros(2))
+    (file,) = kept_here.glob("*.machine_code")
+    assert kept.read() is not None and file.stat().st_mode & 0o777 == 0o600
+    if harm == "owner":
+        if os.geteuid():
+            pytest.skip("only root gives a file to another user")
+        os.chown(file, NOBODY, NOBODY)
+    elif harm == "mode":
+        file.chmod(0o620)
+    else:
+        file.symlink_to(file.rename(kept_here / "elsewhere"))
+    assert kept.read() is None
+
+
+def test_code_is_written_in_the_place_of_a_link_not_where_it_leads(tmp_path: Path) -> None:
+    victim, path = tmp_path / "victim", tmp_path / "kept"
+    victim.write_text("mine")
+    path.symlink_to(victim)
+    write_own(path, b"code")
+    assert victim.read_text() == "mine" and not path.is_symlink() and read_own(path) == b"code"
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["kept", "victim"]
+
+
+@needs_root
+def test_what_numba_pickled_is_not_loaded_from_the_folder_of_another_user(tmp_path: Path) -> None:
+    program = "import numpy as np\nfrom tests.test_compile import mean\nprint(mean(np.ones(3)))"
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+
+    def run() -> str:
+        done = subprocess.run(
+            [sys.executable, "-c", program], env=environment, check=True, capture_output=True, text=True
+        )
+        return done.stdout
+
+    assert run() == "1.0\n"
+    indexes, mark = list(tmp_path.rglob("*.nbi")), tmp_path / "mark"
+    assert indexes
+    harm = f"cos\nsystem\n(S'touch {mark}'\ntR.".encode()  # a pickle that runs a command when it is loaded
+    for file in indexes:
+        file.write_bytes(harm)
+        os.chown(file.parent, NOBODY, NOBODY)
+    assert run() == "1.0\n" and not mark.exists()
+    for file in indexes:
+        os.chown(file.parent, 0, 0)
+    subprocess.run([sys.executable, "-c", program], env=environment, check=False, capture_output=True)
+    assert mark.exists(), "in a folder of our own it is loaded: the test shows something"

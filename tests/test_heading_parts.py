@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from groundstation.base.angles import wrap_360
 from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.records import Column
 from groundstation.base.toml_settings import settings_from
@@ -327,6 +328,15 @@ def test_unknown_arm_without_turns_is_not_observable() -> None:
     found = know_arm(replace(samples, gate=gate), AircraftData(), replace(SETTINGS, arm_speed_min_mps=7.0))
     assert found.applied_arm_m == 0.0
     assert found.origin == "not observable"
+
+
+def test_turns_that_the_method_does_not_hold_for_leave_the_arm_as_it_was() -> None:
+    """Where the heading is far from the track in every turn nothing is left to estimate from: no median of nothing."""
+    samples = paired(noiseless(TWO_TURNS))
+    turned = np.where(samples.is_used, samples.heading_deg, wrap_360(samples.heading_deg + 120.0))
+    found = know_arm(replace(samples, heading_deg=turned), AircraftData(), SETTINGS)
+    assert (found.arm_m, found.arm_sigma_m) == (SETTINGS.arm_prior_m, SETTINGS.arm_prior_sigma_m)
+    assert found.origin == "not observable" and not found.is_offset_observable
 
 
 def test_arm_is_not_read_from_a_slow_log() -> None:

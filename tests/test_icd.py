@@ -94,6 +94,16 @@ def test_a_gnss_name_makes_it_gnss(tmp_path: Path) -> None:
     assert word.elements[0].signal == "gnss.altitude_msl_m"
 
 
+def test_a_count_is_no_angle(tmp_path: Path) -> None:
+    """A most significant bit of no value: the unit says nothing of the counts, which stay raw."""
+    counts = MESSAGE.replace("msbval: 90.0", "msbval: 0.0")
+    assert icd(tmp_path, counts).messages_1553[0].elements[0].signal is None
+    with pytest.raises(SettingsError, match="found 0, a count"):
+        icd(tmp_path, counts.replace('uom: "deg"', 'uom: "deg", signal: ins.latitude_deg'))
+    numbers = counts.replace("SIGNED32", "FLOAT32_IEEE")
+    assert icd(tmp_path, numbers).messages_1553[0].elements[0].signal == "ins.latitude_deg"
+
+
 def test_unknown_keys_are_told(tmp_path: Path) -> None:
     found = icd(tmp_path, MESSAGE.replace('uom: "deg"', 'uom: "deg", signl: x'))
     assert found.notes == ("x.yaml: key 'signl' is not known, 1 times",)

@@ -1,5 +1,7 @@
 """Which files a run takes."""
 
+import inspect
+import sys
 from pathlib import Path
 
 import pytest
@@ -43,6 +45,24 @@ def test_links_in_a_circle_are_not_followed(tmp_path: Path) -> None:
     log = touched(tmp_path / "logs/log.csv")
     (tmp_path / "logs/again").symlink_to(tmp_path / "logs")
     assert [item.path for item in collect([tmp_path])] == [log]
+
+
+def test_of_a_file_and_a_link_to_it_the_first_counts(tmp_path: Path) -> None:
+    touched(tmp_path / "b/log.csv")
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a/link.csv").symlink_to(tmp_path / "b/log.csv")
+    assert [item.path for item in collect([tmp_path])] == [tmp_path / "a/link.csv"]
+
+
+def test_folders_of_any_depth_are_walked(tmp_path: Path) -> None:
+    log = touched(tmp_path.joinpath(*("d" for _ in range(300)), "log.csv"))
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(len(inspect.stack()) + 100)
+    try:
+        (found,) = collect([tmp_path])
+    finally:
+        sys.setrecursionlimit(limit)
+    assert found.path == log
 
 
 def test_a_missing_path_is_a_usage_error(tmp_path: Path) -> None:

@@ -19,12 +19,14 @@ from pypdf import PdfReader
 from typer.testing import CliRunner
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.declination import declination_along
 from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.base.records import Column
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.cli.main import app
 from groundstation.estimators.magnetic.corrected import CorrectedHeading, correct_heading
-from groundstation.pipeline.many_flights.batch import plan_many, run_many
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.dry_run import plan_many
 from groundstation.pipeline.many_flights.inputs import file_in
 from groundstation.pipeline.many_flights.publishing import report_again
 from groundstation.pipeline.many_flights.remote import RemoteFolder
@@ -55,7 +57,6 @@ from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
 from groundstation.store.reader import read, read_info
 from groundstation.tables.assemble import flight_from_batches
-from groundstation.tables.declination import declination_along
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer.recording import write_recording
 from tests import magnetic_example

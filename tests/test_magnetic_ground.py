@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 
 from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.clock import Clock
+from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import Column
@@ -40,7 +41,6 @@ from groundstation.results.flight import FlightResults, Source
 from groundstation.results.magnetic import LETTERS
 from groundstation.results.magnetic_ground import GroundDeviation
 from groundstation.results.manifest import Manifest
-from groundstation.tables.declination import declination_along
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer.recording import write_recording
 from tests.real_logs import real_log

@@ -238,6 +238,68 @@ speed = { column = "ws", unit = "kt" }
     assert read.values("raw.p", "var") == [10.0, None, None] and read.damage("unreadable_cells").count == 1
 
 
+def test_a_derivation_stands_in_for_an_optional_column(tmp_path: Path) -> None:
+    settings = BASIC + EAST + BY_TRACK
+    own = Read(*files(tmp_path, settings, "t,e,trk,gs\n0,7,90,5\n1,,90,5\n"))  # not 5: an empty cell is none
+    assert own.values("gnss", "velocity_east_mps") == [7.0, None]
+    assert own.values("gnss", "velocity_north_mps") == pytest.approx([0.0, 0.0])  # the file has no column of it
+    without = Read(*files(tmp_path, settings, "t,trk,gs\n0,90,5\n"))
+    assert without.values("gnss", "velocity_east_mps") == [5.0] and "missing_columns" not in without.remarks
+
+
+def test_times_in_utc_need_no_column_of_offsets(tmp_path: Path) -> None:
+    settings = LOCAL.replace('offset = "o"', 'offset = "UTC"')
+    read = Read(*files(tmp_path, settings, "d,t,v\n1970-01-01,00:00:01,1\n"))
+    assert read.times("gnss") == [NS_PER_S] and "assumed_utc" not in read.remarks
+
+
+def test_a_local_time_with_an_empty_offset_is_told(tmp_path: Path) -> None:
+    rows = ["1970-01-02,03:00:00,+03:00,1", "1970-01-02,00:00:01,,2"]
+    assert "assumed_utc" not in Read(*files(tmp_path, LOCAL, "\n".join(["d,t,o,v", rows[0], ""]))).remarks
+    assert "assumed_utc" in Read(*files(tmp_path, LOCAL, "\n".join(["d,t,o,v", *rows, ""]))).remarks
+
+
+TELLS = """
+name = "tells"
+[recognise]
+header_tells = true
+second_names = true
+[time]
+kind = "seconds"
+column = "Time"
+[variation]
+column = "Magvar"
+sign = -1
+[columns]
+"Speed" = { field = "gnss.ground_speed_mps", unit = "kt" }
+"Height" = { field = "gnss.altitude_msl_m", unit = "m" }
+"Track" = { field = "gnss.track_deg", unit = "deg", north = "magnetic" }
+"""
+
+
+@pytest.mark.parametrize(
+    ("header", "below", "expected"),
+    [
+        ("Time,Speed,Height,Track,Magvar", "", (36 * 1852 / 3600, "altitude_msl_m", 36.0, 23.0)),
+        ("Time (s),Speed (km/h),Height (ft),Track (deg),Magvar (deg)", "", (10.0, "altitude_msl_m", 10.9728, 23.0)),
+        ("Time,Speed (m/s),Height (WGS84 m),Track (deg true),Magvar", "", (36.0, "altitude_ellipsoid_m", 36.0, 36.0)),
+        ("Time,Speed,Height,Track,Magvar", "t,Speed (kph),h,Track true,mv\n", (10.0, "altitude_msl_m", 36.0, 36.0)),
+        ("Time,Speed (ft),Height,Track,Magvar", "", (None, "altitude_msl_m", 36.0, 23.0)),  # no speed is in feet
+    ],
+)
+def test_headers_that_tell_settle_unit_north_and_height(
+    tmp_path: Path, header: str, below: str, expected: tuple[float | None, str, float, float]
+) -> None:
+    read = Read(*files(tmp_path, TELLS, f"{header}\n{below}0,36,36,36,13\n"))
+    speed, altitude, height, track = expected
+    assert read.values("gnss", "track_deg") == pytest.approx([track])
+    assert read.values("gnss", altitude) == pytest.approx([height])
+    is_fed = any("ground_speed_mps" in batch.columns for batch in read.batches)
+    assert is_fed == (speed is not None) and ("other_unit" in read.remarks) == (speed is None)
+    if speed is not None:
+        assert read.values("gnss", "ground_speed_mps") == pytest.approx([speed])
+
+
 def test_a_derivation_without_its_columns_is_left_out(tmp_path: Path) -> None:
     text = (
         BASIC
@@ -250,6 +312,14 @@ def test_a_derivation_without_its_columns_is_left_out(tmp_path: Path) -> None:
 
 
 HDOP = '[columns]\nv = { field = "gnss.hdop" }\n'
+EAST = (
+    '[columns]\ne = { field = "gnss.velocity_east_mps", unit = "mps", optional = true }\n'
+    'trk = { field = "gnss.track_deg", unit = "deg" }\ngs = { field = "gnss.ground_speed_mps", unit = "mps" }\n'
+)
+BY_TRACK = (
+    '[[derived]]\ntopic = "gnss"\nmethod = "velocity_from_track"\n'
+    'track = "gnss.track_deg"\nspeed = "gnss.ground_speed_mps"\n'
+)
 SLIPS = [
     ("name = ", "TOML"),
     ('nmae = "x"\n' + BASIC + HDOP, "nmae"),
@@ -292,6 +362,17 @@ SLIPS = [
     (BASIC + HDOP + '[metadata.join]\na = "{b}"\n', "metadata.join.a"),
     (BASIC + HDOP + "[recognise]\nrows_after_header = 1.5\n", "recognise.rows_after_header"),
     (BASIC + HDOP + "[recognise]\ncolumns = []\n", "recognise.columns"),
+    (BASIC + HDOP + '[recognise]\nfirst_line = ["#a", 3]\n', "recognise.first_line"),
+    (BASIC + HDOP + "[recognise]\nheader_tells = 1\n", "recognise.header_tells"),
+    (BASIC + HDOP + '[recognise]\nsecond_names = "yes"\n', "recognise.second_names"),
+    (BASIC + HDOP + "[variation]\n", "variation.column"),
+    (BASIC + HDOP + '[variation]\ncolumn = "m"\nsign = 2\n', "variation.sign"),
+    (BASIC + HDOP + '[variation]\ncolumn = "m"\nunit = "kt"\n', "variation.unit"),
+    (BASIC + '[columns]\nv = { field = "gnss.track_deg", unit = "deg", north = "up" }\n', "columns.v.north"),
+    (BASIC + '[columns]\nv = { field = "ins.roll_deg", unit = "deg", north = "true" }\n', "columns.v.north"),
+    (BASIC + '[columns]\nv = { field = "gnss.hdop", optional = "yes" }\n', "columns.v.optional"),
+    (BASIC + EAST.replace(", optional = true", "") + BY_TRACK, "derived[0]"),
+    (BASIC + EAST + BY_TRACK + BY_TRACK, "derived[1]"),
 ]
 
 

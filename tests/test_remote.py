@@ -18,8 +18,9 @@ import pytest
 from distributed import Client
 
 from groundstation.base.errors import GroundstationError, UsageError
-from groundstation.pipeline.many_flights.batch import plan_many, run_many
+from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.many_flights.cluster import on_cluster
+from groundstation.pipeline.many_flights.dry_run import plan_many
 from groundstation.pipeline.many_flights.lease import alone_elsewhere
 from groundstation.pipeline.many_flights.remote import RemoteFolder, far_logs
 from groundstation.pipeline.one_flight.configuration import Configuration

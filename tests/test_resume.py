@@ -20,7 +20,8 @@ from typer.testing import CliRunner
 from groundstation.base.errors import UsageError
 from groundstation.cli.main import app
 from groundstation.pipeline.many_flights import workers
-from groundstation.pipeline.many_flights.batch import _crew, plan_many, run_many
+from groundstation.pipeline.many_flights.batch import _crew, run_many
+from groundstation.pipeline.many_flights.dry_run import plan_many
 from groundstation.pipeline.many_flights.flight_keys import KEYS
 from groundstation.pipeline.many_flights.out_folder import LOCK
 from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, _teller, in_turn, side_by_side

@@ -2,7 +2,11 @@
 
 import http.client
 import os
+import socket
+import socketserver
 import sys
+import threading
+import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -17,7 +21,7 @@ from groundstation.base.errors import GroundstationError
 from groundstation.pipeline.verbs.view import look_at
 from groundstation.viewer import launch, verification
 from groundstation.viewer.fleet_catalog import catalog_server
-from groundstation.viewer.gate import may_enter
+from groundstation.viewer.gate import Gate, request_of
 from groundstation.viewer.own_page import page_files, page_server
 from groundstation.viewer.recorder import FLIGHT_TIME
 from groundstation.viewer.recording import save_stream
@@ -213,7 +217,61 @@ def test_the_catalog_is_closed_to_other_origins(sound: Path) -> None:
         b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nhOST: pages.example\r\n\r\n",
         b"GET / HTTP/1.1\r\nX: y\r\n\r\nHost: 127.0.0.1\r\n\r\n",
         b"PRI / HTTP/1.1\r\nHost: pages.example\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\nGET / HTTP/1.1\r\nHost: pages.example\r\n\r\n",
+        b"GET / HTTP/1.1\nHost: pages.example\n\nX: y\r\nHost: 127.0.0.1\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n X: folded\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost : 127.0.0.1\r\n\r\n",
+        b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\n",
+        b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\n",
+        b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: +1\r\n\r\n",
     ],
 )
 def test_who_does_not_name_this_machine_stays_outside(head: bytes) -> None:
-    assert not may_enter(head)
+    assert request_of(head) is None
+
+
+class _Echo(socketserver.BaseRequestHandler):
+    """Answers with all that it is sent, for as long as it is sent something: as a server that keeps connections."""
+
+    def handle(self) -> None:
+        while block := self.request.recv(1 << 16):
+            self.request.sendall(block)
+
+
+@pytest.fixture
+def gate() -> Iterator[Gate]:
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), _Echo) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True).start()
+        entry = Gate("127.0.0.1", 0)
+        with entry.listening():
+            entry.open("127.0.0.1", server.server_address[1])
+            yield entry
+        server.shutdown()
+
+
+def passed(gate: Gate, *blocks: bytes) -> bytes:
+    """What of some blocks the server behind the gate gets."""
+    with socket.create_connection(("127.0.0.1", gate.port), timeout=PATIENCE_S) as visitor:
+        for block in blocks:
+            visitor.sendall(block)
+            time.sleep(0.05)
+        visitor.shutdown(socket.SHUT_WR)
+        return b"".join(iter(lambda: visitor.recv(1 << 16), b""))
+
+
+OWN = b"POST /a HTTP/1.1\r\nHost: localhost\r\nContent-Length: 4\r\nConnection: keep-alive, Upgrade\r\n\r\n"
+OTHER = b"GET /b HTTP/1.1\r\nHost: pages.example\r\n\r\n"
+
+
+def test_every_request_is_looked_at_not_the_first_alone(gate: Gate) -> None:
+    sent = OWN.replace(b"keep-alive, Upgrade", b"close")
+    assert passed(gate, OWN + b"body" + OTHER) == sent + b"body"
+    assert passed(gate, OWN + b"bo", b"dy" + OTHER, OTHER) == sent + b"body"
+    assert passed(gate, OWN, b"body", OTHER) == sent + b"body"
+    assert passed(gate, OTHER).startswith(b"HTTP/1.1 421 ")
+
+
+def test_a_program_keeps_its_connection(gate: Gate) -> None:
+    everything = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", b"frames", OTHER
+    assert passed(gate, *everything) == b"".join(everything)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from groundstation.base.angles import FloatArray, unwrap, wrap_180
+from groundstation.base.declination import declination_along
 from groundstation.base.errors import SettingsError
 from groundstation.base.geodesy import SEMI_MAJOR_M
 from groundstation.estimators.heading.estimate import estimate_heading_error
@@ -25,7 +26,6 @@ from groundstation.simulation.magnetic_family import (
 )
 from groundstation.simulation.magnetometer import world_field_nt
 from groundstation.simulation.scenario import Anomaly, MagnetometerSettings, load_scenario
-from groundstation.tables.declination import declination_along
 from groundstation.tables.table import Flight
 from tests.simulated_flights import FLIGHT_LEGS, TAXI_LEGS, quiet, scenario
 

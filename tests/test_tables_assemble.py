@@ -37,6 +37,22 @@ def test_fields_that_come_and_go_are_absent_where_missing() -> None:
     assert (flight.start_ns, flight.topics(), flight.metadata["aircraft"]) == (5, ("gnss", "ins"), "A")
 
 
+def test_a_place_that_is_not_on_earth_is_absent_and_raw_topics_keep_it() -> None:
+    places = {
+        "latitude_deg": [56.0, 95.0, -91.0, 56.0, np.nan, np.inf, -90.0],
+        "longitude_deg": [38.0, 38.0, 38.0, 1e9, 38.0, 38.0, 359.0],
+        "roll_deg": [1.0] * 7,
+    }
+    flight = gather(batch("gnss.2", list(range(7)), **places), batch("raw.gnss", list(range(7)), **places))
+    for name in ("latitude_deg", "longitude_deg"):
+        assert flight["gnss.2"].columns[name].mask.tolist() == [True, False, False, False, True, False, True], name
+        assert flight["raw.gnss"].columns[name].present is None
+    assert flight["gnss.2"].columns["roll_deg"].present is None
+    alone = gather(batch("ins", [1, 2], latitude_deg=[95.0, 5.0]), batch("ins", [3, 4], 2, longitude_deg=[1.0, 400.0]))
+    assert alone["ins"].columns["latitude_deg"].mask.tolist() == [False, True, False, False]
+    assert alone["ins"].columns["longitude_deg"].mask.tolist() == [False, False, True, False]
+
+
 def test_types_widen_to_the_common_one() -> None:
     ins = gather(
         batch("ins", [1], a=np.float32([1.5]), b=[1]),

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.declination import declination_along, declination_sigma_deg
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
-from groundstation.tables.declination import declination_along, declination_sigma_deg
 from groundstation.tables.headings import true_from_magnetic, true_heading
 from groundstation.tables.table import Flight, Table
 

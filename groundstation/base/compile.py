@@ -2,9 +2,10 @@
 
 A loop is compiled at its first call, and numba imported then. What was compiled goes beside the code when that folder
 can be written, else into the user's cache folder, else it is compiled again in each process; ``numba.njit(cache=True)``
-alone raises at import in a read-only install without a home. Loops over numbers and arrays are kept as machine code of
-their own (``base.machine_code``), and found again without numba. Where nothing is kept, plain Python goes through the
-bytes of a small log: it has done so before a compiler has started.
+alone raises at import in a read-only install without a home. It is loaded as code: a folder that another user owns or
+may write serves neither here nor for numba, which pickles what it keeps. Loops over numbers and arrays are kept as
+machine code of their own (``base.machine_code``), and found again without numba. Where nothing is kept, plain Python
+goes through the bytes of a small log: it has done so before a compiler has started.
 Keep compiled functions scalar: small matrix products inside njit take 7-10 s to compile.
 """
 
@@ -35,45 +36,68 @@ from groundstation.base.machine_code import (
     object_file,
     plain_forms,
 )
+from groundstation.base.own_files import hand_of_others
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 SMALL_BYTES = 65_536  # of a log: plain Python takes up to a second for so many, and a compiler several
+_BESIDE = Path(__file__).parent / "__pycache__"
 PLAIN_S = 1.0  # of a process for one loop: after that it is compiled, however few bytes come
 _LOCK = RLock()  # numba and its linker are told one thing at a time
 
 
 def _is_writable(folder: Path) -> bool:
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o777 if folder == _BESIDE else 0o700, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return True
     except OSError:
         return False
 
 
+def _serves(folder: Path) -> bool:
+    """Whether compiled code may be kept in a folder: it can be written, and not by others."""
+    return _is_writable(folder) and not hand_of_others(folder)
+
+
 @cache
 def _cache_folder() -> Path | None:
     """Where compiled code is kept; numba is told of it where it is not beside the code."""
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        chosen = Path(os.environ["NUMBA_CACHE_DIR"])
-        return chosen if _is_writable(chosen) else None
-    beside = Path(__file__).parent / "__pycache__"
-    if _is_writable(beside):
-        return beside
-    try:
-        user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "groundstation" / "numba"
-    except RuntimeError:  # a user whom the machine does not know, as in many containers, has no home
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    if not chosen and _serves(_BESIDE):
+        return _BESIDE
+    folder = _own_choice()
+    if folder is None or not _serves(folder):
         return None
-    if _is_writable(user_cache):
-        os.environ["NUMBA_CACHE_DIR"] = str(user_cache)
-        return user_cache
-    return None
+    os.environ["NUMBA_CACHE_DIR"] = str(folder.resolve())  # a link on the way may be another one later
+    return folder.resolve()
+
+
+def _own_choice() -> Path | None:
+    """The folder that ``NUMBA_CACHE_DIR`` names, else one in the user's cache; None for a user without a home."""
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(chosen)
+    try:
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "groundstation" / "numba"
+    except RuntimeError:  # a user whom the machine does not know, as in many containers
+        return None
 
 
 def keeps_nothing() -> bool:
     """Whether nothing compiled is kept: what a log needs of it (a flat CSV needs nothing) takes some seconds more."""
     folder = _cache_folder()
     return folder is None or not any(folder.glob(f"*{SUFFIX}"))
+
+
+def why_nothing_is_kept() -> str:
+    """Say why compiled code is kept nowhere; empty where it is."""
+    if _cache_folder() is not None:
+        return ""
+    folder = _own_choice()
+    if folder is None:
+        reason = "no home folder"
+    else:
+        reason = f"{folder}: {(hand_of_others(folder) if folder.exists() else '') or 'it cannot be written'}"
+    return f"compiled code is not kept ({reason}): each process compiles its loops anew"
 
 
 def _njit(numba: Any) -> Callable[..., Any]:
@@ -94,7 +118,11 @@ class Loop:
     @cached_property
     def _called(self) -> Any:
         """The function as numba has it for calls from Python, kept in its cache."""
-        return self._dispatcher(is_cached=_cache_folder() is not None)  # numba reads NUMBA_CACHE_DIR at its import
+        if _cache_folder() is not None:  # numba reads NUMBA_CACHE_DIR at its import
+            kept = self._dispatcher(is_cached=True)
+            if not hand_of_others(Path(kept.stats.cache_path)):
+                return kept
+        return self._dispatcher(is_cached=False)
 
     @cached_property
     def _part(self) -> Any:

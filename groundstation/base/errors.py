@@ -1,8 +1,16 @@
 """Errors that say where, what was found, what was expected and what to do next."""
 
+import errno
+import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import PurePath
 
+from groundstation.base.printable import in_a_line
+
+_NOT_MAPPED = re.compile("failed to map segment|[Cc]annot allocate memory")
+_NOT_HAD = re.compile("[Cc]annot allocate memory|[Uu]nable to allocate|malloc .*failed|std::bad_alloc|bad allocation")
+_NO_THREAD = re.compile("can't start new thread|Failed to launch worker thread|Resource temporarily unavailable")
 MOST_SHOWN = 2000  # characters of each part of an error: a file may have put much into it
 
 
@@ -43,8 +51,7 @@ class GroundstationError(Exception):
 
 def _shown(part: str) -> str:
     """As much of a part as a person reads, in characters that a terminal shows."""
-    text = " ".join(part.split()) if len(part) <= MOST_SHOWN else f"{part[:MOST_SHOWN]} ... ({len(part)} characters)"
-    return "".join(one if one.isprintable() else "?" for one in text)
+    return in_a_line(part if len(part) <= MOST_SHOWN else f"{part[:MOST_SHOWN]} ... ({len(part)} characters)")
 
 
 class UnreadableLogError(GroundstationError):
@@ -111,13 +118,41 @@ class SettingsError(UsageError):
     """A settings, profile, aircraft or site file has a value that cannot be used."""
 
 
+def lack_of_memory(error: BaseException) -> str:
+    """What could not be had for want of memory or of processes, in a few words; empty for another error.
+
+    Examples
+    --------
+    >>> lack_of_memory(MemoryError())
+    'not enough memory'
+    >>> lack_of_memory(ImportError("/a/libarrow.so.2600: failed to map segment from shared object"))
+    'not enough memory to load libarrow.so.2600'
+    >>> lack_of_memory(OSError(12, "Cannot allocate memory")), lack_of_memory(ImportError("No module named 'x'"))
+    ('not enough memory', '')
+    """
+    told = str(error)
+    if isinstance(error, ImportError) and _NOT_MAPPED.search(told):
+        library = PurePath(told.partition(":")[0]).name
+        return f"not enough memory to load {library}" if library else "not enough memory to load its libraries"
+    if isinstance(error, OSError):
+        return "not enough memory" if error.errno == errno.ENOMEM else ""
+    if isinstance(error, MemoryError) or _NOT_HAD.search(told):
+        return "not enough memory"
+    return "no further thread or process is allowed" if _NO_THREAD.search(told) else ""
+
+
 @contextmanager
 def told_in_a_line(where: str) -> Iterator[None]:
     """Say in one line what the operating system refused, with the file where it is known."""
     try:
         yield
-    except OSError as error:
+    except GroundstationError:
+        raise
+    except Exception as error:
+        lacking = lack_of_memory(error)
+        if lacking:
+            raise GroundstationError(where, lacking) from error
+        if not isinstance(error, OSError):
+            raise
         place = where if error.filename is None else str(error.filename)
         raise GroundstationError(place, error.strerror or str(error)) from error
-    except MemoryError as error:
-        raise GroundstationError(where, "not enough memory") from error

@@ -7,11 +7,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.records import BoolArray
 
 SEMI_MAJOR_M = 6_378_137.0
 FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
 EARTH_RATE_RADPS = 7.292115e-5
+NO_POSITION_DEG = 1e-7  # a centimetre: a receiver or a filter without a position writes zeros
+NO_POSITION = "records with latitude and longitude 0: no position, kept as raw values alone"
+MOST_ON_EARTH_DEG = {"latitude_deg": 90.0, "longitude_deg": 360.0}  # some count longitudes from 0 to 360
+POLAR_LATITUDE_DEG = 85.0  # from here on a plan is drawn as seen from above its origin
 
 
 def curvature_radii_m(latitude_deg: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -39,8 +44,53 @@ def on_earth(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> tuple[FloatAr
     ([56.0, nan, nan], [38.0, nan, nan])
     """
     latitude, longitude = np.asarray(latitude_deg, dtype=np.float64), np.asarray(longitude_deg, dtype=np.float64)
-    is_place = (np.abs(latitude) <= 90.0) & (np.abs(longitude) <= 360.0)
+    most_latitude_deg, most_longitude_deg = MOST_ON_EARTH_DEG.values()
+    is_place = (np.abs(latitude) <= most_latitude_deg) & (np.abs(longitude) <= most_longitude_deg)
     return np.where(is_place, latitude, np.nan), np.where(is_place, longitude, np.nan)
+
+
+def has_position(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> BoolArray:
+    """Rows with a position: both angles are finite, and not both are below ``NO_POSITION_DEG``.
+
+    Parameters
+    ----------
+    latitude_deg, longitude_deg : array_like, same shape
+        As the device wrote them, degrees.
+
+    Returns
+    -------
+    ndarray of bool, same shape
+        False where the device had no position yet. A place on the equator or on the meridian of Greenwich is one.
+
+    Examples
+    --------
+    >>> has_position([56.0, 0.0, 0.0, 3e-8, np.nan], [38.0, 0.0, 38.0, -3e-8, 38.0]).tolist()
+    [True, False, True, False, False]
+    """
+    latitude, longitude = np.asarray(latitude_deg, dtype=np.float64), np.asarray(longitude_deg, dtype=np.float64)
+    is_zero = (np.abs(latitude) < NO_POSITION_DEG) & (np.abs(longitude) < NO_POSITION_DEG)
+    return np.asarray(np.isfinite(latitude) & np.isfinite(longitude) & ~is_zero)
+
+
+def continuous_longitude_deg(longitude_deg: ArrayLike) -> FloatArray:
+    """Longitudes of a path, shape (n,), without the step of a turn at the date line; NaN stays NaN.
+
+    Each is within half a turn of the known one before it, so that some lie beyond 180 deg; the middle of the path does
+    not. A path that does not cross the date line is returned as it is.
+
+    Examples
+    --------
+    >>> continuous_longitude_deg([179.5, np.nan, -179.75]).tolist(), continuous_longitude_deg([-179.5, 179.75]).tolist()
+    ([179.5, nan, 180.25], [-179.5, -180.25])
+    >>> continuous_longitude_deg([179.9, -179.0]).tolist()
+    [-180.1, -179.0]
+    """
+    longitude = np.array(longitude_deg, dtype=np.float64)
+    known = np.isfinite(longitude)
+    if known.any():
+        path = np.unwrap(longitude[known], period=360.0)
+        longitude[known] = path - 360.0 * np.round(0.5 * (path.min() + path.max()) / 360.0)
+    return longitude
 
 
 def north_east_m(
@@ -68,6 +118,36 @@ def north_east_m(
     difference = wrap_180(longitude - origin_longitude_deg)
     east = np.deg2rad(difference) * (prime_vertical + altitude_m) * np.cos(mid_latitude_rad)
     return north, east
+
+
+def plan_north_east_m(
+    latitude_deg: ArrayLike, longitude_deg: ArrayLike, origin_latitude_deg: float, origin_longitude_deg: float
+) -> tuple[FloatArray, FloatArray]:
+    """Places on a plan, metres north and east of an origin: as :func:`north_east_m`, and true in shape near a pole.
+
+    Where one place lies beyond 85 deg of latitude, all are drawn at their distance and direction from the origin
+    (azimuthal equidistant), so that a straight flight over a pole is a straight line.
+
+    Examples
+    --------
+    >>> north, east = plan_north_east_m([89.0, 90.0, 89.0], [30.0, 0.0, -150.0], 89.0, 30.0)
+    >>> (north / 1e3).round(1).tolist(), (abs(east) < 0.001).tolist()
+    ([0.0, 111.7, 223.4], [True, True, True])
+    """
+    latitude, longitude = on_earth(latitude_deg, longitude_deg)
+    if not (np.abs(np.append(latitude, origin_latitude_deg)) > POLAR_LATITUDE_DEG).any():
+        return north_east_m(latitude, longitude, origin_latitude_deg, origin_longitude_deg)
+    latitude_rad, difference_rad = np.deg2rad(latitude), np.deg2rad(longitude - origin_longitude_deg)
+    origin_rad = np.deg2rad(origin_latitude_deg)
+    north = np.sin(latitude_rad) * np.cos(origin_rad) - np.cos(latitude_rad) * np.sin(origin_rad) * np.cos(
+        difference_rad
+    )
+    east = np.cos(latitude_rad) * np.sin(difference_rad)
+    up = np.sin(latitude_rad) * np.sin(origin_rad) + np.cos(latitude_rad) * np.cos(origin_rad) * np.cos(difference_rad)
+    across = np.hypot(north, east)
+    meridian, _unused = curvature_radii_m(origin_latitude_deg)
+    scale = np.arctan2(across, up) * meridian / np.where(across > 0.0, across, 1.0)
+    return north * scale, east * scale
 
 
 def latitude_longitude_deg(

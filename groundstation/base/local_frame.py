@@ -11,6 +11,8 @@ from groundstation.base.ecef import ecef_from_n, ecef_m, geodetic_deg_m
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number, required_number
 
+MOST_LATITUDE_DEG = 90.0 - 1e-7  # of an origin: 1 cm from the pole there is a north
+
 
 @dataclass(frozen=True)
 class LocalFrame:
@@ -85,4 +87,4 @@ def plane_through(position_m: FloatArray) -> LocalFrame:
     """
     middle = position_m[np.isfinite(position_m).all(axis=1)].mean(axis=0)
     latitude, longitude, _ = geodetic_deg_m(middle)
-    return LocalFrame(float(latitude), float(longitude))
+    return LocalFrame(float(np.clip(latitude, -MOST_LATITUDE_DEG, MOST_LATITUDE_DEG)), float(longitude))

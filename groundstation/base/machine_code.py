@@ -7,7 +7,6 @@ pointer and a shape for each array. llvmlite, which numba brings, links it in so
 
 import ctypes
 import hashlib
-import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -18,6 +17,8 @@ from types import FunctionType
 from typing import Any
 
 import numpy as np
+
+from groundstation.base.own_files import read_own, write_own
 
 INTEGER, NUMBER = "integer", "number"
 _DTYPES = ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "bool"]
@@ -169,10 +170,9 @@ class KeptCode:
         self._of = function, forms
 
     def read(self) -> bytes | None:
-        """The object file; None where there is none, or one of other code or of another processor."""
-        try:
-            content = self._path.read_bytes()
-        except OSError:
+        """The object file; None where there is none, one of other code or processor, or one that others may write."""
+        content = read_own(self._path)
+        if content is None:
             return None
         head, code = content[: len(self._head(b""))], content[len(self._head(b"")) :]
         return code if head == self._head(code) else None
@@ -180,10 +180,8 @@ class KeptCode:
     def write(self, code: bytes) -> None:
         """Keep an object file; a folder that cannot be written keeps none."""
         with suppress(OSError):
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            partial = self._path.with_name(f"{self._path.name}.{os.getpid()}")
-            partial.write_bytes(self._head(code) + code)
-            partial.replace(self._path)
+            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            write_own(self._path, self._head(code) + code)
 
     @cached_property
     def _digest(self) -> bytes:

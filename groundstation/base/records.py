@@ -83,7 +83,8 @@ class RecordBatch:
         Corrected recorder time, set once the clock is known: UTC nanoseconds since 1970 when the clock is absolute,
         else nanoseconds since the log's zero. Readers leave it out; the store yields it.
     validity_time_ns : ndarray of int64, shape (n,), optional
-        Time at which the values were true, where it is not ``time_ns``. Readers give it by the device's clock.
+        Time at which the values were true, where it is not ``time_ns``. Readers give it by the device's clock; where it
+        is the device time itself, values are valid at the corrected time of their record.
     """
 
     topic: str
@@ -143,6 +144,9 @@ class LogHeader:
     has_counting_clock : bool
         Device times count up from power-up and nothing sets them: a record that comes after a later one of another
         topic was written late, and is no step of the clock.
+    clock_offsets : tuple of (int, int)
+        What another clock of the log says of the device's: from the record of this index on, so many nanoseconds are to
+        be added to device times (and to times of validity). The records before the first are moved by its offset too.
     utc_readings : UtcReadings, optional
         What ``utc_of_zero_ns`` is from, where the device's clock starts again: each stretch has a zero of its own.
     """
@@ -151,6 +155,7 @@ class LogHeader:
     metadata: Mapping[str, str] = field(default_factory=dict)
     utc_of_zero_ns: int | None = None
     has_counting_clock: bool = False
+    clock_offsets: tuple[tuple[int, int], ...] = ()
     utc_readings: UtcReadings | None = None
 
 

@@ -2,11 +2,13 @@
 
 from collections.abc import Collection, Sequence
 
+from groundstation.base.printable import printable
+
 GAP = "  "
 
 
 def columns(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
-    """Lay rows out in aligned columns; those numbered in ``right`` are aligned to the right.
+    """Lay rows out in aligned columns, each cell in one printable line; those in ``right`` are aligned to the right.
 
     Examples
     --------
@@ -15,6 +17,7 @@ def columns(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
     ins    3020
     baro    302
     """
+    rows = [[printable(cell) for cell in row] for row in rows]
     widths = [max(len(row[place]) for row in rows) for place in range(len(rows[0]))]
     lines = []
     for row in rows:

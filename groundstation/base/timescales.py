@@ -138,6 +138,9 @@ _LEAP_SECONDS = (
 _GPS_EPOCH_S = 315_964_800  # 1980-01-06, seconds since 1970
 GPS_EPOCH_NS = _GPS_EPOCH_S * NS_PER_S
 _S_PER_WEEK = 604_800
+ROLLOVER_WEEKS = 1_024  # the GPS week of the satellites' message has ten bits
+WEEK_NS = _S_PER_WEEK * NS_PER_S
+ROLLOVER_NS = ROLLOVER_WEEKS * WEEK_NS
 
 
 def leap_seconds_at(utc_ns: int) -> int:
@@ -149,6 +152,35 @@ def leap_seconds_at(utc_ns: int) -> int:
     (17, 18)
     """
     return max((leap for day, leap in _LEAP_SECONDS if iso_to_utc_ns(f"{day}T00:00Z")[0] <= utc_ns), default=0)
+
+
+MOST_LEAP_S = 20  # GPS time less UTC, for some years to come
+_NEAR_WEEK_S, _NEAR_SECOND_S = 30, 0.15  # of whole weeks (leap seconds may be wrong too), of whole seconds
+
+
+def whole_weeks(difference_ns: int) -> int:
+    """Weeks by which two times differ, 0 where they do not differ by whole weeks.
+
+    Examples
+    --------
+    >>> whole_weeks(-604_800 * NS_PER_S), whole_weeks(3 * 604_800 * NS_PER_S + 5), whole_weeks(86_400 * NS_PER_S)
+    (-1, 3, 0)
+    """
+    weeks = round(difference_ns / WEEK_NS)
+    return weeks if abs(difference_ns - weeks * WEEK_NS) < _NEAR_WEEK_S * NS_PER_S else 0
+
+
+def leap_seconds_late(difference_ns: int) -> int:
+    """Whole seconds by which a time is late for want of leap seconds, 0 where it is not.
+
+    Examples
+    --------
+    >>> leap_seconds_late(2_010_000_000), leap_seconds_late(2_500_000_000), leap_seconds_late(-2 * NS_PER_S)
+    (2, 0, 0)
+    """
+    whole_s = round(difference_ns / NS_PER_S)
+    is_near = abs(difference_ns - whole_s * NS_PER_S) < _NEAR_SECOND_S * NS_PER_S
+    return whole_s if is_near and 0 < whole_s <= MOST_LEAP_S else 0
 
 
 def gps_week_to_utc_ns(week: NDArray[np.int64] | int, week_ms: NDArray[np.int64] | int) -> NDArray[np.int64]:
@@ -170,6 +202,33 @@ def gps_week_to_utc_ns(week: NDArray[np.int64] | int, week_ms: NDArray[np.int64]
     leap_s = leaps[np.searchsorted(starts_s, gps_s, side="right")]
     whole_ns = (gps_s + _GPS_EPOCH_S - leap_s) * NS_PER_S
     return np.asarray(whole_ns + np.asarray(week_ms, dtype=np.int64) % 1000 * 1_000_000, dtype=np.int64)
+
+
+def utc_to_gps_ns(utc_ns: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Date and time of GPS time of moments in UTC: the inverse of :func:`gps_to_utc_ns`.
+
+    Examples
+    --------
+    >>> told = np.array([iso_to_utc_ns("2025-08-28T17:30:21.749Z")[0]])
+    >>> utc_ns_to_iso(int(utc_to_gps_ns(told)[0])), bool((gps_to_utc_ns(utc_to_gps_ns(told)) == told).all())
+    ('2025-08-28T17:30:39.749Z', True)
+    """
+    days_s = np.array([day for day, _leap in _LEAP_SECONDS], dtype="datetime64[s]").astype(np.int64)
+    leaps = np.array([0, *(leap for _day, leap in _LEAP_SECONDS)], dtype=np.int64)
+    utc_ns = np.asarray(utc_ns, dtype=np.int64)
+    return np.asarray(utc_ns + leaps[np.searchsorted(days_s, utc_ns // NS_PER_S, side="right")] * NS_PER_S)
+
+
+def weeks_later_ns(utc_ns: NDArray[np.int64], weeks: NDArray[np.int64] | int) -> NDArray[np.int64]:
+    """UTC of the same second of another GPS week: leap seconds may have come between.
+
+    Examples
+    --------
+    >>> told = np.array([iso_to_utc_ns("2004-09-20T10:00:05Z")[0]])
+    >>> utc_ns_to_iso(int(weeks_later_ns(told, ROLLOVER_WEEKS)[0]))
+    '2024-05-06T10:00:00.000Z'
+    """
+    return gps_to_utc_ns(utc_to_gps_ns(utc_ns) + np.asarray(weeks, dtype=np.int64) * WEEK_NS)
 
 
 def gps_to_utc_ns(gps_ns: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -1,5 +1,8 @@
 """Which chapter tells which answer, in the order of the report."""
 
+from collections.abc import Iterable
+
+from groundstation.base.failures import attempt
 from groundstation.chapters.chapter import Chapter
 from groundstation.chapters.cooperative import cooperative, is_session
 from groundstation.chapters.forecast import forecast
@@ -46,8 +49,7 @@ SESSION_CHAPTERS: tuple[Chapter, ...] = (Chapter((CooperativeResult,), cooperati
 def answer_chapters(results: FlightResults) -> tuple[Section, ...]:
     """The chapters of a flight that have an answer, the best first: the order of a report."""
     listed = [chapter for chapter in FLIGHT_CHAPTERS if any(map(results.answer, chapter.answers))]
-    own = [section for section in (chapter.build(results) for chapter in listed) if section is not None]
-    every = (*own, *(generic(results, answer) for answer in without_chapter(results)))
+    every = (section for section in (*_built(listed, results), *_generic(results)) if section is not None)
     return tuple(sorted(every, key=lambda one: Rank.OTHER if one.claim is None else one.claim.rank))
 
 
@@ -57,11 +59,17 @@ def chapters_of(results: FlightResults) -> tuple[Section, ...]:
     A chapter of a flight without its answer says why there is none.
     """
     listed = PLAN_CHAPTERS if is_plan(results) else SESSION_CHAPTERS if is_session(results) else FLIGHT_CHAPTERS
-    own = [chapter.build(results) for chapter in listed]
-    return (
-        *(section for section in own if section is not None),
-        *(generic(results, answer) for answer in without_chapter(results)),
-    )
+    return tuple(section for section in (*_built(listed, results), *_generic(results)) if section is not None)
+
+
+def _built(chapters: Iterable[Chapter], results: FlightResults) -> tuple[Section | None, ...]:
+    """Chapters with something to say; one that fails is left out."""
+    return tuple(attempt("chapter", one.name, one.build, results) for one in chapters)
+
+
+def _generic(results: FlightResults) -> tuple[Section | None, ...]:
+    """The generic chapters of answers that have none of their own."""
+    return tuple(attempt("chapter", one.analysis, generic, results, one) for one in without_chapter(results))
 
 
 def chapter_of(results: FlightResults, answer: Answer) -> Section:

@@ -13,3 +13,8 @@ class Chapter(NamedTuple):
 
     answers: tuple[type[Answer], ...]
     build: Callable[[FlightResults], Section | None]
+
+    @property
+    def name(self) -> str:
+        """The analysis whose answer it tells first."""
+        return self.answers[0].analysis

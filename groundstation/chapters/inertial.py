@@ -6,7 +6,7 @@ from dataclasses import replace
 from groundstation.chapters.aided_ins import aided
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.gates import setting_facts
-from groundstation.chapters.inertial_claim import inertial_claim
+from groundstation.chapters.inertial_claim import growth, inertial_claim, is_start_unknown
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, Tone, kept
 from groundstation.chapters.wording import (
     ABSENT,
@@ -96,6 +96,11 @@ def _quality(answer: InertialResult) -> Note:
     largest = number(answer.largest_radial_error_m, 0, "m")
     in_words = _in_words(answer.channels)
     text = f"An unaided INS{rate}: velocity error {velocity} RMS, position error up to {largest}. {in_words}"
+    if is_start_unknown(answer) and answer.navigation_start is not None:
+        text += (
+            f" No rate is stated: nothing shows when navigation began ({answer.navigation_start.reason}). Position "
+            f"error {growth(answer)}. Where the start is known, state it: nav_start_utc in the aircraft file."
+        )
     tone: Tone = "plain" if _is_inflated(answer.channels) else "good"  # raised noise proves nothing
     return Note(text.strip(), tone if _is_consistent(answer.channels) else "warn")
 
@@ -142,8 +147,9 @@ def _figures_of_merit(answer: InertialResult) -> Facts:
         (
             "Radial error rate, median / 95 %",
             " / ".join(_rates(answer)),
-            "position error over time since the first epoch, without the first ten minutes",
+            "position error over time since navigation began, without the first ten minutes",
         ),
+        *_start(answer),
         ("Velocity error, RMS", number(answer.velocity_error_rms_mps, 3, "m/s"), "both channels together"),
         ("Largest radial error", number(answer.largest_radial_error_m, 0, "m"), "against GNSS"),
         ("Kind", (answer.kind or ABSENT).replace("_", "-"), typeset(answer.kind_reason)),
@@ -158,6 +164,17 @@ def _figures_of_merit(answer: InertialResult) -> Facts:
         ("Filter opened again", number(answer.reopened, 0, "times"), "after GNSS had been rejected for long"),
     )
     return Facts("The INS in figures", pairs)
+
+
+def _start(answer: InertialResult) -> list[tuple[str, str, str]]:
+    """When navigation began, a row of the figures; none of an older answer."""
+    start = answer.navigation_start
+    if start is None:
+        return []
+    if start.time_s is None:
+        return [("Start of navigation", "not known", f"{start.reason}; position error {growth(answer)}")]
+    told = clock(start.time_s) if start.time_s >= 0.0 else f"{clock(-start.time_s)} before the log"
+    return [("Start of navigation", told, "stated: " * (start.basis == "stated") + start.reason)]
 
 
 def _states(answer: InertialResult) -> Grid | None:

@@ -16,9 +16,13 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
     """
     rate, most = answer.radial_error_rate_50_nmiph, number(answer.radial_error_rate_95_nmiph, 2, "nmi/h")
     drift = number(rate, 2, "nmi/h")
-    headline = (
-        f"Unaided INS, drifts {drift}" if is_number(rate) else "INS errors measured, flight too short for a drift"
-    )
+    if is_number(rate):
+        headline, remark = f"Unaided INS, drifts {drift}", f"median; 95 % below {most}"
+    elif is_start_unknown(answer):
+        headline = f"INS error {growth(answer)}"
+        remark = "no rate: nothing shows when navigation began"
+    else:
+        headline, remark = "INS errors measured, flight too short for a drift", ""
     found = (
         ("INS drift", drift, f"median; 95 % of the time below {most}"),
         ("Velocity error", number(answer.velocity_error_rms_mps, 2, "m/s"), "RMS"),
@@ -30,10 +34,22 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
         Mark(tone, WORDS[tone]),
         headline,
         value=drift if is_number(rate) else "",
-        remark=f"median; 95 % below {most}" if is_number(rate) else "",
+        remark=remark,
         sentences=(quality,) if quality else (),
         figures=tuple(figure for figure in found if figure[1] != "—"),
     )
+
+
+def is_start_unknown(answer: InertialResult) -> bool:
+    """Whether nothing shows when navigation began; answers saved by older versions did not ask."""
+    return answer.navigation_start is not None and answer.navigation_start.time_s is None
+
+
+def growth(answer: InertialResult) -> str:
+    """Position error at the ends of the log, and the time between them, in words."""
+    minutes = None if answer.compared_hours is None else 60.0 * answer.compared_hours
+    first, last = (number(error, 0, "m") for error in (answer.radial_error_first_m, answer.radial_error_last_m))
+    return f"{first} at first, {last} after {number(minutes, 0, 'min')}"
 
 
 def forecast_claim(answer: ForecastResult, sentences: tuple[str, ...], tone: Tone) -> Claim | None:

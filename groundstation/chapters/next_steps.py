@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from groundstation.chapters.assessed import SUBJECTS
+from groundstation.chapters.inertial_claim import is_start_unknown
 from groundstation.chapters.parts import Facts, Section
 from groundstation.chapters.wording import number, significant
 from groundstation.results.flight import FlightResults
@@ -41,6 +42,7 @@ BY_REASON = (
     ("ground contact proven", ("Record", "weight on wheels")),
     ("no turn of steady bank", ("Fly", "a full circle to either side at equal bank")),
     ("expected at least 300 s", ("Fly", "5 min or more with INS and GNSS")),
+    ("GNSS never had a fix", ("Check", "the GNSS antenna, its cable and its sky")),
     ("no GNSS velocity", ("Record", "GNSS velocity")),
     ("no INS position", ("Record", "INS position")),
     ("no GNSS position", ("Record", "GNSS position")),
@@ -92,6 +94,8 @@ def _advice(results: FlightResults) -> Iterator[tuple[str, str, str]]:
         yield "Record", FREE_INERTIAL, "INS errors"
     if inertial is not None and inertial.kind == "unknown":
         yield "Check", "whether GNSS corrects this INS (ins_kind of the aircraft file)", "INS errors"
+    if inertial is not None and is_start_unknown(inertial):
+        yield "Check", "when the INS began to navigate (nav_start_utc of the aircraft file)", "INS errors"
     if results.status != "ok":
         yield "Check", LOST, ""
 

@@ -1,5 +1,6 @@
 """Chapters of a plan and the top of its report: what is planned, and what its chapters say above all."""
 
+from groundstation.base.failures import attempt
 from groundstation.base.findings import worst
 from groundstation.chapters.chapter import Chapter
 from groundstation.chapters.control import control
@@ -33,7 +34,7 @@ def is_plan(results: FlightResults) -> bool:
 
 def plan_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -> Front:
     """The top of a plan's report: headline of its first chapter, and what every chapter has above its parts."""
-    built = (chapter.build(results) for chapter in PLAN_CHAPTERS)
+    built = (attempt("chapter", chapter.name, chapter.build, results) for chapter in PLAN_CHAPTERS)
     sections = [section for section in built if section is not None]
     above = [part for section in sections for part in section.above]
     return Front(

@@ -4,25 +4,24 @@ import math
 import re
 from typing import Any, TypeGuard
 
+from groundstation.base.printable import printable
 from groundstation.base.unit_names import UNITS, split_unit
 
 ABSENT = "—"
 MINUS = "−"
 NARROW_SPACE = "\u202f"
-# Controls, and the marks that turn the direction of text: a file name may not rearrange the page around it.
-_HIDDEN = dict.fromkeys((*range(0x20), *range(0x7F, 0xA0), *range(0x202A, 0x202F), *range(0x2066, 0x206A)), "\ufffd")
-_HIDDEN |= {ord("\t"): " ", ord("\n"): " ", ord("\r"): " "}
+HIDDEN = "\ufffd"  # stands for a control, or a mark that turns the direction of the text around it
 
 
 def clean(text: str) -> str:
-    """Text of a log without control and direction characters.
+    """Text of a log in one line, without control and direction characters.
 
     Examples
     --------
     >>> clean("a\\u202eb\\x00\\n")
     'a\ufffdb\ufffd '
     """
-    return text.translate(_HIDDEN)
+    return printable(text, HIDDEN)
 
 
 def is_number(value: Any) -> TypeGuard[float]:

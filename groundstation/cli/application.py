@@ -2,16 +2,24 @@
 
 import math
 import sys
+import traceback
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, Literal, ParamSpec
+from typing import TYPE_CHECKING, Annotated, Any, Literal, ParamSpec
 
 import typer
 import typer.core
 
-from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.base.errors import GroundstationError, UsageError, lack_of_memory
+from groundstation.base.failures import Failure, reason_of
 from groundstation.cli.text import as_json, printable
+from groundstation.cli.text import say as say
+from groundstation.cli.text import tell as tell
+
+if TYPE_CHECKING:
+    from groundstation.pipeline.many_flights.confined import Bounds
+    from groundstation.pipeline.one_flight.isolation import Isolation
 
 DONE, FAILED, USAGE, DATA_LOST, LIMIT_REACHED = 0, 1, 2, 3, 4
 INTERRUPTED = 130
@@ -138,6 +146,13 @@ Timeout = Annotated[
         min=1.0,
     ),
 ]
+Isolate = Annotated[
+    bool,
+    typer.Option(
+        "--isolate",
+        help="Read each log in a process of its own, with limits of memory, time and file size ([isolation]).",
+    ),
+]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
 PowerUp = Annotated[
     int | None,
@@ -204,18 +219,40 @@ def time_limit_s(given: float | None) -> float:
     return math.inf if given is None else given
 
 
-def say(text: str) -> None:
-    """Print a line on stderr."""
-    typer.echo(printable(text), err=True)
+def tell_failures(found: Iterable[Failure], *, with_traces: bool = False) -> int:
+    """Print on stderr the parts that failed; the exit code for that."""
+    code = DONE
+    for failure in found:
+        code = FAILED
+        say(f"error: {failure.text}")
+        if with_traces:
+            say(failure.trace.rstrip())
+    return code
+
+
+def time_bound(timeout: float | None, isolation: "Isolation | None" = None) -> "Bounds | None":
+    """What one log may take; None where there is neither a limit of time nor ``--isolate``.
+
+    Raises
+    ------
+    UsageError
+        When the limit is no number, or this system cannot read a log apart.
+    """
+    timeout_s = time_limit_s(timeout)
+    if timeout is None and isolation is None:
+        return None
+    from groundstation.pipeline.many_flights.apart import bounds_of
+
+    return bounds_of(isolation, timeout_s)
 
 
 def tell_written(paths: Iterable[object], *, as_json_text: bool, quiet: bool) -> None:
     """Print the files that were written."""
     written = [str(path) for path in paths]
     if as_json_text:
-        typer.echo(as_json({"written": written}))
+        tell(as_json({"written": written}))
     elif not quiet:
-        typer.echo("\n".join(map(printable, written)))
+        tell("\n".join(map(printable, written)))
 
 
 def answers_with_exit_code(verb: Callable[Parameters, int | None]) -> Callable[Parameters, None]:
@@ -237,14 +274,25 @@ def answers_with_exit_code(verb: Callable[Parameters, int | None]) -> Callable[P
         except BrokenPipeError:  # the reader of our output went away: `groundstation list | head -1`
             sys.stderr.close()
             code = DONE
-        except OSError as error:
-            say(f"error: {error.filename or 'file system'}: {error.strerror or error}")
+        except Exception as error:
             code = FAILED
-        except Exception as error:  # a defect of ours: one line for the user, the rest on request
-            if options.get("verbose"):
-                raise
-            say(f"error: internal error ({type(error).__name__}: {error}); please report it; -v shows where")
-            code = FAILED
+            if lacking := lack_of_memory(error):
+                say(f"error: {lacking}")
+            elif isinstance(error, OSError):
+                say(printable(f"error: {error.filename or 'file system'}: {error.strerror or error}"))
+            elif options.get("verbose"):  # a defect of ours: one line for the user, the rest on request
+                say("".join(traceback.format_exception(error)).rstrip())
+            else:
+                say(f"error: {reason_of(error)}; -v shows where")
+        if options.get("verbose"):
+            _tell_of_compiled_code()
         raise typer.Exit(code)
 
     return run
+
+
+def _tell_of_compiled_code() -> None:
+    """Say why compiled code is not kept where the user wants it, if anything was compiled."""
+    compiling = sys.modules.get("groundstation.base.compile")
+    if compiling is not None and (reason := compiling.why_nothing_is_kept()):
+        say(reason)

@@ -2,8 +2,6 @@
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
-import typer
-
 from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import FieldEntry, Ledger, TopicEntry
@@ -11,8 +9,8 @@ from groundstation.base.signals import is_canonical
 from groundstation.base.text_columns import columns
 from groundstation.chapters.parts import Grid, Head
 from groundstation.chapters.terminal import grid_text
-from groundstation.cli.printing import totals
-from groundstation.cli.text import as_json, printable
+from groundstation.cli.printing import tell_errors, totals
+from groundstation.cli.text import as_json, printable, say, tell
 from groundstation.pipeline.verbs.check import Checked
 
 MOST_LISTED = 8  # gaps or stretches of one topic; all are in the JSON
@@ -26,19 +24,17 @@ def show(
     ``everything`` lists every topic of the log, not only canonical ones and those with something odd.
     """
     if as_json_text:
-        typer.echo(as_json([one.to_dict() for one in checked]))
+        tell(as_json([one.to_dict() for one in checked]))
         return
     told = 0
     for one in checked:
         if one.outcome.state == "failed":
-            typer.echo(f"error: {printable(one.outcome.text)}", err=True)
-            if everything and one.outcome.trace:
-                typer.echo(one.outcome.trace, err=True)
+            tell_errors(one.outcome, with_traces=everything)
         elif not quiet:
-            typer.echo(("\n" if told else "") + text_of(one, everything))
+            tell(("\n" if told else "") + text_of(one, everything))
             told += 1
     if len(checked) > 1 and not quiet:
-        typer.echo(totals([one.outcome for one in checked]), err=True)
+        say(totals([one.outcome for one in checked]))
 
 
 def text_of(one: Checked, everything: bool = False) -> str:

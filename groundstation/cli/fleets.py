@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from groundstation.base.failures import failures, gathered_failures
 from groundstation.cli.application import (
     DONE,
     FAILED,
@@ -15,6 +16,8 @@ from groundstation.cli.application import (
     app,
     examples,
     say,
+    tell,
+    tell_failures,
 )
 
 
@@ -30,7 +33,7 @@ def serve(
     """Offer all recordings of a folder through Rerun's catalog server, until Ctrl-C."""
     from groundstation.pipeline.verbs.serve import serve as offer
 
-    offer(out, host=host, port=port, web=web, tell=typer.echo, say=say)
+    offer(out, host=host, port=port, web=web, tell=tell, say=say)
     return DONE
 
 
@@ -46,19 +49,21 @@ def acceptance(
     from groundstation.cli.text import as_json, printable
     from groundstation.pipeline.many_flights.acceptance import accept_to
 
-    found, paths, problem = accept_to(out, standard, output, with_pdf=with_pdf)
+    with gathered_failures():
+        found, paths, problem = accept_to(out, standard, output, with_pdf=with_pdf)
+        lacking = failures()
     if json:
-        typer.echo(as_json(found.to_dict() | {"written": [str(path) for path in paths]}))
+        tell(as_json(found.to_dict() | {"written": [str(path) for path in paths]}))
     elif not quiet:
         top = front(found)
         told = (line.replace(NARROW_SPACE, " ") for line in (top.line, *top.sentences))
-        typer.echo("\n".join(map(printable, (*told, *map(str, paths)))))
+        tell("\n".join(map(printable, (*told, *map(str, paths)))))
     if problem:
         say(f"warning: {problem}")
     unread = [flight for flight in found.flights if not flight.is_read]
     for flight in unread:
         say(f"error: {flight.flight_id}: {flight.reason}")
-    if unread:
+    if tell_failures(lacking) or unread:
         return FAILED
     reached_at = {"fail": ("warn", "fail"), "not enough flights": ("warn",), "not flown": ("warn",)}
     return LIMIT_REACHED if fail_on in reached_at.get(found.decision, ()) else DONE

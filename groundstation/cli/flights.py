@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from groundstation.base.errors import UsageError
+from groundstation.base.failures import failures, gathered_failures
 from groundstation.cli.application import (
-    DONE,
     ConfigFile,
     Force,
     Json,
@@ -19,6 +19,8 @@ from groundstation.cli.application import (
     answers_with_exit_code,
     app,
     examples,
+    tell,
+    tell_failures,
 )
 from groundstation.cli.text import printable
 
@@ -178,12 +180,14 @@ def compare(
     from groundstation.pipeline.verbs.compare import compare as held_against
     from groundstation.pipeline.verbs.compare import compare_to
 
-    found = held_against(a, b, align)[0] if output is None else compare_to(a, b, output, align, force=force)
+    with gathered_failures():
+        found = held_against(a, b, align)[0] if output is None else compare_to(a, b, output, align, force=force)
+        lacking = failures()
     if json:
-        typer.echo(printing.as_json(to_json(found.to_dict())))
+        tell(printing.as_json(to_json(found.to_dict())))
     elif not quiet:
-        typer.echo(comparison_text(found, everything=verbose))
-    return DONE
+        tell(comparison_text(found, everything=verbose))
+    return tell_failures(lacking, with_traces=verbose)
 
 
 def comparison_text(found: "Comparison", *, everything: bool = False) -> str:

@@ -28,6 +28,7 @@ from groundstation.cli.application import (
     Force,
     IcdFiles,
     IntervalsFile,
+    Isolate,
     Jobs,
     Json,
     NoPdf,
@@ -47,7 +48,9 @@ from groundstation.cli.application import (
     app,
     examples,
     say,
+    tell,
     tell_written,
+    time_bound,
     time_limit_s,
 )
 
@@ -60,7 +63,7 @@ PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have
 
 def _version(is_asked: bool) -> None:
     if is_asked:
-        typer.echo(f"groundstation {__version__}")
+        tell(f"groundstation {__version__}")
         raise typer.Exit
 
 
@@ -82,21 +85,30 @@ def info(
     suggest_icd: Annotated[
         bool, typer.Option("--suggest-icd", help="Print a draft ICD for what is on its buses.")
     ] = False,
+    timeout: Timeout = None,
     json: Json = False,
     verbose: Verbose = False,
 ) -> int | None:
     """Show what a log is: format, clock, span, topics with rows, rates, fields; its buses (word by word with -v)."""
     from groundstation.cli import printing
+    from groundstation.pipeline.one_flight.convert import why_nothing_is_placed
     from groundstation.pipeline.verbs import describe
 
+    bounds = time_bound(timeout)
+    if bounds is not None:
+        from groundstation.pipeline.verbs import check_apart as apart
     if suggest_icd:
-        typer.echo(describe.suggest_icd(log))
+        tell(apart.suggest_icd_apart(log, bounds) if bounds is not None else describe.suggest_icd(log))
         return DONE
-    description = describe.describe(log, profile, tuple(icd or ()))
+    icds = tuple(icd or ())
+    if bounds is not None:
+        description = apart.describe_apart(log, profile, icds, bounds)
+    else:
+        description = describe.describe(log, profile, icds)
     shown = printing.as_json(description.to_dict()) if json else printing.description(description, everything=verbose)
-    typer.echo(shown)
+    tell(shown)
     if not description.has_records:
-        say(f"error: {log.name}: no readable record")
+        say(f"error: {log.name}: {why_nothing_is_placed(description.findings)}")
         return FAILED
     return DATA_LOST if description.has_lost_data else DONE
 
@@ -120,6 +132,8 @@ def check(
     config: ConfigFile = None,
     profile: Profile = None,
     icd: IcdFiles = None,
+    timeout: Timeout = None,
+    isolate: Isolate = False,
     fail_on: FailOn = "none",
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -136,8 +150,14 @@ def check(
     from groundstation.pipeline.verbs.check import check_many
 
     configuration = load_configuration(config, aircraft, site, profile=profile, thresholds=thresholds, icds=icd)
+    bounds = time_bound(timeout, configuration.isolation if isolate else None)
     with listener("none" if quiet else progress) as listen:
-        checked = check_many(logs, configuration, purpose=purpose, fail_on=fail_on, listen=listen)
+        check_logs = check_many
+        if bounds is not None:
+            from groundstation.pipeline.verbs.check_apart import check_apart
+
+            check_logs = partial(check_apart, bounds=bounds)
+        checked = check_logs(logs, configuration, purpose=purpose, fail_on=fail_on, listen=listen)
     check_table.show(checked, as_json_text=json, quiet=quiet, everything=verbose)
     return printing.worst_code(tuple(one.outcome for one in checked))
 
@@ -161,6 +181,7 @@ def convert(
     icd: IcdFiles = None,
     together: Together = False,
     reference: ReferenceFiles = None,
+    timeout: Timeout = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -176,8 +197,10 @@ def convert(
 
     settings = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
     configuration = judged_by(settings, reference or (), is_one_log=together or len(logs) == 1)
+    if together and timeout is not None:
+        raise UsageError("--together", "--timeout", "--together without it")
     with listener("none" if quiet else progress) as listen:
-        convert_logs = convert_together if together else convert_many
+        convert_logs = convert_together if together else partial(convert_many, bounds=time_bound(timeout))
         outcomes = convert_logs(logs, output, configuration=configuration, force=force, listen=listen)
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet)
     return printing.worst_code(outcomes)
@@ -201,6 +224,7 @@ def run(
         str, typer.Option("--scheduler", help="Dask scheduler whose workers do the work.", metavar="tcp://HOST:PORT")
     ] = "",
     timeout: Timeout = None,
+    isolate: Isolate = False,
     fail_on: FailOn = "none",
     apply: Annotated[
         str,
@@ -240,26 +264,36 @@ def run(
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.many_flights.batch import plan_many, run_many, run_together
+    from groundstation.pipeline.many_flights.batch import run_many, run_together
+    from groundstation.pipeline.many_flights.dry_run import plan_many
     from groundstation.pipeline.many_flights.references import judged_by
     from groundstation.pipeline.one_flight.configuration import applying, load_configuration
 
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd)
     is_one_log = together or (len(paths) == 1 and not Path(paths[0]).is_dir())
     configuration = judged_by(applying(settings, apply), reference or (), is_one_log=is_one_log)
-    if together and (dry_run or scheduler or stations is not None or timeout is not None or store):
-        beside = "--dry-run, --scheduler, --stations, --timeout or --store"
+    if together and (dry_run or scheduler or stations is not None or timeout is not None or store or isolate):
+        beside = "--dry-run, --scheduler, --stations, --timeout, --store or --isolate"
         raise UsageError("--together", beside, "--together without them")
+    if isolate and (dry_run or scheduler):
+        raise UsageError("--isolate", "--dry-run or --scheduler", "--isolate without them")
     if dry_run:
         plan = partial(plan_many, with_pdf=not no_pdf, only_results=only == "results")
         planned = plan(paths, output, configuration, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
     timeout_s = time_limit_s(timeout)
-    run_apart = partial(
-        run_many, jobs=jobs, scheduler=scheduler, redo=redo, stations=stations, timeout_s=timeout_s, store=store
+    run_each = partial(
+        run_many,
+        jobs=jobs,
+        scheduler=scheduler,
+        redo=redo,
+        stations=stations,
+        timeout_s=timeout_s,
+        is_isolated=isolate,
+        store=store,
     )
-    run_logs = run_together if together else run_apart  # logs are joined anew at every run, in this process
+    run_logs = run_together if together else run_each  # logs are joined anew at every run, in this process
     try:
         with listener("none" if quiet else progress) as listen:
             outcomes = run_logs(
@@ -370,7 +404,7 @@ def list_(
     from groundstation.pipeline.verbs.catalogue import catalogue
 
     entries = catalogue(log, profile)
-    typer.echo(printing.as_json(entries) if json else printing.catalogue(entries, log is not None))
+    tell(printing.as_json(entries) if json else printing.catalogue(entries, log is not None))
     return DONE
 
 

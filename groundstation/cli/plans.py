@@ -17,6 +17,7 @@ from groundstation.cli.application import (
     Verbose,
     answers_with_exit_code,
     app,
+    tell,
 )
 
 plans = typer.Typer(
@@ -93,7 +94,7 @@ def _plan(
     if listed:
         rows = [[one.name, one.title] for one in shipped_scenarios(kind)]
         names = [{"name": name, "title": title} for name, title in rows]
-        typer.echo(printing.as_json(names) if json else columns(rows))
+        tell(printing.as_json(names) if json else columns(rows))
         return DONE
     if scenario is None or output is None:
         raise UsageError(f"plan {kind}", "no FILE or no -o", "a scenario and a folder for the results")

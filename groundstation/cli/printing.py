@@ -5,10 +5,8 @@ from itertools import groupby
 from pathlib import Path, PurePath
 from typing import Any
 
-import typer
-
 from groundstation.base.text_columns import columns
-from groundstation.cli.text import as_json, printable
+from groundstation.cli.text import as_json, printable, say, tell
 from groundstation.pipeline.one_flight.log import log_name
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
 from groundstation.pipeline.verbs.describe import BusWord, Description
@@ -80,27 +78,37 @@ def outcomes(
     On stderr what was skipped, by reason, then failures, then totals. Of a plan there is no state and no total.
     """
     if as_json_text:
-        typer.echo(as_json([_plain(outcome) for outcome in done]))
+        tell(as_json([_plain(outcome) for outcome in done]))
         return
     names = _names(done)
     for name, outcome in zip(names, done, strict=True):
         if outcome.state not in ("failed", "skipped") and not quiet:
             state = "finished before" if outcome.was_finished else _LINE_WORDS[outcome.state]
             state = "" if is_plan else state
-            typer.echo("  ".join(printable(part) for part in (name, state, outcome.flight_id, outcome.text) if part))
+            tell("  ".join(printable(part) for part in (name, state, outcome.flight_id, outcome.text) if part))
         if with_times and outcome.times_s:
             spent = ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in outcome.times_s.items())
-            typer.echo(f"  {spent}", err=True)
+            say(f"  {spent}")
     if not quiet:
         for line in skipped_lines(done, most=len(done) if with_times else MOST_SKIPPED):
-            typer.echo(line, err=True)
+            say(line)
     for outcome in done:
-        if outcome.state == "failed":
-            typer.echo(f"error: {printable(outcome.text)}", err=True)
-            if with_times and outcome.trace:
-                typer.echo(outcome.trace, err=True)
-    if len(done) > 1 and not quiet and not is_plan:
-        typer.echo(totals(done), err=True)
+        tell_errors(outcome, with_traces=with_times)
+    if sum(not one.is_beside for one in done) > 1 and not quiet and not is_plan:
+        say(totals(done))
+
+
+def tell_errors(outcome: Outcome, *, with_traces: bool = False) -> None:
+    """Print on stderr why a log failed, and which parts of a flight did."""
+    traces = [outcome.trace] if outcome.state == "failed" else []
+    if outcome.state == "failed":
+        say(printable(f"error: {outcome.text}"))
+    name = outcome.source if outcome.is_session else log_name(Path(outcome.source))
+    for failure in outcome.failures:
+        say(printable(f"error: {name}: {failure.text}"))
+        traces.append(failure.trace)
+    for trace in filter(None, traces if with_traces else ()):
+        say(trace.rstrip())
 
 
 def _names(done: Sequence[Outcome]) -> list[str]:
@@ -135,7 +143,7 @@ def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:
 
 
 def totals(done: Sequence[Outcome]) -> str:
-    """Totals line: how many logs, and sessions of several, ended in which state.
+    """Totals line: how many logs, and sessions of several, ended in which state; what stands beside them is none.
 
     Examples
     --------
@@ -143,9 +151,12 @@ def totals(done: Sequence[Outcome]) -> str:
     '2 logs: 1 done, 0 with data lost, 0 at the limit, 1 failed, 0 skipped'
     >>> totals([Outcome("a", "done", ""), Outcome("a, b", "done", "", is_session=True)]).partition("; ")[2]
     '1 session: 1 done, 0 with data lost, 0 at the limit, 0 failed'
+    >>> totals([Outcome("a", "incomplete", "")])
+    '1 log: 0 done, 0 with data lost, 0 at the limit, 0 failed, 0 skipped, 1 incomplete'
     >>> totals([Outcome("a", "done", "", was_finished=True)])
     '1 log: 1 done, 0 with data lost, 0 at the limit, 0 failed, 0 skipped; 1 was finished before'
     """
+    done = [one for one in done if not one.is_beside]
     logs = _counted("log", [one for one in done if not one.is_session], list(_STATE_WORDS))
     sessions = [one for one in done if one.is_session and one.state != "skipped"]
     parts = [logs, *([_counted("session", sessions, list(_STATE_WORDS)[:-1])] if sessions else [])]
@@ -157,11 +168,18 @@ def totals(done: Sequence[Outcome]) -> str:
 
 def _counted(noun: str, done: Sequence[Outcome], states: Sequence[State]) -> str:
     counts = ", ".join(f"{sum(one.state == state for one in done)} {_STATE_WORDS[state]}" for state in states)
-    return f"{len(done)} {noun}{'' if len(done) == 1 else 's'}: {counts}"
+    incomplete = sum(one.state == "incomplete" for one in done)
+    more = f", {incomplete} incomplete" if incomplete else ""
+    return f"{len(done)} {noun}{'' if len(done) == 1 else 's'}: {counts}{more}"
 
 
 MOST_SKIPPED = 5  # named in a line
-_LINE_WORDS: Mapping[State, str] = {"done": "done", "data_lost": "data lost", "limit_reached": "at the limit"}
+_LINE_WORDS: Mapping[State, str] = {
+    "done": "done",
+    "data_lost": "data lost",
+    "limit_reached": "at the limit",
+    "incomplete": "incomplete",
+}
 _STATE_WORDS: Mapping[State, str] = {
     "done": "done",
     "data_lost": "with data lost",
@@ -173,7 +191,7 @@ _STATE_WORDS: Mapping[State, str] = {
 
 def _plain(outcome: Outcome) -> dict[str, Any]:
     return {
-        **({"kind": "session"} if outcome.is_session else {}),
+        **({"kind": "session"} if outcome.is_session else {"kind": "output"} if outcome.is_beside else {}),
         "source": outcome.source,
         "state": outcome.state,
         "exit_code": outcome.code,
@@ -182,6 +200,7 @@ def _plain(outcome: Outcome) -> dict[str, Any]:
         "was_finished": outcome.was_finished,
         **({"power_up": outcome.power_up} if outcome.power_up else {}),
         "text": outcome.text,
+        **({"left_out": [failure.text for failure in outcome.failures]} if outcome.failures else {}),
     }
 
 

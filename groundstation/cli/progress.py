@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Literal
 
+from groundstation.base.printable import printable, printable_json
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
 
@@ -34,8 +35,9 @@ def _as_json(event: Event) -> None:
     document: dict[str, str | int] = {"event": event.kind, "name": event.name, "text": event.text}
     if event.kind == "begin":
         document["total"] = event.total
+    line = printable_json(json.dumps(document, ensure_ascii=False)) + "\n"
     with suppress(OSError):  # nobody reads any more: the run goes on
-        sys.stderr.write(json.dumps(document, ensure_ascii=False) + "\n")  # one write: events come from two threads
+        sys.stderr.write(line)  # one write: events come from two threads
         sys.stderr.flush()
 
 
@@ -60,7 +62,7 @@ def _bar() -> Iterator[Listener]:
             if event.kind == "begin":
                 bar.update(task, total=event.total)
             elif event.kind == "stage":
-                bar.update(task, description=escape(f"{event.name}: {event.text}"))
+                bar.update(task, description=escape(printable(f"{event.name}: {event.text}")))
             else:
                 bar.advance(task)
 

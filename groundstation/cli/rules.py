@@ -18,6 +18,7 @@ from groundstation.cli.application import (
     app,
     examples,
     say,
+    tell,
 )
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def test(
 
     With -v, list every gate with another limit, not only those of changed verdicts.
     """
-    from groundstation.cli.text import as_json, printable
+    from groundstation.cli.text import as_json
     from groundstation.pipeline.verbs.export import require_place
     from groundstation.pipeline.verbs.rules import rules_test, write_rules
 
@@ -65,9 +66,9 @@ def test(
     if output is not None:
         write_rules(found, output)
     if json:
-        typer.echo(as_json(found.to_dict()))
+        tell(as_json(found.to_dict()))
     elif not quiet:
-        typer.echo("\n".join(map(printable, rules_text(found, everything=verbose).split("\n"))))
+        tell(rules_text(found, everything=verbose))
     for reason in found.unread:
         say(f"error: {reason}")
     if found.unread:

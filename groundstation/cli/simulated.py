@@ -15,6 +15,7 @@ from groundstation.cli.application import (
     answers_with_exit_code,
     app,
     examples,
+    tell,
     tell_written,
 )
 
@@ -74,5 +75,5 @@ def study(
             name, output, runs=runs, seed=seed, force=force, listen=listen, recorded=recorded, minutes=minutes
         )
     if not quiet:
-        typer.echo(text)
+        tell(text)
     return DONE

@@ -1,21 +1,35 @@
-"""Text for a terminal and for other programs: printable lines, JSON."""
+"""What all verbs print with: text that shows and drives no terminal, JSON for programs."""
 
 import json
 from typing import Any
 
+import typer
 
-def printable(text: str) -> str:
-    """Text of a log without control characters: a log must not drive the terminal.
+from groundstation.base.printable import printable as printable
+from groundstation.base.printable import printable_json
+
+
+def tell(text: str) -> None:
+    """Print a result on stdout."""
+    typer.echo(printable_lines(text))
+
+
+def say(text: str) -> None:
+    """Print everything else on stderr."""
+    typer.echo(printable_lines(text), err=True)
+
+
+def printable_lines(text: str) -> str:
+    """Text of several lines, each as :func:`groundstation.base.printable.printable` has it.
 
     Examples
     --------
-    >>> printable("L-39\\x1b[2J")
-    'L-39?[2J'
+    >>> printable_lines("a\\x1b[2J\\nb")
+    'a?[2J\\nb'
     """
-    return "".join(character if character.isprintable() else "?" for character in text)
+    return "\n".join(map(printable, text.split("\n")))
 
 
 def as_json(document: Any) -> str:
-    """Render a document as JSON text."""
-    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
-    return text.encode("utf-8", "backslashreplace").decode()  # file names need not be UTF-8
+    """Render a document as JSON text: hidden characters, and names of files that are not UTF-8, as escapes."""
+    return printable_json(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))

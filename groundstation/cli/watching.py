@@ -12,6 +12,7 @@ from groundstation.cli.application import (
     FailOn,
     Force,
     IcdFiles,
+    Isolate,
     Jobs,
     Json,
     NoPdf,
@@ -66,6 +67,7 @@ def watch(
     ] = None,
     jobs: Jobs = 0,
     timeout: Timeout = None,
+    isolate: Isolate = False,
     fail_on: FailOn = "none",
     no_pdf: NoPdf = False,
     only: Only = None,
@@ -102,6 +104,7 @@ def watch(
             force=force,
             only_results=only == "results",
             timeout_s=timeout_s,
+            is_isolated=isolate,
             say=say,
             listen=listen,
         )

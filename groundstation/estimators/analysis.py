@@ -158,6 +158,11 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
         """Name of the TOML table with its settings."""
         return self.table or self.name
 
+    def values(self, answers: Answers) -> dict[str, Any]:
+        """What its answer gives to the tables of flights, by the names of its columns; nothing without an answer."""
+        answer = answers.get(self.answer.analysis)
+        return {} if answer is None else {column.name: column.value(cast(Any, answer)) for column in self.columns}
+
 
 def in_order_of_need(analyses: tuple[Analysis, ...]) -> tuple[Analysis, ...]:
     """The analyses so that each stands behind those of them it builds on, else in the order given.

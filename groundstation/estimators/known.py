@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Literal, TypeVar
 
-from groundstation.base.errors import SettingsError
+from groundstation.base.errors import GroundstationError, SettingsError
+from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.toml_settings import check_ranges, number, required_number
 from groundstation.results.answer import A, Answers, answer_of
 from groundstation.tables.phases import Phases
@@ -42,6 +43,8 @@ class AircraftData:
     ins_serial, ins_alignment : str
         Which unit is installed and how it is aligned ("gyrocompass", "stored heading"): for the acceptance of many
         flights; no estimator looks at them.
+    nav_start_utc : str
+        When the INS began to navigate, ISO 8601, where the log does not show it; it may lie before the log.
     always_on_ground : bool
         A car: nothing need prove ground contact.
     """
@@ -58,10 +61,17 @@ class AircraftData:
     ins_kind: Literal["", "unaided", "gnss_aided"] = ""
     ins_serial: str = ""
     ins_alignment: str = ""
+    nav_start_utc: str = ""
     always_on_ground: bool = False
 
     def __post_init__(self) -> None:
         check_ranges(self)
+        if self.nav_start_utc:
+            try:
+                iso_to_utc_ns(self.nav_start_utc)
+            except GroundstationError as error:
+                expected = "ISO 8601 such as 2026-05-04T06:00:00Z"
+                raise SettingsError("nav_start_utc", repr(self.nav_start_utc), expected) from error
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+from groundstation.base.printable import printable
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.exports.text import coordinates, number
 from groundstation.exports.tracks import MSL, Track
@@ -13,7 +14,10 @@ OF_GPX = (MSL, "satellites_used", "hdop")
 
 
 def write_gpx(path: Path, title: str, tracks: Sequence[Track]) -> None:
-    """Write the tracks. ``ele`` is height above sea level in GPX: an altitude above anything else is an extension."""
+    """Write the tracks, each crossing of the date line between two segments.
+
+    ``ele`` is height above sea level in GPX: an altitude above anything else is an extension.
+    """
     ET.register_namespace("", GPX)
     ET.register_namespace("gs", OWN)
     root = ET.Element(f"{{{GPX}}}gpx", {"version": "1.1", "creator": "groundstation"})
@@ -22,18 +26,21 @@ def write_gpx(path: Path, title: str, tracks: Sequence[Track]) -> None:
         part = _sub(root, "trk")
         _sub(part, "name", track.name)
         _sub(part, "desc", track.title)
-        _points(_sub(part, "trkseg"), track)
+        _segments(part, track)
     ET.indent(root)
     ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
 
-def _points(segment: ET.Element, track: Track) -> None:
+def _segments(part: ET.Element, track: Track) -> None:
     own = {name: values.tolist() for name, values in track.columns.items() if name not in OF_GPX}
     if not track.has_utc:
         own["flight_time_s"] = track.time_s.tolist()
     altitude, satellites, hdop = (track.column(name).tolist() for name in OF_GPX)
+    starts, segment = {piece.start for piece in track.pieces()}, part
     places = zip(coordinates(track.latitude_deg), coordinates(track.longitude_deg), strict=True)
     for row, (latitude, longitude) in enumerate(places):
+        if row in starts:
+            segment = _sub(part, "trkseg")
         point = ET.SubElement(segment, f"{{{GPX}}}trkpt", {"lat": latitude, "lon": longitude})
         _known(point, "ele", number(altitude[row], 3))
         if track.has_utc:
@@ -55,5 +62,5 @@ def _known(parent: ET.Element, tag: str, text: str) -> None:
 
 def _sub(parent: ET.Element, tag: str, text: str | None = None) -> ET.Element:
     element = ET.SubElement(parent, f"{{{GPX}}}{tag}")
-    element.text = text
+    element.text = None if text is None else printable(text)  # XML knows no other characters
     return element

@@ -9,7 +9,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.timescales import GPS_EPOCH_NS, leap_seconds_at
 from groundstation.base.units import NS_PER_S
 from groundstation.exports.tracks import ELLIPSOID, Track
-from groundstation.readers.sbet import RECORD, S_PER_WEEK
+from groundstation.readers.sbet_records import RECORD, S_PER_WEEK
 
 NS_PER_DAY = 86_400 * NS_PER_S
 NEEDED = (

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from groundstation.base.printable import spreadsheet_text
 from groundstation.exports.tracks import Track
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ def write_csv(path: Path, tracks: Sequence[Track]) -> None:
     frame[numbers] = frame[numbers].round(DECIMALS)
     if "time_utc" in frame:
         frame["time_utc"] = frame["time_utc"].dt.strftime("%Y-%m-%dT%H:%M:%S.%fZ")
+    frame["track"] = frame["track"].map(spreadsheet_text)
+    frame.columns = frame.columns.map(spreadsheet_text)
     frame.to_csv(path, index=False, lineterminator="\n")
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -70,6 +71,11 @@ class Track:
     def column(self, name: str) -> FloatArray:
         """A column, NaN where the track has none."""
         return self.columns.get(name, np.full(len(self), np.nan))
+
+    def pieces(self) -> tuple[slice, ...]:
+        """Rows of the track between its crossings of the date line; all rows where it crosses none."""
+        crossings = (np.flatnonzero(np.abs(np.diff(self.longitude_deg)) > 180.0) + 1).tolist()
+        return tuple(slice(first, last) for first, last in pairwise((0, *crossings, len(self))))
 
 
 def tracks_of(flight: Flight, figures: Mapping[str, FigureData], ins_topic: str = "") -> tuple[Track, ...]:

@@ -8,8 +8,8 @@ How that time runs by other clocks of the log is told (``relations``), and nothi
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -100,11 +100,7 @@ class ClockModel:
 
         Records without a time of their own must be among those the survey saw.
         """
-        if len(self.starts) == 1:
-            time = device_time_ns.values + self.offsets_ns[0]
-        else:
-            segment = np.searchsorted(self.starts, record_index, side="right") - 1
-            time = device_time_ns.values + self.offsets_ns[np.maximum(segment, 0)]
+        time = device_time_ns.values + self._offset_ns(record_index)
         if not len(self.placed_index) or not len(record_index):
             return np.asarray(time, dtype=np.int64)
         if (record_index[1:] <= record_index[:-1]).any():
@@ -116,16 +112,43 @@ class ClockModel:
         time[at[found]] = self.placed_ns[low:high][found]
         return np.asarray(time, dtype=np.int64)
 
-    def correct(self, batch: RecordBatch) -> RecordBatch:
-        """The batch with ``time_ns`` set, its rows in the order of the source.
+    def _offset_ns(self, record_index: Int64Array) -> Any:
+        """What is added to device times of records."""
+        if len(self.starts) == 1:
+            return self.offsets_ns[0]
+        segment = np.searchsorted(self.starts, record_index, side="right") - 1
+        return self.offsets_ns[np.maximum(segment, 0)]
 
-        Times of validity, which readers give by the device's clock, are moved as its times are.
+    def valid_ns(
+        self, record_index: Int64Array, device_time_ns: Column, validity_ns: Int64Array, time_ns: Int64Array
+    ) -> Int64Array:
+        """Times of validity on the corrected clock: readers give them by the device's clock, they are moved as that is.
+
+        Values that were true when their record was written, or in a record without a device time, are valid at the
+        record's corrected time ``time_ns``, wherever it was placed.
         """
-        time_ns, device_ns = self.time_ns(batch.record_index, batch.device_time_ns), batch.device_time_ns
-        validity_ns = batch.validity_time_ns
+        has_own = validity_ns != device_time_ns.values
+        if device_time_ns.present is not None:
+            has_own &= device_time_ns.present
+        return np.where(has_own, validity_ns + self._offset_ns(record_index), time_ns)
+
+    def correct(self, batch: RecordBatch) -> RecordBatch:
+        """The batch with ``time_ns`` set, its rows in the order of the source."""
+        index, device_ns, validity_ns = batch.record_index, batch.device_time_ns, batch.validity_time_ns
+        time_ns = self.time_ns(index, device_ns)
         if validity_ns is not None:
-            validity_ns = np.where(device_ns.mask, validity_ns + (time_ns - device_ns.values), time_ns)
-        return RecordBatch(batch.topic, batch.record_index, device_ns, batch.columns, time_ns, validity_ns)
+            validity_ns = self.valid_ns(index, device_ns, validity_ns, time_ns)
+        return RecordBatch(batch.topic, index, device_ns, batch.columns, time_ns, validity_ns)
+
+    def on(self, offsets: "ClockOffsets", first_device_ns: int) -> "ClockModel":
+        """The model of the device's own times, of one that was made of times moved by ``offsets``."""
+        starts = np.union1d(self.starts, offsets.starts)
+        return replace(
+            self,
+            starts=starts,
+            offsets_ns=self._offset_ns(starts) + offsets.at(starts),
+            first_device_ns=first_device_ns,
+        )
 
     def text(self, time_ns: int) -> str:
         """A time for people: ISO UTC, or ``+mm:ss`` from the log's zero."""
@@ -167,6 +190,30 @@ class ClockModel:
     def mistake(self, step: ClockStep) -> str:
         """Name of the error that a step put right, empty where it has none."""
         return mistake_of_step(step.set_s, step.device_after_ns + int(self.offsets_ns[-1])) if self.is_absolute else ""
+
+
+@dataclass(frozen=True)
+class ClockOffsets:
+    """What is added to device times from some records on, by another clock of the log."""
+
+    starts: Int64Array
+    offsets_ns: Int64Array
+
+    @classmethod
+    def of(cls, offsets: tuple[tuple[int, int], ...]) -> "ClockOffsets | None":
+        """The offsets that a reader states, None where it states none."""
+        if not offsets:
+            return None
+        starts, added = np.array(sorted(offsets), dtype=np.int64).T
+        return cls(starts, added)
+
+    def at(self, record_index: Int64Array) -> Int64Array:
+        """What is added to the device times of records."""
+        return np.asarray(self.offsets_ns[np.maximum(np.searchsorted(self.starts, record_index, side="right") - 1, 0)])
+
+    def moved(self, record_index: Int64Array, device_time_ns: Column) -> Column:
+        """Device times of records with what is added."""
+        return Column(device_time_ns.values + self.at(record_index), device_time_ns.present)
 
 
 def estimate_clock(

@@ -151,8 +151,9 @@ def _absolute(clock: ClockModel) -> Iterator[Finding]:
 def _relation(relation: ClockRelation, clock: ClockModel, most_ppm: float) -> Iterator[Finding]:
     for mistake in relation.mistakes:
         place = "" if mistake.time_ns is None else clock.text(mistake.time_ns)
-        text = f"{relation.name} minus the recorder's: {mistake.text}" + (f", a step at {place}" if place else "")
-        yield Finding("warn", f"clock.{mistake.kind}", text, place=place)
+        where = f", from {place} on" if mistake.readings else f", a step at {place}"
+        text = f"{relation.name} minus the recorder's: {mistake.text}" + (where if place else "")
+        yield Finding("warn", f"clock.{mistake.kind}", text, place=place, count=mistake.readings)
     for one in relation.breaks:
         place = f"{clock.text(one.time_ns)} ± {one.time_sigma_s:.1f} s"
         if one.kind == "step":

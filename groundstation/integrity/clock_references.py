@@ -6,6 +6,7 @@ of each are kept, evenly spread. Corrected time is never changed by what is foun
 
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
-from groundstation.base.timescales import gps_week_to_utc_ns, iso_to_utc_ns
+from groundstation.base.timescales import WEEK_NS, gps_week_to_utc_ns, iso_to_utc_ns, whole_weeks
 from groundstation.base.toml_settings import number, required_number
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import FIRST_NS, LARGEST_NS, ClockModel
@@ -25,6 +26,7 @@ from groundstation.integrity.clock_relation import (
     Mistake,
     mistake_of_offset,
     mistake_of_step,
+    mistake_of_told_step,
 )
 from groundstation.integrity.stretches import Sampler
 
@@ -32,7 +34,11 @@ MOST_SAMPLES = 4_096
 MOST_REFERENCES = 8
 _FEWEST_ZEROS = 3  # readings that tell when a counter began
 _DAY_NS = 86_400 * NS_PER_S
+STAMPS = "header stamp"  # a clock that is read when a message is made, and written when it reaches the recorder
+_AROUND, _PROMPT_NS, _WAITED_NS = 64, NS_PER_S // 100, NS_PER_S // 2
 _FLOAT_NS = 1_000  # of seconds since 1970 in a float64
+_FEW, _FEW_READINGS = 0.1, 5  # with the number of another week: so many are set aside, more are a step
+_FEWEST = 3
 
 
 @dataclass(frozen=True)
@@ -190,10 +196,15 @@ def _relation(readings: _Readings, clock: ClockModel, settings: RelationSettings
     told_ns = told_ns[good]
     order = np.argsort(own_ns, kind="stable")
     own_ns, told_ns = own_ns[order], told_ns[order]
+    if reference.clock == STAMPS:
+        prompt = _prompt(own_ns - told_ns)
+        own_ns, told_ns = own_ns[prompt], told_ns[prompt]
     if len(own_ns) < settings.fewest_samples:
         return ClockRelation(reference.clock, source, samples=len(own_ns), reason=f"{len(own_ns)} readings are too few")
     if reference.scale == "day":
         told_ns = _unfolded(told_ns, own_ns)
+    is_aside, aside = _other_weeks(own_ns, told_ns, clock.is_absolute)
+    own_ns, told_ns = own_ns[~is_aside], told_ns[~is_aside]
     bound_s = min(_last_digit_s(told_ns), readings.every_s) if reference.is_sampled else reference.unit_ns / NS_PER_S
     held_s = readings.every_s if readings.is_held else 0.0
     fitted = fit_relation(
@@ -212,8 +223,19 @@ def _relation(readings: _Readings, clock: ClockModel, settings: RelationSettings
         resolution_s=bound_s,
         is_utc=reference.scale != "free",
         is_absolute=reference.scale in ("utc", "gps"),
-        mistakes=_mistakes(reference, fitted, clock, told_ns),
+        mistakes=(*aside, *_mistakes(reference, fitted, clock, told_ns)),
     )
+
+
+def _prompt(late_ns: Int64Array) -> BoolArray:
+    """Messages that were written soon after their stamp, shape (n,): all where none waited longer than those around."""
+    window = min(_AROUND, len(late_ns))
+    if not window:
+        return np.ones(len(late_ns), dtype=bool)
+    least = np.lib.stride_tricks.sliding_window_view(late_ns, window).min(axis=1)
+    around = np.clip(np.arange(len(late_ns)) - window // 2, 0, len(least) - 1)
+    waited_ns = late_ns - least[around]
+    return waited_ns < _PROMPT_NS if (waited_ns > _WAITED_NS).any() else np.ones(len(late_ns), dtype=bool)
 
 
 def _told(reference: ReferenceField, columns: dict[str, NDArray[Any]]) -> tuple[Int64Array, BoolArray]:
@@ -221,7 +243,7 @@ def _told(reference: ReferenceField, columns: dict[str, NDArray[Any]]) -> tuple[
     time_ns, good = _nanoseconds(columns["time"], reference.unit_ns)
     if reference.scale == "gps":
         week, has_week = _nanoseconds(columns["week"], 1)
-        good &= has_week & (week > 0) & (week < 2**14) & (time_ns >= 0) & (time_ns < WEEK_S * NS_PER_S)
+        good &= has_week & (week > 0) & (week < 2**14) & (time_ns >= 0) & (time_ns < WEEK_NS)
         week, time_ns = np.where(good, week, 0), np.where(good, time_ns, 0)
         return gps_week_to_utc_ns(week, time_ns // 1_000_000) + time_ns % 1_000_000, good
     if reference.scale == "day":
@@ -260,6 +282,28 @@ def _unfolded(told_ns: Int64Array, own_ns: Int64Array) -> Int64Array:
     return np.asarray(own_ns + first + (told_ns - own_ns - first + half) % _DAY_NS - half, dtype=np.int64)
 
 
+def _other_weeks(own_ns: Int64Array, told_ns: Int64Array, is_utc: bool) -> tuple[BoolArray, list[Mistake]]:
+    """Readings of another GPS week for a short while, shape (n,), and each while by name.
+
+    A receiver may know the time of the week before the week; at the turn of a week the new number may come late. The
+    week that counts is that of the recorder, where it runs by UTC and some readings agree, else that of most readings.
+    """
+    away_ns = told_ns - own_ns
+    agrees = np.abs(away_ns) < WEEK_NS // 2
+    usual_ns = 0 if is_utc and agrees.sum() >= _FEWEST else int(np.sort(away_ns)[len(away_ns) // 2])
+    number = np.rint((away_ns - usual_ns) / WEEK_NS).astype(np.int64)
+    is_aside, found = np.zeros(len(number), dtype=bool), []
+    starts = np.flatnonzero(np.diff(number, prepend=number[:1] - 1))
+    for first, stop in pairwise([*starts.tolist(), len(number)]):
+        few = stop - first <= max(_FEW * len(number), min(_FEW_READINGS, len(number) // 3))
+        if number[first] and few and whole_weeks(int(away_ns[first]) - usual_ns):
+            is_aside[first:stop] = True
+            found.append(
+                Mistake("week_number", float(number[first] * WEEK_S), int(own_ns[first]), readings=stop - first)
+            )
+    return is_aside, found
+
+
 def _last_digit_s(time_ns: Int64Array) -> float:
     """The largest power of ten, at most a second, that all times are multiples of."""
     step = NS_PER_S
@@ -273,13 +317,15 @@ def _mistakes(reference: ReferenceField, fitted: Fitted, clock: ClockModel, told
     if reference.scale == "free":
         return ()
     last_ns = int(told_ns[-1])
-    named = [(one, mistake_of_step(one.step_s, last_ns)) for one in fitted.breaks if one.kind == "step"]
+    name = mistake_of_step if reference.scale == "gps" else mistake_of_told_step
+    named = [(one, name(one.step_s, last_ns)) for one in fitted.breaks if one.kind == "step"]
     found = [Mistake(kind, one.step_s, one.time_ns) for one, kind in named if kind]
     if clock.is_absolute:
         offset_s = fitted.segments[-1].offset_ns / NS_PER_S
         kind = mistake_of_offset(offset_s)
         found += [Mistake(kind, offset_s)] if kind else []
     earliest_ns = iso_to_utc_ns(f"{reference.earliest_year}-01-01T00:00:00Z")[0]
-    if reference.scale != "day" and FIRST_NS <= last_ns < earliest_ns:  # before that it was never set
+    is_named = any(one.kind == "week_number" and one.time_ns is None for one in found)
+    if reference.scale != "day" and FIRST_NS <= last_ns < earliest_ns and not is_named:  # before that it was never set
         found.append(Mistake("week_number", -float(ROLLOVER_S)))
     return tuple(found)

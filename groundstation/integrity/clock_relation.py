@@ -4,14 +4,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from groundstation.base.clock import BreakEntry, MistakeEntry, RelationEntry, SegmentEntry
-from groundstation.base.timescales import leap_seconds_at, utc_ns_to_iso
+from groundstation.base.timescales import (
+    ROLLOVER_WEEKS,
+    leap_seconds_at,
+    leap_seconds_late,
+    utc_ns_to_iso,
+    whole_weeks,
+)
 from groundstation.base.units import NS_PER_S
 
 WEEK_S, ROLLOVER_S, QUARTER_S = 604_800, 1_024 * 604_800, 900  # time zones are multiples of a quarter of an hour
 _NEAR_S = 0.35  # of whole seconds: receivers are late by less
 _LEAP_S = range(13, 21)  # GPS time less UTC since 1999, and for some years to come
 _MISTAKES = {
-    "week_number": "GPS week number off by {weeks:+d} weeks (it rolls over every 1024)",
     "leap_seconds": "{seconds:+.2f} s: equal to the leap seconds between GPS time and UTC",
     "time_zone": "{seconds:+.2f} s: whole quarters of an hour, as between time zones",
 }
@@ -87,17 +92,39 @@ class Mistake:
     size_s : float
         Reference minus recorder, or the step of it.
     time_ns : int or None
-        Corrected time of the step; None when it holds throughout, or at the end.
+        Corrected time of the step, or of the first of the readings; None when it holds throughout, or at the end.
+    readings : int
+        How many readings have it, where it is neither a step nor holds at the end; they are left out of all else.
     """
 
     kind: str
     size_s: float
     time_ns: int | None = None
+    readings: int = 0
 
     @property
     def text(self) -> str:
-        """In words."""
-        return _MISTAKES[self.kind].format(seconds=self.size_s, weeks=round(self.size_s / WEEK_S))
+        """In words.
+
+        Examples
+        --------
+        >>> Mistake("week_number", -604_800.0, 0, readings=4).text
+        '4 readings of one week: GPS week number off by -1 week, as before a receiver knows it'
+        """
+        if self.kind == "week_number":
+            return self._of_weeks
+        if self.kind == "leap_seconds" and round(abs(self.size_s)) not in _LEAP_S:
+            return f"{self.size_s:+.2f} s: whole seconds, as where a receiver learns the leap seconds"
+        return _MISTAKES[self.kind].format(seconds=self.size_s)
+
+    @property
+    def _of_weeks(self) -> str:
+        weeks = round(self.size_s / WEEK_S)
+        why = "as before a receiver knows it" if weeks % ROLLOVER_WEEKS else "it rolls over every 1024"
+        text = f"GPS week number off by {weeks:+d} week{'s' if abs(weeks) > 1 else ''}"
+        text += f", {why}" if weeks % ROLLOVER_WEEKS else f" ({why})"
+        of_readings = f"{self.readings} reading{'s' if self.readings > 1 else ''} of one week: "
+        return of_readings + text if self.readings else text
 
 
 @dataclass(frozen=True)
@@ -214,11 +241,23 @@ def mistake_of_step(size_s: float, utc_ns: int) -> str:
     >>> mistake_of_step(-18.02, 1_777_874_400_000_000_000), mistake_of_step(619_315_200.1, 0), mistake_of_step(-5.0, 0)
     ('leap_seconds', 'week_number', '')
     """
-    if _is_rollover(size_s):
+    if whole_weeks(round(size_s * NS_PER_S)):
         return "week_number"
     whole = round(abs(size_s))
     is_leap = whole > 0 and whole == leap_seconds_at(utc_ns) and abs(abs(size_s) - whole) < _NEAR_S
     return "leap_seconds" if is_leap else ""
+
+
+def mistake_of_told_step(size_s: float, utc_ns: int) -> str:
+    """Name of a step of a receiver's UTC, which falls as leap seconds are learnt, or empty.
+
+    Examples
+    --------
+    >>> mistake_of_told_step(-2.003, 0), mistake_of_told_step(2.0, 0), mistake_of_told_step(-2.5, 0)
+    ('leap_seconds', '', '')
+    """
+    learnt = leap_seconds_late(round(-size_s * NS_PER_S))
+    return mistake_of_step(size_s, utc_ns) or ("leap_seconds" if learnt else "")
 
 
 def mistake_of_offset(offset_s: float) -> str:
@@ -229,18 +268,13 @@ def mistake_of_offset(offset_s: float) -> str:
     >>> mistake_of_offset(16.9), mistake_of_offset(10_800.1), mistake_of_offset(0.12)
     ('leap_seconds', 'time_zone', '')
     """
-    if _is_rollover(offset_s):
+    if whole_weeks(round(offset_s * NS_PER_S)):
         return "week_number"
     whole = round(abs(offset_s))
     if whole in _LEAP_S and abs(abs(offset_s) - whole) < _NEAR_S:
         return "leap_seconds"
     quarters = round(abs(offset_s) / QUARTER_S)
     return "time_zone" if 0 < quarters <= 56 and abs(abs(offset_s) - quarters * QUARTER_S) < 2.0 else ""
-
-
-def _is_rollover(size_s: float) -> bool:
-    times = round(size_s / ROLLOVER_S)
-    return times != 0 and abs(size_s - times * ROLLOVER_S) < 30.0  # leap seconds may be wrong too
 
 
 def _places(sigma: float) -> int:

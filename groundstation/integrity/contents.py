@@ -1,6 +1,7 @@
 """What the batches of a log hold, counted as they pass: fields, counters, motion, drop-outs, and rows in time."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from groundstation.base.records import Column, Int64Array, RecordBatch
 from groundstation.base.signals import is_canonical
 from groundstation.integrity.clock import ClockModel
+from groundstation.integrity.contradictions import Contradiction, contradictions
 from groundstation.integrity.ledger import FieldCounts
 from groundstation.integrity.limits import Thresholds
 from groundstation.integrity.sequence import Counter, Sequence, counters_of
@@ -123,7 +125,7 @@ class Contents:
         for name, counter in tally.counters.items():
             if name in batch.columns:
                 counter.add(batch.columns[name], batch.record_index, device_ns)
-        self._motion.add(batch)
+        self._motion.add(batch, device_ns)
         self._sample(batch, device_ns)
         if batch.topic == DROPOUTS and DROPOUT_LENGTH in batch.columns:
             self._add_dropouts(batch.columns[DROPOUT_LENGTH], batch.record_index, device_ns)
@@ -158,6 +160,10 @@ class Contents:
         watched = {name: tally.constancy for name, tally in tallies.items() if tally.constancy is not None}
         stuck = self._judge.stuck(topic, watched)
         return tuple(tally.ledger(name, clock, stuck.get(name, ())) for name, tally in tallies.items())
+
+    def contradictions(self, clock: ClockModel, metadata: Mapping[str, str]) -> tuple[Contradiction, ...]:
+        """Places where the motion of the log contradicts itself."""
+        return contradictions(self._motion, clock, self._topics, metadata)
 
     def sequences(self, topic: str, clock: ClockModel) -> tuple[Sequence, ...]:
         """What the counters of a topic say."""

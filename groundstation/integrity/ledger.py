@@ -23,6 +23,7 @@ from groundstation.base.records import Damage, Int64Array, Remark
 from groundstation.base.signals import is_canonical
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import ClockModel
+from groundstation.integrity.contradictions import Contradiction
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.rhythm import rhythm_of
 from groundstation.integrity.sequence import Sequence
@@ -167,6 +168,7 @@ class LedgerCounts:
     thresholds: Thresholds = field(default_factory=shipped)
     dropouts: tuple[Dropout, ...] = ()
     timeline: Timeline | None = None
+    contradictions: tuple[Contradiction, ...] = ()
     power_ups: tuple[PowerUpClock, ...] = ()
 
     def __getitem__(self, topic: str) -> TopicCounts:

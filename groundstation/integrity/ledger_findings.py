@@ -7,6 +7,7 @@ from groundstation.base.records import Damage
 from groundstation.base.signals import is_canonical
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.clock_findings import clock_findings, counted
+from groundstation.integrity.contradictions import CONTRADICTION, Contradiction
 from groundstation.integrity.ledger import FieldCounts, LedgerCounts, TopicCounts
 from groundstation.integrity.limits import DuplicateLimits
 from groundstation.integrity.sequence import Sequence
@@ -17,20 +18,26 @@ TOPIC_CODES = (
 )
 _REMARKS_THAT_WARN = (
     *("assumed_utc", "assumed_year", "year_unknown", "clock_disagrees", "unreadable_metadata"),
-    *("plug_in", "duplicate_column", "icd_of_another", "tmats_contradicted"),
+    *("plug_in", "duplicate_column", "icd_of_another", "tmats_contradicted", "week_rollover", "week_number"),
 )
 
 
 def ledger_findings(ledger: LedgerCounts) -> tuple[Finding, ...]:
     """Findings of a ledger: clock first, then losses, topics and the reader's remarks.
 
-    Codes: those of :func:`clock_findings`, ``time.duplicates``, ``data.none``, ``data.gaps``,
+    Codes: those of :func:`clock_findings`, ``time.duplicates``, ``data.none``, ``data.gaps``, ``data.contradiction``,
     ``data.<kind of damage>`` (``data.truncated``, ``data.dropped_rows``, ``data.breaks_off`` ...),
     ``data.sequence``, ``data.sequence_reset``, ``values.out_of_range``, ``values.nan``, ``values.stuck``,
     ``reader.<remark>`` (``reader.derived``, ``reader.assumed_utc`` ...).
     """
     damages = (damage_finding(damage) for damage in ledger.damages)
-    return (*clock_findings(ledger), *damages, *topic_findings(ledger), *_remarks(ledger))
+    against = (_contradiction(one, ledger.clock) for one in ledger.contradictions)
+    return (*clock_findings(ledger), *damages, *against, *topic_findings(ledger), *_remarks(ledger))
+
+
+def _contradiction(one: Contradiction, clock: ClockModel) -> Finding:
+    place = f"from {clock.text(one.start_ns)}, {one.length_s:.0f} s in all"
+    return Finding("warn", CONTRADICTION, f"this log contradicts itself: {one.text}", one.topic, place)
 
 
 def topic_findings(ledger: LedgerCounts) -> tuple[Finding, ...]:

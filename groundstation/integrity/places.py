@@ -1,4 +1,4 @@
-"""Places and device times of a log's records: kept as they came, and beyond a size compactly in a temporary file.
+"""Places and times of a log's records: kept as they came, and beyond a size compactly in a temporary file.
 
 A survey needs them twice more: for the clock, in the order of the log, and for the ledger, topic by topic. Neither
 needs all at once.
@@ -24,10 +24,14 @@ WINDOW_RECORDS = 500_000  # at least so many records of all topics are laid in o
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Places and device times of one batch, or of all of a topic; topics that are sampled together share it."""
+    """Places and times of one batch, or of all of a topic; topics that are sampled together share it.
+
+    ``validity_ns`` are times of validity by the device's clock, where they are others.
+    """
 
     index: Int64Array
     time: Column
+    validity_ns: Int64Array | None = None
 
     @property
     def timed(self) -> Int64Array:
@@ -38,16 +42,18 @@ class Piece:
     def nbytes(self) -> int:
         """Memory that it takes."""
         present = self.time.present
-        return self.index.nbytes + self.time.values.nbytes + (0 if present is None else present.nbytes)
+        validity = 0 if self.validity_ns is None else self.validity_ns.nbytes
+        return self.index.nbytes + self.time.values.nbytes + (0 if present is None else present.nbytes) + validity
 
     def holds(self, batch: RecordBatch) -> bool:
         """Whether it is the places and times of this batch."""
-        device = batch.device_time_ns
+        device, validity = batch.device_time_ns, batch.validity_time_ns
         return (
             len(self.index) == len(batch)
             and np.array_equal(self.index, batch.record_index)
             and np.array_equal(self.time.values, device.values)
             and (self.time.present is device.present or np.array_equal(self.time.mask, device.mask))
+            and _are_equal(self.validity_ns, validity)
         )
 
 
@@ -69,6 +75,8 @@ class Kept:
         Every record has a time.
     times : tuple of int
         First and last time, how many there are, and how many repeat the one before; empty when there is none.
+    has_validity : bool
+        Records have times of validity of their own.
     """
 
     number: int
@@ -79,11 +87,13 @@ class Kept:
     is_near: bool
     is_timed: bool
     times: tuple[int, ...]
+    has_validity: bool = False
 
     @property
     def size(self) -> int:
         """Bytes that it takes in a file."""
-        return self.count * ((4 if self.is_near else 8) + 8 + (0 if self.is_timed else 1))
+        of_one = (4 if self.is_near else 8) + 8 + (0 if self.is_timed else 1) + (8 if self.has_validity else 0)
+        return self.count * of_one
 
 
 class Places:
@@ -121,9 +131,11 @@ class Places:
                 return kept
         device = batch.device_time_ns
         present = None if device.present is None else _lasting(device.present)
+        validity = batch.validity_time_ns
         piece = Piece(
             _lasting(np.asarray(batch.record_index, np.int64)),
             Column(_lasting(np.asarray(device.values, np.int64)), present),
+            None if validity is None else _lasting(np.asarray(validity, np.int64)),
         )
         self._recent.append((piece, self._keep(piece)))
         return self._recent[-1][1]
@@ -133,7 +145,8 @@ class Places:
         first, last = int(index[0]), int(index[-1])
         is_near, is_timed = last - first < 1 << 32, len(timed) == len(index)
         times = (int(timed[0]), int(timed[-1]), len(timed), _repeats(timed)) if len(timed) else ()
-        kept = Kept(self._count, self._end, len(index), first, last, is_near, is_timed, times)
+        has_validity = piece.validity_ns is not None
+        kept = Kept(self._count, self._end, len(index), first, last, is_near, is_timed, times, has_validity)
         self._end += kept.size
         self._count += 1
         self.records += len(index)
@@ -155,6 +168,8 @@ class Places:
                 self._file.write(np.ascontiguousarray(piece.time.values).data)
                 if not kept.is_timed:
                     self._file.write(np.ascontiguousarray(piece.time.mask).data)
+                if piece.validity_ns is not None:
+                    self._file.write(np.ascontiguousarray(piece.validity_ns).data)
         except OSError as error:
             folder, reason = tempfile.gettempdir(), error.strerror or type(error).__name__
             raise GroundstationError(folder, f"no temporary file ({reason})", "", "make room, or set TMPDIR") from error
@@ -168,7 +183,8 @@ class Places:
         self._file.seek(kept.at)
         index = self._array(np.uint32 if kept.is_near else np.int64, kept.count).astype(np.int64) + kept.first
         time = self._array(np.int64, kept.count)
-        return Piece(index, Column(time, None if kept.is_timed else self._array(np.bool_, kept.count)))
+        timed = None if kept.is_timed else self._array(np.bool_, kept.count)
+        return Piece(index, Column(time, timed), self._array(np.int64, kept.count) if kept.has_validity else None)
 
     def _array(self, dtype: Any, count: int) -> Any:
         return np.frombuffer(self._file.read(count * np.dtype(dtype).itemsize), dtype)
@@ -199,6 +215,10 @@ class Places:
             index[rows], time[rows], timed[rows] = window_index, window_time.values, window_time.mask
             count = rows.stop
         return index[:count], Column(time[:count], timed[:count])
+
+
+def _are_equal(one: Int64Array | None, other: Int64Array | None) -> bool:
+    return one is other or (one is not None and other is not None and np.array_equal(one, other))
 
 
 def _lasting(array: Any) -> Any:

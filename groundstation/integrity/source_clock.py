@@ -7,7 +7,7 @@ import numpy as np
 
 from groundstation.base.records import BoolArray, Column, Int64Array, LogHeader, NewLog
 from groundstation.base.units import NS_PER_S
-from groundstation.integrity.clock import ClockModel, estimate_clock
+from groundstation.integrity.clock import ClockModel, ClockOffsets, estimate_clock
 from groundstation.integrity.clock_references import ClockReferences
 from groundstation.integrity.counting import CountingSettings, estimate_counting_clock
 from groundstation.integrity.limits import Thresholds
@@ -80,6 +80,9 @@ def clock_of(found: Found, limits: Thresholds) -> tuple[ClockModel, tuple[PowerU
     begins in it.
     """
     header = found.header
+    offsets = ClockOffsets.of(header.clock_offsets)
+    if offsets is not None:  # another clock of the log tells how this one was set
+        return _set_by_another(found, limits, offsets), ()
     clock = _whole(found, limits)
     is_odd = clock.steps or clock.is_unordered or found.new_logs
     if not (is_odd or (header.utc_of_zero_ns == 0 and clock.longest_step_ns > SILENT_NS)):
@@ -94,14 +97,23 @@ def clock_of(found: Found, limits: Thresholds) -> tuple[ClockModel, tuple[PowerU
     return _beside([_of(part, found, limits, zero_ns) for part, zero_ns in zip(parts, zeros, strict=True)])
 
 
-def _whole(found: Found, limits: Thresholds) -> ClockModel:
-    """The model of a source as one power-up."""
+def _whole(found: Found, limits: Thresholds, offsets: ClockOffsets | None = None) -> ClockModel:
+    """The model of a source as one power-up; ``offsets`` are added to its times."""
     zero_ns = found.header.utc_of_zero_ns
     if found.header.has_counting_clock:
-        windows = found.places.in_order(found.topics)
+        windows: Iterable[Window] = found.places.in_order(found.topics)
+        if offsets is not None:
+            windows = ((index, offsets.moved(index, time), frozen) for index, time, frozen in windows)
         return _counting_clock(windows, found.places.is_long, zero_ns, limits.counting_clock)
     index, time = found.places.in_one(found.topics)
+    time = time if offsets is None else offsets.moved(index, time)
     return estimate_clock(index, time, zero_ns, settings=limits.clock)
+
+
+def _set_by_another(found: Found, limits: Thresholds, offsets: ClockOffsets) -> ClockModel:
+    """The model for times as the device wrote them, from one for times as another clock sets them."""
+    clock = _whole(found, limits, offsets)
+    return clock.on(offsets, clock.first_device_ns - int(offsets.offsets_ns[0])) if clock.has_times else clock
 
 
 def _counting_clock(

@@ -29,6 +29,8 @@ _NOISY = (
     *(f"field_{axis}_nt" for axis in ("forward", "right", "down")),
 )
 _WITNESSES = frozenset((*_POSITIONS, *_ALTITUDES, *_VELOCITIES, *_HEADINGS))
+_ATTITUDE = ("roll_deg", "pitch_deg")  # sampled beside the witnesses, which are no witnesses themselves
+_TIME = "device_ns"
 WATCHED = _WITNESSES | frozenset(_NOISY)
 _KINDS = ("ins", "gnss", "baro", "magnetometer")
 
@@ -72,11 +74,11 @@ class Motion:
     def __init__(self) -> None:
         self._samplers: dict[str, Sampler] = {}
 
-    def add(self, batch: RecordBatch) -> None:
-        """Sample a batch."""
+    def add(self, batch: RecordBatch, device_ns: Int64Array) -> None:
+        """Sample a batch; ``device_ns`` are its times to go by."""
         if kind_of(batch.topic) not in _KINDS:
             return
-        names = [name for name in batch.columns if name in _WITNESSES]
+        names = [name for name in batch.columns if name in _WITNESSES or name in _ATTITUDE]
         if not names:
             return
         sampler = self._samplers.setdefault(batch.topic, Sampler())
@@ -86,7 +88,14 @@ class Motion:
             column = batch.columns[name]
             values = column.values[rows].astype(np.float64)
             columns[name] = values if column.present is None else np.where(column.present[rows], values, np.nan)
+        columns[_TIME] = np.array(device_ns[rows], dtype=np.int64)
         sampler.put(np.array(batch.record_index[rows]), columns)
+
+    def samples(self) -> Iterator[tuple[str, Int64Array, Int64Array, dict[str, FloatArray]]]:
+        """Topic by topic: places, device times and values, in the order of the log."""
+        for topic, sampler in sorted(self._samplers.items()):
+            index, columns = sampler.all()
+            yield topic, index, columns[_TIME], {name: one for name, one in columns.items() if name != _TIME}
 
     def sources(self) -> list[_Seen]:
         """Every source of every quantity; speed and track from velocities where they are not logged."""
@@ -94,7 +103,7 @@ class Motion:
         for topic, sampler in sorted(self._samplers.items()):
             index, columns = sampler.all()
             order = np.argsort(index, kind="stable")
-            index, columns = index[order], {name: values[order] for name, values in columns.items()}
+            index, columns = index[order], {name: one[order] for name, one in columns.items() if name in _WITNESSES}
             if {"velocity_north_mps", "velocity_east_mps"} <= columns.keys():
                 north, east = columns["velocity_north_mps"], columns["velocity_east_mps"]
                 with np.errstate(over="ignore"):

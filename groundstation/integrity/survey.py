@@ -1,7 +1,8 @@
 """One pass over a log: its header, clock model and ledger.
 
 Kept are places and times, 16 bytes a record, for each set of topics that are sampled together; when there are more than
-16 MiB of them, all go to a temporary file, 12 bytes a record.
+16 MiB of them, all go to a temporary file, 12 bytes a record; times of validity take 8 bytes more. Rates and gaps are
+those of the times at which values were valid.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,6 +16,7 @@ from groundstation.base.gaps import Gaps
 from groundstation.base.records import Damage, Int64Array, Item, LogHeader, NewLog, RecordBatch, Remark
 from groundstation.integrity.breaks_off import broken_off
 from groundstation.integrity.clock import ClockModel
+from groundstation.integrity.clock_dates import doubtful_dates
 from groundstation.integrity.clock_references import ClockReferences
 from groundstation.integrity.contents import Contents
 from groundstation.integrity.ledger import LedgerCounts, TopicCounts, topic_ledger
@@ -61,9 +63,9 @@ class Survey:
 
 
 class _Order(NamedTuple):
-    """Corrected times of a topic in order, and how far it was from it: lateness in nanoseconds, counts."""
+    """Times of validity of a topic in order, and how far from it its records were: lateness in nanoseconds, counts."""
 
-    time_ns: Int64Array
+    valid_ns: Int64Array
     lateness_ns: int
     backward_steps: int
     stray_rows: int
@@ -72,11 +74,16 @@ class _Order(NamedTuple):
 def _order_of(places: Places, pieces: Sequence[Kept], clock: ClockModel) -> _Order:
     """The order of the records of some pieces, taken piece by piece."""
     time_ns = np.empty(sum(kept.count for kept in pieces), dtype=np.int64)
+    valid_ns = np.empty_like(time_ns) if any(kept.has_validity for kept in pieces) else time_ns
     at = backward = stray = 0
     before = np.zeros(0, dtype=np.int64)
     for kept in pieces:
         piece = places.piece(kept)
-        time_ns[at : at + kept.count] = clock.time_ns(piece.index, piece.time)
+        rows = slice(at, at + kept.count)
+        time_ns[rows] = clock.time_ns(piece.index, piece.time)
+        if valid_ns is not time_ns:
+            own_ns = piece.time.values if piece.validity_ns is None else piece.validity_ns
+            valid_ns[rows] = clock.valid_ns(piece.index, piece.time, own_ns, time_ns[rows])
         timed = np.concatenate((before, piece.timed))
         backward += int(np.count_nonzero(timed[1:] < timed[:-1]))
         stray += int(np.isin(piece.index, clock.stray_index).sum()) if len(clock.stray_index) else 0
@@ -84,8 +91,9 @@ def _order_of(places: Places, pieces: Sequence[Kept], clock: ClockModel) -> _Ord
     lateness = 0
     if (time_ns[1:] < time_ns[:-1]).any():
         lateness = int((np.maximum.accumulate(time_ns) - time_ns).max())
-        time_ns.sort(kind="stable")
-    return _Order(time_ns, lateness, backward, stray)
+    if (valid_ns[1:] < valid_ns[:-1]).any():
+        valid_ns.sort(kind="stable")
+    return _Order(valid_ns, lateness, backward, stray)
 
 
 def survey(items: Iterable[Item], *, thresholds: Thresholds | None = None) -> Survey:
@@ -132,9 +140,11 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
     clock = replace(clock, relations=references.relations(clock))
     results = _ledgers(places, pieces, contents, clock, limits) if clock.has_times else []
     topics = tuple(ledger for ledger, _lateness in results)
+    remarks += doubtful_dates(header.reader, clock, topics, remarks)
     clock = replace(clock, lateness_ns={ledger.topic: lateness for ledger, lateness in results})
     dropouts, timeline = (contents.dropouts(clock), contents.timeline(clock)) if clock.has_times else ((), None)
-    ledger = LedgerCounts(topics, clock, tuple(damages), tuple(remarks), limits, dropouts, timeline, parts)
+    against = contents.contradictions(clock, header.metadata) if clock.has_times else ()
+    ledger = LedgerCounts(topics, clock, tuple(damages), tuple(remarks), limits, dropouts, timeline, against, parts)
     return Survey(header, clock, replace(ledger, damages=(*damages, *broken_off(ledger))))
 
 
@@ -151,7 +161,7 @@ def _ledgers(
         for topic in topics:
             ledger = topic_ledger(
                 topic,
-                order.time_ns,
+                order.valid_ns,
                 backward_steps=order.backward_steps,
                 stray_rows=order.stray_rows,
                 fields=contents.fields(topic, clock),
@@ -177,7 +187,8 @@ class Census:
         self.rows += len(batch)
         if not len(batch) or batch.time_ns is None:
             return
-        self._times.setdefault(batch.topic, []).append(np.array(batch.time_ns))
+        valid_ns = batch.time_ns if batch.validity_time_ns is None else batch.validity_time_ns
+        self._times.setdefault(batch.topic, []).append(np.array(valid_ns))
         self._contents.add(batch, batch.time_ns)
 
     def ledger(self, damages: Sequence[Damage] = ()) -> LedgerCounts:

@@ -25,6 +25,7 @@ _DECIMAL_DIGITS = 19  # before the point: what 64 bits can hold
 _DECIMAL = rf"^[+-]?\d{{1,{_DECIMAL_DIGITS}}}(?:\.\d*)?$"
 _EXPONENT = re.compile(r"[+-]?(?:\d{1,30}\.?\d{0,30}|\.\d{1,30})[eE][+-]?\d{1,2}")
 _INTEGER = r"^[+-]?\d{1,18}$"
+_TWO_SIGNS = r"^\+-"  # a Garmin G5 writes its plus in front of every number
 _NOT_TEXT = r"[\x00-\x08\x0a-\x1e\x7f\x{FFFD}]"
 
 
@@ -64,11 +65,13 @@ def numbers(text: Any) -> Cells:
 
     Examples
     --------
-    >>> read = numbers(pa.array(["1.5", None, "nan", "1.5x"]))
+    >>> read = numbers(pa.array(["1.5", None, "nan", "1.5x", "+-2"]))
     >>> read.column.values.tolist(), read.column.mask.tolist(), read.unreadable.tolist()
-    ([1.5, nan, nan, nan], [True, False, True, False], [False, False, False, True])
+    ([1.5, nan, nan, nan, -2.0], [True, False, True, False, True], [False, False, False, True, False])
     """
     array, unreadable = _cast(text, pa.float64(), _NUMBER)
+    if unreadable.any():
+        array, unreadable = _cast(_one_sign(text), pa.float64(), _NUMBER)
     return Cells(_column(array, float("nan")), unreadable)
 
 
@@ -79,7 +82,16 @@ def ready_numbers(array: Any) -> Cells:
 
 def are_numbers(text: Any) -> bool:
     """Whether every cell that is not empty is a number."""
-    return bool(pc.all(pc.match_substring_regex(text, _NUMBER), min_count=0).as_py())
+    if pc.all(pc.match_substring_regex(text, _NUMBER), min_count=0).as_py():
+        return True
+    if not pc.any(pc.starts_with(text, "+-")).as_py():
+        return False
+    return bool(pc.all(pc.match_substring_regex(_one_sign(text), _NUMBER), min_count=0).as_py())
+
+
+def _one_sign(text: Any) -> Any:
+    """Numbers such as ``+-2.5`` as ``-2.5``."""
+    return pc.replace_substring_regex(text, _TWO_SIGNS, "-")
 
 
 def flags(text: Any) -> Cells:

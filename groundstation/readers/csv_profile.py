@@ -4,49 +4,30 @@
 profile's raw topic.
 """
 
-from collections.abc import Container, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 from groundstation.base.errors import UnreadableLogError
-from groundstation.base.records import Item, LogHeader, Remark
+from groundstation.base.records import Damage, Item, LogHeader, Remark
 from groundstation.base.slips import slips
 from groundstation.base.source_units import PREFIX, units_entry
-from groundstation.readers.dialect import (
-    DELIMITERS,
-    Dialect,
-    Line,
-    detect_encoding,
-    head_lines,
-    normal_form,
-    split_cells,
-    trailing_cells,
-    uses_decimal_comma,
-)
-from groundstation.readers.layout import Derivation, Layout, Rule, TimeRule, rule_for
+from groundstation.readers.dialect import Dialect, Line, detect_encoding, head_lines
 from groundstation.readers.misnamed import misnamed
 from groundstation.readers.profile import Profile, load, shipped
+from groundstation.readers.profile_fit import Fit, delimiter_of, fit_at, fit_below
+from groundstation.readers.profile_layout import layout_of
+from groundstation.readers.sections import MOST, Section, header_places, left_out, mark_of, told
 from groundstation.readers.source import Claim, Source
 from groundstation.readers.start import unusable_references, utc_of_zero
 
 NAME = "csv-profile"
 DISTINCTIVE_COLUMNS = 4
+_HEAD_LINES = 1000
 DAMAGED_HEAD_LINES = 20  # in which a header row is looked for when the first line is not the profile's
 MOST_LINES = 10_000  # in which it is looked for elsewhere
 FEWEST_ROWS = 3  # above the header row that are those of another log
-
-
-@dataclass(frozen=True)
-class _Fit:
-    """A profile laid over the head of a file: lines down to the last one above the data, and the first rows."""
-
-    profile: Profile
-    encoding: str
-    delimiter: str
-    names: tuple[str, ...]
-    above: tuple[Line, ...]
-    first_rows: tuple[str, ...]
 
 
 @cache
@@ -57,28 +38,41 @@ def _shipped() -> tuple[Profile, ...]:
 def sniff(source: Source) -> Claim | None:
     """Claim a file whose first line and header row are those of a shipped profile.
 
-    Where the first line is damaged a header row with enough of the profile's columns will do.
+    Where the first line is damaged a header row with enough of the profile's columns will do. Of the profiles of a
+    family the one has the file whose header row stands first, or has the long names of that row below it.
     """
+    found = _best(source)
+    return None if found is None else Claim(NAME, found[1].profile.name, found[0])
+
+
+def _best(source: Source) -> tuple[float, Fit] | None:
+    """The shipped profile that fits a file, and how sure that is."""
     first = source.head[:4096].removeprefix(b"\xef\xbb\xbf").decode("utf-8", errors="replace").lstrip()
-    for profile in _shipped():
-        if not profile.first_line:
-            continue
-        if first.startswith(profile.first_line):
-            if _fit(source, profile) is not None:
-                return Claim(NAME, profile.name, 1.0)
-        elif (fit := _fit(source, profile, _limit(source, profile))) is not None and _is_distinctive(fit):
-            return Claim(NAME, profile.name, 0.9)
-    return None
+    profiles = [profile for profile in _shipped() if profile.first_lines]
+    is_one = any(first.startswith(profile.first_lines) for profile in profiles)
+    encoding = detect_encoding(source.head, source.name)
+    below = {profile.name for profile in profiles if _stands_below(source, profile)}
+    most = MOST_LINES if below else _HEAD_LINES if is_one else DAMAGED_HEAD_LINES
+    lines = head_lines(source, encoding, most)
+    found: list[tuple[float, Fit]] = []
+    for profile in profiles:
+        is_its_own = first.startswith(profile.first_lines)
+        is_near = not is_its_own and profile.name not in below
+        fit = _fit(profile, encoding, lines[:DAMAGED_HEAD_LINES] if is_near else lines)
+        count = 0 if fit is None else sum(rule.name in fit.position for rule in profile.columns)
+        if fit is not None and (is_its_own or count >= DISTINCTIVE_COLUMNS):
+            found.append((1.0 if is_its_own else 0.9, fit))
+            lines = lines[: fit.header.number + DAMAGED_HEAD_LINES]  # a relative has its header near by
+    best = max(found, key=lambda one: (one[0], -one[1].header.number), default=None)
+    for one in found:
+        if best is not None and one[1].header in best[1].behind and one[1].told_count > best[1].told_count:
+            return one
+    return best
 
 
-def _limit(source: Source, profile: Profile) -> int:
-    """In how many lines a header row is looked for: below the rows of another log it has its first line above it."""
-    return MOST_LINES if b"\n" + profile.first_line.encode() in source.head else DAMAGED_HEAD_LINES
-
-
-def _is_distinctive(fit: _Fit) -> bool:
-    """Whether a header row has enough of the columns that the profile names to be no other table's."""
-    return len({rule.name for rule in fit.profile.columns}.intersection(fit.names)) >= DISTINCTIVE_COLUMNS
+def _stands_below(source: Source, profile: Profile) -> bool:
+    """Whether the profile's first line stands below the rows of another log, of which the beginning is lost."""
+    return any(b"\n" + line.encode() in source.head for line in profile.first_lines)
 
 
 def claim_by(source: Source, profile: Path) -> Claim:
@@ -103,63 +97,46 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
     if profile is not None:
         fit = _fitted(source, load(profile))
     else:
-        claim = sniff(source)
-        if claim is None:
+        found = _best(source)
+        if found is None:
             raise UnreadableLogError(source.name, "no table of a known layout", "", "describe it by a profile")
-        fit = _fitted(source, next(known for known in _shipped() if known.name == claim.detail))
+        fit = found[1]
     metadata = _metadata(fit)
     utc_of_zero_ns, remarks = _utc_of_zero(fit, metadata)
-    layout, layout_remarks = _layout(fit)
     header = LogHeader(f"{NAME} {fit.profile.name}", metadata, utc_of_zero_ns)
-    last = fit.above[-1]
-    if not last.ended:
+    if not fit.last.ended:
         yield header
-        yield truncated_header(last.number)
+        yield truncated_header(fit.last.number)
         return
-    header_lines = frozenset(normal_form(line.text, fit.delimiter) for line in _of_the_header(fit)) - {""}
-    cells = len(fit.names) + trailing_cells(fit.first_rows, fit.delimiter, len(fit.names))
-    start = (0, 1) if _has_rows_above(fit, cells) else (last.next_byte, last.number + 1)
-    dialect = Dialect(fit.encoding, fit.delimiter, cells, *start, header_lines)
-    items = TableReader(source, dialect, layout).items(header)
+    sections, section_remarks = _sections(source, fit, utc_of_zero_ns)
+    above = _rows_of_another(fit)
+    items = TableReader(source, [*([Section(above, sections[0].layout)] if above else []), *sections]).items(header)
     yield next(items)
-    yield from remarks + layout_remarks + unusable_references(metadata)
-    yield from misnamed(items, _slips(fit), last.number - fit.profile.rows_after_header)
+    yield from dict.fromkeys([*remarks, *section_remarks, *unusable_references(metadata)])
+    yield from () if above else _above(fit)
+    yield from misnamed(items, _slips(fit), fit.header.number)
 
 
-def _of_the_header(fit: _Fit) -> tuple[Line, ...]:
-    """The header row, what belongs to it, and the lines of comments above it."""
-    rows = 1 + fit.profile.rows_after_header
-    first = fit.profile.first_line
-    is_below = first and any(line.text.lstrip().startswith(first) for line in fit.above[1:])
-    return (
-        *(line for line in fit.above[:-rows] if not is_below or line.text.lstrip().startswith("#")),
-        *fit.above[-rows:],
-    )
+def _rows_of_another(fit: Fit) -> Dialect | None:
+    """Form of the rows above the header, where they are those of another log with the same columns."""
+    is_begun = any(line.text.lstrip().startswith(fit.profile.first_lines) for line in fit.above)
+    if not fit.profile.first_lines or not is_begun or len(fit.rows_above) < FEWEST_ROWS:
+        return None
+    return replace(fit.dialect_to(None), first_byte=0, first_line=1, end_byte=fit.rows_above[-1].next_byte)
 
 
-def _has_rows_above(fit: _Fit, cells: int) -> bool:
-    """Whether rows of another log stand above the header; they have its columns."""
-    above = set(fit.above) - set(_of_the_header(fit))
-    return sum(len(split_cells(line.text, fit.delimiter)) == cells for line in above) >= FEWEST_ROWS
-
-
-def _fit(source: Source, profile: Profile, limit: int = MOST_LINES) -> _Fit | None:
+def _fit(profile: Profile, encoding: str, lines: Sequence[Line]) -> Fit | None:
     """Find the header row: the first one that has every column the profile asks for."""
-    encoding = detect_encoding(source.head, source.name)
-    lines = head_lines(source, encoding, limit)
-    wanted = {*profile.required, *profile.time.columns[:2]}
     for at, line in enumerate(lines):
-        for delimiter in DELIMITERS:
-            names = tuple(split_cells(line.text, delimiter))
-            if wanted.issubset(names):
-                start = at + 1 + profile.rows_after_header
-                above, below = tuple(lines[:start]), tuple(below.text for below in lines[start:])
-                return _Fit(profile, encoding, delimiter, names, above, below)
+        delimiter = delimiter_of(line.text, profile)
+        if delimiter:
+            return fit_at(profile, encoding, delimiter, lines, at)
     return None
 
 
-def _fitted(source: Source, profile: Profile) -> _Fit:
-    fit = _fit(source, profile)
+def _fitted(source: Source, profile: Profile) -> Fit:
+    encoding = detect_encoding(source.head, source.name)
+    fit = _fit(profile, encoding, head_lines(source, encoding, MOST_LINES))
     if fit is None:
         wanted = ", ".join(dict.fromkeys((*profile.required, *profile.time.columns[:2])))
         raise UnreadableLogError(
@@ -171,8 +148,53 @@ def _fitted(source: Source, profile: Profile) -> _Fit:
     return fit
 
 
-def _metadata(fit: _Fit) -> dict[str, str]:
-    text = "\n".join(line.text for line in _of_the_header(fit))
+def _above(fit: Fit) -> Iterator[Damage]:
+    """Rows that stand above the header: nothing names their columns."""
+    if fit.rows_above:
+        first, last = fit.rows_above[0].number, fit.rows_above[-1].number
+        place = f"row {first}" if first == last else f"rows {first} to {last}"
+        yield Damage("dropped_rows", place, len(fit.rows_above), "rows above the header that names their columns")
+
+
+def _sections(source: Source, first: Fit, utc_of_zero_ns: int | None) -> tuple[list[Section], list[Remark | Damage]]:
+    """Rows below each header that names other columns or another zero of time."""
+    fits, ends, shifts = [first], list[int](), [0]
+    remarks: list[Remark | Damage] = []
+    profile = first.profile
+    mark = mark_of(max((*profile.required, *profile.time.columns[:2]), key=len))
+    stands_again, last_byte, own_until = False, None, first.last.number
+    for place in header_places(
+        source, first.last, first.encoding, mark, lambda line: bool(delimiter_of(line, profile))
+    ):
+        if place.line.number <= own_until:
+            continue  # a header's own row of other names
+        stands_again = True
+        if fits[-1].is_repeated(place):
+            own_until = place.line.number + len(fits[-1].behind)
+            continue
+        found, end_byte = fit_below(source, fits[-1], place)
+        own_until = found.last.number
+        utc_ns, _remarks = _utc_of_zero(found, _metadata(found))
+        shift_ns = shifts[-1] if utc_ns is None or utc_of_zero_ns is None else utc_ns - utc_of_zero_ns
+        is_same = found.names_as(fits[-1])
+        if is_same and shift_ns == shifts[-1]:
+            continue
+        if len(fits) == MOST:
+            remarks.append(left_out(source, place.line.number, place.first_byte))
+            last_byte = place.first_byte
+            break
+        remarks.append(told(place, is_same))
+        fits, ends, shifts = [*fits, found], [*ends, end_byte], [*shifts, shift_ns]
+    sections = []
+    for fit, end, shift_ns in zip(fits, (*ends, last_byte), shifts, strict=True):
+        layout, more = layout_of(fit, source, utc_of_zero_ns, end)
+        sections.append(Section(fit.dialect_to(end, stands_again), layout, shift_ns))
+        remarks += more
+    return sections, remarks
+
+
+def _metadata(fit: Fit) -> dict[str, str]:
+    text = "\n".join(line.text for line in (*fit.above, fit.header, *fit.behind))
     found = dict(fit.profile.constants)
     for key, pattern in fit.profile.find.items():
         match = pattern.search(text)
@@ -181,77 +203,22 @@ def _metadata(fit: _Fit) -> dict[str, str]:
     for key, template in fit.profile.join.items():
         names = {name: found.get(name, "") for name in (*fit.profile.find, *fit.profile.constants)}
         found[key] = " ".join(template.format(**names).split())
-    units = units_entry(_units(fit))
+    units = units_entry(fit.units)
     return found | {PREFIX + fit.profile.raw_topic: units} if units else found
 
 
-def _units(fit: _Fit) -> dict[str, str]:
-    """Units by column: a comment above the header, or the first row left out below it, that has as many cells."""
-    header = len(fit.above) - 1 - fit.profile.rows_after_header
-    for line in (*(line for line in fit.above[:header] if line.text.startswith("#")), *fit.above[header + 1 :]):
-        cells = [cell.strip() for cell in split_cells(line.text.lstrip("# "), fit.delimiter)]
-        if len(cells) == len(fit.names):
-            return {name: cell for name, cell in zip(fit.names, cells, strict=True) if name and cell != "-"}
-    return {}
-
-
-def _utc_of_zero(fit: _Fit, metadata: dict[str, str]) -> tuple[int | None, list[Remark]]:
+def _utc_of_zero(fit: Fit, metadata: Mapping[str, str]) -> tuple[int | None, list[Remark]]:
     time = fit.profile.time
-    if time.kind == "iso":
+    if time.kind == "iso" or time.is_utc:
         return 0, []
     if time.kind == "local":
-        has_offset = len(time.columns) == 3 and time.columns[2] in fit.names
+        has_offset = len(time.columns) == 3 and time.columns[2] in fit.position
         assumed = Remark("assumed_utc", "date and time have no offset column: read as UTC")
         return 0, [] if has_offset else [assumed]
     return utc_of_zero(metadata)
 
 
-def _layout(fit: _Fit) -> tuple[Layout, list[Remark]]:
-    profile, names = fit.profile, fit.names
-    position = {name: at for at, name in reversed(list(enumerate(names))) if name}
-    time_names = tuple(name for name in profile.time.columns if name in position)
-    time = TimeRule(
-        profile.time.kind,  # type: ignore[arg-type]
-        tuple(position[name] for name in time_names),
-        (", ".join(time_names),),
-        *profile.time.unit,
-        date_formats=profile.time.date_formats,
-    )
-    rules = [
-        rule_for(position[rule.name], rule.topic, rule.field, rule.factor, rule.offset)
-        for rule in profile.columns
-        if rule.name in position
-    ]
-    missing = [rule.name for rule in profile.columns if rule.name not in position]
-    derivations = _derivations(profile, rules, position)
-    inputs = {given.column for rule in profile.derived for given in rule.inputs}
-    taken = {rule.column for rule in rules} | set(time.columns)
-    for at, name in enumerate(names):
-        if name and at not in taken:
-            label = name if position[name] == at else f"{name}_{at + 1}"
-            rules.append(Rule(at, profile.raw_topic, label, "double" if label in inputs else "raw"))
-    remarks = [
-        Remark("missing_columns", f"profile {profile.name} names columns that are not there: {', '.join(missing)}")
-    ]
-    layout = Layout(time, tuple(rules), derivations, uses_decimal_comma(fit.first_rows, fit.delimiter))
-    return layout, remarks if missing else []
-
-
-def _slips(fit: _Fit) -> dict[tuple[str, str], tuple[str, str]]:
+def _slips(fit: Fit) -> dict[tuple[str, str], tuple[str, str]]:
     """Columns that are almost ones of the profile, by raw topic and name: their name, and what was perhaps meant."""
     known = (*(rule.name for rule in fit.profile.columns), *(name for name in fit.profile.time.columns))
     return {(fit.profile.raw_topic, name): (name, meant) for name, meant in slips(fit.names, known).items()}
-
-
-def _derivations(profile: Profile, rules: list[Rule], columns: Container[str]) -> tuple[Derivation, ...]:
-    """Those of the profile's derivations whose inputs the file has."""
-    known = {rule.key for rule in rules}
-    found: list[Derivation] = []
-    for rule in profile.derived:
-        if all(given.column in columns if given.column else given.key in known for given in rule.inputs):
-            keys, factors = (
-                tuple(part) for part in zip(*((given.key, given.factor) for given in rule.inputs), strict=True)
-            )
-            found.append(Derivation(rule.method, rule.topic, rule.outputs, keys, factors))
-            known |= {(rule.topic, name) for name in rule.outputs}
-    return tuple(found)

@@ -39,6 +39,8 @@ class Dialect:
         Where the rows after the header begin.
     header_lines : frozenset of str
         Header lines as :func:`normal_form` gives them; repeats inside the file are skipped.
+    end_byte : int, optional
+        Where the rows end; None at the end of the file.
     """
 
     encoding: str
@@ -47,6 +49,7 @@ class Dialect:
     first_byte: int
     first_line: int
     header_lines: frozenset[str] = field(default_factory=frozenset)
+    end_byte: int | None = None
 
 
 def detect_encoding(head: bytes, name: str) -> str:

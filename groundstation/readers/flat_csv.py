@@ -5,8 +5,10 @@ without a canonical field go to ``raw.<topic>`` (``raw.csv`` when their name has
 the file is one, else as text.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -27,12 +29,24 @@ from groundstation.readers.dialect import (
 )
 from groundstation.readers.layout import Derivation, Layout, Rule, TimeRule, rule_for
 from groundstation.readers.misnamed import misnamed
+from groundstation.readers.sections import (
+    MOST,
+    Place,
+    Section,
+    ended,
+    header_places,
+    left_out,
+    lines_below,
+    told,
+    without_headers,
+)
 from groundstation.readers.source import Claim, Source
 from groundstation.readers.start import told_at_zero, unusable_references, utc_of_zero
 
 NAME = "flat-csv"
 PAGE = "docs/flat-csv.md has ten lines to copy"
 TIME_COLUMNS = {"time_ns": "nanoseconds", "time_s": "seconds", "time_utc": "iso"}  # the recorder's own clock first
+_MARK = re.compile(rb"time_(?:s|ns|utc)")
 _MOST_NS = 9e18  # 64 bits hold such differences
 FEWEST_ROWS = 3  # below a header row that does not stand on top
 
@@ -56,12 +70,29 @@ class _Top:
 
     @property
     def is_flat(self) -> bool:
-        """Whether there is a time column, and one of ``<topic>.<field>``."""
-        return any(name in TIME_COLUMNS for name in self.names) and any("." in name.strip(".") for name in self.names)
+        """Tell whether there is a time column, and one of ``<topic>.<field>``."""
+        return _are_flat(self.names)
+
+    @property
+    def time_kind(self) -> str:
+        """Time of a row, as it is written."""
+        return next(kind for name, kind in TIME_COLUMNS.items() if name in self.names)
+
+    @cached_property
+    def dialect(self) -> Dialect:
+        """Form of the rows below."""
+        return Dialect(
+            self.encoding,
+            self.delimiter,
+            len(self.names) + trailing_cells(self.first_rows, self.delimiter, len(self.names)),
+            self.header.next_byte,
+            self.header.number + 1,
+            frozenset({normal_form(self.header.text, self.delimiter)}),
+        )
 
     @property
     def has_rows(self) -> bool:
-        """Whether most of the lines below have as many cells as the header row."""
+        """Tell whether most of the lines below have as many cells as the header row."""
         sizes = [len(split_cells(row, self.delimiter)) for row in self.first_rows if row.strip()]
         sound = sizes.count(len(self.names))
         return sound >= FEWEST_ROWS and 2 * sound > len(sizes)
@@ -136,24 +167,79 @@ def read(source: Source) -> Iterator[Item]:
         yield from remarks
         yield truncated_header(top.header.number)
         return
-    header_lines = frozenset({normal_form(top.header.text, top.delimiter)})
-    trailing = trailing_cells(top.first_rows, top.delimiter, len(top.names))
-    dialect = Dialect(
-        top.encoding,
-        top.delimiter,
-        len(top.names) + trailing,
-        top.header.next_byte,
-        top.header.number + 1,
-        header_lines,
-    )
-    utc_of_zero_ns, clock_remarks = _utc_of_zero(source, dialect, layout, top.metadata, top.names)
-    items = TableReader(source, dialect, layout).items(LogHeader(NAME, top.metadata, utc_of_zero_ns))
+    utc_of_zero_ns, clock_remarks = _utc_of_zero(source, top.dialect, layout, top.metadata, top.names)
+    sections, section_remarks = _sections(source, top, layout, utc_of_zero_ns)
+    items = TableReader(source, sections).items(LogHeader(NAME, top.metadata, utc_of_zero_ns))
     yield next(items)
-    yield from remarks + clock_remarks
+    yield from dict.fromkeys([*remarks, *clock_remarks, *section_remarks])
     if top.strange_lines:
         what = "lines above the header row that are no metadata"
         yield Damage("corrupt", f"rows 1 to {top.header.number - 1}", top.strange_lines, what)
     yield from misnamed(items, _slips(top), top.header.number)
+
+
+def _sections(
+    source: Source, top: _Top, layout: Layout, utc_of_zero_ns: int | None
+) -> tuple[list[Section], list[Remark | Damage]]:
+    """Rows below each header that names other columns or another zero of time."""
+    sections, remarks = [Section(top.dialect, layout)], list[Remark | Damage]()
+    last, last_utc_ns, stands_again = top, utc_of_zero_ns, False
+    for place in header_places(source, top.header, top.encoding, _MARK, _is_header):
+        stands_again = True
+        above, first_byte = _belonging(place)
+        metadata = dict(_entries(above))
+        delimiter = detect_delimiter(place.line.text)
+        names = tuple(split_cells(place.line.text, delimiter))
+        is_same = (names, delimiter) == (last.names, last.delimiter)
+        if is_same and utc_of_zero(metadata)[0] in (None, last_utc_ns):
+            continue
+        if len(sections) == MOST:
+            sections[-1] = ended(sections[-1], first_byte)
+            return sections, [*remarks, left_out(source, place.line.number, place.first_byte)]
+        below = tuple(line.text for line in lines_below(source, place.line, top.encoding))
+        found = _Top(top.encoding, metadata, place.line, names, delimiter, below, 0)
+        found_layout, more = _layout(found)
+        utc_ns, clock_remarks = _utc_of_zero(source, found.dialect, found_layout, metadata, names)
+        shift_ns = _shift_ns(utc_of_zero_ns, utc_ns, found, last, sections[-1].shift_ns)
+        sections[-1] = ended(sections[-1], first_byte)
+        sections.append(Section(found.dialect, found_layout, shift_ns))
+        remarks += [told(place, is_same, shift_ns), *more, *_mistakes(found), *clock_remarks]
+        last, last_utc_ns = found, last_utc_ns if utc_ns is None else utc_ns
+    return sections if stands_again else [without_headers(sections[0])], remarks
+
+
+def _shift_ns(zero_ns: int | None, utc_ns: int | None, found: _Top, last: _Top, shift_ns: int | None) -> int | None:
+    """From the times below a header to those of the log; None where nothing tells it."""
+    is_continued = (found.time_kind == "iso") == (last.time_kind == "iso")
+    if utc_ns is not None and zero_ns is not None:
+        return utc_ns - zero_ns
+    return shift_ns if is_continued else None
+
+
+def _is_header(line: str) -> bool:
+    """Tell whether a line in the middle of the file names a time column, and one of ``<topic>.<field>``."""
+    return _are_flat(split_cells(line, detect_delimiter(line)))
+
+
+def _are_flat(names: Sequence[str]) -> bool:
+    return any(name in TIME_COLUMNS for name in names) and any("." in name.strip(".") for name in names)
+
+
+def _belonging(place: Place) -> tuple[tuple[Line, ...], int]:
+    """Lines of metadata right above a header, and the byte where they begin."""
+    count = 0
+    for line in reversed(place.above):
+        if line.text.strip() and not line.text.startswith("#"):
+            break
+        count += 1
+    return place.above[len(place.above) - count :], place.above_from[-count] if count else place.first_byte
+
+
+def _entries(lines: Sequence[Line]) -> Iterator[tuple[str, str]]:
+    for line in lines:
+        key, colon, value = line.text.lstrip("#").partition(":")
+        if colon and key.strip():
+            yield key.strip(), value.strip()
 
 
 def _utc_of_zero(
@@ -178,10 +264,11 @@ def _utc_from_rows(source: Source, dialect: Dialect, layout: Layout, column: int
     both = (device.mask & utc.mask & fits).nonzero()[0]
     if not len(both):
         return None, []
-    zero_ns, zeros = told_at_zero(utc.values[both], device.values[both])
-    remarks = [Remark("derived", f"UTC of the recorder's zero from time_utc: median over its first {len(zeros)} times")]
+    zero = told_at_zero(utc.values[both], device.values[both])
+    text = f"UTC of the recorder's zero from time_utc: median over its first {len(zero.zeros_ns)} times"
+    remarks = [Remark("derived", text), *zero.remarks("time_utc")]
     remarks += [Remark("assumed_utc", "time_utc names no zone: read as UTC")] if zoneless else []
-    return zero_ns, remarks
+    return zero.ns, remarks
 
 
 def _layout(top: _Top) -> tuple[Layout, list[Remark]]:
@@ -209,7 +296,7 @@ def _rule(column: int, name: str) -> Rule:
     topic, _, field = name.rpartition(".")
     known = field_of(topic, field)
     if known is not None:
-        return rule_for(column, topic, known)
+        return rule_for(column, topic, known, raw=(f"{RAW_PREFIX}{topic}", field))
     raw_topic = topic if topic.startswith(RAW_PREFIX) else f"{RAW_PREFIX}{topic or 'csv'}"
     return Rule(column, raw_topic, field, "raw")
 

@@ -34,6 +34,8 @@ class Rule:
         To the unit of the canonical field.
     is_heading : bool
         Values are brought into [0, 360).
+    raw : (topic, field), optional
+        Where the number in the cell is kept when it is no value of the field.
     """
 
     column: int
@@ -43,6 +45,7 @@ class Rule:
     factor: float = 1.0
     offset: float = 0.0
     is_heading: bool = False
+    raw: Key | None = None
 
     @property
     def key(self) -> Key:
@@ -57,7 +60,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class TimeRule:
-    """How the time of a row is written.
+    """Time of a row, as it is written.
 
     Parameters
     ----------
@@ -94,13 +97,17 @@ class Method:
 
 @dataclass(frozen=True)
 class Derivation:
-    """Fields of a topic that the reader computes row by row from other fields times ``factors`` (1 where empty)."""
+    """Fields of a topic that the reader computes row by row from other fields times ``factors`` (1 where empty).
+
+    A zero of an input that is named in ``not_zero`` is no value.
+    """
 
     method: str
     topic: str
     outputs: tuple[str, ...]
     inputs: tuple[Key, ...]
     factors: tuple[float, ...] = ()
+    not_zero: tuple[Key, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -133,8 +140,9 @@ def velocity_from_track(track_deg: FloatArray, speed_mps: FloatArray) -> tuple[F
     >>> [round(float(part[0]), 9) for part in velocity_from_track(np.array([90.0]), np.array([50.0]))]
     [0.0, 50.0]
     """
-    track_rad = np.deg2rad(track_deg)
-    return speed_mps * np.cos(track_rad), speed_mps * np.sin(track_rad)
+    with np.errstate(invalid="ignore", over="ignore"):  # of an infinite direction or speed: NaN
+        track_rad = np.deg2rad(track_deg)
+        return speed_mps * np.cos(track_rad), speed_mps * np.sin(track_rad)
 
 
 def wind_from_direction(from_deg: FloatArray, speed_mps: FloatArray) -> tuple[FloatArray, ...]:
@@ -195,20 +203,29 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 )
 
 
-def rule_for(column: int, topic: str, known: Field, factor: float = 1.0, offset: float = 0.0) -> Rule:
+def rule_for(
+    column: int, topic: str, known: Field, factor: float = 1.0, offset: float = 0.0, raw: Key | None = None
+) -> Rule:
     """Rule that feeds a canonical field from a column."""
-    return Rule(column, topic, known.name, known.kind, factor, offset, known.is_heading)
+    return Rule(column, topic, known.name, known.kind, factor, offset, known.is_heading, raw)
 
 
 def apply(derivation: Derivation, known: Mapping[Key, Column]) -> dict[Key, Column]:
-    """Columns that a derivation gives: present where all its inputs are."""
+    """Columns that a derivation gives and the file has not: present where all its inputs are.
+
+    A column of the file is not filled from others where it is empty: a Garmin G5 without a fix writes no velocity
+    beside a speed of 150 kt.
+    """
     inputs = [known[key] for key in derivation.inputs]
-    present = np.logical_and.reduce([column.mask for column in inputs])
+    masks = [column.mask for column in inputs]
+    masks += [known[key].values != 0.0 for key in derivation.not_zero]
+    present = np.logical_and.reduce(masks)
     factors = derivation.factors or (1.0,) * len(inputs)
     with np.errstate(over="ignore", invalid="ignore"):  # of absurd numbers: becomes infinite or NaN
         values = [np.where(present, one.values * factor, np.nan) for one, factor in zip(inputs, factors, strict=True)]
         results = METHODS[derivation.method].function(*values)
-    return {
+    found = {
         (derivation.topic, name): Column(np.asarray(result), present)
         for name, result in zip(derivation.outputs, results, strict=True)
     }
+    return {key: column for key, column in found.items() if key not in known}

@@ -30,6 +30,17 @@ def recognise(source: Source) -> str | None:
     return next((name for magic, name in _AT_START if source.head.startswith(magic)), None)
 
 
+def companion(source: Source) -> str | None:
+    """Name a file that belongs to a log and is none itself; None for any other.
+
+    RTKLIB writes beside a log it records when which of its bytes came: ``TIMETAG RTKLIB`` and its version, 60 bytes.
+    """
+    if not source.head.startswith(b"TIMETAG RTKLIB"):
+        return None
+    name = source.name.removesuffix(".tag")
+    return f"an RTKLIB time tag of {name if name != source.name else 'a log'}, no log"
+
+
 def is_mostly_text(source: Source) -> bool:
     """Whether most of the head is lines without a control character, whatever its first bytes are; by samples."""
     step = max(_SAMPLE_BYTES, len(source.head) // _SAMPLES)

@@ -22,6 +22,7 @@ from groundstation.base.records import BoolArray, Column, Item, LogHeader, Recor
 from groundstation.readers.dialect import Dialect, Line, head_lines, split_cells
 from groundstation.readers.layout import Layout, Rule, TimeRule
 from groundstation.readers.losses import Losses
+from groundstation.readers.sections import Section
 from groundstation.readers.source import Claim, Source
 
 NAME = "miluv"
@@ -69,7 +70,7 @@ def read(source: Source) -> Iterator[Item]:
     )
     time = TimeRule("seconds", (names.index(TIME),), (TIME,))
     dialect = Dialect("utf-8", ",", len(names), line.next_byte, 2)
-    items = TableReader(source, dialect, Layout(time, rules)).items(header)
+    items = TableReader(source, [Section(dialect, Layout(time, rules))]).items(header)
     yield next(items)
     yield Remark("no_truth_range", "gt_range and bias are kept raw: the true range is that of the poses")
     losses = Losses()
@@ -88,7 +89,8 @@ def _parted(batch: RecordBatch, vehicles: list[str], losses: Losses) -> Iterator
     ids = [np.where(end.mask, end.values, -1.0) for end in ends]
     good = np.logical_and.reduce([(one >= 0.0) & (one <= MOST_ID) & (one == np.round(one)) for one in ids])
     losses.add("unreadable_cells", "rows without two tags", batch.record_index[~good], where=", ".join(ENDS))
-    key = np.where(good, ids[0] * (MOST_ID + 1) + ids[1], -1.0)
+    one_id, other_id = (np.where(good, one, 0.0) for one in ids)
+    key = np.where(good, one_id * (MOST_ID + 1) + other_id, -1.0)
     for number in np.unique(key[good & distance.mask]).astype(int).tolist():
         one, two = divmod(number, MOST_ID + 1)
         rows = np.flatnonzero((key == number) & distance.mask)
@@ -109,7 +111,8 @@ def _of(batch: RecordBatch, rows: NDArray[np.intp], topic: str, columns: Mapping
 def _pose(place: Column | None, turn: Column | None, n: int) -> tuple[dict[str, Column], BoolArray]:
     """Position and attitude of a vehicle in north-east-down, and where they can be read."""
     position, quaternion = _vectors(place, 3, n), _vectors(turn, 4, n)
-    norm = np.linalg.norm(quaternion, axis=1)
+    with np.errstate(invalid="ignore", over="ignore"):
+        norm = np.linalg.norm(quaternion, axis=1)
     present: BoolArray = np.isfinite(position).all(axis=1) & (np.abs(norm - 1.0) < 0.1)
     with np.errstate(invalid="ignore", divide="ignore"):
         x, y, z, w = (quaternion / norm[:, None]).T

@@ -7,7 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Int64Array, RecordBatch, frozen
+from groundstation.base.records import (
+    MAX_BATCH_ROWS,
+    BoolArray,
+    Column,
+    Int64Array,
+    RecordBatch,
+    frozen,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,3 +94,35 @@ def bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
     """The batch in pieces of at most ``MAX_BATCH_ROWS`` rows."""
     for start in range(0, len(batch), MAX_BATCH_ROWS):
         yield batch if len(batch) <= MAX_BATCH_ROWS else batch.take(slice(start, start + MAX_BATCH_ROWS))
+
+
+def one_row_each(batch: RecordBatch) -> RecordBatch:
+    """Records that are valid at the same time as one row: what a unit says of one instant.
+
+    Those of an instant at which two have the same field stay as they are.
+    """
+    stamps = batch.validity_time_ns
+    if stamps is None:
+        return batch
+    instants, first, place = np.unique(stamps, return_index=True, return_inverse=True)
+    if len(first) == len(batch):
+        return batch
+    masks = {id(column.present): column.mask for column in batch.columns.values()}
+    is_twice = np.zeros(len(instants), dtype=bool)
+    for mask in masks.values():
+        is_twice |= np.bincount(place[mask], minlength=len(instants)) > 1
+    if is_twice.any():
+        own = np.flatnonzero(is_twice[place])
+        place[own] = len(instants) + np.arange(len(own))
+        _places, first, place = np.unique(place, return_index=True, return_inverse=True)
+        if len(first) == len(batch):
+            return batch
+    columns = {}
+    for name, column in batch.columns.items():
+        values, present = np.zeros(len(first), dtype=column.values.dtype), np.zeros(len(first), dtype=bool)
+        mask = masks[id(column.present)]
+        at = place[mask]
+        values[at], present[at] = column.values[mask], True
+        columns[name] = Column(values, None if present.all() else present)
+    index, time = batch.record_index[first], batch.device_time_ns.take(first)
+    return RecordBatch(batch.topic, index, time, columns, validity_time_ns=stamps[first]).take(np.argsort(index))

@@ -7,7 +7,7 @@ docs/profiles.md describes every key.
 import re
 import string
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NoReturn
@@ -17,24 +17,33 @@ from groundstation.base.signals import RAW_PREFIX, Field, field_of, is_canonical
 from groundstation.base.toml_text import toml_table, toml_text
 from groundstation.base.units import CONVERSIONS
 from groundstation.readers.layout import METHODS, Key
+from groundstation.readers.told import HPA_PER_INHG
 
 SHIPPED = Path(__file__).parent / "profiles"
 # Unit of time -> (digits, multiple): it is 10**digits x multiple nanoseconds.
 TIME_UNITS: Mapping[str, tuple[int, int]] = MappingProxyType(
     {"ns": (0, 1), "us": (3, 1), "ms": (6, 1), "s": (9, 1), "min": (9, 60), "h": (9, 3600)}
 )
+DIRECTIONS = ("track_deg", "true_heading_deg")  # of which a profile may say from which north they count
 _DATE_DIRECTIVES = frozenset("YymdbBj")
 
 
 @dataclass(frozen=True)
 class ColumnRule:
-    """One column: the field it feeds, and ``number x factor + offset`` in the field's unit."""
+    """One column: the field it feeds, and ``number x factor + offset`` in the field's unit.
+
+    ``north`` is that of a direction where the file says nothing else; ``unit_factor`` is the unit's part of the factor.
+    A column that is optional is not missed.
+    """
 
     name: str
     topic: str
     field: Field
     factor: float = 1.0
     offset: float = 0.0
+    unit_factor: float = 1.0
+    north: str = ""
+    is_optional: bool = False
 
 
 @dataclass(frozen=True)
@@ -58,26 +67,45 @@ class DerivedRule:
 
 @dataclass(frozen=True)
 class TimeColumns:
-    """Time of a row: kind as in :class:`groundstation.readers.layout.TimeRule`, its columns, its unit."""
+    """Time of a row: kind as in :class:`groundstation.readers.layout.TimeRule`, its columns, its unit.
+
+    ``is_utc``: date and time of kind ``local`` are UTC.
+    """
 
     kind: str
     columns: tuple[str, ...]
     unit: tuple[int, int] = TIME_UNITS["s"]
     date_formats: tuple[str, ...] = ()
+    is_utc: bool = False
+
+
+@dataclass(frozen=True)
+class Variation:
+    """The column of the magnetic variation, and the factor that makes it degrees, east positive."""
+
+    column: str
+    factor: float
 
 
 @dataclass(frozen=True)
 class Profile:
-    """A layout by column names, ready to be laid over a header row."""
+    """A layout by column names, ready to be laid over a header row.
+
+    ``header_tells``: the file's own names and rows of units settle unit, north and height where they say something, and
+    a column may have its unit in parentheses behind its name. ``has_second_names``: a row of other names may follow.
+    """
 
     name: str
     path: Path
     description: str
     raw_topic: str
-    first_line: str
+    first_lines: tuple[str, ...]
     required: tuple[str, ...]
     rows_after_header: int
+    header_tells: bool
+    has_second_names: bool
     time: TimeColumns
+    variation: Variation | None = None
     columns: tuple[ColumnRule, ...] = ()
     derived: tuple[DerivedRule, ...] = ()
     constants: Mapping[str, str] = field(default_factory=dict)
@@ -170,24 +198,27 @@ class Checker:
         if known.kind != "double":
             self.table(table, key, ("field",))
             return ColumnRule(name, topic, known)
-        factor = self.unit(table.get("unit", ""), f"{key}.unit", known.unit)
+        unit_factor = self.unit(table.get("unit", ""), f"{key}.unit", known.unit)
         scale = self.number(table.get("scale", 1.0), f"{key}.scale")
         sign = self.number(table.get("sign", 1), f"{key}.sign")
         if sign not in (1.0, -1.0) or scale == 0.0:
             self.fail(f"{key}.sign" if scale else f"{key}.scale", f"{sign:g}" if scale else "0", "1 or -1, scale not 0")
         offset = self.number(table.get("offset", 0.0), f"{key}.offset")
-        return ColumnRule(name, topic, known, scale * sign * factor, offset * factor)
+        return ColumnRule(name, topic, known, scale * sign * unit_factor, offset * unit_factor, unit_factor)
 
 
 class _Checker(Checker):
     """Turns the TOML tables into the rules of a table's columns."""
 
     def profile(self, table: dict[str, Any]) -> Profile:
-        allowed = ("name", "description", "raw_topic", "recognise", "time", "metadata", "columns", "derived")
+        allowed = (
+            *("name", "description", "raw_topic", "recognise", "time", "metadata", "variation", "columns", "derived"),
+        )
         table = self.table(table, "", allowed, ("name", "time", "columns"))
         name = self.text(table["name"], "name")
         raw_topic = RAW_PREFIX + self.text(table.get("raw_topic", name), "raw_topic").removeprefix(RAW_PREFIX)
-        recognise = self.table(table.get("recognise", {}), "recognise", ("first_line", "columns", "rows_after_header"))
+        keys = ("first_line", "columns", "rows_after_header", "header_tells", "second_names")
+        recognise = self.table(table.get("recognise", {}), "recognise", keys)
         time = self.time(table["time"])
         columns = self.columns(table["columns"])
         metadata = self.table(table.get("metadata", {}), "metadata", ("find", "join", "set"))
@@ -205,18 +236,38 @@ class _Checker(Checker):
             path=self._path,
             description=str(table.get("description", "")),
             raw_topic=raw_topic,
-            first_line=str(recognise.get("first_line", "")),
+            first_lines=self.first_lines(recognise.get("first_line", [])),
             required=self.texts(recognise["columns"], "recognise.columns")
             if "columns" in recognise
             else time.columns[:1],
             rows_after_header=int(rows_after),
+            header_tells=self.flag(recognise.get("header_tells", False), "recognise.header_tells"),
+            has_second_names=self.flag(recognise.get("second_names", False), "recognise.second_names"),
             time=time,
+            variation=self.variation(table["variation"]) if "variation" in table else None,
             columns=columns,
             derived=self.derivations(table.get("derived", []), columns, raw_topic),
             constants=constants,
             find=find,
             join={key: self.template(value, key, known) for key, value in join.items()},
         )
+
+    def first_lines(self, value: Any) -> tuple[str, ...]:
+        texts = value if isinstance(value, list) else [value]
+        return tuple(self.text(text, "recognise.first_line") for text in texts)
+
+    def flag(self, value: Any, key: str) -> bool:
+        if not isinstance(value, bool):
+            self.fail(key, repr(value), "true or false")
+        return value
+
+    def variation(self, value: Any) -> Variation:
+        table = self.table(value, "variation", ("column", "unit", "sign"), ("column",))
+        sign = self.number(table.get("sign", 1), "variation.sign")
+        if sign not in (1.0, -1.0):
+            self.fail("variation.sign", f"{sign:g}", "1 (east positive) or -1")
+        factor = self.unit(table.get("unit", "deg"), "variation.unit", "deg")
+        return Variation(self.text(table["column"], "variation.column"), sign * factor)
 
     def pattern(self, value: Any, key: str) -> re.Pattern[str]:
         try:
@@ -255,37 +306,52 @@ class _Checker(Checker):
 
     def local_time(self, table: dict[str, Any]) -> TimeColumns:
         self.table(table, "time", ("kind", "date", "time", "offset", "date_formats"), ("date", "time"))
-        names = [self.text(table[key], f"time.{key}") for key in ("date", "time", "offset") if key in table]
+        is_utc = table.get("offset") == "UTC"
+        keys = [key for key in ("date", "time", "offset") if key in table and not (key == "offset" and is_utc)]
+        names = [self.text(table[key], f"time.{key}") for key in keys]
         formats = self.texts(table.get("date_formats", ["%Y-%m-%d"]), "time.date_formats")
         for form in formats:
             used = set(re.findall(r"%(.)", form))
             if not used or not used <= _DATE_DIRECTIVES:
                 self.fail("time.date_formats", repr(form), "a date such as %Y-%m-%d")
-        return TimeColumns("local", tuple(names), date_formats=formats)
+        return TimeColumns("local", tuple(names), date_formats=formats, is_utc=is_utc)
 
     def columns(self, value: Any) -> tuple[ColumnRule, ...]:
         rules: dict[str, ColumnRule] = {}
         for name, entry in self.table(value, "columns", ()).items():
             key = f"columns.{name}"
-            table = self.table(entry, key, ("field", "unit", "scale", "sign", "offset"), ("field",))
+            allowed = ("field", "unit", "scale", "sign", "offset", "north", "optional")
+            table = dict(self.table(entry, key, allowed, ("field",)))
+            north = self.north(table.pop("north", ""), f"{key}.north")
+            is_optional = self.flag(table.pop("optional", False), f"{key}.optional")
             topic, known = self.canonical(table["field"], f"{key}.field")
+            if north and known.name not in DIRECTIONS:
+                self.fail(f"{key}.north", known.name, f"one of {', '.join(DIRECTIONS)}")
             target = f"{topic}.{known.name}"
             if target in rules:
                 self.fail(f"{key}.field", target, f"a field that {rules[target].name!r} does not feed already")
-            rules[target] = self.column(name, key, topic, known, table)
+            rule = self.column(name, key, topic, known, table)
+            rules[target] = replace(rule, north=north, is_optional=is_optional)
         return tuple(rules.values())
+
+    def north(self, value: Any, key: str) -> str:
+        if value not in ("", "true", "magnetic"):
+            self.fail(key, repr(value), "true or magnetic")
+        return str(value)
 
     def derivations(self, value: Any, columns: tuple[ColumnRule, ...], raw_topic: str) -> tuple[DerivedRule, ...]:
         if not isinstance(value, list):
             self.fail("derived", repr(value), "a list of tables ([[derived]])")
         known = {(rule.topic, rule.field.name) for rule in columns}
+        optional = {(rule.topic, rule.field.name) for rule in columns if rule.is_optional}
         rules: list[DerivedRule] = []
         for number, entry in enumerate(value):
             rule = self.derivation(entry, f"derived[{number}]", known, raw_topic)
             outputs = {(rule.topic, name) for name in rule.outputs}
-            if outputs & known:
+            if outputs & (known - optional):
                 self.fail(f"derived[{number}]", f"{rule.topic}.{rule.outputs[0]}", "a field that nothing feeds already")
             known |= outputs
+            optional -= outputs
             rules.append(rule)
         return tuple(rules)
 
@@ -318,7 +384,7 @@ class _Checker(Checker):
         table = self.table(value, key, ("column", "unit"), ("column", "unit"))
         column = self.text(table["column"], f"{key}.column")
         if unit == "inhg":  # the one input that is in no canonical unit
-            factors = {"inhg": 1.0, "hpa": 1.0 / 33.8638866667}
+            factors = {"inhg": 1.0, "hpa": 1.0 / HPA_PER_INHG}
             if not isinstance(table["unit"], str) or table["unit"] not in factors:
                 self.fail(f"{key}.unit", repr(table["unit"]), "inhg or hpa")
             return InputRule((raw_topic, column), factors[table["unit"]], column)

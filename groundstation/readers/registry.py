@@ -30,7 +30,7 @@ from groundstation.readers import (
     ulog,
     utias,
 )
-from groundstation.readers.compressed import COMPRESSIONS
+from groundstation.readers.compressed import COMPRESSIONS, compression_of
 from groundstation.readers.source import Claim, Reader, Source
 
 if TYPE_CHECKING:
@@ -165,11 +165,38 @@ def _guarded(reader: Reader, claim: Claim, source: Source) -> Iterator[Item]:
 
 
 def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]]:
-    if source.is_empty:
-        raise UnclaimedLogError(source.name, "an empty file", "a recorded log", "check how it was copied")
+    if source.is_empty or magic.companion(source) is not None:
+        raise _unclaimed(source, [], [])
     if profile is not None:
         by_profile = bags if bags.sniff(source) else csv_profile
         return by_profile.claim_by(source, profile), plug_in_failures()
+    claims, refusals, troubles = _claims(source)
+    if claims:
+        return _best(claims, source), tuple(troubles)
+    raise _unclaimed(source, refusals, troubles)
+
+
+def unclaimed(path: Path) -> UnclaimedLogError | None:
+    """Why no reader claims a file, found by its first bytes alone, or None where those do not show it.
+
+    Nothing is decompressed, and no plug-in is asked: where there is one, only :func:`identify` tells.
+    """
+    source = Source(path)
+    try:
+        with path.open("rb") as stream:
+            is_packed = bool(compression_of(stream.read(4)))
+        if is_packed or _plug_ins()[0]:
+            return None
+        is_none = source.is_empty or magic.companion(source) is not None
+        claims, refusals, troubles = ([], [], []) if is_none else _claims(source)
+        error = None if claims else _unclaimed(source, refusals, troubles)
+    except OSError:
+        return None
+    return error if isinstance(error, UnclaimedLogError) else None
+
+
+def _claims(source: Source) -> tuple[list[Claim], list[GroundstationError], list[str]]:
+    """Who claims a file, who refuses it, and troubles with plug-ins."""
     claims: list[Claim] = []
     refusals: list[GroundstationError] = []
     troubles = list(plug_in_failures())
@@ -186,9 +213,7 @@ def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]
             troubles.append(_one_line(f"reader plug-in {name!r} failed to look at the file: {_named(error)}"))
         else:
             claims += [claim] if claim is not None else []
-    if claims:
-        return _best(claims, source), tuple(troubles)
-    raise _unclaimed(source, refusals, troubles)
+    return claims, refusals, troubles
 
 
 def _are_sure(claims: list[Claim], source: Source) -> bool:
@@ -229,6 +254,11 @@ def _own(claim: Any, name: str) -> Claim | None:
 
 
 def _unclaimed(source: Source, refusals: list[GroundstationError], troubles: list[str]) -> GroundstationError:
+    if source.is_empty:
+        return UnclaimedLogError(source.name, "an empty file", "a recorded log", "check how it was copied")
+    companion = magic.companion(source)
+    if companion is not None:
+        return UnclaimedLogError(source.name, companion, "", "give the log itself")
     known = magic.recognise(source)
     if known in COMPRESSIONS and not source.compression:
         return UnclaimedLogError(source.name, f"{known} data that cannot be decompressed")

@@ -47,6 +47,7 @@ class RowScanner:
     def __init__(self, source: Source, dialect: Dialect, losses: Losses) -> None:
         self._source, self._dialect, self._losses = source, dialect, losses
         self._next_line = dialect.first_line
+        self._left = None if dialect.end_byte is None else dialect.end_byte - dialect.first_byte
         self._newline = b"\n" if b"\n" in source.head or b"\r" not in source.head else b"\r"
         self.ends_without_newline = False
         self.skipped: dict[int, str] = {}  # header and comment lines inside the file, by their numbers
@@ -61,10 +62,13 @@ class RowScanner:
 
     def _read(self, stream: BinaryIO) -> bytes:
         try:
-            return stream.read(BLOCK_BYTES)
+            data = stream.read(BLOCK_BYTES if self._left is None else min(BLOCK_BYTES, self._left))
         except OSError as error:  # a failing disk or network share
             where = f"{self._source.name}, row {self._next_line}"
             raise UnreadableLogError(where, f"no more data ({error.strerror})", "", "copy the file again") from error
+        if self._left is not None:
+            self._left -= len(data)
+        return data
 
     def _pieces(self, stream: BinaryIO) -> Iterator[tuple[bytes, bool]]:
         """Pieces of whole lines; the last line of a file that ends without a line feed comes alone, marked as cut."""
@@ -93,6 +97,7 @@ class RowScanner:
             end = data.find(self._newline)
             if end >= 0:
                 stream.seek(end + 1 - len(data), 1)
+                self._left = None if self._left is None else self._left + len(data) - end - 1
                 break
         return b""
 

@@ -1,26 +1,34 @@
 """RTKLIB solutions (.pos): position and velocity of a receiver with their covariances, every column kept.
 
 The line of names says which form it is: latitude and longitude (degrees, or degrees, minutes and seconds), ECEF, or a
-baseline east, north, up from the base station; in GPS time, UTC or Japan's, as date and time or as week and second.
+baseline east, north, up from the base station; in GPS time, UTC or Japan's, as date and time or as week and second. A
+further header in the middle of the file governs the rows below it.
 
 Source: Takasu, RTKLIB ver. 2.4.2 manual (2013), appendix B.1.
 """
 
 import io
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.ecef import ecef_from_n, ecef_m, geodetic_deg_m
+from groundstation.base.errors import UnreadableLogError
+from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import Column, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.timescales import gps_to_utc_ns, gps_week_to_utc_ns
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.dialect import Dialect, Line, head_lines
+from groundstation.readers.dialect import Dialect
 from groundstation.readers.layout import Layout, Rule, TimeRule
+from groundstation.readers.losses import Losses
+from groundstation.readers.places import placed
+from groundstation.readers.rtklib_header import Form, Governed, form_of, forms_of
+from groundstation.readers.sections import Section
 from groundstation.readers.source import Claim, Source
 
 if TYPE_CHECKING:
@@ -28,111 +36,72 @@ if TYPE_CHECKING:
 
 NAME = "rtklib-pos"
 RAW = "raw.pos"
-_NAMES = re.compile(r"%\s*(GPST|UTC|JST)\b.*\b(latitude|x-ecef|e-baseline)\b.*\bQ\b\s*[,;]?\s*\bns\b")
 _PARTING = re.compile(rb"[ \t]+(?:[,;][ \t]*)?|[,;][ \t]*")
+_TOUCHING = re.compile(rb"(?<=[0-9.])(?=[-+][0-9.])")
 _OF_NO_ROW = re.compile(rb"(?m)^\t?%[^\n]*|^\t|\t?\r?$")  # of lines whose cells are parted by tabs
-_REFERENCE = re.compile(r"ref pos\s*:\s*(-?[\d.]+)\s+(-?[\d.]+)\s+(-?[\d.]+)")
+_PLUS, _MINUS, _POINT, _DIGITS_FROM, _DIGITS_TO = b"+-.09"
 _FIXES = np.array(["none", "rtk_fixed", "rtk_float", "dgnss", "dgnss", "3d", "ppp", "dead_reckoning"])
 _JST_NS = 9 * 3_600 * NS_PER_S
 _PIECE_BYTES, _LONGEST_LINE = 1 << 20, 1 << 16
-_MS = 1_000
-
-
-@dataclass(frozen=True)
-class _Form:
-    """What the lines above the data say.
-
-    ``names`` are those of the cells, date and time (or week and second) first.
-    """
-
-    names: tuple[str, ...]
-    scale: str
-    has_week: bool
-    heights: str
-    reference: tuple[float, float, float] | None
-    metadata: Mapping[str, str]
-    first: Line
+_CALENDAR = TimeRule("local", (0, 1), ("date", "time"), date_formats=("%Y/%m/%d",))
 
 
 def sniff(source: Source) -> Claim | None:
     """Claim a file with RTKLIB's line of names."""
-    if not source.head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"%"):
-        return None
-    return Claim(NAME) if _form_of(source) is not None else None
+    return Claim(NAME) if form_of(source) is not None else None
 
 
 def read(source: Source) -> Iterator[Item]:
     """Yield the header, rows as ``raw.pos`` and as ``gnss``, then remarks and damages."""
-    from groundstation.base.errors import UnreadableLogError
+    first = form_of(source)
+    if first is None:
+        raise UnreadableLogError(source.name, "no line of names", "%  GPST latitude(deg) ... of RTKLIB")
+    governed, left = forms_of(source, first)
+    yield LogHeader(NAME, first.form.metadata, 0)
+    yield from dict.fromkeys(_remarks(governed))
+    losses = Losses()
+    for _names, group in groupby(governed, key=lambda one: (one.form.names, one.form.has_week)):
+        yield from _rows(source, list(group), losses)
+    yield from losses.damages()
+    if left is not None:
+        yield left
+
+
+def _rows(source: Source, governed: Sequence[Governed], losses: Losses) -> Iterator[Item]:
+    """Rows below headers that name the same columns."""
     from groundstation.readers.table_reader import TableReader
 
-    form = _form_of(source)
-    if form is None:
-        raise UnreadableLogError(source.name, "no line of names", "%  GPST latitude(deg) ... of RTKLIB")
-    dialect = Dialect("utf-8", "\t", len(form.names), 0, form.first.number + 1)
+    form, first = governed[0].form, governed[0]
     time = TimeRule("seconds", (1,), ("tow",)) if form.has_week else _CALENDAR
     rules = [Rule(at, RAW, name, "double") for at, name in enumerate(form.names) if at >= 2]
     rules += [Rule(0, RAW, "week", "double")] if form.has_week else []
-    table = TableReader(_Tabbed(source.path, source, form.first.next_byte), dialect, Layout(time, tuple(rules)))
-    items = table.items(LogHeader(NAME, form.metadata, 0))
-    yield next(items)
-    yield from _remarks(form)
+    dialect = Dialect("utf-8", "\t", len(form.names), 0, first.first_line)
+    table = TableReader(
+        _Tabbed(source.path, source, first.first_byte, governed[-1].end_byte),
+        [Section(dialect, Layout(time, tuple(rules)))],
+    )
+    items = table.items(LogHeader(NAME))
+    next(items)
+    lines = np.array([one.first_line for one in governed])
     for item in items:
         if not isinstance(item, RecordBatch):
             yield item
             continue
-        batch = _in_utc(item, form)
-        yield batch
-        gnss = _gnss(batch, form)
-        if gnss is not None:
-            yield gnss
-
-
-_CALENDAR = TimeRule("local", (0, 1), ("date", "time"), date_formats=("%Y/%m/%d",))
-
-
-def _form_of(source: Source) -> _Form | None:
-    top: list[Line] = []
-    for line in head_lines(source, "utf-8"):
-        if not line.text.lstrip().startswith("%"):
-            break
-        top.append(line)
-    named = next((line for line in reversed(top) if _NAMES.match(line.text)), None)
-    if named is None:
-        return None
-    text = "\n".join(line.text for line in top)
-    words = re.sub(r"[,;]", " ", named.text.lstrip("% ")).split()
-    names = ["date", "time"]
-    for word in words[1:]:
-        name, _, unit = word.partition("(")
-        names += [f"{name}_deg", f"{name}_min", f"{name}_s"] if unit.startswith("d'") else [name]
-    names = [name if names.index(name) == at else f"{name}_{at}" for at, name in enumerate(names)]
-    row = source.head[named.next_byte :].lstrip(b" \r\n")[:12]
-    reference = _REFERENCE.search(text)
-    heights = next((word for word in ("ellipsoidal", "geodetic") if word in text), "")
-    facts = {key: found[1].strip() for key, found in _facts(text)}
-    place = None if reference is None else (float(reference[1]), float(reference[2]), float(reference[3]))
-    return _Form(tuple(names), words[0], b"/" not in row, heights, place, facts, named)
-
-
-def _facts(text: str) -> Iterator[tuple[str, re.Match[str]]]:
-    """Program and settings of the solution, as metadata."""
-    for key, name in (
-        ("program", "program"),
-        ("pos mode", "pos_mode"),
-        ("ref pos", "ref_pos"),
-        ("solution", "solution"),
-    ):
-        found = re.search(rf"(?m)^%\s*{key}\s*:\s*(.{{1,200}})$", text)
-        if found is not None:
-            yield f"rtklib.{name}", found
+        ends = np.searchsorted(item.record_index, lines[1:])
+        for start, end, one in zip((0, *ends), (*ends, len(item)), governed, strict=True):
+            if end > start:
+                batch = _in_utc(item if end - start == len(item) else item.take(slice(start, end)), one.form)
+                yield batch
+                gnss = _gnss(batch, one.form, losses)
+                if gnss is not None:
+                    yield gnss
 
 
 class _Tabs(io.RawIOBase):
-    """The rows of a file with one tab between cells; lines stay lines."""
+    """The rows of a file with one tab between cells; lines stay lines. At most ``left`` bytes of it are read."""
 
-    def __init__(self, stream: BinaryIO) -> None:
-        self._stream, self._rest, self._ready = stream, b"", b""
+    def __init__(self, stream: BinaryIO, left: int | None) -> None:
+        self._stream, self._left, self._rest, self._ready = stream, left, b"", b""
 
     def readable(self) -> bool:
         return True
@@ -151,10 +120,12 @@ class _Tabs(io.RawIOBase):
     def readinto(self, buffer: "WriteableBuffer") -> int:
         view = memoryview(buffer).cast("B")
         while not self._ready:
-            data = self._stream.read(_PIECE_BYTES)
+            data = self._stream.read(_PIECE_BYTES if self._left is None else min(_PIECE_BYTES, self._left))
+            if self._left is not None:
+                self._left -= len(data)
             whole = self._rest + data
             end = whole.rfind(b"\n") + 1 if data and len(self._rest) < _LONGEST_LINE else len(whole)
-            self._rest, self._ready = whole[end:], _OF_NO_ROW.sub(b"", _PARTING.sub(b"\t", whole[:end]))
+            self._rest, self._ready = whole[end:], _OF_NO_ROW.sub(b"", _PARTING.sub(b"\t", _parted(whole[:end])))
             if not data:
                 break
         count = min(len(view), len(self._ready))
@@ -162,21 +133,43 @@ class _Tabs(io.RawIOBase):
         return count
 
 
+def _parted(rows: bytes) -> bytes:
+    """Rows with a tab between numbers that touch: where a digit stands right before a sign.
+
+    Examples
+    --------
+    >>> _parted(b"40.086179918-105.206044414 1.0e-5 -0.1")
+    b'40.086179918\\t-105.206044414 1.0e-5 -0.1'
+    """
+    content = np.frombuffer(rows, dtype=np.uint8)
+    signs = np.flatnonzero((content == _MINUS) | (content == _PLUS))
+    before = content[signs[signs > 0] - 1]
+    if not (((before >= _DIGITS_FROM) & (before <= _DIGITS_TO)) | (before == _POINT)).any():
+        return rows
+    return _TOUCHING.sub(b"\t", rows)
+
+
 @dataclass(frozen=True)
 class _Tabbed(Source):
-    """Another source whose rows are parted by tabs; ``first_byte`` is where they begin in it."""
+    """Another source, rows parted by tabs, from ``first_byte`` to ``end_byte`` (None: end)."""
 
     whole: Source
     first_byte: int
+    end_byte: int | None
+
+    @property
+    def head(self) -> bytes:
+        """That of the whole file."""
+        return self.whole.head
 
     def open(self) -> BinaryIO:
         """The rows, from the first on."""
         stream = self.whole.open()
         stream.seek(self.first_byte)
-        return io.BufferedReader(_Tabs(stream))
+        return io.BufferedReader(_Tabs(stream, None if self.end_byte is None else self.end_byte - self.first_byte))
 
 
-def _in_utc(batch: RecordBatch, form: _Form) -> RecordBatch:
+def _in_utc(batch: RecordBatch, form: Form) -> RecordBatch:
     time = batch.device_time_ns
     present = time.mask
     if form.has_week:
@@ -193,10 +186,10 @@ def _in_utc(batch: RecordBatch, form: _Form) -> RecordBatch:
     return RecordBatch(batch.topic, batch.record_index, when, batch.columns)
 
 
-def _gnss(batch: RecordBatch, form: _Form) -> RecordBatch | None:
+def _gnss(batch: RecordBatch, form: Form, losses: Losses) -> RecordBatch | None:
     """The canonical row of each solution."""
     columns = _Cells(batch)
-    found = _position(columns, form)
+    found = _placed(_position(columns, form), batch, losses)
     if "Q" in columns:
         quality = columns["Q"]
         known = quality.mask & (quality.values >= 0) & (quality.values < len(_FIXES))
@@ -206,6 +199,13 @@ def _gnss(batch: RecordBatch, form: _Form) -> RecordBatch | None:
     rows = np.logical_or.reduce([column.mask for column in found.values()]) if found else np.zeros(len(batch), bool)
     batch = RecordBatch("gnss", batch.record_index, batch.device_time_ns, found)
     return None if not rows.any() else batch if rows.all() else batch.take(rows)
+
+
+def _placed(found: dict[str, Column], batch: RecordBatch, losses: Losses) -> dict[str, Column]:
+    """Columns without the rows that have no place."""
+    found, zeros = placed("gnss", found)
+    losses.add("no_position", NO_POSITION, batch.record_index[zeros], topic="gnss", loses_data=False)
+    return found
 
 
 class _Cells(dict[str, Column]):
@@ -228,7 +228,7 @@ class _Cells(dict[str, Column]):
         return Column(np.hypot(self[one].values, self[other].values), self[one].mask & self[other].mask)
 
 
-def _position(columns: _Cells, form: _Form) -> dict[str, Column]:
+def _position(columns: _Cells, form: Form) -> dict[str, Column]:
     for name in ("latitude", "longitude"):
         if all(f"{name}_{part}" in columns for part in ("deg", "min", "s")):
             columns[name] = _of_minutes(columns, name)
@@ -248,7 +248,7 @@ def _of_minutes(columns: _Cells, name: str) -> Column:
     return Column(np.copysign(size, degrees.values), degrees.mask & minutes.mask & seconds.mask)
 
 
-def _of_vectors(columns: _Cells, form: _Form) -> dict[str, Column]:
+def _of_vectors(columns: _Cells, form: Form) -> dict[str, Column]:
     """Positions in ECEF, or east, north, up of a base station whose place the file tells."""
     ecef, baseline = (
         columns.vector("x-ecef", "y-ecef", "z-ecef"),
@@ -296,14 +296,22 @@ def _velocities(velocity: tuple[FloatArray, Any] | None) -> dict[str, Column]:
     }
 
 
-def _remarks(form: _Form) -> Iterator[Remark]:
-    if form.scale == "GPST":
-        yield Remark("converted", "times are GPS time: UTC is less the leap seconds of the day", "gnss")
-    elif form.scale == "JST":
-        yield Remark("converted", "times are Japan's: UTC is 9 h less", "gnss")
-    if "latitude" in form.names or "latitude_deg" in form.names:
-        if not form.heights:
-            text = "the file does not say above what its heights are: taken as above the ellipsoid, RTKLIB's default"
-            yield Remark("assumed", text, "gnss", ("altitude_ellipsoid_m",))
-    elif "e-baseline" in form.names and form.reference is None:
-        yield Remark("no_position", "baselines from a base station whose place the file does not tell: no position")
+def _remarks(governed: Sequence[Governed]) -> Iterator[Remark]:
+    for one in governed[1:]:
+        form = one.form
+        text = f"a header above row {one.first_line} governs the rows below it: times in {form.scale}"
+        yield Remark("second_header", f"{text}, {', '.join(form.names[2:5])}")
+    for form in (one.form for one in governed):
+        if form.scale == "GPST":
+            yield Remark("converted", "times are GPS time: UTC is less the leap seconds of the day", "gnss")
+        elif form.scale == "JST":
+            yield Remark("converted", "times are Japan's: UTC is 9 h less", "gnss")
+        if "latitude" in form.names or "latitude_deg" in form.names:
+            if not form.heights:
+                text = (
+                    "the file does not say above what its heights are: taken as above the ellipsoid, RTKLIB's default"
+                )
+                yield Remark("assumed", text, "gnss", ("altitude_ellipsoid_m",))
+        elif "e-baseline" in form.names and form.reference is None:
+            text = "baselines from a base station whose place the file does not tell: no position"
+            yield Remark("no_position", text)

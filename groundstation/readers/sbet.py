@@ -18,28 +18,30 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.errors import UnreadableLogError
-from groundstation.base.geodesy import curvature_radii_m
+from groundstation.base.geodesy import NO_POSITION, curvature_radii_m
 from groundstation.base.records import MAX_BATCH_ROWS, Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.base.timescales import GPS_EPOCH_NS, gps_week_to_utc_ns, iso_to_utc_ns
 from groundstation.base.units import ARCMIN_PER_DEG, DEG_PER_RAD, MPS2_PER_G, NS_PER_S
-from groundstation.readers.receiver.times import calendar_ns, unrolled
+from groundstation.readers.receiver.times import calendar_ns
+from groundstation.readers.sbet_records import (
+    ACCURACY,
+    FEWEST,
+    IN_A_ROW,
+    RECORD,
+    S_PER_WEEK,
+    are_plausible,
+    are_sound,
+    has_place,
+    next_start,
+    unrolled_s,
+)
 from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Claim, Source
 
 NAME = "sbet"
-_FIELDS = (
-    "time latitude longitude altitude x_velocity y_velocity z_velocity roll pitch platform_heading wander_angle "
-    "x_acceleration y_acceleration z_acceleration x_rate y_rate z_rate"
-)
-RECORD = np.dtype([(name, "<f8") for name in _FIELDS.split()])
-_ACCURACIES = "time north_m east_m down_m north_mps east_mps down_mps roll_arcmin pitch_arcmin heading_arcmin"
-ACCURACY = np.dtype([(name, "<f8") for name in _ACCURACIES.split()])
-S_PER_WEEK = 604_800
-_LOOKED_AT, _FEWEST, _FIRST, _ENOUGH = 200, 5, 20, 0.9
-_IN_A_ROW, _SEARCHED, _MOST_TRIED, _JUDGED = 3, 256, 500, 4_096
-_NO_PLACE = 1e-12  # radians: bytes that are no latitude are often a number next to zero
-_LONGEST_STEP_S, _FASTEST_MPS = 10.0, 1_000.0
+_LOOKED_AT, _JUDGED = 200, 4_096  # records
 _DATE = re.compile(r"(?<!\d)(20\d\d)[-_.]?([01]\d)[-_.]?([0-3]\d)(?!\d)")
+_PLACE = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m")
 _MODE = "gnss_aided"
 _MOST_APART_S = 5.0  # of two accuracies between which one is interpolated
 _NS_PER_MS = 1_000_000
@@ -56,13 +58,29 @@ class _Sense:
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim a file whose first records are places on Earth, moments in order and speeds that fit the way between."""
-    count = min(len(source.head) // RECORD.itemsize, _LOOKED_AT)
-    if count < _FEWEST:
+    """Claim a file whose records are places on Earth in order, as near as the speeds say.
+
+    Some hundred records are looked at on top, and of a longer file in its middle or at its end.
+    """
+    head = np.frombuffer(source.head, RECORD, min(len(source.head) // RECORD.itemsize, _LOOKED_AT))
+    if len(head) < FEWEST or not are_plausible(head, has_no_place=True):
         return None
-    is_sound = _follow(np.frombuffer(source.head, RECORD, count))
-    is_one = is_sound[:_FIRST].all() or is_sound.mean() >= _ENOUGH
-    return Claim(NAME, confidence=0.6) if is_one and is_sound.sum() >= _FEWEST else None
+    whole = source.size // RECORD.itemsize
+    if whole <= 2 * _LOOKED_AT:
+        return Claim(NAME, confidence=0.6) if are_plausible(head) else None
+    is_one = any(are_plausible(_records_at(source, first)) for first in (whole // 2, whole - _LOOKED_AT))
+    return Claim(NAME, confidence=0.6) if is_one else None
+
+
+def _records_at(source: Source, first: int) -> NDArray[Any]:
+    """Some records from one on; behind damage that has moved them, from where they begin again."""
+    with source.open() as stream:
+        stream.seek(first * RECORD.itemsize)
+        data = stream.read(2 * _LOOKED_AT * RECORD.itemsize)
+    start = 0
+    if not are_plausible(np.frombuffer(data, RECORD, min(_LOOKED_AT, len(data) // RECORD.itemsize))):
+        start = next_start(data, 1) or 0
+    return np.frombuffer(data, RECORD, min(_LOOKED_AT, (len(data) - start) // RECORD.itemsize), start)
 
 
 def read(source: Source) -> Iterator[Item]:
@@ -70,17 +88,42 @@ def read(source: Source) -> Iterator[Item]:
     head = np.frombuffer(source.head, RECORD, len(source.head) // RECORD.itemsize)
     if not len(head):
         raise UnreadableLogError(source.name, "less than one record", f"{RECORD.itemsize} bytes", "the file was cut")
-    week, sense = _week_of(source.name, float(head["time"][0])), _sense_of(head)
+    week, sense = _week_of(source.name, float(head["time"][0])), _sense_of(head[has_place(head)])
     accuracies = _accuracies(source.path)
     yield LogHeader(NAME, {"ins_kind": _MODE}, None if week is None else 0)
     yield from _remarks(week, sense, accuracies)
-    walk, last_s, first = _Walk(source), np.zeros(0), 0
+    walk, last_s, first, placeless = _Walk(source), np.zeros(0), 0, _Placeless()
     for records in walk:
         week_s = unrolled_s(np.concatenate((last_s, records["time"])))[len(last_s) :]
         last_s = week_s[-1:]
-        yield from _batches(records, first, _time(week, week_s), week_s, sense, accuracies)
+        is_placed = has_place(records)
+        placeless.add(first, is_placed)
+        yield from _batches(records, first, is_placed, _time(week, week_s), week_s, sense, accuracies)
         first += len(records)
+    yield from placeless.damages()
     yield from walk.damages()
+
+
+@dataclass
+class _Placeless:
+    """Records without a place: how many, the first and the last."""
+
+    count: int = 0
+    first: int = 0
+    last: int = 0
+
+    def add(self, first: int, is_placed: NDArray[np.bool_]) -> None:
+        """Count those of some records."""
+        none = np.flatnonzero(~is_placed)
+        if len(none):
+            self.first = self.first if self.count else first + int(none[0])
+            self.count, self.last = self.count + len(none), first + int(none[-1])
+
+    def damages(self) -> Iterator[Damage]:
+        """One that tells of them, where there are any."""
+        if self.count:
+            place = f"record {self.first}" if self.count == 1 else f"records {self.first} to {self.last}"
+            yield Damage("no_position", place, self.count, NO_POSITION, "ins", loses_data=False)
 
 
 class _Walk:
@@ -115,7 +158,7 @@ class _Walk:
             if (at - origin) % RECORD.itemsize or at >= origin + records.nbytes:  # others than those judged already
                 count = min((len(data) - at) // RECORD.itemsize, _JUDGED)
                 origin, records = at, np.frombuffer(data, RECORD, count, at)
-                damaged = np.append(np.flatnonzero(~_is_sound(records)), len(records))
+                damaged = np.append(np.flatnonzero(~are_sound(records)), len(records))
             first = (at - origin) // RECORD.itemsize
             count = int(damaged[np.searchsorted(damaged, first)]) - first
             for start in range(0, count, MAX_BATCH_ROWS):
@@ -124,9 +167,9 @@ class _Walk:
             at += count * RECORD.itemsize
             if len(data) - at < RECORD.itemsize or first + count == len(records):
                 continue
-            found = _next_start(data, at + 1)
+            found = next_start(data, at + 1)
             if found is None:  # what is left may begin a record that the next block ends
-                tail = len(data) - (_IN_A_ROW + 1) * RECORD.itemsize
+                tail = len(data) - (IN_A_ROW + 1) * RECORD.itemsize
                 found = tail if at < tail else len(data)
             self._skipped.add(base + at, base + found, self._count)
             self._skipped_to = base + found
@@ -138,56 +181,6 @@ class _Walk:
             self._skipped.add(start, end, self._count)
         else:
             self._cut = start, end
-
-
-def _next_start(data: bytes, at: int) -> int | None:
-    """The next byte at which several sound records in a row begin, one step of time apart from each other."""
-    span = _IN_A_ROW * RECORD.itemsize
-    aligned = at - 1 + RECORD.itemsize  # most often one record alone is damaged
-    width = _SEARCHED
-    while at + span <= len(data):
-        width = min(4 * width, len(data) - at - span + 1)
-        time, latitude, longitude = (np.ndarray((width,), "<f8", data, at + 8 * k, (1,)) for k in range(3))
-        with np.errstate(invalid="ignore", over="ignore"):
-            steps = np.ndarray((width,), "<f8", data, at + RECORD.itemsize, (1,)) - time
-            plausible = (time >= 0.0) & (time < 2 * S_PER_WEEK) & (steps > 0.0) & (steps < _LONGEST_STEP_S)
-            plausible &= (np.abs(latitude) <= np.pi / 2) & (np.abs(longitude) <= np.pi) & (np.abs(latitude) > _NO_PLACE)
-        candidates = at + np.flatnonzero(plausible)
-        for place in sorted(candidates[:_MOST_TRIED].tolist(), key=lambda place: (place != aligned, place)):
-            if _follow(np.frombuffer(data, RECORD, _IN_A_ROW, place)).all():
-                return int(place)
-        at += width
-    return None
-
-
-def unrolled_s(week_s: FloatArray) -> FloatArray:
-    """Seconds of the week that count on past its end; what is no number stays."""
-    finite = np.isfinite(week_s) & (np.abs(week_s) < 1e9)
-    ms = unrolled((np.where(finite, week_s, 0.0) * 1e3).astype(np.int64), S_PER_WEEK * 1000)
-    turns = np.round((ms / 1e3 - np.where(finite, week_s, 0.0)) / S_PER_WEEK)
-    return np.asarray(week_s + S_PER_WEEK * turns)
-
-
-def _is_sound(records: NDArray[Any]) -> NDArray[np.bool_]:
-    """Whether records are places on Earth with angles and speeds that exist, shape (n,)."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        time, latitude, longitude = records["time"], records["latitude"], records["longitude"]
-        sound = (time >= 0.0) & (time < 2 * S_PER_WEEK) & (np.abs(latitude) <= np.pi / 2) & (np.abs(longitude) <= np.pi)
-        sound &= (np.abs(records["altitude"]) < 100_000.0) & (np.abs(records["wander_angle"]) <= 2 * np.pi)
-        sound &= (np.abs(records["roll"]) <= np.pi) & (np.abs(records["pitch"]) <= np.pi / 2)
-        sound &= np.abs(records["platform_heading"]) <= 4 * np.pi
-        sound &= np.hypot(records["x_velocity"], records["y_velocity"]) < _FASTEST_MPS
-        sound &= (latitude != 0.0) | (longitude != 0.0)
-    return np.asarray(sound)
-
-
-def _follow(records: NDArray[Any]) -> NDArray[np.bool_]:
-    """Whether records are sound and each a small step of time behind the one before, shape (n,)."""
-    sound = _is_sound(records)
-    with np.errstate(invalid="ignore", over="ignore"):
-        steps = np.diff(unrolled_s(records["time"]))
-    sound[1:] &= (steps > 0.0) & (steps < _LONGEST_STEP_S)
-    return sound
 
 
 def _week_of(name: str, first_s: float) -> int | None:
@@ -240,7 +233,13 @@ def _turned(records: NDArray[Any], wander_sign: int) -> tuple[FloatArray, FloatA
 
 
 def _batches(
-    records: NDArray[Any], first: int, time: Column, week_s: FloatArray, sense: _Sense, accuracies: NDArray[Any]
+    records: NDArray[Any],
+    first: int,
+    is_placed: NDArray[np.bool_],
+    time: Column,
+    week_s: FloatArray,
+    sense: _Sense,
+    accuracies: NDArray[Any],
 ) -> Iterator[RecordBatch]:
     index = np.arange(first, first + len(records), dtype=np.int64)
     with np.errstate(invalid="ignore", over="ignore"):
@@ -261,6 +260,8 @@ def _batches(
         if sense.force_sign:
             columns |= {f"accel_{axis}_mps2": sense.force_sign * records[f"{axis}_acceleration"] for axis in "xyz"}
     found = {name: Column(values) for name, values in columns.items()} | _sigmas(week_s, accuracies)
+    if not is_placed.all():
+        found |= {name: Column(found[name].values, is_placed) for name in _PLACE}
     found["mode"] = Column(np.full(len(records), _MODE))
     yield RecordBatch("ins", index, time, found)
     raw = {name: Column(records[name].copy()) for name in RECORD.names or () if name != "time"}

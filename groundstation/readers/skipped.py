@@ -40,6 +40,10 @@ class SkippedBytes:
     _other_bytes: int = 0
     _other_ends: tuple[_Stretch, ...] = ()
 
+    def __bool__(self) -> bool:
+        """Whether there is any."""
+        return bool(self._shown)
+
     def add(self, start: int, end: int, index: int) -> None:
         """Count the bytes from ``start`` to ``end`` of the file, in front of the record ``index``."""
         stretch = _Stretch(start, end, index)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import BinaryIO, Protocol, runtime_checkable
 
 from groundstation.base.errors import UnreadableLogError
+from groundstation.base.reading import open_to_read
 from groundstation.base.records import Damage, Item
 from groundstation.readers.compressed import Expanded, Window, compression_of, expand, head_of
 
@@ -92,7 +93,7 @@ class Source:
 
     def _open_file(self) -> BinaryIO:
         try:
-            return self.path.open("rb")
+            return open_to_read(self.path)
         except OSError as error:
             raise self._unopenable(error) from error
 

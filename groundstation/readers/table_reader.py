@@ -1,6 +1,6 @@
 """Reads a delimited table by its dialect and layout: blocks of rows in, batches of typed columns out."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +9,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv as pa_csv
 
+from groundstation.base import arrow_values as arrow
 from groundstation.base.angles import wrap_360
+from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import (
     MAX_BATCH_ROWS,
     MAX_TEXT_CHARACTERS,
@@ -22,6 +24,7 @@ from groundstation.base.records import (
     RecordBatch,
     Remark,
 )
+from groundstation.base.signals import kind_of
 from groundstation.readers import cells
 from groundstation.readers.cells import Cells
 from groundstation.readers.dates import local_ns
@@ -29,60 +32,99 @@ from groundstation.readers.dialect import Dialect
 from groundstation.readers.inside import new_logs, with_own_zeros
 from groundstation.readers.layout import METHODS, Key, Layout, Rule, apply
 from groundstation.readers.losses import Losses
+from groundstation.readers.places import PLACED, without_place, zeroed
 from groundstation.readers.rows import Block, RowScanner, restore_delimiters
+from groundstation.readers.sections import Section
 from groundstation.readers.source import Source
 
 MAX_BATCH_BYTES = 32 << 20  # a text field is as wide as its longest value: a batch of long texts has fewer rows
 
 
 class TableReader:
-    """Iterator of items over one delimited file.
+    """Iterator of items over one delimited file, section by section.
 
     Parameters
     ----------
     source : Source
-    dialect : Dialect
-    layout : Layout
-        Rules of kind ``raw`` are settled here by a first pass over the file.
+    sections : sequence of Section
+        In the order of the file. Rules of kind ``raw`` are settled here by a first pass over the file.
+
+    Attributes
+    ----------
+    zoneless : int
+        Times read so far that name no zone.
     """
 
-    def __init__(self, source: Source, dialect: Dialect, layout: Layout) -> None:
-        self._source, self._dialect = source, dialect
+    def __init__(self, source: Source, sections: Sequence[Section]) -> None:
+        self._source = source
         self._losses = Losses()
         self._wrapped: dict[str, int] = {}
-        self._zoneless = 0
-        self._layout = replace(layout, rules=self._settled(layout))
+        self.zoneless = 0
+        self._placeless: set[str] = set()  # topics that had a row without a place
+        self._dialect, self._layout = sections[0].dialect, sections[0].layout
+        self._sections = self._settled(sections)
 
     def items(self, header: LogHeader) -> Iterator[Item]:
         """The header, batches in the order of the file, then remarks and damages."""
         yield header
-        scanner = RowScanner(self._source, self._dialect, self._losses)
-        for block in scanner:
-            time, columns = self._typed(block)
-            time = with_own_zeros(time, block.line_numbers, scanner.skipped, header.utc_of_zero_ns)
-            yield from self._batches(block.line_numbers, time, columns)
-        yield from new_logs(scanner.skipped)
+        lines: dict[int, str] = {}
+        for number, section in enumerate(self._sections):
+            self._dialect, self._layout = section.dialect, section.layout
+            scanner = RowScanner(self._source, section.dialect, self._losses)
+            zero_ns = _zero_of(header, section)
+            for block in scanner:
+                time, columns = self._typed(block)
+                time = with_own_zeros(time, block.line_numbers, scanner.skipped, zero_ns)
+                yield from self._batches(block.line_numbers, _shifted(time, section.shift_ns), columns)
+            lines |= ({section.dialect.first_line - 1: ""} if number else {}) | scanner.skipped
+        yield from new_logs(lines)
         yield from self._remarks(scanner)
         yield from self._losses.damages()
 
-    def _settled(self, layout: Layout) -> tuple[Rule, ...]:
-        """Rules with ``raw`` settled: float64 where every cell of the file is a number, else text.
+    def columns(self) -> Iterator[dict[Key, Column]]:
+        """Columns of the rows of the first section without their times, block by block."""
+        for block in RowScanner(self._source, self._dialect, Losses()):
+            yield self._fields(self._arrays(block, with_time=False), block.line_numbers)
 
-        A column's type must not change between batches, so it takes a pass of its own; only raw columns are parsed.
+    def first_times(self) -> Column:
+        """Times of the first block of rows; none when there are no rows."""
+        for block in RowScanner(self._source, self._dialect, Losses()):
+            return self._time(self._arrays(block), block.line_numbers)
+        return Column(np.zeros(0, dtype=np.int64))
+
+    def _settled(self, sections: Sequence[Section]) -> tuple[Section, ...]:
+        """Sections with ``raw`` settled: float64 where every cell of the file is a number, else text.
+
+        A column's type must not change between batches, so it takes a pass of its own; only raw columns are parsed. A
+        field that is a number by the rule of one section is one in all.
         """
-        raw = {rule.column for rule in layout.rules if rule.kind == "raw"}
+        kinds = {rule.key: rule.kind for section in sections for rule in section.layout.rules if rule.kind != "raw"}
+        for section in sections:
+            raw = {rule.column: rule.key for rule in section.layout.rules if rule.kind == "raw"}
+            texts = self._texts(section, {column for column, key in raw.items() if key not in kinds})
+            kinds |= {raw[column]: "text" for column in texts}
+        settled = []
+        for section in sections:
+            rules = tuple(
+                replace(rule, kind=kinds.get(rule.key, "double")) if rule.kind == "raw" else rule
+                for rule in section.layout.rules
+            )
+            settled.append(replace(section, layout=replace(section.layout, rules=rules)))
+        return tuple(settled)
+
+    def _texts(self, section: Section, columns: set[int]) -> set[int]:
+        """Those of some columns of a section that have a cell which is no number."""
+        self._dialect = section.dialect
         texts: set[int] = set()
-        if raw:
-            for block in RowScanner(self._source, self._dialect, Losses()):
-                parsed = self._parse(block, dict.fromkeys(sorted(raw - texts), pa.string()))
-                for column, array in parsed.items():
-                    text = cells.trimmed(array)
-                    if not cells.are_numbers(_with_point(text) if layout.decimal_comma else text):
-                        texts.add(column)
-                if texts == raw:
-                    break
-        kinds = {column: "text" if column in texts else "double" for column in raw}
-        return tuple(replace(rule, kind=kinds.get(rule.column, rule.kind)) for rule in layout.rules)  # type: ignore[arg-type]
+        for block in RowScanner(self._source, section.dialect, Losses()) if columns else ():
+            parsed = self._parse(block, dict.fromkeys(sorted(columns - texts), pa.string()))
+            for column, array in parsed.items():
+                text = cells.trimmed(array)
+                if not cells.are_numbers(_with_point(text) if section.layout.decimal_comma else text):
+                    texts.add(column)
+            if texts == columns:
+                break
+        return texts
 
     def _parse(self, block: Block, types: Mapping[int, Any], decimal_point: str = ".") -> dict[int, Any]:
         """Columns of a block as arrow arrays, empty cells null; pa.ArrowInvalid where a type does not fit."""
@@ -104,19 +146,56 @@ class TableReader:
         return {column: table.column(str(column)).combine_chunks() for column in types}
 
     def _typed(self, block: Block) -> tuple[Column, dict[Key, Column]]:
+        arrays = self._arrays(block)
+        return self._time(arrays, block.line_numbers), self._fields(arrays, block.line_numbers)
+
+    def _arrays(self, block: Block, with_time: bool = True) -> dict[int, Any]:
+        """Cells of the columns that have rules, and of the time, as numbers where they can be, else as text."""
         layout = self._layout
         types = {rule.column: pa.float64() if rule.kind == "double" else pa.string() for rule in layout.rules}
-        types |= dict.fromkeys(layout.time.columns, pa.string())
+        types |= dict.fromkeys(layout.time.columns if with_time else (), pa.string())
         try:
             arrays = self._parse(block, types, "," if layout.decimal_comma else ".")
         except pa.ArrowInvalid:  # some cell is no number: take all as text and find out which
             arrays = self._parse(block, dict.fromkeys(types, pa.string()))
-        arrays = {at: cells.trimmed(array) if pa.types.is_string(array.type) else array for at, array in arrays.items()}
-        time = self._time(arrays, block.line_numbers)
-        columns = {rule.key: self._column(rule, arrays[rule.column], block.line_numbers) for rule in layout.rules}
-        for derivation in layout.derivations:
+        return {at: cells.trimmed(array) if pa.types.is_string(array.type) else array for at, array in arrays.items()}
+
+    def _fields(self, arrays: Mapping[int, Any], lines: Int64Array) -> dict[Key, Column]:
+        """Columns of the rules, and those that are derived from them."""
+        columns = {rule.key: self._column(rule, arrays[rule.column], lines) for rule in self._layout.rules}
+        for topic, by_field in self._places():
+            columns |= self._placed(topic, by_field, columns, lines)
+        for derivation in self._layout.derivations:
             columns |= apply(derivation, columns)
-        return time, columns
+        return columns
+
+    def _places(self) -> Iterator[tuple[str, dict[str, Rule]]]:
+        """Topics whose rows tell a place, and their rules by field; truth is left alone."""
+        topics: dict[str, dict[str, Rule]] = {}
+        for rule in self._layout.rules:
+            topics.setdefault(rule.topic, {})[rule.field] = rule
+        for topic, by_field in topics.items():
+            if kind_of(topic) in PLACED and by_field.keys() >= {"latitude_deg", "longitude_deg"}:
+                yield topic, by_field
+
+    def _placed(
+        self, topic: str, by_field: Mapping[str, Rule], columns: Mapping[Key, Column], lines: Int64Array
+    ) -> dict[Key, Column]:
+        """Columns of a topic without values that have no place, and the raw numbers beside them."""
+        latitude, longitude = (columns[topic, f"{name}_deg"] for name in ("latitude", "longitude"))
+        is_zero = without_place(latitude, longitude)
+        self._losses.add("no_position", NO_POSITION, lines[is_zero], topic=topic, loses_data=False)
+        if not is_zero.any() and topic not in self._placeless:
+            return {}
+        self._placeless.add(topic)
+        fields = {name: columns[topic, name] for name in by_field}
+        found: dict[Key, Column] = {}
+        for name, absent in zeroed(kind_of(topic), fields, is_zero).items():
+            column, rule = fields[name], by_field[name]
+            found[rule.key] = Column(column.values, column.mask & ~absent)
+            if rule.raw is not None and rule.raw not in columns:
+                found[rule.raw] = Column((column.values - rule.offset) / rule.factor, column.present)
+        return found
 
     def _time(self, arrays: Mapping[int, Any], lines: Int64Array) -> Column:
         rule = self._layout.time
@@ -129,9 +208,11 @@ class TableReader:
             read = cells.integers_ns(texts[0])
         elif rule.kind == "iso":
             read, zoneless = cells.iso_ns(texts[0])
-            self._zoneless += int(zoneless.sum())
+            self.zoneless += int(zoneless.sum())
         else:
             read = local_ns(texts[0], texts[1], texts[2] if len(texts) > 2 else None, rule.date_formats)
+            if len(texts) > 2:
+                self.zoneless += int(np.count_nonzero(read.column.mask & ~arrow.is_valid(texts[2])))
         self._losses.add("unreadable_cells", "times that cannot be read", lines[read.unreadable], where=rule.names[0])
         return read.column
 
@@ -184,16 +265,17 @@ class TableReader:
                 yield batch if len(batch) <= step else batch.take(slice(start, start + step))
 
     def _remarks(self, scanner: RowScanner) -> Iterator[Remark]:
-        for derivation in self._layout.derivations:
+        layouts = [section.layout for section in self._sections]
+        for derivation in dict.fromkeys(derivation for layout in layouts for derivation in layout.derivations):
             outputs = ", ".join(derivation.outputs)
             text = f"{derivation.topic}: {outputs} derived from {METHODS[derivation.method].text}"
             yield Remark("derived", text, derivation.topic, derivation.outputs)
         for target, count in self._wrapped.items():
             text = f"{target}: {count} values outside [0, 360) brought into it by whole turns"
             yield Remark("wrapped_heading", text, target.rpartition(".")[0])
-        if self._zoneless:
-            yield Remark("assumed_utc", f"{self._zoneless} times without a zone are read as UTC")
-        if self._layout.decimal_comma:
+        if self.zoneless:
+            yield Remark("assumed_utc", f"{self.zoneless} times without a zone are read as UTC")
+        if any(layout.decimal_comma for layout in layouts):
             yield Remark("decimal_comma", "numbers are written with a decimal comma")
         if scanner.ends_without_newline:
             yield Remark("no_final_newline", "the last row has no line end: its last cell may be cut short")
@@ -201,6 +283,20 @@ class TableReader:
 
 def _with_point(text: Any) -> Any:
     return pc.replace_substring(text, ",", ".", max_replacements=1)
+
+
+def _zero_of(header: LogHeader, section: Section) -> int | None:
+    """UTC of time zero of the rows of a section."""
+    if header.utc_of_zero_ns is None or section.shift_ns is None:
+        return None
+    return header.utc_of_zero_ns + section.shift_ns
+
+
+def _shifted(time: Column, shift_ns: int | None) -> Column:
+    """Times by the clock of the log's header; none where nothing tells the shift."""
+    if shift_ns is None:
+        return Column(time.values, np.zeros(len(time), dtype=bool))
+    return Column(time.values + shift_ns, time.present) if shift_ns else time
 
 
 def _occupied(fields: Mapping[str, Column]) -> BoolArray | None:
@@ -213,11 +309,8 @@ def _occupied(fields: Mapping[str, Column]) -> BoolArray | None:
 
 def first_times(source: Source, dialect: Dialect, layout: Layout) -> tuple[Column, int]:
     """Times of the first block of rows (none when there are no rows), and how many name no zone."""
-    block = next(iter(RowScanner(source, dialect, Losses())), None)
-    if block is None:
-        return Column(np.zeros(0, dtype=np.int64)), 0
-    reader = TableReader(source, dialect, replace(layout, rules=(), derivations=()))
-    return reader._typed(block)[0], reader._zoneless
+    reader = TableReader(source, [Section(dialect, replace(layout, rules=(), derivations=()))])
+    return reader.first_times(), reader.zoneless
 
 
 def truncated_header(line: int) -> Damage:

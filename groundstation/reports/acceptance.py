@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.base.failures import attempt, gathered_failures
 from groundstation.chapters import acceptance as chapters
 from groundstation.chapters.acceptance_front import front, stated
 from groundstation.chapters.parts import Document
@@ -29,14 +30,16 @@ def write_acceptance_report(page: Path, found: Acceptance, *, with_pdf: bool = T
     OSError
         When a file cannot be written.
     """
-    document = acceptance_document(found)
-    html = flight_report_html(document, page.with_suffix(".json").name)
-    return write_pages(page, html, document, with_pdf=with_pdf)
+    beside = page.with_suffix(".json").name
+    with gathered_failures():
+        document = acceptance_document(found)
+        return write_pages(page, lambda shown: flight_report_html(shown, beside), document, document, with_pdf=with_pdf)
 
 
 def acceptance_document(found: Acceptance) -> Document:
     """Put the report of an acceptance together, its figures drawn."""
-    sections = tuple(drawn_by(DRAWN, section, found) for section in chapters.sections(found))
+    drawn = (attempt("chapter", one.key, drawn_by, DRAWN, one, found) for one in chapters.sections(found))
+    sections = tuple(section for section in drawn if section is not None)
     return Document(ACCEPTANCE, f"{ACCEPTANCE} {found.name}", front(found), sections)
 
 

@@ -5,7 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from groundstation.base.geodesy import north_east_m
+from groundstation.base.failures import attempt
+from groundstation.base.geodesy import north_east_m, on_earth, plan_north_east_m
 from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.comparison import answers, findings, opening, settings
 from groundstation.chapters.parts import Section
@@ -36,8 +37,13 @@ LINES = (  # figure, column, column of the half width and what it is multiplied 
 
 
 def comparison_html(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> str:
-    """Render the page of a comparison as a complete HTML document."""
-    sections = (answers(comparison), _figures(comparison, a, b), settings(comparison), findings(comparison))
+    """Render the page of a comparison as a complete HTML document; a chapter or figure that fails is left out."""
+    sections = (
+        attempt("chapter", "answers", answers, comparison),
+        attempt("chapter", "figures", _figures, comparison, a, b),
+        attempt("chapter", "settings", settings, comparison),
+        attempt("chapter", "findings", findings, comparison),
+    )
     return render(
         "compare.html.j2",
         title=f"{comparison.a.flight_id} and {comparison.b.flight_id}",
@@ -52,7 +58,11 @@ def comparison_html(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> s
 
 def _figures(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> Section | None:
     sides = (_Side("A", a, A), _Side("B", b, B, comparison.alignment.offset_s))
-    drawings = [_tracks(sides), *(_overlay(sides, *row) for row in LINES), _growth(sides)]
+    drawings = [
+        attempt("figure", "tracks", _tracks, sides),
+        *(attempt("figure", f"{row[0]}.{row[1]}", _overlay, sides, *row) for row in LINES),
+        attempt("figure", "growth", _growth, sides),
+    ]
     parts = [drawing for drawing in drawings if drawing is not None]
     lead = "A blue, B orange; thin lines are 95 % bands."
     return Section("figures", "Figures", lead, parts) if parts else None
@@ -114,15 +124,17 @@ def _tracks(sides: Sequence[_Side]) -> Drawing | None:
     for side in sides:
         data = side.figure("overview", "latitude_deg", "longitude_deg")
         if data is not None:
-            latitude, longitude = numbers(data, "latitude_deg"), numbers(data, "longitude_deg")
-            first = int(np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))[0])
-            drawn.append((side, latitude, longitude, (latitude[first], longitude[first])))
+            latitude, longitude = on_earth(numbers(data, "latitude_deg"), numbers(data, "longitude_deg"))
+            known = np.flatnonzero(np.isfinite(latitude))
+            if known.size:
+                first = float(latitude[known[0]]), float(longitude[known[0]])
+                drawn.append((side, latitude, longitude, first))
     if not drawn:
         return None
     shared = drawn[0][-1]
     is_shared = bool(np.hypot(*north_east_m(*drawn[-1][-1], *shared)) <= NEAR_M)
     tracks = [
-        (side, *north_east_m(latitude, longitude, *(shared if is_shared else own)))
+        (side, *plan_north_east_m(latitude, longitude, *(shared if is_shared else own)))
         for side, latitude, longitude, own in drawn
     ]
 

@@ -106,6 +106,8 @@ class Drawing(Part):
         The only text that the page passes on unescaped: made by reports.drawing alone.
     numbers : sequence of str
         Names of the figure data; the readable copies are tables/<name>.csv.
+    name : str
+        What the chapter calls the figure.
     """
 
     kind: ClassVar[str] = "drawing"
@@ -114,6 +116,7 @@ class Drawing(Part):
     alt: str
     svg: Svg
     numbers: Sequence[str] = ()
+    name: str = ""
 
 
 @dataclass(frozen=True)

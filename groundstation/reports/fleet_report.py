@@ -5,8 +5,9 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from groundstation.base.failures import attempt, gathered_failures
 from groundstation.chapters.fleet import CHAPTERS, flights, front
-from groundstation.chapters.parts import Document
+from groundstation.chapters.parts import Document, Front
 from groundstation.chapters.shortened import shortened
 from groundstation.reports.figures import drawn_by
 from groundstation.reports.fleet import DRAWERS
@@ -53,22 +54,29 @@ def fleet_report_begun(
     out: Path, fleet: FleetResults, *, with_pdf: bool = True, painters: int = 1
 ) -> Iterator[Callable[[], Written]]:
     """Begin a report, parameters as of :func:`write_fleet_report`: the other painters paint while this process does
-    something else. Yields what finishes it.
+    something else. Yields what finishes it. A part that fails by a defect is left out.
     """
-    with document_begun(lambda: fleet_document(fleet), painters) as finish:
+    with gathered_failures(), document_begun(lambda: fleet_document(fleet), painters) as painting:
 
         def finished() -> Written:
-            document = finish()
-            return write_pages(out / PAGE, fleet_report_html(document, fleet), on_paper(document), with_pdf=with_pdf)
+            document = painting.finished()
+            return write_pages(
+                out / PAGE,
+                lambda shown: fleet_report_html(shown, fleet),
+                document,
+                on_paper(document),
+                with_pdf=with_pdf,
+            )
 
         yield finished
 
 
 def fleet_document(fleet: FleetResults) -> Document:
     """Put the report of a fleet together, its tables at full length."""
-    told = (build(fleet) for build in CHAPTERS)
-    sections = tuple(drawn_by(DRAWERS, section, fleet) for section in told if section is not None)
-    top = front.build(fleet)
+    told = [attempt("chapter", name, build, fleet) for name, build in CHAPTERS.items()]
+    drawn = (attempt("chapter", one.key, drawn_by, DRAWERS, one, fleet) for one in told if one is not None)
+    sections = tuple(section for section in drawn if section is not None)
+    top = attempt("chapter", "front", front.build, fleet) or Front("Fleet")
     return Document("Fleet report", top.title, top, sections)
 
 

@@ -4,11 +4,13 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
+from groundstation.base.failures import Failure, attempt, failures, gathered_failures
 from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.front import front
-from groundstation.chapters.parts import Document
+from groundstation.chapters.parts import Document, Front
 from groundstation.chapters.plan import is_plan
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.page import TEMPLATES, live_figures, render
@@ -17,8 +19,9 @@ from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.reports.sections import flight_sections
 from groundstation.reports.steer_card import write_exports
 from groundstation.results.answer import Answer
-from groundstation.results.files import SavedFlight, load, write_text
+from groundstation.results.files import SavedFlight, load, put_failures, write_text
 
+PARTS = "chapter", "figure", "report"  # of a report, by their kinds as failures tell them
 REPORT = "report.html"
 PDF = "report.pdf"
 SESSION, PLAN, ACCEPTANCE = "Session report", "Plan", "Acceptance report"
@@ -28,10 +31,14 @@ _NOT_IN_AN_ID = re.compile(r"[^A-Za-z0-9_-]+")
 
 @dataclass(frozen=True)
 class Written:
-    """The files of a report; ``problem`` says why there is no PDF where one was asked for."""
+    """The files of a report; ``problem`` says why there is no PDF where one was asked for.
+
+    ``failures`` are the parts that failed by a defect, where they are gathered.
+    """
 
     paths: tuple[Path, ...]
     problem: str = ""
+    failures: tuple[Failure, ...] = ()
 
 
 def write_flight_report(
@@ -67,31 +74,47 @@ def flight_report_begun(
 ) -> Iterator[Callable[[], Written]]:
     """Begin a report, parameters as of :func:`write_flight_report`: the other painters paint while this process does
     something else. Yields what finishes it.
+
+    A part that fails by a defect is left out, and summary.json and the report tell it: those that failed elsewhere
+    until the report is finished, too.
     """
-    saved = load(folder, answer_types)
-    exports, problem = write_exports(saved, with_pdf=with_pdf)  # first: the report links to those that are there
-    with document_begun(lambda: sketched_document(saved), painters) as finish:
+    with gathered_failures():
+        saved = load(folder, answer_types)
+        # first: the report links to those that are there
+        exports = attempt("report", "exports", partial(write_exports, saved, with_pdf=with_pdf), unless=(OSError,))
+        written, problem = exports or ((), "")
+        with document_begun(lambda: sketched_document(saved), painters) as painting:
 
-        def finished() -> Written:
-            document = finish()
-            written = write_pages(folder / REPORT, flight_report_html(document), document, with_pdf=with_pdf)
-            return Written((*written.paths, *exports), "; ".join(filter(None, (written.problem, problem))))
+            def finished() -> Written:
+                document = painting.finished()
+                if put_failures(folder, failures(), PARTS):
+                    again = load(folder, answer_types)
+                    document = painting.told_again(lambda: sketched_document(again))
+                pages = write_pages(folder / REPORT, flight_report_html, document, document, with_pdf=with_pdf)
+                put_failures(folder, failures())
+                problems = "; ".join(filter(None, (pages.problem, problem)))
+                return Written((*pages.paths, *written), problems, failures())
 
-        yield finished
+            yield finished
 
 
-def write_pages(page: Path, html: str, document: Document, *, with_pdf: bool) -> Written:
-    """Write a page and, beside it, the document as PDF; a PDF of an earlier run is removed."""
-    pdf = page.with_suffix(".pdf")
-    write_text(page, html)
+def write_pages(
+    page: Path, render: Callable[[Document], str], shown: Document, on_paper: Document, *, with_pdf: bool
+) -> Written:
+    """Write a page and, beside it, a document as PDF; what is not made is not there from an earlier run either."""
+    pdf, problem = page.with_suffix(".pdf"), ""
+    html = attempt("report", page.name, render, shown)
+    if html is None:
+        page.unlink(missing_ok=True)
+    else:
+        write_text(page, html)
     pdf.unlink(missing_ok=True)
-    if not with_pdf:
-        return Written((page,))
-    try:
-        write_pdf(document, pdf)
-    except PdfError as error:
-        return Written((page,), str(error))
-    return Written((page, pdf))
+    if with_pdf:
+        try:
+            attempt("report", pdf.name, write_pdf, on_paper, pdf, unless=(OSError, PdfError))
+        except PdfError as error:
+            problem = str(error)
+    return Written(tuple(path for path in (page, pdf) if path.is_file()), problem, failures())
 
 
 def flight_document(saved: SavedFlight, painters: int = 1) -> Document:
@@ -102,7 +125,8 @@ def flight_document(saved: SavedFlight, painters: int = 1) -> Document:
 def sketched_document(saved: SavedFlight) -> Document:
     """The report of a flight as it is told; within :func:`sketching` no figure is painted."""
     kind = PLAN if is_plan(saved.results) else SESSION if is_session(saved.results) else "Flight report"
-    return Document(kind, saved.results.flight_id, front(saved.results), flight_sections(saved))
+    top = attempt("chapter", "front", front, saved.results) or Front(saved.results.flight_id)
+    return Document(kind, saved.results.flight_id, top, flight_sections(saved))
 
 
 def flight_report_html(document: Document, beside: str = "manifest.json") -> str:

@@ -6,11 +6,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 from groundstation.base.digits import digits_of
+from groundstation.base.printable import csv_cell
 from groundstation.base.serial import to_json_exactly
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.wording import is_number
 from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
-from groundstation.results.files import SavedFlight, json_text, text_cell, write_text
+from groundstation.results.files import SavedFlight, json_text, write_text
 from groundstation.results.flight import FlightResults
 from groundstation.results.summary import SCHEMA_VERSION
 
@@ -133,7 +134,7 @@ def _cell(name: str, value: Any) -> str:
     if value is None:
         return ""
     if isinstance(value, list):
-        return text_cell("; ".join(map(str, value)))
+        return csv_cell("; ".join(map(str, value)))
     if is_number(value):
         return f"{value:.{digits_of(name)}f}" if isinstance(value, float) else str(value)
-    return text_cell(str(value))
+    return csv_cell(str(value))

@@ -13,11 +13,13 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
+from types import MappingProxyType
 from typing import IO
 
+from groundstation.base.failures import attempt
 from groundstation.chapters.parts import Document, Part
 from groundstation.reports.drawing import Drawing, Sketch, draw, is_sketching, sketching
 from groundstation.reports.live import Svg
@@ -29,47 +31,69 @@ LOOK_EVERY_S = 0.005
 NUMBER_BYTES = 2
 
 
+class Painting:
+    """A document that is told, whose figures are being painted, or are those of somebody who gathers sketches."""
+
+    def __init__(self, document: Document, finish: Callable[[], dict[str, Svg]] | None) -> None:
+        self._document, self._finish = document, finish
+        self._pictures: dict[str, Svg] = {}
+
+    def finished(self) -> Document:
+        """The document with its figures, this process painting with the others; without those that fail."""
+        if self._finish is None:
+            return self._document
+        self._pictures = self._finish()
+        return self._with_pictures(self._document)
+
+    def told_again(self, tell: Callable[[], Document]) -> Document:
+        """The document told another time, with the figures that were painted."""
+        if self._finish is None:
+            return tell()
+        with sketching():
+            document = tell()
+        return self._with_pictures(document)
+
+    def _with_pictures(self, document: Document) -> Document:
+        sections = (
+            replace(section, parts=tuple(_painted(section.parts, self._pictures))) for section in document.sections
+        )
+        return replace(document, sections=tuple(sections))
+
+
 def with_painted_figures(tell: Callable[[], Document], processes: int = 1) -> Document:
     """A document with the figures that it draws while it is told, which then are painted.
 
     ``processes`` paint side by side; equal bytes whatever their number. Who gathers sketches gets a document with
     these.
     """
-    with document_begun(tell, processes) as finish:
-        return finish()
+    with document_begun(tell, processes) as painting:
+        return painting.finished()
 
 
 @contextmanager
-def document_begun(tell: Callable[[], Document], processes: int = 1) -> Iterator[Callable[[], Document]]:
-    """Tell a document, and let other processes paint its figures while this one does something else.
-
-    Yields what finishes it: this process then paints with the others.
-    """
+def document_begun(tell: Callable[[], Document], processes: int = 1) -> Iterator[Painting]:
+    """Tell a document, and let other processes paint its figures while this one does something else."""
     if is_sketching():
-        document = tell()
-        yield lambda: document
+        yield Painting(tell(), None)
         return
     with sketching() as sketches:
         document = tell()
-    with painting_begun(sketches, processes) as finish:
-
-        def finished() -> Document:
-            pictures = finish()
-            sections = (
-                replace(section, parts=tuple(_painted(part, pictures) for part in section.parts))
-                for section in document.sections
-            )
-            return replace(document, sections=tuple(sections))
-
-        yield finished
+    drawings = (part for section in document.sections for part in section.parts if isinstance(part, Drawing))
+    with painting_begun(sketches, processes, {drawing.svg: drawing.name for drawing in drawings}) as finish:
+        yield Painting(document, finish)
 
 
-def _painted(part: Part, pictures: Mapping[str, Svg]) -> Part:
-    return replace(part, svg=pictures.get(part.svg, part.svg)) if isinstance(part, Drawing) else part
+def _painted(parts: Iterable[Part], pictures: Mapping[str, Svg]) -> Iterator[Part]:
+    """Parts with pictures; a drawing that has none is left out."""
+    for part in parts:
+        if not isinstance(part, Drawing):
+            yield part
+        elif part.svg in pictures:
+            yield replace(part, svg=pictures[part.svg])
 
 
 def painted(sketches: Mapping[str, Sketch], processes: int = 1) -> dict[str, Svg]:
-    """Paint sketches: pictures by key.
+    """Paint sketches: pictures by key; without those that failed, where failures are gathered.
 
     Parameters
     ----------
@@ -82,15 +106,27 @@ def painted(sketches: Mapping[str, Sketch], processes: int = 1) -> dict[str, Svg
 
 
 @contextmanager
-def painting_begun(sketches: Mapping[str, Sketch], processes: int = 1) -> Iterator[Callable[[], dict[str, Svg]]]:
+def painting_begun(
+    sketches: Mapping[str, Sketch], processes: int = 1, names: Mapping[str, str] = MappingProxyType({})
+) -> Iterator[Callable[[], dict[str, Svg]]]:
     """Let other processes begin to paint, as :func:`painted` has it; what is yielded paints with them to the end.
 
-    matplotlib is not loaded for that: each process loads it, side by side, where it is not there already.
+    ``names`` are those of the figures by key: what fails is told by its name, in the order of the sketches. matplotlib
+    is not loaded for that: each process loads it, side by side, where it is not there already.
     """
     keys = list(sketches)
     others = min(processes, len(keys) // 2) - 1 if CAN_FORK and len(keys) >= FEWEST else 0
+
+    def with_rest(pictures: Mapping[str, Svg]) -> dict[str, Svg]:
+        """All pictures: those that are not there are painted here, and fail where it can be told."""
+        found = (
+            (key, pictures.get(key) or attempt("figure", names.get(key) or key, _paint, key, sketches[key]))
+            for key in keys
+        )
+        return {key: picture for key, picture in found if picture is not None}
+
     if others < 1:
-        yield lambda: {key: _paint(key, sketches[key]) for key in keys}
+        yield lambda: with_rest({})
         return
     started = time.monotonic()
     at_work: list[_Painter] = []
@@ -100,11 +136,14 @@ def painting_begun(sketches: Mapping[str, Sketch], processes: int = 1) -> Iterat
                 at_work.append(painters.enter_context(_painter(keys, sketches, queue)))
 
         def finish() -> dict[str, Svg]:
-            pictures = {keys[number]: _paint(keys[number], sketches[keys[number]]) for number in _taken(queue)}
+            pictures = {}
+            for number in _taken(queue):
+                with suppress(Exception):  # what fails is painted again below
+                    pictures[keys[number]] = _paint(keys[number], sketches[keys[number]])
             now = time.monotonic()
             for painter in at_work:
                 pictures |= painter.delivered(now + max(LATE_S, LATE * (now - started)))
-            return {key: pictures[key] if key in pictures else _paint(key, sketches[key]) for key in keys}
+            return with_rest(pictures)
 
         yield finish
 
@@ -181,8 +220,10 @@ def _paint_on(keys: Sequence[str], sketches: Mapping[str, Sketch], queue: int, r
     """The life of another process. What it cannot paint is painted, and fails, where it can be told."""
     try:
         for number in _taken(queue):
-            pickle.dump((keys[number], _paint(keys[number], sketches[keys[number]])), results)
-            results.flush()
+            with suppress(Exception):
+                picture = _paint(keys[number], sketches[keys[number]])
+                pickle.dump((keys[number], picture), results)
+                results.flush()
             if os.getppid() != parent:
                 break
     finally:

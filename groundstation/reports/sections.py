@@ -1,12 +1,13 @@
 """Chapters of the flight report, in its order, with their figures drawn."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from string import ascii_uppercase
 from typing import Any
 
+from groundstation.base.failures import attempt
 from groundstation.chapters.by_answer import answer_chapters, chapters_of
 from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.findings import findings
@@ -19,9 +20,13 @@ from groundstation.chapters.quality import quality
 from groundstation.chapters.sources import sources
 from groundstation.reports.figures import with_drawings
 from groundstation.results.files import SavedFlight
+from groundstation.results.flight import FlightResults
 
-ON_THE_DATA = (findings, quality)  # behind the chapters on the answers
-ON_THE_SESSION = (findings, provenance)  # and of a plan
+Build = Callable[[FlightResults], Section | None]
+BEFORE_THE_ANSWERS: dict[str, Build] = {"overview": overview, "next_steps": next_steps}
+ON_THE_DATA: dict[str, Build] = {"findings": findings, "quality": quality}  # behind the chapters on the answers
+ON_THE_SESSION: dict[str, Build] = {"findings": findings, "provenance": provenance}  # and of a plan
+APPENDICES: dict[str, Build] = {"provenance": provenance, "sources": sources}
 
 
 def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
@@ -29,26 +34,30 @@ def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
 
     Of a session of several aircraft, and of a plan: those on its answers, its findings, its source.
 
-    A chapter that has nothing to say is left out, and one of nothing but figures without arrays.
+    A chapter that has nothing to say is left out, one of nothing but figures without arrays, and one that fails.
     """
     results = saved.results
     is_flight = not (is_session(results) or is_plan(results))
     told = (
-        (overview(results), next_steps(results), *answer_chapters(results), *(build(results) for build in ON_THE_DATA))
+        (*_built(BEFORE_THE_ANSWERS, results), *answer_chapters(results), *_built(ON_THE_DATA, results))
         if is_flight
-        else (*chapters_of(results), *(build(results) for build in ON_THE_SESSION))
+        else (*chapters_of(results), *_built(ON_THE_SESSION, results))
     )
     chapters = [section for section in told if section is not None]
     workings = (_workings(section, saved.manifest.configuration) for section in chapters)
-    appendix = [*workings, *((provenance(results), sources(results)) if is_flight else ())]
+    appendix = [*workings, *(_built(APPENDICES, results) if is_flight else ())]
     shown = [replace(section, appendix=()) for section in chapters if not section.is_open]
     return (*_numbered(shown, saved, count(1)), *_numbered(appendix, saved, ascii_uppercase))
 
 
+def _built(builds: Mapping[str, Build], results: FlightResults) -> tuple[Section | None, ...]:
+    return tuple(attempt("chapter", name, build, results) for name, build in builds.items())
+
+
 def _numbered(sections: Sequence[Section | None], saved: SavedFlight, numbers: Iterable[object]) -> tuple[Section, ...]:
     """The sections as a page shows them, those without parts left out."""
-    drawn = (on_a_page(section, saved) for section in sections if section is not None)
-    shown = (section for section in drawn if section.parts)
+    drawn = (attempt("chapter", section.key, on_a_page, section, saved) for section in sections if section is not None)
+    shown = (section for section in drawn if section is not None and section.parts)
     return tuple(replace(section, number=str(number)) for section, number in zip(shown, numbers, strict=False))
 
 

@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import SEEK_END
@@ -12,7 +12,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from groundstation.base.errors import UnreadableLogError
-from groundstation.base.serial import MismatchError, from_json, to_json_exactly
+from groundstation.base.failures import CODE, Failure, attempt, with_failures
+from groundstation.base.printable import csv_cell, printable_json
+from groundstation.base.serial import MismatchError, from_json, to_json, to_json_exactly
+from groundstation.base.to_disk import sync_file
 from groundstation.results.answer import Answer
 from groundstation.results.chosen import chosen_intervals
 from groundstation.results.document import SummaryDocument
@@ -33,7 +36,6 @@ OLD_COLUMNS: Mapping[str, Mapping[str, str]] = {  # names of an earlier version,
         "sigma_recommended_deg": "deviation_sigma_deg",
     },
 }
-FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 PARQUET_MAGIC = b"PAR1"  # at both ends of a whole file
 PARQUET_LEAST_BYTES = 12  # both, and the length of what describes the file
 
@@ -78,19 +80,24 @@ def mapping(document: Any, *keys: str) -> Mapping[str, Any]:
     return document if isinstance(document, Mapping) else {}
 
 
-def write_text(path: Path, text: str) -> None:
+def write_text(path: Path, text: str, *, is_synced: bool = True) -> None:
     """Write a text file as :func:`write_bytes` does.
 
     A lone surrogate (a file name that is not UTF-8) is written as its escape, which JSON reads back as it was.
     """
-    write_bytes(path, text.encode("utf-8", "backslashreplace"))
+    write_bytes(path, text.encode("utf-8", "backslashreplace"), is_synced=is_synced)
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file under a temporary name and move it into place: a kill never leaves half a file."""
+def write_bytes(path: Path, content: bytes, *, is_synced: bool = True) -> None:
+    """Write a file under a temporary name and move it into place: a kill never leaves half a file.
+
+    Nor does a loss of power, if ``is_synced``: without, the caller writes it through to the disk.
+    """
     temporary = path.with_name(f".{path.name}.partial")
     try:
         temporary.write_bytes(content)
+        if is_synced:
+            sync_file(temporary)
         temporary.replace(path)
     except OSError as error:  # a full disk does not say which file
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
@@ -99,12 +106,14 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def json_text(document: Any) -> str:
-    """Render JSON as it is written everywhere: two spaces, order kept, NaN refused."""
-    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    """Render JSON as it is written everywhere: two spaces, order kept, NaN refused, hidden characters as escapes."""
+    return printable_json(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
 
 
 def save(folder: Path, results: FlightResults, manifest: Manifest) -> None:
     """Write a flight's answers and arrays into its folder; what an earlier run left of them is replaced.
+
+    They are not yet written through to the disk.
 
     Parameters
     ----------
@@ -122,15 +131,38 @@ def save(folder: Path, results: FlightResults, manifest: Manifest) -> None:
     for name in (ARRAYS, TABLES):
         (folder / name).mkdir()
     for figure in results.figures:
-        _write_parquet(folder / ARRAYS / f"{figure.name}.parquet", figure)
-        write_text(folder / TABLES / f"{figure.name}.csv", csv_text(figure))
-    write_text(folder / SUMMARY, json_text(summary_of(results)))
-    save_manifest(folder, manifest)
+        attempt("arrays", figure.name, _save_figure, folder, figure, unless=(OSError,))
+    write_text(folder / SUMMARY, json_text(summary_of(results)), is_synced=False)
+    save_manifest(folder, manifest, is_synced=False)
 
 
-def save_manifest(folder: Path, manifest: Manifest) -> None:
+def _save_figure(folder: Path, figure: FigureData) -> None:
+    text = csv_text(figure)
+    _write_parquet(folder / ARRAYS / f"{figure.name}.parquet", figure)
+    write_text(folder / TABLES / f"{figure.name}.csv", text, is_synced=False)
+
+
+def put_failures(folder: Path, found: Sequence[Failure], made_again: Sequence[str] = ()) -> bool:
+    """Put findings on parts that failed into summary.json; whether it changed.
+
+    ``made_again`` are the kinds of parts of which earlier failures no longer hold.
+    """
+    if not found and f'"{CODE}.' not in (folder / SUMMARY).read_text(encoding="utf-8"):
+        return False
+    summary = _json_object(folder / SUMMARY)
+    before = load_document(folder).findings
+    stale = tuple(f"{CODE}.{part}." for part in made_again)
+    kept = [finding for finding in before if not (stale and finding.code.startswith(stale))]
+    findings = with_failures(kept, found)
+    if findings == before:
+        return False
+    write_text(folder / SUMMARY, json_text(summary | {"findings": to_json(findings)}))
+    return True
+
+
+def save_manifest(folder: Path, manifest: Manifest, *, is_synced: bool = True) -> None:
     """Write manifest.json of a flight folder."""
-    write_text(folder / MANIFEST, json_text(to_json_exactly(manifest)))
+    write_text(folder / MANIFEST, json_text(to_json_exactly(manifest)), is_synced=is_synced)
 
 
 def load_manifest(folder: Path) -> Manifest:
@@ -286,19 +318,7 @@ def csv_text(figure: FigureData, line_end: str = "\n") -> str:
             cells.append(["1" if value else "0" for value in values.tolist()])
         else:
             is_whole = values.dtype.kind in "iu"
-            cells.append([str(value) if is_whole else text_cell(str(value)) for value in values.tolist()])
-    lines = [",".join(text_cell(name) for name in figure.columns)]
+            cells.append([str(value) if is_whole else csv_cell(str(value)) for value in values.tolist()])
+    lines = [",".join(csv_cell(name) for name in figure.columns)]
     lines += [",".join(row) for row in zip(*cells, strict=True)]
     return line_end.join(lines) + line_end
-
-
-def text_cell(text: str) -> str:
-    """Write text as a CSV cell that no spreadsheet runs: quoted where needed, an apostrophe before a formula.
-
-    Examples
-    --------
-    >>> text_cell("=1+1"), text_cell("a,b"), text_cell("ab")
-    ("'=1+1", '"a,b"', 'ab')
-    """
-    safe = "'" + text if text.lstrip(" ").startswith(FORMULA_STARTS) else text
-    return '"' + safe.replace('"', '""') + '"' if any(mark in safe for mark in ',;"\n\r\t') else safe

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 MISSING: dict[str, str] = {"gnss": "GNSS", "ins": "INS", "both": "both"}  # RealOutage.missing, for people
 CHANNELS = ("north", "east")
 QUANTITIES = ("position", "velocity")
+STARTS = ("stated", "mode", "standstill", "unknown")
 STATES = ("position", "velocity", "tilt", "drift", "drift_rate", "random_drift")
 NOT_SEEN = 0.01  # observability below which the data said nothing of a state
 UNMOVED = 0.01  # share of its sigma at the start by which the sigma of such a state may differ
@@ -130,6 +131,20 @@ class OwnInnovation:
 
 
 @dataclass(frozen=True)
+class NavigationStart:
+    """Moment from which an INS navigates, and what proves it.
+
+    ``time_s`` is in flight seconds, negative before the log, None where nothing proves it. ``basis`` is ``stated``,
+    ``mode`` (a logged change from alignment), ``standstill`` (the log begins parked, with INS and GNSS together) or
+    ``unknown``; ``reason`` says it for people.
+    """
+
+    time_s: float | None
+    basis: str = field(metadata={"one_of": STARTS})
+    reason: str
+
+
+@dataclass(frozen=True)
 class InertialResult(Answer):
     """INS errors of one flight; of an INS that GNSS corrects already, what it differs from GNSS by and nothing else.
 
@@ -148,8 +163,14 @@ class InertialResult(Answer):
     epochs, gnss_seconds
         Epochs compared, and seconds of the flight with GNSS.
     radial_error_rate_50_nmiph, radial_error_rate_95_nmiph : float or None
-        Radial position error over time since the first epoch, nautical miles per hour, median and 95 % over epochs
-        later than ten minutes.
+        Radial position error over the time since navigation began (or the INS was reset), nautical miles per hour,
+        median and 95 % over epochs later than ten minutes after it. None where nothing proves the start.
+    navigation_start : NavigationStart or None
+        When navigation began; None of an INS that GNSS corrects.
+    radial_error_first_m, radial_error_last_m : float or None
+        Radial position error at the first and the last epoch with GNSS: the growth inside the log.
+    compared_hours : float or None
+        Between these two.
     differences : tuple of Difference
         INS minus GNSS of an INS that GNSS corrects.
     own_filter : str
@@ -185,6 +206,10 @@ class InertialResult(Answer):
     radial_error_rate_95_nmiph: float | None = None
     velocity_error_rms_mps: float | None = None
     largest_radial_error_m: float | None = None
+    navigation_start: NavigationStart | None = None
+    radial_error_first_m: float | None = None
+    radial_error_last_m: float | None = None
+    compared_hours: float | None = None
     differences: tuple[Difference, ...] = ()
     own_filter: str = ""
     own_innovations: tuple[OwnInnovation, ...] = ()

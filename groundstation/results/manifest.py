@@ -87,6 +87,15 @@ class Resume:
 
 
 @dataclass(frozen=True)
+class FileOfRun:
+    """A file as the run left it: bytes; of the MCAP its digest and the time of its last change, too."""
+
+    size_bytes: int
+    sha256: str = field(default="", metadata=LEFT_OUT_WHEN_DEFAULT)
+    time_ns: int = field(default=0, metadata=LEFT_OUT_WHEN_DEFAULT)
+
+
+@dataclass(frozen=True)
 class Manifest:
     """Everything that may differ between two equal runs.
 
@@ -106,6 +115,8 @@ class Manifest:
         Whether a run found the session among its flights, and may replace it; not what ``cooperative`` made.
     resume : Resume, optional
         Absent where no run made the folder.
+    files : mapping of str to FileOfRun
+        All others of the folder by their path in it; absent in manifests of earlier versions.
     power_up : PowerUpOfRun, optional
         Absent where the log holds one.
     parts : tuple of PartOfRun
@@ -123,5 +134,6 @@ class Manifest:
     logs: tuple[LogOfSession, ...] = field(default=(), metadata=LEFT_OUT_WHEN_DEFAULT)
     is_found: bool = field(default=False, metadata=LEFT_OUT_WHEN_DEFAULT)
     resume: Resume | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)
+    files: Mapping[str, FileOfRun] = field(default_factory=dict, metadata=LEFT_OUT_WHEN_DEFAULT)
     power_up: PowerUpOfRun | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)
     parts: tuple[PartOfRun, ...] = field(default=(), metadata=LEFT_OUT_WHEN_DEFAULT)

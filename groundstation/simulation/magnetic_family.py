@@ -10,6 +10,7 @@ from itertools import chain
 
 import numpy as np
 
+from groundstation.base.declination import NORTH_EAST_DOWN_SIGMA_NT
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.simulation.flight import Simulated, simulate
@@ -30,7 +31,6 @@ from groundstation.simulation.scenario import (
     Vector,
     Wind,
 )
-from groundstation.tables.declination import NORTH_EAST_DOWN_SIGMA_NT
 
 RATE_HZ = 10.0
 FIELD_ALTITUDE_M, FIGURE_ALTITUDE_M = 200.0, 1500.0

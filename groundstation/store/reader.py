@@ -38,7 +38,7 @@ PLACES_BYTES = 64 << 20  # bound of the working arrays for one piece of a chunk
 
 
 def read_info(path: str | os.PathLike[str]) -> StoreInfo:
-    """Facts about a store file; blank where the file lost them.
+    """Facts about a store file; blank where the file lost them. A log of its own that holds no name has the file's.
 
     Raises
     ------
@@ -46,7 +46,8 @@ def read_info(path: str | os.PathLike[str]) -> StoreInfo:
         When the file cannot be opened or is not of the store.
     """
     with _opened(path) as (file, _):
-        return from_strings(find_facts(file)[0])
+        info = from_strings(find_facts(file)[0])
+    return info if info.source_name else replace(info, source_name=Path(path).name)
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,13 @@
 """Write a store file: chunks go to a spool as they fill, and into the file in order of time when all are known."""
 
+import glob
+import hashlib
 import os
 import re
 import tempfile
 import zlib
 from collections import Counter, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -32,6 +34,7 @@ from numpy.typing import NDArray
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import RecordBatch
 from groundstation.base.signals import is_canonical, kind_of
+from groundstation.base.to_disk import sync_folder, sync_open
 from groundstation.base.version import __version__
 from groundstation.store.channel import ChannelWriter, Chunk, TopicWriter
 from groundstation.store.derived import LOG_TOPIC, LocationFixWriter, LogWriter, Origin, PoseWriter
@@ -44,6 +47,7 @@ LIBRARY = f"groundstation {__version__}"
 ZSTD_LEVEL = -1
 MEMORY_BYTES = 32 << 20  # of finished chunks that are kept in memory; when there are more, all go to the spool
 MOST_ON_THEIR_WAY = 4  # chunks that wait for the thread which compresses and writes them
+PART = ".part"  # end of the name of a file that is being written
 MAX_CHANNELS = 65_535  # MCAP's channel ids have 16 bits
 
 
@@ -59,6 +63,33 @@ class _Finished:
     index: ChunkIndex
 
 
+class _Digested:
+    """A file that is written from its beginning to its end, and the digest of what was."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self._digest, self._at = file, hashlib.sha256(), 0
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of all that was written, hexadecimal."""
+        return self._digest.hexdigest()
+
+    def tell(self) -> int:
+        """Bytes written."""
+        return self._at
+
+    def write(self, data: bytes) -> None:
+        """Write bytes at the end."""
+        self._file.write(data)
+        self._digest.update(data)
+        self._at += len(data)
+
+    def writelines(self, parts: Iterable[bytes]) -> None:
+        """Write several parts at the end."""
+        for part in parts:
+            self.write(part)
+
+
 class StoreWriter:
     """Write batches of corrected records into an MCAP file.
 
@@ -70,7 +101,8 @@ class StoreWriter:
     Parameters
     ----------
     path : path-like
-        File to write; replaced when it exists.
+        File to write; replaced when it exists. When the block has ended it is on the disk, and attribute ``sha256``
+        has its digest.
     info : StoreInfo
         Facts about the file. Attribute ``info`` may be replaced until the block ends, as the ledger often is complete
         only then; ``has_utc`` is taken at the start.
@@ -87,6 +119,7 @@ class StoreWriter:
     def __init__(self, path: str | os.PathLike[str], info: StoreInfo) -> None:
         self.path = Path(path)
         self.info = info
+        self.sha256 = ""
         self._has_utc = info.has_utc
         self._channels: dict[str, ChannelWriter] = {}
         self._derived_of: dict[str, ChannelWriter] = {}
@@ -109,7 +142,7 @@ class StoreWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         assert self._spool is not None
-        part = self.path.with_name(f".{self.path.name}.{os.getpid()}.part")
+        part = self.path.with_name(f".{self.path.name}.{os.getpid()}{PART}")
         try:
             if kind is None:
                 with self._failing_in_one_line():
@@ -118,8 +151,13 @@ class StoreWriter:
                     self._write_log()
                     self._wait_until_left(0)
                     with part.open("wb") as file:
-                        self._finish(file)
+                        told = _Digested(file)
+                        self._finish(told)
+                        file.flush()
+                        sync_open(file.fileno(), self.path)
                     part.replace(self.path)
+                    sync_folder(self.path.parent)
+                    self.sha256 = told.sha256
         finally:
             self._thread.shutdown(cancel_futures=True)
             self._spool.close()
@@ -227,7 +265,7 @@ class StoreWriter:
                 one.parts = ()
             self._spooled = len(self._chunks)
 
-    def _finish(self, file: BinaryIO) -> None:
+    def _finish(self, file: _Digested) -> None:
         """Write the whole file: definitions, chunks, facts again, summary."""
         definitions = [channel.definition(self.info.metadata) for channel in self._channels.values() if channel.count]
         schemas: list[McapRecord] = [schema for schema, _ in definitions]
@@ -259,7 +297,7 @@ class StoreWriter:
         ]
         file.write(_summary(groups, file.tell()) + MAGIC)
 
-    def _copy_chunk(self, file: BinaryIO, chunk: _Finished) -> ChunkIndex:
+    def _copy_chunk(self, file: _Digested, chunk: _Finished) -> ChunkIndex:
         """Copy a chunk from the spool; returns its index with the places it now has."""
         assert self._spool is not None
         start = file.tell()
@@ -295,6 +333,26 @@ class StoreWriter:
         except OSError as error:
             reason = error.strerror or type(error).__name__
             raise GroundstationError(str(self.path), f"cannot be written ({reason})") from error
+
+
+def clear_parts(path: Path) -> None:
+    """Remove what processes that died while they wrote a file have left beside it."""
+    for part in path.parent.glob(f".{glob.escape(path.name)}.*{PART}"):
+        number = part.name.removesuffix(PART).rpartition(".")[2]
+        if number.isdecimal() and not _is_alive(int(number)):
+            part.unlink(missing_ok=True)
+
+
+def _is_alive(process: int) -> bool:
+    if os.name != "posix":  # there the signal 0 is another one
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError
+from groundstation.base.geodesy import MOST_ON_EARTH_DEG
 from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Int64Array, RecordBatch
-from groundstation.base.signals import has_values
+from groundstation.base.signals import has_values, is_canonical
 from groundstation.tables.table import Flight, Table
 
 
@@ -29,7 +30,8 @@ def flight_from_batches(
     Returns
     -------
     Flight
-        Rows of equal time keep the order of the source. ``start_ns`` is the first time of any topic.
+        Rows of equal time keep the order of the source. ``start_ns`` is the first time of any topic. A place that is
+        not on Earth (:func:`groundstation.base.geodesy.on_earth`) is absent: the ledger counts it, the store has it.
 
     Raises
     ------
@@ -84,10 +86,11 @@ def batches_from_flight(flight: Flight, max_rows: int = MAX_BATCH_ROWS) -> Itera
 def _table(topic: str, parts: list[RecordBatch]) -> Table:
     lengths = [len(part) for part in parts]
     names = dict.fromkeys(name for part in parts for name in part.columns)  # in order of first appearance
+    columns = {name: _column([part.columns.get(name) for part in parts], lengths) for name in names}
     table = Table(
         topic,
         np.concatenate([_time_of_validity_ns(part) for part in parts]),
-        {name: _column([part.columns.get(name) for part in parts], lengths) for name in names},
+        _with_places_on_earth(columns) if is_canonical(topic) else columns,
         np.concatenate([part.record_index for part in parts]),
         _column([part.device_time_ns for part in parts], lengths),
     )
@@ -120,6 +123,17 @@ def _column(pieces: list[Column | None], lengths: list[int]) -> Column:
         if present is not None:
             present[start:end] = False if piece is None else piece.mask
     return Column(values, _unless_all(present))
+
+
+def _with_places_on_earth(columns: dict[str, Column]) -> dict[str, Column]:
+    """The columns, latitude and longitude absent where one of them is beyond what there is on Earth."""
+    named = {name: columns[name] for name in MOST_ON_EARTH_DEG if name in columns}
+    places = {name: column for name, column in named.items() if column.values.dtype.kind in "fiu"}
+    beyond = [column.mask & (np.abs(column.values) > MOST_ON_EARTH_DEG[name]) for name, column in places.items()]
+    off = np.any(beyond, axis=0) if beyond else np.zeros(0, dtype=bool)
+    if not off.any():
+        return columns
+    return columns | {name: Column(column.values, column.mask & ~off) for name, column in places.items()}
 
 
 def _common_type(dtypes: list[np.dtype[Any]]) -> np.dtype[Any]:

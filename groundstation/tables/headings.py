@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray, unwrap, wrap_180, wrap_360
+from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import frozen
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
-from groundstation.tables.declination import declination_along
 from groundstation.tables.table import Flight, Table
 
 FARTHEST_POSITION_S = 600.0  # an aircraft covers 150 km in that time: some tenths of a degree of declination

@@ -14,6 +14,8 @@ FASTEST_HZ = 10.0  # a faster source says no more of a motion
 SURER = 1.5  # times: a smaller difference of the stated sigma is none
 NEEDS = {"gnss": ("velocity_north_mps", "velocity_east_mps"), "ins": ("roll_deg", "pitch_deg")}
 AIDED, HALF = "gnss_aided", 0.5
+FIX_FIELDS = ("latitude_deg", "velocity_north_mps", "ground_speed_mps")  # a receiver with a fix logs one of them
+NEVER_A_FIX = "GNSS never had a fix"
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,25 @@ def sources_of_kind(flight: Flight, kind: str) -> tuple[str, ...]:
     if not is_joined(flight) or len(topics) < 2:
         return topics
     return tuple(one.topic for one in ranked(flight, kind))
+
+
+def why_without_gnss(flight: Flight, what: str) -> str:
+    """Reason why GNSS has no velocity, or no position: ``no GNSS velocity in the log``, or that it never had a fix.
+
+    A receiver that logs its satellites or its kind of fix and never a place or a velocity had none.
+    """
+    tables = [flight[topic] for topic in topics_of_kind("gnss", flight.topics()) if len(flight[topic])]
+    told = [table for table in tables if table.has("satellites_used") or table.has("fix")]
+    if not told or any(table.has(field) for table in tables for field in FIX_FIELDS):
+        return f"no GNSS {what} in the log"
+    used = [table.values("satellites_used") for table in told if table.has("satellites_used")]
+    most = max((float(np.nanmax(values)) for values in used), default=np.nan)
+    satellites = "" if np.isnan(most) else f", {'at most ' if most else ''}{_counted(most, 'satellite')}"
+    return f"{NEVER_A_FIX}: {_counted(sum(len(table) for table in tables), 'row')}{satellites}"
+
+
+def _counted(number: float, noun: str) -> str:
+    return f"{number:g} {noun}" + ("" if number == 1 else "s")
 
 
 def ranked(flight: Flight, kind: str) -> list[Ranked]:

@@ -1,6 +1,6 @@
 """Two saved flights in one recording: entities ``A/`` and ``B/``, the clock of B moved onto that of A."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,7 +8,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.base.geodesy import north_east_m, on_earth
+from groundstation.base.failures import attempt
+from groundstation.base.geodesy import north_east_m, on_earth, plan_north_east_m
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.results.comparison import Comparison
@@ -86,9 +87,8 @@ def send_comparison(
     stream.send_recording_name(clean_text(f"{comparison.a.flight_id} | {comparison.b.flight_id}"))
     halves = (Half("A", a, colours.INS), Half("B", b, colours.GNSS, comparison.alignment.offset_s))
     recorder.document("comparison", comparison_text(comparison))
-    tabs = [_overview(recorder, halves), _heading(recorder, halves), _inertial(recorder, halves)]
-    tabs.append(_cooperative(recorder, halves))
-    return send_layout(stream, [tab for tab in (*tabs, _forecast(recorder, halves)) if tab is not None])
+    tabs = (attempt("tab", name, tab, recorder, halves) for name, tab in TABS.items())
+    return send_layout(stream, [tab for tab in tabs if tab is not None])
 
 
 def _overview(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container:
@@ -186,7 +186,7 @@ def _plan(recorder: Recorder, halves: Sequence[Half]) -> rrb.View | None:
     is_shared = bool(apart_m <= NEAR_M)
     places = []
     for (half, time_s, positions, known), origin in zip(tracks, origins, strict=True):
-        north, east = north_east_m(positions[:, 0], positions[:, 1], *(origins[0] if is_shared else origin))
+        north, east = plan_north_east_m(positions[:, 0], positions[:, 1], *(origins[0] if is_shared else origin))
         points = np.column_stack([east, -north])  # the axes of a Rerun picture run right and down
         places.append(points[known])
         _track(recorder, half, time_s, points, known)
@@ -276,3 +276,12 @@ def _forecast(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | Non
     chart.curves("methods", curves)
     chart.legend([line for _, _, line in curves])
     return rrb.Horizontal(contents=[chart.view()], name="Forecast")
+
+
+TABS: dict[str, Callable[[Recorder, Sequence[Half]], rrb.Container | None]] = {
+    "overview": _overview,
+    "heading": _heading,
+    "inertial": _inertial,
+    "cooperative": _cooperative,
+    "forecast": _forecast,
+}

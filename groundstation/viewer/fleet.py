@@ -1,15 +1,18 @@
 """The Rerun recording of a fleet: fleet.rrd, a row a flight, on the timelines ``utc`` and ``flight_number``."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import rerun as rr
 import rerun.blueprint as rrb
 
+from groundstation.base.failures import attempt
 from groundstation.results.fleet import FleetResults
 from groundstation.viewer.fleet_charts import (
     HEADING,
     MOST_AIRCRAFT,
     PATHS,
+    Aircraft,
     aircraft_of,
     log_aircraft,
     over_time,
@@ -23,6 +26,7 @@ from groundstation.viewer.fleet_text import aircraft_text, failed_text, flights_
 from groundstation.viewer.recording import save_stream, send_layout
 from groundstation.viewer.views import document
 
+Logged = tuple[Aircraft, list[str]]  # an aircraft and the quantities it has
 FLEET = "fleet"
 FLIGHTS_TEXT = "flights"  # entity of the table of flights
 
@@ -48,16 +52,29 @@ def send_fleet(stream: rr.RecordingStream, fleet: FleetResults) -> rrb.Blueprint
     """Log a fleet to a stream that has its sink, send the layout, wait until all is out; returns the layout."""
     recorder = FleetRecorder(stream, fleet)
     stream.send_recording_name("Fleet")
-    aircraft = aircraft_of(fleet)
-    found = [(one, log_aircraft(recorder, fleet, one)) for one in aircraft]
+    logged = (attempt("aircraft", one.name, _logged, recorder, fleet, one) for one in aircraft_of(fleet))
+    found = [one for one in logged if one is not None]
+    shown = (attempt("tab", name, tab, recorder, fleet, found) for name, tab in TABS.items())
+    tabs = [tab for tab in shown if tab is not None]
+    return send_layout(stream, tabs, timeline=FLIGHT_NUMBER)  # on utc, the flights of a year are a few columns of dots
+
+
+def _logged(recorder: FleetRecorder, fleet: FleetResults, one: Aircraft) -> Logged:
+    return one, log_aircraft(recorder, fleet, one)
+
+
+def _fleet(recorder: FleetRecorder, fleet: FleetResults, found: list[Logged]) -> rrb.Container:
+    aircraft = [one for one, _ in found]
     recorder.document("by_aircraft", aircraft_text(fleet, {one.name: one.entity for one in aircraft}))
-    recorder.document(FLIGHTS_TEXT, flights_text(recorder, fleet))
     plots = [*over_time(found, HEADING), *([verdicts(aircraft)] if aircraft else [])]
     answer = [document("By aircraft", "by_aircraft"), *heading_error_density(recorder, fleet)]
     columns = [rrb.Vertical(contents=answer)]
     if plots:
         columns.append(rrb.Vertical(contents=plots, row_shares=[3.0, 1.0][: len(plots)]))
-    tabs: list[rrb.Container] = [rrb.Horizontal(contents=columns, name="Fleet")]
+    return rrb.Horizontal(contents=columns, name="Fleet")
+
+
+def _aircraft(_recorder: FleetRecorder, _fleet: FleetResults, found: list[Logged]) -> rrb.Container | None:
     own = [
         rrb.Vertical(
             contents=[*(view for quantity in PATHS for view in over_time([(one, names)], quantity)), verdicts([one])],
@@ -65,15 +82,35 @@ def send_fleet(stream: rr.RecordingStream, fleet: FleetResults) -> rrb.Blueprint
         )
         for one, names in found[:MOST_AIRCRAFT]
     ]
-    if own:
-        tabs.append(rrb.Tabs(contents=own, name="Aircraft"))
+    return rrb.Tabs(contents=own, name="Aircraft") if own else None
+
+
+def _forecast(recorder: FleetRecorder, fleet: FleetResults, _found: list[Logged]) -> rrb.Container | None:
     forecast = [*skill_over_flights(recorder, fleet), *skill_by_horizon(recorder, fleet)]
-    if skill := forecast_text(fleet):
-        recorder.document("forecast/skill", skill)
-        views = [*forecast, document("Skill of the forecast", "forecast/skill")]
-        tabs.append(rrb.Grid(contents=views, grid_columns=2, name="Forecast"))
-    tabs.append(rrb.Vertical(contents=[document("Flights and their recordings", FLIGHTS_TEXT)], name="Flights"))
-    if fleet.not_in_fleet:
-        recorder.document("failed", failed_text(fleet))
-        tabs.append(rrb.Vertical(contents=[document("Logs without a flight", "failed")], name="Failed"))
-    return send_layout(stream, tabs, timeline=FLIGHT_NUMBER)  # on utc, the flights of a year are a few columns of dots
+    skill = forecast_text(fleet)
+    if not skill:
+        return None
+    recorder.document("forecast/skill", skill)
+    views = [*forecast, document("Skill of the forecast", "forecast/skill")]
+    return rrb.Grid(contents=views, grid_columns=2, name="Forecast")
+
+
+def _flights(recorder: FleetRecorder, fleet: FleetResults, _found: list[Logged]) -> rrb.Container:
+    recorder.document(FLIGHTS_TEXT, flights_text(recorder, fleet))
+    return rrb.Vertical(contents=[document("Flights and their recordings", FLIGHTS_TEXT)], name="Flights")
+
+
+def _failed(recorder: FleetRecorder, fleet: FleetResults, _found: list[Logged]) -> rrb.Container | None:
+    if not fleet.not_in_fleet:
+        return None
+    recorder.document("failed", failed_text(fleet))
+    return rrb.Vertical(contents=[document("Logs without a flight", "failed")], name="Failed")
+
+
+TABS: dict[str, Callable[[FleetRecorder, FleetResults, list[Logged]], rrb.Container | None]] = {
+    "fleet": _fleet,
+    "aircraft": _aircraft,
+    "forecast": _forecast,
+    "flights": _flights,
+    "failed": _failed,
+}

@@ -1,9 +1,11 @@
 """A gate before Rerun's catalog server, which answers any name: browsers come in by a name of this machine alone.
 
 Viewers and programs speak HTTP/2 without encryption, which no browser does; browsers speak HTTP/1.1 and name the host
-that their page asked for. The server itself listens on an address of this machine that nobody is told.
+that their page asked for. Each connection of HTTP/1.1 takes one request, so that every request is looked at. The server
+itself listens on an address of this machine that nobody is told.
 """
 
+import math
 import re
 import secrets
 import socket
@@ -12,15 +14,20 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from typing import NamedTuple
 
 from groundstation.viewer.own_name import LOCAL, is_own_name
 
+HEAD_END = b"\r\n\r\n"
 HTTP2 = b"PRI * HTTP/2.0\r\n"  # how a client begins that knows that the server speaks HTTP/2
 MOST_HEAD_BYTES = 1 << 16
 BLOCK_BYTES = 1 << 16
 PATIENCE_S = 10.0  # for the head of the first request
 REFUSAL = b"HTTP/1.1 421 Misdirected Request\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
-_HOST = re.compile(rb"\r\nhost:[ \t]*([^\r\n]*)", re.IGNORECASE)
+LENGTH_DIGITS = 18  # of the length of a body
+_FIRST = re.compile(rb"[A-Z]+ [!-~]+ HTTP/1\.[01]")
+_LINE = re.compile(rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+):[ \t]*([^\r\n\0]*)")
+_OF_THE_CONNECTION = (b"connection", b"keep-alive", b"proxy-connection", b"upgrade", b"http2-settings")
 
 
 def hidden_address() -> str:
@@ -93,8 +100,9 @@ class _Visitor(socketserver.BaseRequestHandler):
     def handle(self) -> None:
         with suppress(OSError):  # a visitor who leaves
             self.request.settimeout(PATIENCE_S)
-            head = self._head()
-            if not may_enter(head):
+            head, rest = self._head()
+            wanted = None if head.startswith(HTTP2) else request_of(head)
+            if wanted is None and not head.startswith(HTTP2):
                 self.request.sendall(REFUSAL if head else b"")
                 return
             destination = self.server.destination()
@@ -102,43 +110,80 @@ class _Visitor(socketserver.BaseRequestHandler):
                 return
             with socket.create_connection(destination) as inner:
                 self.request.settimeout(None)
-                inner.sendall(head)
-                back = threading.Thread(target=_pass_on, args=(inner, self.request), daemon=True)
+                back = threading.Thread(target=_answer, args=(inner, self.request, wanted is not None), daemon=True)
                 back.start()
-                _pass_on(self.request, inner)
+                if wanted is None:
+                    _pass_on(self.request, inner, head + rest)
+                else:
+                    inner.sendall(wanted.head)
+                    _pass_on(self.request, inner, rest, wanted.body_bytes)
                 back.join()
 
-    def _head(self) -> bytes:
-        """The first bytes, as many as tell whether the visitor may enter."""
+    def _head(self) -> tuple[bytes, bytes]:
+        """What tells whether the visitor may enter, to the end of the first head, and the bytes behind it."""
         head = b""
-        while len(head) < MOST_HEAD_BYTES and b"\r\n\r\n" not in head:
+        while len(head) < MOST_HEAD_BYTES and HEAD_END not in head:
             block = self.request.recv(BLOCK_BYTES)
             if not block:
                 break
             head += block
-        return head
+        first, end, rest = head.partition(HEAD_END)
+        return first + end, rest
 
 
-def may_enter(head: bytes) -> bool:
-    """Whether a connection that begins so is let in: HTTP/2, or HTTP/1.1 with one Host, a name of this machine.
+class Request(NamedTuple):
+    """A request as it is passed on: its head, which closes the connection behind it, and the length of its body."""
+
+    head: bytes
+    body_bytes: int
+
+
+def request_of(head: bytes) -> Request | None:
+    """The request that a connection of HTTP/1.1 begins with, if it may enter: one Host, a name of this machine.
+
+    None else, and where two readers of it might see two requests: ends of lines that are none, a body without a
+    length, or with two.
 
     Examples
     --------
-    >>> may_enter(b"GET / HTTP/1.1\\r\\nHost: 127.0.0.1:51234\\r\\n\\r\\n")
+    >>> request_of(b"GET / HTTP/1.1\\r\\nHost: 127.0.0.1:51234\\r\\n\\r\\n").head
+    b'GET / HTTP/1.1\\r\\nHost: 127.0.0.1:51234\\r\\nConnection: close\\r\\n\\r\\n'
+    >>> request_of(b"GET / HTTP/1.1\\r\\nHost: pages.example\\r\\n\\r\\n") is None
     True
-    >>> may_enter(b"GET / HTTP/1.1\\r\\nHost: pages.example\\r\\n\\r\\n")
-    False
     """
-    if head.startswith(HTTP2):
-        return True
-    lines, end, _ = head.partition(b"\r\n\r\n")
-    hosts = _HOST.findall(lines)
-    return bool(end) and len(hosts) == 1 and is_own_name(hosts[0].decode("latin-1"))
+    lines, end, rest = head.partition(HEAD_END)
+    first, *others = lines.split(b"\r\n")
+    found = [_LINE.fullmatch(line) for line in others]
+    if not end or rest or not _FIRST.fullmatch(first) or None in found:
+        return None
+    fields = [(line[1].lower(), line[2].strip()) for line in found if line is not None]
+    hosts, lengths = ([text for name, text in fields if name == wanted] for wanted in (b"host", b"content-length"))
+    is_sized = len(lengths) <= 1 and all(one.isdigit() and len(one) <= LENGTH_DIGITS for one in lengths)
+    if b"transfer-encoding" in dict(fields) or not is_sized:
+        return None
+    if len(hosts) != 1 or not is_own_name(hosts[0].decode("latin-1")):
+        return None
+    kept = [line for line, (name, _) in zip(others, fields, strict=True) if name not in _OF_THE_CONNECTION]
+    passed = b"\r\n".join((first, *kept, b"Connection: close")) + HEAD_END
+    return Request(passed, int(lengths[0]) if lengths else 0)
 
 
-def _pass_on(source: socket.socket, target: socket.socket) -> None:
+def _pass_on(source: socket.socket, target: socket.socket, first: bytes = b"", most: float = math.inf) -> None:
+    """Pass bytes on until the source ends; behind ``most`` of them they are dropped."""
     with suppress(OSError):
-        while block := source.recv(BLOCK_BYTES):
-            target.sendall(block)
+        block = first or source.recv(BLOCK_BYTES)
+        while block:
+            passed = block[: int(min(most, len(block)))]
+            most -= len(passed)
+            target.sendall(passed)
+            block = source.recv(BLOCK_BYTES)
     with suppress(OSError):
         target.shutdown(socket.SHUT_WR)
+
+
+def _answer(inner: socket.socket, visitor: socket.socket, is_last: bool) -> None:
+    """Pass answers on; behind the last one the connection is closed."""
+    _pass_on(inner, visitor)
+    if is_last:
+        with suppress(OSError):
+            visitor.shutdown(socket.SHUT_RDWR)

@@ -1,10 +1,10 @@
 """Names an operator reads, and entity paths no log can break: whatever a file calls its columns, both stay legible."""
 
 import re
-import unicodedata
 from collections.abc import Iterable
 
 from groundstation.base import unit_names
+from groundstation.base.printable import printable
 
 MAX_LABEL_CHARACTERS = 80
 
@@ -31,8 +31,7 @@ def clean_text(text: str, limit: int = MAX_LABEL_CHARACTERS) -> str:
     >>> clean_text("roll\\x00\\n\\u202eangle")
     'roll angle'
     """
-    printable = "".join(" " if unicodedata.category(mark)[0] in "CZ" else mark for mark in text)
-    line = " ".join(printable.split())
+    line = " ".join(printable(text, " ").split())
     return line if len(line) <= limit else line[: limit - 1] + "…"
 
 

@@ -3,8 +3,10 @@
 import hashlib
 import re
 import socket
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -13,6 +15,8 @@ import rerun.blueprint as rrb
 import rerun_bindings
 
 from groundstation.base.errors import GroundstationError
+from groundstation.base.failures import attempt, failures, with_failures
+from groundstation.base.to_disk import sync_file
 from groundstation.results.answer import Answer
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
@@ -47,6 +51,7 @@ ANSWER_TABS: tuple[tuple[Callable[[Recorder, FlightResults], rrb.Container | Non
     (together, ("together",)),
     (reference, ("reference",)),
 )
+Tab = tuple[str, Callable[[], rrb.Container | None]]
 SHOWN_ELSEWHERE = ("latency",)  # in the tab on data quality
 CONNECT_SECONDS, FLUSH_SECONDS = 3.0, 60.0
 
@@ -75,6 +80,7 @@ def save_stream(path: Path, identity: str, send: Callable[[rr.RecordingStream], 
     try:
         _save(temporary, identity, send)
         rerun_bindings.flush_and_cleanup_orphaned_recordings()  # else the threads and buffers of each one stay
+        sync_file(temporary)
         temporary.replace(path)
     except (OSError, RuntimeError) as error:  # Rerun's own are RuntimeErrors
         raise GroundstationError(str(path), str(error), next_step="check the folder and the free space") from error
@@ -129,18 +135,29 @@ def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResul
     """Log everything to a stream that has its sink, send the layout, wait until it is out; returns the layout."""
     recorder = Recorder(stream, flight.start_ns, flight.has_utc)
     stream.send_recording_name(clean_text(results.flight_id))
-    send_properties(stream, results)
+    attempt("properties", "results", send_properties, stream, results)
     if flight.has_utc:
         stream.send_recording_start_time_nanos(flight.start_ns)
-    tabs = (
-        overview(recorder, results),
-        quality(recorder, flight, results),
-        *(tab(recorder, results) for tab, _ in ANSWER_TABS),
-        *(generic_tab(recorder, results, answer) for answer in _without_tab(results)),
-        raw(recorder, flight, results),
-        log(recorder, flight, results),
-    )
-    return send_layout(stream, [tab for tab in tabs if tab is not None])
+    return send_layout(stream, logged(tabs_of(recorder, flight, results), recorder, flight, results))
+
+
+def tabs_of(recorder: Recorder, flight: Flight, results: FlightResults) -> Iterator[Tab]:
+    """The tabs of a flight but for the log, in their order: the name of each and what logs it."""
+    yield "overview", partial(overview, recorder, results)
+    yield "quality", partial(quality, recorder, flight, results)
+    for tab, analyses in ANSWER_TABS:
+        yield analyses[0], partial(tab, recorder, results)
+    for answer in _without_tab(results):
+        yield answer.analysis, partial(generic_tab, recorder, results, answer)
+    yield "raw", partial(raw, recorder, flight, results)
+
+
+def logged(tabs: Iterable[Tab], recorder: Recorder, flight: Flight, results: FlightResults) -> list[rrb.Container]:
+    """Log tabs and, behind them, the log, which tells of those that failed and are left out."""
+    shown = [attempt("tab", name, tab) for name, tab in tabs]
+    told = replace(results, findings=with_failures(results.findings, failures()))
+    shown.append(attempt("tab", "log", log, recorder, flight, told))
+    return [tab for tab in shown if tab is not None]
 
 
 def _without_tab(results: FlightResults) -> list[Answer]:

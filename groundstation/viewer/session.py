@@ -1,19 +1,20 @@
 """The Rerun recording of a session of several aircraft."""
 
+from functools import partial
 from pathlib import Path
 
 import rerun as rr
 import rerun.blueprint as rrb
 
+from groundstation.base.failures import attempt
 from groundstation.results.flight import FlightResults
 from groundstation.tables.session_assemble import AssembledSession
 from groundstation.tables.table import Flight
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.properties import send_properties
 from groundstation.viewer.recorder import Recorder
-from groundstation.viewer.recording import save_stream, send_layout
+from groundstation.viewer.recording import logged, save_stream, send_layout
 from groundstation.viewer.tabs.cooperative import cooperative
-from groundstation.viewer.tabs.log import log
 
 
 def write_session_recording(path: Path, assembled: AssembledSession, results: FlightResults) -> None:
@@ -39,10 +40,9 @@ def send_session(stream: rr.RecordingStream, assembled: AssembledSession, result
     """Log everything to a stream that has its sink and send the layout; returns the layout."""
     recorder = Recorder(stream, assembled.start_ns, assembled.has_utc)
     stream.send_recording_name(clean_text(results.flight_id))
-    send_properties(stream, results)
+    attempt("properties", "results", send_properties, stream, results)
     if assembled.has_utc:
         stream.send_recording_start_time_nanos(assembled.start_ns)
     clock = Flight({}, results.metadata, assembled.start_ns, assembled.has_utc)  # findings have places in time alone
-    return send_layout(
-        stream, [cooperative(recorder, assembled.session.points, results), log(recorder, clock, results)]
-    )
+    tabs = [("cooperative", partial(cooperative, recorder, assembled.session.points, results))]
+    return send_layout(stream, logged(tabs, recorder, clock, results))

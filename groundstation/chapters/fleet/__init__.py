@@ -16,17 +16,17 @@ from groundstation.chapters.fleet import (
 from groundstation.chapters.parts import Section
 from groundstation.results.fleet import FleetResults
 
-CHAPTERS: tuple[Callable[[FleetResults], Section | None], ...] = (
-    flights.build,
-    sessions.build,
-    densities.build,
-    aircraft.heading,
-    trend.build,
-    aircraft.ins,
-    skill.build,
-    calibration.build,
-    deviation.build,
-    rest.outliers,
-    rest.not_in_fleet,
-    rest.method,
-)
+CHAPTERS: dict[str, Callable[[FleetResults], Section | None]] = {
+    "flights": flights.build,
+    "sessions": sessions.build,
+    "densities": densities.build,
+    "heading": aircraft.heading,
+    "trend": trend.build,
+    "ins": aircraft.ins,
+    "skill": skill.build,
+    "calibration": calibration.build,
+    "deviation": deviation.build,
+    "outliers": rest.outliers,
+    "not_in_fleet": rest.not_in_fleet,
+    "method": rest.method,
+}

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.geodesy import continuous_longitude_deg
 from groundstation.base.records import BoolArray
 from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.estimators.approaches.geometry import along_and_across, metres_per_dot
@@ -240,7 +241,7 @@ def _steps(positions: Positions, used: Rows, runway: RunwayUsed) -> FloatArray:
     """
     total = np.zeros((len(used), len(used)))
     time_s = positions.time_s[used]
-    coordinates = (positions.latitude_deg[used], positions.longitude_deg[used])
+    coordinates = (positions.latitude_deg[used], continuous_longitude_deg(positions.longitude_deg[used]))
     for size_m, step_deg, values in zip(step_across_m(positions, runway), positions.step_deg, coordinates, strict=True):
         if step_deg <= 0.0:
             continue

@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from groundstation.base.angles import wrap_180
+from groundstation.base.geodesy import continuous_longitude_deg
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import MPS2_PER_G
 from groundstation.estimators.approaches.finals import Final
@@ -23,7 +25,9 @@ SPIKE_G = 1.5  # of one sample against both its neighbours
 def touchdown_of(flight: "Flight", path: FlightPath, final: Final, runway: RunwayUsed, near: Against) -> Touchdown:
     """Measure the touchdown that a final ends in."""
     at_s = final.end.time_s
-    latitude, longitude = (float(np.interp(at_s, path.time_s, one)) for one in (path.latitude_deg, path.longitude_deg))
+    places = path.latitude_deg, continuous_longitude_deg(path.longitude_deg)
+    latitude, longitude = (float(np.interp(at_s, path.time_s, one)) for one in places)
+    longitude = longitude if abs(longitude) <= 180.0 else float(wrap_180(longitude))
     distance_m, _across = along_and_across(np.array([latitude]), np.array([longitude]), runway)
     on_ground = np.arange(near.rows.start, near.rows.stop)[~near.is_final]
     course = None

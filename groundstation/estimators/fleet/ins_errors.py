@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.geodesy import curvature_radii_m
+from groundstation.base.geodesy import continuous_longitude_deg, curvature_radii_m
 from groundstation.base.records import frozen
 from groundstation.base.units import M_PER_NAUTICAL_MILE
 
@@ -22,7 +22,7 @@ S_PER_H = 3600.0
 class InsErrors:
     """Position errors of one flight, INS minus reference, at the moments when both are known, shapes (n,).
 
-    ``hours`` count from the first of them; ``along_nmi`` and ``cross_nmi`` are NaN where the aircraft hardly moves.
+    ``hours`` count from the start of navigation; ``along_nmi``, ``cross_nmi`` are NaN where the aircraft hardly moves.
     """
 
     hours: FloatArray
@@ -66,6 +66,8 @@ def ins_errors(
     east_error_m: FloatArray,
     latitude_deg: FloatArray,
     longitude_deg: FloatArray,
+    *,
+    start_s: float | None = None,
 ) -> InsErrors | None:
     """Errors of a flight over its hours; None where fewer than two positions are compared.
 
@@ -77,15 +79,20 @@ def ins_errors(
         INS minus reference, NaN where the reference is missing.
     latitude_deg, longitude_deg : ndarray, shape (n,)
         Of the INS: the way it flew says which direction is along.
+    start_s : float, optional
+        Flight seconds at which navigation began, perhaps before the log; None: at the first position compared. What
+        lies before it does not count.
     """
     known = np.isfinite(north_error_m) & np.isfinite(east_error_m)
+    known &= time_s >= (-np.inf if start_s is None else start_s)
     if known.sum() < 2 or not np.ptp(time_s[known]) > 0.0:
         return None
+    zero_s = float(time_s[known][0]) if start_s is None else start_s
     along_north, along_east = _direction(time_s, latitude_deg, longitude_deg)
     along = north_error_m * along_north + east_error_m * along_east
     cross = east_error_m * along_north - north_error_m * along_east
     nmi = [values[known] / M_PER_NAUTICAL_MILE for values in (np.hypot(north_error_m, east_error_m), along, cross)]
-    return InsErrors((time_s[known] - time_s[known][0]) / S_PER_H, *nmi)
+    return InsErrors((time_s[known] - zero_s) / S_PER_H, *nmi)
 
 
 def _direction(
@@ -94,9 +101,8 @@ def _direction(
     """Unit vector along the track, north and east; NaN where the aircraft hardly moves or its place is not known."""
     meridian, prime_vertical = curvature_radii_m(latitude_deg)
     north = np.gradient(np.deg2rad(latitude_deg), time_s) * meridian
-    turned = np.rad2deg(np.unwrap(np.deg2rad(np.where(np.isfinite(longitude_deg), longitude_deg, 0.0))))
-    turned = np.where(np.isfinite(longitude_deg), turned, np.nan)
-    east = np.gradient(np.deg2rad(turned), time_s) * prime_vertical * np.cos(np.deg2rad(latitude_deg))
+    turned_rad = np.deg2rad(continuous_longitude_deg(longitude_deg))
+    east = np.gradient(turned_rad, time_s) * prime_vertical * np.cos(np.deg2rad(latitude_deg))
     speed = np.hypot(north, east)
     speed = np.where(speed > MOVING_MPS, speed, np.nan)
     return north / speed, east / speed
@@ -154,6 +160,6 @@ def growth_of(flights: Sequence[InsErrors]) -> Growth:
     for row, flight in enumerate(flights):
         after = np.clip(np.searchsorted(flight.hours, hours), 1, len(flight.hours) - 1)
         gap = flight.hours[after] - flight.hours[after - 1]
-        is_known = (hours <= flight.hours[-1] + 1e-9) & (gap <= LONGEST_GAP_H)
+        is_known = (hours >= flight.hours[0] - 1e-9) & (hours <= flight.hours[-1] + 1e-9) & (gap <= LONGEST_GAP_H)
         radial[row, is_known] = np.interp(hours, flight.hours, flight.radial_nmi)[is_known]
     return Growth(hours, radial)

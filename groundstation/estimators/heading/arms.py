@@ -114,6 +114,8 @@ def _from_turns(
     rate, speed = samples.arm_rate_dps[turning], samples.speed_mps[turning]
     index = np.flatnonzero(turning)
     keep = np.abs(sine) < LARGEST_SINE
+    if keep.sum() < LEAST_TURNING:
+        return (arm[0], 0.0), (arm[1], settings.offset_prior_sigma_s)
     differences = Differences(
         time_s=samples.time_s[index][keep],
         difference_deg=sine[keep] * DEG_PER_RAD,

@@ -15,7 +15,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.estimators.heading.lines import fitted_lines, window_bounds
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.results.reasons import NO_CONTACT
-from groundstation.tables.sources import sources_of_kind
+from groundstation.tables.sources import sources_of_kind, why_without_gnss
 from groundstation.tables.table import Flight, Table
 
 FloatArray = NDArray[np.float64]
@@ -157,7 +157,7 @@ def choose_topics(flight: Flight, request: HeadingRequest) -> tuple[str, str]:
     if ins not in flight:
         raise NotAssessableError("heading", f"no topic {ins}" if ins else "no INS heading in the log")
     if gnss not in flight:
-        raise NotAssessableError("heading", f"no topic {gnss}" if gnss else "no GNSS velocity in the log")
+        raise NotAssessableError("heading", f"no topic {gnss}" if gnss else why_without_gnss(flight, "velocity"))
     if _is_track(flight, ins):
         text = f"the heading of {ins} is the receiver's own track: their difference is zero whatever the nose does"
         raise NotAssessableError("heading", text)

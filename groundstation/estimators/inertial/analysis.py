@@ -36,7 +36,15 @@ def _run(flight: "Flight", known: Known, settings: InertialSettings) -> Found[In
     compared, kind = compared_with_kind(flight, known, settings)
     if kind[0] != UNAIDED:
         return Found(*compare_aided(flight, kind, settings=settings, excluded_s=known.excluded_s))
-    found = estimate_compared(flight, compared, kind, settings=settings, aircraft_class=known.aircraft.ins_class)
+    aircraft = known.aircraft
+    found = estimate_compared(
+        flight,
+        compared,
+        kind,
+        settings=settings,
+        aircraft_class=aircraft.ins_class,
+        nav_start_utc=aircraft.nav_start_utc,
+    )
     return Found(found.result, found.findings, found)
 
 
@@ -89,6 +97,8 @@ def _sentence(answers: Answers) -> str:
     parts = []
     if inertial.radial_error_rate_50_nmiph is not None:
         parts.append(f"{inertial.radial_error_rate_50_nmiph:.2f} nmi/h")
+    elif inertial.navigation_start is not None and inertial.navigation_start.time_s is None:
+        parts.append("no rate: start of navigation not known")
     if forecast is not None:
         shipped = [row for row in forecast.skill if row.method == forecast.default_method]
         longest = max(shipped, key=lambda row: row.horizon_min, default=None)

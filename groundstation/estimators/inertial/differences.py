@@ -16,7 +16,7 @@ from groundstation.estimators.inertial.filter import Epochs
 from groundstation.estimators.inertial.model import FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.tables.resample import join
-from groundstation.tables.sources import is_joined, sources_of_kind
+from groundstation.tables.sources import is_joined, sources_of_kind, why_without_gnss
 from groundstation.tables.table import Flight, Table
 
 POSITION_FIELDS = ("latitude_deg", "longitude_deg")
@@ -107,7 +107,8 @@ def choose_pair(flight: Flight) -> tuple[str, str]:
         covered = {name: _covered_s(flight[name]) for name in sources_of_kind(flight, kind)}
         covered = {name: seconds for name, seconds in covered.items() if flight[name].has(*POSITION_FIELDS)}
         if not covered:
-            raise NotAssessableError("inertial", f"no {title} position in the log")
+            why = why_without_gnss(flight, "position") if kind == "gnss" else f"no {title} position in the log"
+            raise NotAssessableError("inertial", why)
         if is_joined(flight):
             found[kind] = next(iter(covered))
             continue

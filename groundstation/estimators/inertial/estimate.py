@@ -24,11 +24,12 @@ from groundstation.estimators.inertial.filter import (
 )
 from groundstation.estimators.inertial.kind import UNAIDED, kind_of
 from groundstation.estimators.inertial.model import POSITION, STATES, ChannelModel, FloatArray
+from groundstation.estimators.inertial.navigation_start import navigation_start, stated_start
 from groundstation.estimators.inertial.noise import InsNoise, choose_class
 from groundstation.estimators.inertial.outages import Bridged, bridge_outages
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import QUANTILES
-from groundstation.results.inertial import ChannelResult, InertialResult, StateEstimate
+from groundstation.results.inertial import ChannelResult, InertialResult, NavigationStart, StateEstimate
 from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight
 
@@ -40,7 +41,7 @@ TITLES = {
     "drift_rate": "rate of the drift",
     "random_drift": "random gyro drift",
 }
-RATE_FROM_S = 600.0
+RATE_FROM_S, S_PER_H = 600.0, 3600.0
 HALF = 0.5
 OUTAGES_LISTED = 5
 
@@ -69,6 +70,7 @@ def estimate_ins_errors(
     settings: InertialSettings | None = None,
     aircraft_class: str = "",
     excluded_s: tuple[tuple[float, float], ...] = (),
+    nav_start_utc: str = "",
 ) -> Estimation:
     """Estimate the errors of the INS in both horizontal channels.
 
@@ -81,6 +83,8 @@ def estimate_ins_errors(
         INS class the aircraft file names.
     excluded_s : tuple of (float, float)
         Flight seconds in which GNSS is not used.
+    nav_start_utc : str
+        Start of navigation, ISO 8601, where the aircraft file states it.
 
     Raises
     ------
@@ -97,7 +101,12 @@ def estimate_ins_errors(
     settings = settings or InertialSettings()
     compared = differences(flight, settings=settings, excluded_s=excluded_s)
     return estimate_compared(
-        flight, compared, kind_of(compared, settings), settings=settings, aircraft_class=aircraft_class
+        flight,
+        compared,
+        kind_of(compared, settings),
+        settings=settings,
+        aircraft_class=aircraft_class,
+        nav_start_utc=nav_start_utc,
     )
 
 
@@ -108,6 +117,7 @@ def estimate_compared(
     *,
     settings: InertialSettings,
     aircraft_class: str = "",
+    nav_start_utc: str = "",
 ) -> Estimation:
     """Estimate the errors of an INS that is compared with GNSS already; ``kind`` and the reason for it are known."""
     noise, origin = choose_class(settings, aircraft_class, said_of(flight, compared.ins_topic, "ins_class"))
@@ -116,8 +126,10 @@ def estimate_compared(
     run = run_filter(used, model, noise, gate=settings.gate_sigmas**2, initial=initial_of(used, noise))
     run = replace(run, epochs=compared.epochs)  # what the filter may not use still judges it
     smoothed, bridged = smooth(run), bridge_outages(flight, compared, run, settings)
-    result = _result(flight, compared, run, smoothed, bridged, settings, origin, kind)
-    findings = (*compared.findings, *_findings(compared, run, result))
+    stated = stated_start(nav_start_utc, flight, compared.ins_topic)
+    start, unusable = navigation_start(flight, compared, noise.gnss, stated)
+    result = _result(flight, compared, run, smoothed, bridged, settings, origin, kind, start)
+    findings = (*compared.findings, *unusable, *_findings(compared, run, result))
     return Estimation(compared, noise, run, smoothed, bridged.error_m, result, findings, bridged.coupled)
 
 
@@ -146,10 +158,13 @@ def _result(
     settings: InertialSettings,
     origin: str,
     kind: tuple[str, str],
+    start: NavigationStart,
 ) -> InertialResult:
     visible, epochs = observability(run), run.epochs
     radial, velocity = np.hypot(*run.measured(0).T), run.measured(1)
-    rate_50, rate_95 = _radial_rates(epochs, radial)
+    rate_50, rate_95 = _radial_rates(epochs, radial, start.time_s)
+    with_error = np.flatnonzero(np.isfinite(radial))
+    ends = with_error[[0, -1]] if len(with_error) else with_error
     speed = velocity[np.isfinite(velocity).all(axis=1)]
     return InertialResult(
         ins_topic=compared.ins_topic,
@@ -166,7 +181,11 @@ def _result(
         radial_error_rate_50_nmiph=rate_50,
         radial_error_rate_95_nmiph=rate_95,
         velocity_error_rms_mps=float(np.sqrt(np.mean(np.sum(speed**2, axis=1)))) if len(speed) else None,
-        largest_radial_error_m=float(np.nanmax(radial)) if np.isfinite(radial).any() else None,
+        largest_radial_error_m=float(np.nanmax(radial)) if len(ends) else None,
+        navigation_start=start,
+        radial_error_first_m=float(radial[ends[0]]) if len(ends) else None,
+        radial_error_last_m=float(radial[ends[1]]) if len(ends) else None,
+        compared_hours=float(np.ptp(epochs.time_s[ends])) / S_PER_H if len(ends) else None,
         outages=bridged.outages,
         azimuth=estimate_azimuth(compared, run, settings) if kind[0] == UNAIDED else None,
         reopened=run.reopened,
@@ -218,18 +237,19 @@ def _channel(run: FilterRun, visible: FloatArray, channel: int) -> ChannelResult
     )
 
 
-def _radial_rates(epochs: Epochs, radial_m: FloatArray) -> tuple[float | None, float | None]:
-    """Radial error over the time since the first epoch or the last reset of the INS, nmi/h: median and 95 %.
+def _radial_rates(epochs: Epochs, radial_m: FloatArray, start_s: float | None) -> tuple[float | None, float | None]:
+    """Radial error over the time since navigation began or the INS was last reset, nmi/h: median and 95 %.
 
-    Over epochs later than ten minutes after it.
+    Over epochs later than ten minutes after it; none where nobody knows when navigation began.
     """
-    began = np.flatnonzero(epochs.is_reset | (np.arange(len(epochs)) == 0))
-    which = np.searchsorted(began, np.arange(len(epochs)), side="right") - 1
-    elapsed = epochs.time_s - epochs.time_s[began[which]]
-    late = (elapsed > RATE_FROM_S) & np.isfinite(radial_m)
+    if start_s is None:
+        return None, None
+    reset_s = np.where(epochs.is_reset, epochs.time_s, -np.inf)
+    elapsed_s = epochs.time_s - np.maximum(np.maximum.accumulate(reset_s), start_s)
+    late = (elapsed_s > RATE_FROM_S) & np.isfinite(radial_m)
     if not late.any():
         return None, None
-    rates = radial_m[late] / M_PER_NAUTICAL_MILE / (elapsed[late] / 3600.0)
+    rates = radial_m[late] / M_PER_NAUTICAL_MILE / (elapsed_s[late] / S_PER_H)
     return float(np.median(rates)), float(np.quantile(rates, 0.95))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
+from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
@@ -28,7 +29,6 @@ from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.deviation import Deviation
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import Residual
-from groundstation.tables.declination import declination_along
 from groundstation.tables.headings import true_from_magnetic
 from groundstation.tables.phases import Phases
 from groundstation.tables.resample import values_at

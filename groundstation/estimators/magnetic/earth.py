@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180
+from groundstation.base.declination import Declination, declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.magnetic.poisson import EarthField
 from groundstation.estimators.magnetic.readings import ANALYSIS, NO_DATE, PLACE_WANTED, Readings
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.magnetic import DeclinationUsed
-from groundstation.tables.declination import Declination, declination_along
 from groundstation.tables.table import Flight
 
 

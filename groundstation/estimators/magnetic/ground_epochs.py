@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180, wrap_360
+from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
 from groundstation.estimators.heading.delay import known_delay
@@ -27,11 +28,10 @@ from groundstation.estimators.magnetic.readings import NO_DATE, PLACE_WANTED
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import DeclinationUsed
 from groundstation.results.magnetic_ground import LeftOut
-from groundstation.tables.declination import declination_along
 from groundstation.tables.headings import FARTHEST_POSITION_S
 from groundstation.tables.phases import ground_mask
 from groundstation.tables.resample import join
-from groundstation.tables.sources import sources_of_kind
+from groundstation.tables.sources import sources_of_kind, why_without_gnss
 from groundstation.tables.table import Flight
 
 ANALYSIS = "magnetic_ground"
@@ -79,7 +79,8 @@ def choose_topics(flight: Flight, ins_topic: str = "", gnss_topic: str = "") -> 
     ):
         having = [topic for topic in sources_of_kind(flight, kind) if flight[topic].has(*names)]
         if not having or (wanted and wanted not in having):
-            raise NotAssessableError(ANALYSIS, f"no {what} in {wanted}" if wanted else f"no {what} in the log")
+            why = why_without_gnss(flight, "velocity") if kind == "gnss" else f"no {what} in the log"
+            raise NotAssessableError(ANALYSIS, f"no {what} in {wanted}" if wanted else why)
         found.append(wanted or having[0])
     return found[0], found[1]
 

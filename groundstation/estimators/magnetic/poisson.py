@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
+from groundstation.base.declination import HORIZONTAL_SIGMA_NT, NORTH_EAST_DOWN_SIGMA_NT
 from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.attitude import field_in_body, levelled_heading_deg
 from groundstation.estimators.magnetic.iron import Iron
 from groundstation.estimators.magnetic.readings import Readings
 from groundstation.estimators.magnetic.settings import MagneticSettings
-from groundstation.tables.declination import HORIZONTAL_SIGMA_NT, NORTH_EAST_DOWN_SIGMA_NT
 
 AXES = 3
 MAD_SIGMA = 1.4826  # median of absolute values -> standard deviation of a normal distribution

@@ -38,7 +38,7 @@ from groundstation.results.inertial import InertialResult
 STANDARDS = ShippedToml("groundstation.estimators.fleet", "standards", "standard")
 STATES, TRACK = "inertial_states", "inertial_track"
 NOT_STATED = "not stated"
-RESET = "inertial.ins_reset"
+RESET, REALIGNED = "inertial.ins_reset", "inertial.realigned"
 
 
 def read_standard(name_or_path: str) -> tuple[Standard, TomlFile]:
@@ -151,7 +151,8 @@ def _errors_of(saved: SavedFlight, standard: Standard) -> tuple[FlightError, Ins
         saved.manifest.groundstation,
     )
     reason = _not_judged(saved, inertial)
-    if reason or inertial is None:
+    start = None if inertial is None or reason else inertial.navigation_start
+    if inertial is None or start is None or start.time_s is None:
         return replace(flight, reason=reason), None, {}
     states, track = saved.figure(STATES), saved.figure(TRACK)
     if states is None or track is None or len(states) != len(track):
@@ -160,8 +161,9 @@ def _errors_of(saved: SavedFlight, standard: Standard) -> tuple[FlightError, Ins
         numbers(states, "time_s"),
         *(numbers(states, f"measured_{channel}_position_m") for channel in ("north", "east")),
         *(numbers(track, f"ins_{name}_deg") for name in ("latitude", "longitude")),
+        start_s=start.time_s,
     )
-    if errors is None or errors.hours[-1] * 60.0 < standard.minutes_min:
+    if errors is None or np.ptp(errors.hours) * 60.0 < standard.minutes_min:
         return replace(flight, reason=f"less than {standard.minutes_min:g} min of navigation compared"), None, {}
     heading = results.answer(HeadingResult)
     flight = replace(
@@ -180,8 +182,15 @@ def _not_judged(saved: SavedFlight, inertial: InertialResult | None) -> str:
         return "; ".join(saved.results.reasons("inertial")) or "no INS errors found"
     if inertial.kind != "unaided":
         return "GNSS corrects its INS" if inertial.kind == "gnss_aided" else "GNSS may correct its INS"
-    if any(finding.code == RESET for finding in saved.results.findings):
+    codes = {finding.code for finding in saved.results.findings}
+    if RESET in codes:
         return "the position of the INS was set in flight"
+    if REALIGNED in codes:
+        return "the INS was aligned again in flight"
+    if inertial.navigation_start is None:
+        return "saved by an older version, which did not ask when navigation began: run the log again"
+    if inertial.navigation_start.time_s is None:
+        return f"nothing shows when navigation began: {inertial.navigation_start.reason}"
     return ""
 
 

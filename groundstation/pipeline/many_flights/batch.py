@@ -6,46 +6,36 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path, PurePath
+from types import MappingProxyType
 
-from groundstation.base.errors import UnclaimedLogError, UsageError
+from groundstation.base.errors import UsageError
+from groundstation.base.to_disk import sync_folder
+from groundstation.pipeline.many_flights.apart import bounds_of, outcomes_apart
+from groundstation.pipeline.many_flights.confined import Bounds
 from groundstation.pipeline.many_flights.consecutive import flights_of_parts
 from groundstation.pipeline.many_flights.delta_sink import delta_place, put_flights
-from groundstation.pipeline.many_flights.fleet_store import Scan, refresh, scan
-from groundstation.pipeline.many_flights.found_sessions import (
-    STATIONS_TOML,
-    Asked,
-    FoundSessions,
-    find_sessions,
-    run_sessions,
-)
-from groundstation.pipeline.many_flights.inputs import collect, is_ours, session_folders
+from groundstation.pipeline.many_flights.fleet_store import Scan, refresh
+from groundstation.pipeline.many_flights.found_sessions import Asked, find_sessions, run_sessions
+from groundstation.pipeline.many_flights.inputs import session_folders
 from groundstation.pipeline.many_flights.known_flights import KnownFlights
+from groundstation.pipeline.many_flights.listed_logs import inputs_of, run_known, skipped_files, with_steps
 from groundstation.pipeline.many_flights.out_folder import alone_in, clear_unfinished, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.output import LocalOutput, RemoteOutput
 from groundstation.pipeline.many_flights.placement import Placement
 from groundstation.pipeline.many_flights.publishing import FLEET_FILES, write_beside, write_index_of
-from groundstation.pipeline.many_flights.remote import FarLog, far_logs, is_remote
+from groundstation.pipeline.many_flights.remote import is_remote
 from groundstation.pipeline.many_flights.remote_runs import RemoteJob, digest_remote, run_remote
-from groundstation.pipeline.many_flights.session import load_stations, planned_session
+from groundstation.pipeline.many_flights.session import load_stations
+from groundstation.pipeline.many_flights.strangers import Strangers
 from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJob, Crew, in_turn, side_by_side
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.cores import cores, painters_of
 from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.identity import plain_id
-from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
-from groundstation.pipeline.one_flight.resume import Finished, Keys
-from groundstation.results.manifest import PartOfRun
-
-PLANS: Mapping[str, str] = {
-    "everything": "to run",
-    "analysis": "to analyse again: a setting changed, or a file is missing; the MCAP stays",
-    "reports": "to report again",
-    "nothing": "finished, nothing to do",
-}
 
 
 def run_many(
@@ -62,8 +52,9 @@ def run_many(
     stations: Path | None = None,
     only_results: bool = False,
     timeout_s: float = math.inf,
+    is_isolated: bool = False,
     store: str = "",
-    strangers: Sequence[Path] = (),
+    unclaimed: Sequence[Path] = (),
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Run logs and folders of logs into ``out``, then the sessions among the flights; the index lists all of them.
@@ -85,9 +76,11 @@ def run_many(
         Neither recordings nor reports, of flights or of all; a later run without it makes them.
     timeout_s : float
         A log, or a session, that takes longer has failed, and the process that ran it is ended.
+    is_isolated : bool
+        Each log, and each session, in a process of its own that may take what ``[isolation]`` of the settings allows.
     store : str
         ``delta:`` and a path or URL: a Delta table that takes the rows of these flights, too.
-    strangers : sequence of Path
+    unclaimed : sequence of Path
         Files that no reader claims: they are skipped, unless one goes on from a log.
 
     Returns
@@ -104,10 +97,15 @@ def run_many(
     ground = None if stations is None else load_stations(stations)
     if store:
         delta_place(store)
-    odd = [FarLog(str(path), is_named=False, size=path.stat().st_size) for path in strangers]
-    inputs = tuple(sorted((*_inputs(paths, out, configuration, is_alone=not odd), *odd), key=lambda one: one.url))
-    crew = _crew(scheduler, jobs or cores(), len(inputs), listen, timeout_s)
-    painters = 1 if scheduler else painters_of(jobs or cores(), len(inputs))
+    inputs = inputs_of(paths, out, configuration, unclaimed)
+    is_near = not any(is_remote(str(place)) for place in (out, *paths))
+    listen(Event("begin", total=len(inputs)))
+    strangers = Strangers(Path(out) if is_near else None)
+    skipped = skipped_files(inputs, strangers) if is_near and configuration.profile is None else {}
+    logs = len(inputs) - len(skipped)
+    bounds = bounds_of(configuration.isolation, timeout_s) if is_isolated else None
+    crew = _crew(scheduler, jobs or cores(), logs, listen, timeout_s, bounds)
+    painters = 1 if scheduler else painters_of(jobs or cores(), logs)
     make = partial(
         Job,
         configuration=configuration,
@@ -116,7 +114,6 @@ def run_many(
         only_results=only_results,
         painters=painters,
     )
-    listen(Event("begin", total=len(inputs)))
     asked = Asked(
         Path(out),
         configuration,
@@ -128,14 +125,16 @@ def run_many(
         store=store,
         painters=jobs or cores(),
     )
-    if any(is_remote(str(place)) for place in (out, *paths)):
+    if not is_near:
         remote = [
             RemoteJob(make(Path(), Path(), is_named=one.is_named), one.url, str(out), redo, one.size) for one in inputs
         ]
         return _run_remote(remote, asked, crew, force, listen)
     near = [make(Path(one.url), Path(out), is_named=one.is_named) for one in inputs]
     refresher = _crew(scheduler, jobs or cores(), TASKS_PER_PROCESS + 1, listen)
-    return _run_here(near, asked, crew, force, listen, refresher)
+    outcomes = _run_here(near, asked, crew, force, listen, refresher, skipped, is_isolated=is_isolated)
+    strangers.keep(outcomes)
+    return outcomes
 
 
 def run_together(
@@ -190,17 +189,30 @@ def run_together(
 
 
 def _run_here(
-    work: Sequence[Job], asked: Asked, crew: Crew, force: bool, listen: Listener, refresher: Crew | None = None
+    work: Sequence[Job],
+    asked: Asked,
+    crew: Crew,
+    force: bool,
+    listen: Listener,
+    refresher: Crew | None = None,
+    skipped: Mapping[int, Outcome] = MappingProxyType({}),
+    *,
+    is_isolated: bool = False,
 ) -> tuple[Outcome, ...]:
     out = asked.out
     refuse_foreign(out, force)
     with alone_in(out):
         prepare(out)
-        known = KnownFlights(None if asked.redo else out)
+        known = KnownFlights(None if asked.redo or is_isolated else out)  # isolated, no log is read in this process
+        run = partial(run_known, redo=asked.redo) if is_isolated else run_flight
         placement = Placement(LocalOutput(out), [job.log for job in work])
+        for number, outcome in skipped.items():
+            placement.put(number, outcome)
 
         def left() -> Iterator[tuple[int, Job]]:
-            for number, job, twin in _with_steps(work, known):
+            for outcome in skipped.values():
+                listen(Event("end", PurePath(outcome.source).name, outcome.text))
+            for number, job, twin in with_steps(work, known, skipped):
                 flight = job.finished
                 if twin is None:
                     yield number, job
@@ -214,7 +226,7 @@ def _run_here(
         def suffixed(number: int) -> Job:
             return replace(work[number % len(work)], add_suffix=True, power_up=placement.power_up(number))
 
-        _run_into(placement, out, left(), run_flight, suffixed, crew, listen, len(work))
+        _run_into(placement, out, left(), run, suffixed, crew, listen, len(work))
         apart = _run_joined(placement, work, known, crew, listen)
         clear_unfinished(out)  # of processes that died or took too long
         found, unwritten = _swept(placement, out, refresher)
@@ -222,6 +234,7 @@ def _run_here(
         outcomes = (*placement.outcomes(), *sessions)
         found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
         problems = _write_beside(out, outcomes, asked, found)
+        sync_folder(out)
         stored = put_flights(asked.store, found, outcomes) if asked.store else ()
         return (*outcomes, *apart, *unwritten, *problems, *stored)
 
@@ -339,7 +352,7 @@ def _run_remote_sessions(
 ) -> tuple[Outcome, ...]:
     """Run the sessions in the copy of an OUT elsewhere, in this process, where the MCAPs are fetched to."""
     before = session_folders(output.root)
-    here = replace(asked, out=output.root, mcap_in=output.mcap_in)
+    here = replace(asked, out=output.root, mcap_in=output.mcap_in, is_copy=True)
     outcomes = _run_sessions(placement, here, among, partial(in_turn, listen=listen), listen)
     sent = []
     for outcome in outcomes:
@@ -383,8 +396,17 @@ def _run_into(
         raise
 
 
-def _crew(scheduler: str, workers: int, logs: int, listen: Listener, timeout_s: float = math.inf) -> Crew:
+def _crew(
+    scheduler: str,
+    workers: int,
+    logs: int,
+    listen: Listener,
+    timeout_s: float = math.inf,
+    bounds: Bounds | None = None,
+) -> Crew:
     """Who does the work: a cluster, processes, or this process alone, where there is little and no limit of time."""
+    if bounds is not None:
+        return partial(outcomes_apart, workers=workers, listen=listen, bounds=bounds)
     if scheduler:
         from groundstation.pipeline.many_flights.cluster import on_cluster
 
@@ -392,139 +414,3 @@ def _crew(scheduler: str, workers: int, logs: int, listen: Listener, timeout_s: 
     if min(workers, logs) <= 1 and logs <= TASKS_PER_PROCESS and math.isinf(timeout_s):
         return partial(in_turn, listen=listen)
     return partial(side_by_side, workers=min(workers, logs), listen=listen, timeout_s=timeout_s)
-
-
-def plan_many(
-    paths: Sequence[Path | str],
-    out: Path | str,
-    configuration: Configuration,
-    *,
-    with_pdf: bool = True,
-    redo: bool = False,
-    stations: Path | None = None,
-    only_results: bool = False,
-) -> tuple[Outcome, ...]:
-    """Say what :func:`run_many` would do of each log, and of the sessions among finished flights; nothing is written.
-
-    Raises
-    ------
-    UsageError
-        As :func:`run_many`, and for logs or results elsewhere, which would have to be fetched first.
-    """
-    if any(is_remote(str(place)) for place in (out, *paths)):
-        raise UsageError("--dry-run", "logs or results elsewhere", "local ones")
-    inputs, out = _inputs(paths, out, configuration), Path(out)
-    refuse_foreign(out, force=True)
-    before = scan(out)
-    known = KnownFlights(None if redo else out)
-    make = partial(Job, out=out, configuration=configuration, with_pdf=with_pdf, only_results=only_results)
-    work = [make(Path(one.url), is_named=one.is_named) for one in inputs]
-    outcomes = []
-    for number, job, twin in _with_steps(work, known):
-        if twin is not None and job.finished is not None and len(job.finished.parts) > 1:
-            text = f"part of {job.finished.flight_id}, with {work[twin].name}"
-            outcomes.append(Outcome(work[number % len(work)].log, "done", text, was_finished=job.step == "nothing"))
-        elif twin is not None:
-            outcomes.append(Outcome(job.log, "done", f"same content as {work[twin].log}, listed once"))
-        else:
-            outcomes.append(_planned(job))
-    ground = None if stations is None else load_stations(stations)
-    asked = Asked(out, configuration, ground, "none", with_pdf, redo, only_results=only_results)
-    return (*outcomes, *_planned_sessions(asked, before, outcomes))
-
-
-def _planned(job: Job) -> Outcome:
-    """What would become of a log."""
-    if job.finished is not None:
-        is_there = job.step == "nothing"
-        return Outcome(job.log, "done", PLANS[job.step], flight_id=job.finished.flight_id, was_finished=is_there)
-    try:
-        open_log(job.path, job.configuration.profile_path)
-    except UnclaimedLogError as error:
-        return Outcome(job.log, "failed" if job.is_named else "skipped", str(error))
-    except Exception as error:
-        return Outcome(job.log, "failed", reason_of(job.name, error)[0])
-    return Outcome(job.log, "done", PLANS[job.step])
-
-
-def _planned_sessions(asked: Asked, among: Scan, planned: Sequence[Outcome]) -> list[Outcome]:
-    """Sessions among the finished flights; that those of unread logs are looked for, where stations are given."""
-    flight_ids = {one.flight_id for one in planned if one.flight_id}
-    found = find_sessions(asked, among, flight_ids) if flight_ids else FoundSessions()
-    sessions = [*map(planned_session, found.jobs), *(one for one in found.told if one.state == "failed")]
-    logs = [one for one in planned if one.state == "done"]
-    unread = [one.source for one in logs if one.text == PLANS["everything"]]
-    has_stations = asked.stations is not None or any(Path(log).with_name(STATIONS_TOML).is_file() for log in unread)
-    if unread and len(logs) > 1 and has_stations:
-        text = "looked for among the flights once the logs are read"
-        sessions.append(Outcome("sessions", "done", text, is_session=True))
-    return sessions
-
-
-def _inputs(
-    paths: Sequence[Path | str], out: Path | str, configuration: Configuration, *, is_alone: bool = True
-) -> tuple[FarLog, ...]:
-    """Logs by path or URL, in a stable order; there may be none where they do not stand alone."""
-    near = [Path(path) for path in paths if not is_remote(str(path))]
-    found = {log.url: log for path in paths if is_remote(str(path)) for log in far_logs(str(path))}
-    judges = {path.resolve() for path in configuration.references.paths}  # in a folder they are no logs to run
-    for one in collect(near, None if is_remote(str(out)) else Path(out)):
-        if one.is_named or one.path.resolve() not in judges:
-            found[str(one.path)] = FarLog(str(one.path), one.is_named, one.path.stat().st_size)
-    if not found and is_alone:
-        hint = "output of groundstation is no input" if any(path.is_dir() and is_ours(path) for path in near) else ""
-        raise UsageError(", ".join(map(str, paths)), "no log in it", "", hint)
-    return tuple(log for _, log in sorted(found.items()))
-
-
-def _with_steps(jobs: Sequence[Job], known: KnownFlights) -> Iterator[tuple[int, Job, int | None]]:
-    """Jobs by number, with what is to be done of each, and the number of an earlier one that gives its flight.
-
-    That is one with the same log, or with another part of the flight. A log whose flights of several power-ups are
-    finished has a job for each of them.
-    """
-    first: dict[str, int] = {}
-    numbers = {str(job.path.absolute()): number for number, job in enumerate(jobs)}
-    asked = cache(lambda number: jobs[number].asked())
-
-    @cache
-    def digest(number: int) -> str:
-        found = asked(number)
-        return found[0] if found else jobs[number].digest()
-
-    def is_as_it_was(part: PartOfRun) -> bool:
-        return part.path not in numbers or digest(numbers[part.path]) == part.sha256
-
-    for number, job in enumerate(jobs):
-        found = known.of(digest(number)) if len(known) else ()
-        for place, planned in enumerate(_with_step(job, asked(number) if found else None, found, is_as_it_was)):
-            flight = planned.finished
-            kept = number if flight is None else first.setdefault(flight.sha256, number)
-            yield number + place * len(jobs), planned, kept if kept != number else None
-
-
-def _with_step(
-    job: Job,
-    asked: tuple[str, Keys] | None,
-    found: Sequence[Finished],
-    is_as_it_was: Callable[[PartOfRun], bool],
-) -> tuple[Job, ...]:
-    """A job with what is left to do of it, one for each power-up of its log; ``found`` are its finished flights."""
-    if found and len(found[0].parts) > 1:
-        return (_of_parts(job, found[0], is_as_it_was),)
-    if asked is None or not found:
-        return (job,)
-    planned = tuple(job.going_on(one, asked[1]) for one in found)
-    if len(planned) > 1 and any(one.step == "everything" for one in planned):
-        return (job,)  # the log is read anew: it tells what it holds
-    return planned
-
-
-def _of_parts(job: Job, flight: Finished, is_as_it_was: Callable[[PartOfRun], bool]) -> Job:
-    """The job of a flight of several logs; where one of them has changed, that of its own log alone."""
-    if not all(map(is_as_it_was, flight.parts)):
-        return job
-    joined = job.of_parts(flight.parts)
-    planned = replace(joined.going_on(flight, joined.keys_of(flight)), power_up=0)
-    is_read = planned.step in ("everything", "analysis")
-    return job if is_read and not all(Path(part.path).is_file() for part in flight.parts) else planned

@@ -57,7 +57,7 @@ def put_flights(store: str, found: Scan, outcomes: Sequence[Outcome]) -> tuple[O
             _merge(place, rows)
     except Exception as error:  # every store has errors of its own
         reason = str(error) if isinstance(error, GroundstationError) else f"{type(error).__name__}: {error}"
-        return (Outcome(place, "failed", f"{place}: not written ({' '.join(reason.split())[:300]})"),)
+        return (Outcome(place, "failed", f"{place}: not written ({' '.join(reason.split())[:300]})", is_beside=True),)
     return ()
 
 

@@ -109,7 +109,7 @@ def write_fleet(out: Path, found: Scan) -> tuple[FleetResults, tuple[Outcome, ..
             write_bytes(out / FLEET_PARQUET, fleet_parquet(table))
     except OSError as error:
         problem = f"{out}: {FLEET_PARQUET} cannot be written ({error.strerror or error})"
-        problems = (Outcome(str(out), "failed", problem),)
+        problems = (Outcome(str(out), "failed", problem, is_beside=True),)
     flights = flights_of(table)
     del table
     return _results(found, flights, shares, unread), problems

@@ -233,8 +233,8 @@ def refresh(out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, .
     """
     before, samples = scan(out), SampleStore(out)
     there, known = samples.files(), before.fresh.column("samples")
-    others = there.difference(known)
-    lost = set(known).difference(there, ("",))
+    others = there.keys() - set(known)
+    lost = set(known).difference((name for name, size in there.items() if size), ("",))
     fresh = before.fresh.without(lost, "samples")
     jobs = list(_jobs(before, fresh))
     here: Crew = partial(in_turn, listen=silent)
@@ -290,8 +290,8 @@ def write_month(job: MonthJob, listen: Listener = silent) -> Outcome:
         _write(job)
     except OSError as error:
         reason = f"{job.out}: {FLIGHTS} and the samples of {job.month} cannot be written ({error.strerror or error})"
-        return Outcome(job.log, "failed", reason)
-    return Outcome(job.log, "done", "")
+        return Outcome(job.log, "failed", reason, is_beside=True)
+    return Outcome(job.log, "done", "", is_beside=True)
 
 
 def _write(job: MonthJob) -> None:

@@ -51,6 +51,7 @@ class Asked:
     only_results: bool = False
     store: str = ""
     painters: int = 1
+    is_copy: bool = False
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,7 @@ def _job(asked: Asked, group: Sequence[Member]) -> SessionJob:
         is_found=True,
         notes=notes,
         only_results=asked.only_results,
+        is_copy=asked.is_copy,
     )
 
 

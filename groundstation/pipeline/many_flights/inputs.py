@@ -1,6 +1,7 @@
 """Which files a run takes: named files, and logs found in folders; nothing that groundstation itself made."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,8 +42,9 @@ def collect(paths: Sequence[Path], out: Path | None = None) -> tuple[Input, ...]
         if not path.exists():
             raise UsageError(str(path), "no such file or folder")
         if path.is_dir():
-            for file in _walk(path, out.resolve() if out else None):
-                found.setdefault(file.resolve(), Input(file, is_named=file.is_dir()))
+            walked = _walk(path, out.resolve() if out else None)
+            for place, one in sorted(walked, key=lambda item: str(item[1].path)):
+                found.setdefault(place, one)
         else:
             found[path.resolve()] = Input(path, is_named=True)
     return tuple(sorted(found.values(), key=lambda item: str(item.path)))
@@ -130,21 +132,25 @@ def _finished_folders(out: Path) -> list[Path]:
     return sorted(folder for folder in out.iterdir() if folder.name[0] != "." and (folder / SUMMARY).is_file())
 
 
-def _walk(folder: Path, out: Path | None) -> list[Path]:
-    if folder.resolve() == out or is_ours(folder):
-        return []
-    if (bag := as_log(folder)) != folder:
-        return [bag]
-    files: list[Path] = []
-    try:
-        entries = sorted(folder.iterdir())
-    except OSError:
-        return [folder]  # it fails in its turn, with its name, and stops nothing else
-    for entry in entries:
-        if entry.name.startswith(".") or entry.suffix.lower() == NO_LOGS:
+def _walk(folder: Path, out: Path | None) -> Iterator[tuple[Path, Input]]:
+    """Files below a folder, each behind its place once links are followed."""
+    folders = [(folder, folder.resolve())]
+    while folders:
+        folder, place = folders.pop()
+        if place == out or is_ours(folder):
             continue
-        if entry.is_dir() and not entry.is_symlink():
-            files += _walk(entry, out)
-        elif entry.is_file():
-            files.append(entry)
-    return files
+        if (bag := as_log(folder)) != folder:
+            yield bag.resolve(), Input(bag, is_named=False)
+            continue
+        try:
+            with os.scandir(folder) as entries:
+                listed = [one for one in entries if one.name[0] != "." and not one.name.lower().endswith(NO_LOGS)]
+        except OSError:
+            yield place, Input(folder, is_named=True)  # it fails in its turn, with its name, and stops nothing else
+            continue
+        for entry in listed:
+            path = folder / entry.name
+            if entry.is_dir(follow_symlinks=False):
+                folders.append((path, place / entry.name))
+            elif entry.is_file():
+                yield path.resolve() if entry.is_symlink() else place / entry.name, Input(path, is_named=False)

@@ -10,20 +10,28 @@ from groundstation.base.errors import UsageError
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, is_ours
 from groundstation.pipeline.many_flights.publishing import write_index_of
 from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX
+from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
 
 LOCK = ".lock"
+BEGUN = frozenset((INDEX_CSV, INDEX_JSON, f".{INDEX_CSV}.partial", f".{INDEX_JSON}.partial"))
 
 
 def refuse_foreign(out: Path, force: bool) -> None:
     """Refuse to write results into what another made, or into a flight folder."""
     if out.exists() and not out.is_dir():
         raise UsageError(str(out), "a file", "a folder for the results")
-    if out.is_dir() and not is_ours(out) and not force and any(one.name != LOCK for one in out.iterdir()):
+    if out.is_dir() and not is_ours(out) and not force and not _is_begun(out):
         raise UsageError(
             str(out), "a folder that groundstation did not make", "a new folder or one it made", "-f uses it"
         )
     if (out / FLIGHT_FOLDER_MARK).exists():
         raise UsageError(str(out), "a flight folder", "a folder that holds flight folders", "name another -o")
+
+
+def _is_begun(out: Path) -> bool:
+    """Whether a folder is empty, or a run was killed in it before it was marked as ours."""
+    names = {one.name for one in out.iterdir()}
+    return not names or names == {LOCK} or (LOCK in names and names <= {LOCK, *BEGUN})
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
+from groundstation.base.failures import attempt, failures, gathered_failures
 from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, write_fleet
 from groundstation.pipeline.many_flights.fleet_columns import INDEXED, answer_values
@@ -27,12 +28,15 @@ from groundstation.pipeline.many_flights.inputs import (
     session_folders,
 )
 from groundstation.pipeline.one_flight.cores import cores
-from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.one_flight.flight import REPORT_FILES
+from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
+from groundstation.pipeline.one_flight.sealing import note
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
 from groundstation.reports.fleet_report import fleet_report_begun
 from groundstation.reports.index import IndexRow, Kind
 from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
 
+MOST_SKIPPED = 1000  # files that the index lists
 FLEET_RECORDING, FLEET_PDF = "fleet.rrd", str(Path(FLEET_PAGE).with_suffix(".pdf"))
 FLEET_FILES = (INDEX_JSON, INDEX_CSV, FLEET_PARQUET, FLIGHTS, SAMPLES, FLEET_RECORDING, FLEET_PAGE, FLEET_PDF)
 
@@ -56,13 +60,14 @@ def write_beside(
     problems: list[Outcome] = []
     again: set[str] = set()
     try:
-        with told_in_a_line(str(out)):
+        with told_in_a_line(str(out)), gathered_failures():
             while True:
                 if found is None:
                     found, unwritten = refresh(out)
                     problems += unwritten
                 try:
                     problems += _write_beside(out, outcomes, kept_rows, found, with_pdf, only_results, painters)
+                    problems += [_beside(out, "failed", f"{out}: {one.text}", one.trace) for one in failures()]
                     break
                 except DamagedMonthError as error:
                     if error.month in again:  # making it again did not help
@@ -70,11 +75,16 @@ def write_beside(
                     again.add(error.month)
                     forget_month(out, error.month)
                     text = f"{error.where}: damaged ({error.found}), made again from the flight folders"
-                    problems.append(Outcome(str(out), "skipped", text))
+                    problems.append(_beside(out, "skipped", text))
                     found = None
-    except GroundstationError as error:  # the flights are done, and told of in any case
-        problems.append(Outcome(str(out), "failed", str(error)))
-    return tuple(problems)
+    except Exception as error:  # the flights are done, and told of in any case
+        problems.append(_beside(out, "failed", *reason_of(str(out), error)))
+    return tuple({(one.source, one.text): one for one in problems}.values())
+
+
+def _beside(place: Path, state: State, text: str, trace: str = "") -> Outcome:
+    """The outcome of something that stands beside the flights, or of a flight folder that was there before."""
+    return Outcome(str(place), state, text, trace=trace, is_beside=True)
 
 
 def _write_beside(
@@ -97,9 +107,10 @@ def _write_beside(
     with fleet_report_begun(out, fleet, with_pdf=with_pdf, painters=painters) as finish:
         from groundstation.viewer.fleet import write_fleet_recording  # Rerun is loaded while the others paint
 
-        write_fleet_recording(out / FLEET_RECORDING, fleet)
+        recording = out / FLEET_RECORDING
+        attempt("recording", "fleet", write_fleet_recording, recording, fleet, unless=(OSError, GroundstationError))
         problem = finish().problem
-    return [*problems, Outcome(str(out), "skipped", f"{out}: {problem}")] if problem else problems
+    return [*problems, _beside(out, "skipped", f"{out}: {problem}")] if problem else problems
 
 
 def write_index_of(
@@ -125,15 +136,27 @@ def write_index_of(
         try:
             saved = load(folder, ANSWER_TYPES)
             rows.append(index_row(saved, kind, answer_values(saved.results)))
-        except GroundstationError as error:
-            problems.append(Outcome(str(folder), "failed", str(error)))
-    without_flight = [one for one in outcomes if not one.flight_id and not (one.is_session and one.state == "skipped")]
-    rows += [failed_row(one.source, one.state, one.text) for one in (*without_flight, *problems)]
+        except Exception as error:
+            problems.append(_beside(folder, "failed", *reason_of(folder.name, error)))
+    logs = [one for one in outcomes if not one.is_beside]
+    without_flight = [one for one in logs if not one.flight_id and not (one.is_session and one.state == "skipped")]
+    rows += [failed_row(one.source, one.state, one.text) for one in (*_listed(without_flight), *problems)]
     try:
         write_index(out, rows, INDEXED, elsewhere=f"{len(found)} flights: {FLIGHTS}/" if is_large else "")
     except OSError as error:
-        problems.append(Outcome(str(out), "failed", f"{out}: the index cannot be written ({error.strerror or error})"))
+        problems.append(_beside(out, "failed", f"{out}: the index cannot be written ({error.strerror or error})"))
     return tuple(problems)
+
+
+def _listed(without_flight: Sequence[Outcome]) -> list[Outcome]:
+    """Logs without a flight as the index lists them: of very many skipped files the rest is one row."""
+    skipped = [one for one in without_flight if one.state == "skipped"]
+    rest = skipped[MOST_SKIPPED:]
+    if not rest:
+        return list(without_flight)
+    others = [one for one in without_flight if one.state != "skipped"]
+    told = Outcome(f"{len(rest)} more files", "skipped", f"skipped as these {MOST_SKIPPED}, and not listed")
+    return [*others, *skipped[:MOST_SKIPPED], told]
 
 
 def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple[Outcome, ...]]:
@@ -160,14 +183,16 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
         try:
             with told_in_a_line(str(folder)):
                 written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf, painters=cores())
+                note(folder, written.paths, removed=REPORT_FILES)
         except GroundstationError as error:
             if is_flight:
                 raise
-            problems.append(Outcome(str(folder), "failed", str(error)))
+            problems.append(_beside(folder, "failed", str(error)))
             continue
         paths += written.paths
         if written.problem:
-            problems.append(Outcome(str(folder), "done", f"{folder.name}: {written.problem}"))
+            problems.append(_beside(folder, "done", f"{folder.name}: {written.problem}"))
+        problems += [_beside(folder, "incomplete", f"{folder.name}: {one.text}", one.trace) for one in written.failures]
     if is_flight:
         return paths, tuple(problems)
     told = {one.source for one in problems}

@@ -77,6 +77,12 @@ class RemoteFolder:
             found = self._fs.find(self._root, detail=True).items()
             return dict(sorted((str(PurePosixPath(path).relative_to(self._root)), one["size"]) for path, one in found))
 
+    def sizes(self, name: str) -> dict[str, int]:
+        """Bytes of all files below a folder, by their path from it."""
+        with self._told(name):
+            root, found = self._path(name), self._fs.find(self._path(name), detail=True).items()
+            return {PurePosixPath(path).relative_to(root).as_posix(): int(one["size"]) for path, one in found}
+
     def read(self, name: str) -> bytes | None:
         """Content of a file, None where there is none."""
         with self._told(name):

@@ -157,10 +157,9 @@ def array_files(out: RemoteFolder, flight_id: str) -> list[str]:
 
 def _fetched(out: RemoteFolder, flight_id: str, scratch: Path) -> Finished | None:
     """What a flight elsewhere remembers, its two documents fetched; None when it is not whole."""
-    folder, files = scratch / flight_id, out.names(flight_id)
-    if not {MANIFEST, SUMMARY} <= set(files):
+    folder, sizes = scratch / flight_id, out.sizes(flight_id)
+    if not {MANIFEST, SUMMARY} <= sizes.keys():
         return None
     for name in (SUMMARY, MANIFEST):
         out.fetch(f"{flight_id}/{name}", folder / name)
-    found = finished(folder)
-    return replace(found, files=frozenset(files)) if found else None
+    return finished(folder, sizes)

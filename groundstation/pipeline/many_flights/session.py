@@ -4,15 +4,15 @@ import hashlib
 import json
 import platform
 import shutil
-import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from groundstation.base.clock import Clock
 from groundstation.base.errors import GroundstationError, NotAssessableError
-from groundstation.base.findings import Finding, worst
+from groundstation.base.failures import attempt, failures, gathered_failures, is_incomplete, with_failures
+from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import RecordBatch
 from groundstation.base.signals import kind_of
@@ -25,16 +25,24 @@ from groundstation.pipeline.many_flights.session_figures import session_figures
 from groundstation.pipeline.one_flight.analyse import run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration, read_toml, session_tables
 from groundstation.pipeline.one_flight.convert import convert_log
-from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX, Stopwatch, place, state_of
+from groundstation.pipeline.one_flight.flight import (
+    OF_THE_WORLD,
+    REPORT_FILES,
+    Stopwatch,
+    partial_folder,
+    place,
+    state_of,
+)
 from groundstation.pipeline.one_flight.identity import MAX_PART_CHARACTERS, flight_id, safe_part
 from groundstation.pipeline.one_flight.log import Log
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.pipeline.one_flight.resume import versions
+from groundstation.pipeline.one_flight.sealing import note, seal, spoiled_files
 from groundstation.reports.flight_report import PDF, REPORT, flight_report_begun, write_flight_report
 from groundstation.results.file_names import MANIFEST
-from groundstation.results.files import load_document, load_manifest, save, save_manifest
+from groundstation.results.files import load_document, load_manifest, put_failures, save, save_manifest
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.manifest import Keys, LogOfSession, Manifest, Resume
 from groundstation.tables.assemble import flight_from_batches
@@ -72,6 +80,8 @@ class SessionJob:
         Whether there is neither a recording nor a report.
     painters : int
         How many processes paint the figures of its report.
+    is_copy : bool
+        Whether ``out`` is a copy of a folder elsewhere, which has most files by name alone.
     """
 
     logs: tuple[Log, ...]
@@ -85,6 +95,7 @@ class SessionJob:
     notes: tuple[Finding, ...] = ()
     only_results: bool = False
     painters: int = 1
+    is_copy: bool = False
 
     @property
     def log(self) -> str:
@@ -130,15 +141,19 @@ def load_stations(path: Path | None) -> Stations:
 def run_one(job: SessionJob, listen: Listener = silent) -> Outcome:
     """Run a session into its place; of one that is finished only the reports that are missing are made.
 
-    What cannot be computed is an outcome with the reason, never an exception.
+    What cannot be computed is an outcome with the reason, never an exception; a part that fails by a defect is left
+    out, as in a flight.
     """
-    watch = Stopwatch(listen, job.name)
+    with gathered_failures():
+        return _run_gathering(job, Stopwatch(listen, job.name))
+
+
+def _run_gathering(job: SessionJob, watch: Stopwatch) -> Outcome:
     partial: Path | None = None
     try:
         if (finished := _finished(job, watch)) is not None:
             return finished
-        partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=job.out))
-        partial.chmod(0o755)  # mkdtemp's folders are private
+        partial = partial_folder(job.out)
         return _run_into(partial, job, watch)
     except Exception as error:
         reason, trace = reason_of(job.name, error)
@@ -153,7 +168,9 @@ def _outcome(
     job: SessionJob, state: State, text: str, folder: Path | None, watch: Stopwatch, trace: str = ""
 ) -> Outcome:
     name, place = (folder.name, str(folder)) if folder else ("", "")
-    return Outcome(job.name, state, text, name, place, job.sha256, watch.times_s, trace, is_session=True)
+    return Outcome(
+        *(job.name, state, text, name, place, job.sha256, watch.times_s, trace), is_session=True, failures=failures()
+    )
 
 
 def sessions_of(out: Path) -> Iterator[tuple[Path, Manifest]]:
@@ -182,15 +199,29 @@ def _kept(job: SessionJob) -> _Kept | None:
         if resume is None or manifest.source.sha256 != job.sha256:
             continue
         is_of_the_verb = job.is_found and not manifest.is_found
-        is_whole = resume.keys.analysis == keys.analysis
+        spoiled = frozenset() if job.is_copy else spoiled_files(folder, manifest)
+        is_whole = resume.keys.analysis == keys.analysis and not _is_incomplete(folder)
+        is_whole &= spoiled <= {f"{folder.name}.rrd", *REPORT_FILES}
         if not job.only_results:
-            is_whole &= (folder / f"{folder.name}.rrd").is_file()
+            is_whole &= _is_whole(folder / f"{folder.name}.rrd", spoiled)
         if not is_of_the_verb and (job.redo or not is_whole):
             continue
         is_told = is_of_the_verb or resume.keys.reports == keys.reports
-        has_reports = is_told and all((folder / name).is_file() for name in reports)
+        has_reports = is_told and all(_is_whole(folder / name, spoiled) for name in reports)
         return _Kept(folder, manifest, resume, job.only_results or has_reports)
     return None
+
+
+def _is_incomplete(folder: Path) -> bool:
+    """Whether a part of a session failed: it is then run again."""
+    try:
+        return is_incomplete(load_document(folder).findings)
+    except GroundstationError:
+        return True
+
+
+def _is_whole(file: Path, spoiled: Collection[str]) -> bool:
+    return file.is_file() and file.name not in spoiled
 
 
 def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
@@ -201,9 +232,11 @@ def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
     folder, resume, problem = kept.folder, kept.resume, ""
     if not kept.is_finished:
         with watch.stage("reporting"):
-            problem = write_flight_report(folder, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters).problem
+            written = write_flight_report(folder, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters)
+        problem = written.problem
         save_manifest(folder, replace(kept.manifest, resume=replace(resume, keys=job.keys())))
-    state = state_of(worst(load_document(folder).findings), resume.has_lost_data, job.fail_on)
+        note(folder, written.paths, removed=REPORT_FILES)
+    state = state_of(load_document(folder).findings, resume.has_lost_data, job.fail_on)
     found = _outcome(job, state, "; ".join(filter(None, (resume.text, problem))), folder, watch)
     return replace(found, was_finished=kept.is_finished)
 
@@ -230,13 +263,16 @@ def _run_into(partial: Path, job: SessionJob, watch: Stopwatch) -> Outcome:
         results = _results(job, assembled, flights, damaged)
     with watch.stage("saving"):
         text = _sentence(results)
-        resume = Resume(job.keys(), text, bool(damaged))
-        save(partial, results, _manifest(job, results, logs, resume))
+        manifest = _manifest(job, results, logs, Resume(job.keys(), text, bool(damaged)))
+        save(partial, results, manifest)
     problem = "" if job.only_results else _show(partial, assembled, results, job, watch)
+    put_failures(partial, failures())
+    with watch.stage("saving"):
+        seal(partial, manifest)
     target = job.out / results.flight_id
     shutil.rmtree(target / MCAPS, ignore_errors=True)
     place(partial, target)
-    state = state_of(worst(results.findings), bool(damaged), job.fail_on)
+    state = state_of(with_failures(results.findings, failures()), bool(damaged), job.fail_on)
     return _outcome(job, state, "; ".join(filter(None, (text, problem))), target, watch)
 
 
@@ -247,7 +283,8 @@ def _show(partial: Path, assembled: AssembledSession, results: FlightResults, jo
         with watch.stage("recording"):  # while the other painters are at the report's figures
             from groundstation.viewer.session import write_session_recording  # Rerun is loaded after they were forked
 
-            write_session_recording(partial / f"{results.flight_id}.rrd", assembled, results)
+            path = partial / f"{results.flight_id}.rrd"
+            attempt("recording", "session", write_session_recording, path, assembled, results, unless=OF_THE_WORLD)
         with watch.stage("reporting"):
             return finish().problem
 
@@ -362,7 +399,8 @@ def joined_names(names: Sequence[str]) -> str:
 
 
 def _sentence(results: FlightResults) -> str:
-    found = [text for analysis in SESSION_ANALYSES if (text := analysis.sentence(results.answers))]
+    told = (attempt("line", one.name, one.sentence, results.answers) for one in SESSION_ANALYSES)
+    found = [text for text in told if text]
     reasons = "; ".join(f"{entry.analysis}: {entry.reason}" for entry in results.not_assessable)
     return "; ".join(found) or f"not assessable: {reasons}"
 

@@ -44,6 +44,7 @@ class Batch:
     is_first: bool
     only_results: bool = False
     timeout_s: float = math.inf
+    is_isolated: bool = False
 
 
 def run_batch(batch: Batch, listen: Listener) -> tuple[Outcome, ...] | str:
@@ -131,10 +132,11 @@ def _outcomes(batch: Batch, listen: Listener) -> tuple[Outcome, ...]:
             claimed,
             batch.out,
             batch.configuration,
-            strangers=[Path(one.source) for one in strangers],
+            unclaimed=[Path(one.source) for one in strangers],
             jobs=batch.jobs,
             only_results=batch.only_results,
             timeout_s=batch.timeout_s,
+            is_isolated=batch.is_isolated,
             force=batch.force,
             fail_on=batch.fail_on,
             with_pdf=batch.with_pdf,

@@ -71,6 +71,7 @@ def watch(
     force: bool = False,
     only_results: bool = False,
     timeout_s: float = math.inf,
+    is_isolated: bool = False,
     say: Callable[[str], None],
     listen: Listener = silent,
     wait: Callable[[float], None] = time.sleep,
@@ -90,6 +91,8 @@ def watch(
         No recording and no report, as for ``run``.
     timeout_s : float
         Longest time for one log, in seconds; one that takes longer has failed, and is run again when it changes.
+    is_isolated : bool
+        Each log in a process of its own, as for ``run``.
     say : callable
         Is given what is not about a log: that the folder cannot be reached, that another run writes into ``out``.
     wait : callable
@@ -106,6 +109,7 @@ def watch(
         raise UsageError(str(out), "the folder that is watched", "another one for the results")
     refuse_foreign(out, force)
     batch = Batch((), out, configuration, fail_on, with_pdf, jobs, stations, force, True, only_results, timeout_s)
+    batch = replace(batch, is_isolated=is_isolated)
     watched, trouble = Watched(), _Trouble((lambda _: None) if once else say)
     watched.ready(_look(folder, out, configuration, trouble))
     while True:
@@ -123,7 +127,7 @@ def watch(
                 yield found
         if once:
             if trouble.told:
-                yield (Outcome(str(out), "failed", trouble.told),)
+                yield (Outcome(str(out), "failed", trouble.told, is_beside=True),)
             return
 
 

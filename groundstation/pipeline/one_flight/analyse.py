@@ -3,20 +3,21 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.clock import Clock
 from groundstation.base.errors import NotAssessableError, SettingsError
+from groundstation.base.failures import attempt, left_out
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.gaps import Gaps
 from groundstation.base.ledger import Ledger
 from groundstation.base.signals import topics_of_kind
 from groundstation.estimators import overview
 from groundstation.estimators.analyses import FLIGHT_ANALYSES
-from groundstation.estimators.analysis import Analysis, in_order_of_need
+from groundstation.estimators.analysis import Analysis, Found, in_order_of_need
 from groundstation.estimators.damage import damage_finding
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.known import Interval, Known
@@ -90,7 +91,9 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     findings = list(given.findings)
     for analysis in FLIGHT_ANALYSES:
         findings += found.findings.get(analysis.name, ())
-        findings += _on_damage(analysis, flight, given, found.answers, gaps)
+        findings += (
+            attempt("damage check", analysis.name, _on_damage, analysis, flight, given, found.answers, gaps) or ()
+        )
     figures = [*_general_figures(flight, given, known, found.answers, gaps)]
     for answer in found.answers.values():
         figures += answer.figures
@@ -154,6 +157,8 @@ def known_of(flight: Flight, configuration: Configuration) -> Known:
 def run_analyses(analyses: tuple[Analysis, ...], data: Any, known: Any) -> Answered:
     """Run analyses on a flight or a session, each behind those it builds on; what lacks data gives its reason.
 
+    So does one that fails by a defect, where failures are gathered (:mod:`groundstation.base.failures`).
+
     Parameters
     ----------
     analyses : tuple of Analysis
@@ -168,27 +173,17 @@ def run_analyses(analyses: tuple[Analysis, ...], data: Any, known: Any) -> Answe
     findings: dict[str, tuple[Finding, ...]] = {}
     reasons: dict[str, NotAssessable] = {}
     for analysis in in_order_of_need(analyses):
-        if not analysis.applies(data, known):
-            continue
-        missing = next((name for name in analysis.requires if name not in answers), None)
-        if missing is not None:
-            reasons[analysis.name] = reasons.get(missing) or NotAssessable(missing, f"{missing} did not run")
-            continue
         so_far = replace(known, answers=answers, workings=workings)
         try:
-            found = analysis.run(data, so_far, known.settings[analysis.settings_table])
-        except NotAssessableError as error:
-            reason, severity = str(error).removeprefix(f"{analysis.name}: "), INFO
-        except SettingsError as error:
-            reason, severity = str(error), WARN
-        else:
+            found = _run_one(analysis, data, so_far, reasons)
+        except Exception as error:
+            failure = left_out("analysis", analysis.name, error)
+            found = _Unanswered(NotAssessable(analysis.name, failure.reason), (failure.finding(),))
+        if isinstance(found, _Unanswered):
+            reasons[analysis.name], findings[analysis.name] = found
+        elif found is not None:
             answers[analysis.name], workings[analysis.name] = found.answer, found.workings
             findings[analysis.name] = found.findings
-            continue
-        reasons[analysis.name] = NotAssessable(analysis.name, reason)
-        if analysis.is_expected(data, so_far):
-            text = f"{analysis.subject} not assessable: {reason}"
-            findings[analysis.name] = (Finding(severity, f"{analysis.name}.not_assessable", text),)
     names = [analysis.name for analysis in analyses]
     return Answered(
         {name: answers[name] for name in names if name in answers},
@@ -197,6 +192,33 @@ def run_analyses(analyses: tuple[Analysis, ...], data: Any, known: Any) -> Answe
         tuple(reasons[name] for name in names if name in reasons and reasons[name].analysis == name),
         workings,
     )
+
+
+class _Unanswered(NamedTuple):
+    """Why an analysis gave no answer, and what is found of that."""
+
+    reason: NotAssessable
+    findings: tuple[Finding, ...]
+
+
+def _run_one(
+    analysis: Analysis, data: Any, known: Any, reasons: Mapping[str, NotAssessable]
+) -> Found[Any] | _Unanswered | None:
+    """Run an analysis behind others, of which some gave ``reasons``; None where it does not apply to the data."""
+    if not analysis.applies(data, known):
+        return None
+    missing = next((name for name in analysis.requires if name not in known.answers), None)
+    if missing is not None:
+        return _Unanswered(reasons.get(missing) or NotAssessable(missing, f"{missing} did not run"), ())
+    try:
+        return analysis.run(data, known, known.settings[analysis.settings_table])
+    except NotAssessableError as error:
+        reason, severity = str(error).removeprefix(f"{analysis.name}: "), INFO
+    except SettingsError as error:
+        reason, severity = str(error), WARN
+    text = f"{analysis.subject} not assessable: {reason}"
+    told = (Finding(severity, f"{analysis.name}.not_assessable", text),)
+    return _Unanswered(NotAssessable(analysis.name, reason), told if analysis.is_expected(data, known) else ())
 
 
 def _on_damage(
@@ -228,13 +250,14 @@ def _status(given: Given, findings: list[Finding]) -> Status:
 def _general_figures(
     flight: Flight, given: Given, known: Known, answers: Answers, gaps: Mapping[str, Gaps]
 ) -> tuple[FigureData, ...]:
-    true_heading_deg, ins_topic = _heading_for_overview(flight, answers)
+    heading = attempt("arrays", "overview_heading", _heading_for_overview, flight, answers) or (None, None)
+    geometry_max = known.settings_of(HeadingSettings).geometry_max
     general = (
-        overview.overview(flight, true_heading_deg, ins_topic),
-        overview.phase_figure(known.phases),
-        overview.gnss_lanes(flight, known.settings_of(HeadingSettings).geometry_max),
-        overview.state_lanes(flight),
-        *overview.ledger_figures(flight, given.ledger, gaps),
+        attempt("arrays", "overview", overview.overview, flight, *heading),
+        attempt("arrays", "phases", overview.phase_figure, known.phases),
+        attempt("arrays", "gnss_lanes", overview.gnss_lanes, flight, geometry_max),
+        attempt("arrays", "state_lanes", overview.state_lanes, flight),
+        *(attempt("arrays", "ledger", overview.ledger_figures, flight, given.ledger, gaps) or ()),
     )
     return tuple(figure for figure in general if figure is not None)
 

@@ -14,12 +14,14 @@ from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import settings_from
 from groundstation.base.toml_text import toml_table, toml_text
 from groundstation.integrity.limits import Thresholds, thresholds_from
+from groundstation.pipeline.one_flight.isolation import Isolation
 
 if TYPE_CHECKING:
     from groundstation.estimators.known import AircraftData, SiteData
     from groundstation.pipeline.one_flight.deviation_to_apply import Apply
     from groundstation.tables.session_settings import SessionSettings
 
+ISOLATION = "isolation"  # the table that changes no result: it is not kept
 S = TypeVar("S")
 Settings = Path | Mapping[str, Any]  # a TOML file, or its content
 
@@ -44,7 +46,7 @@ def tables() -> tuple[str, ...]:
 @cache
 def sections() -> tuple[str, ...]:
     """Names of all that a settings file may hold."""
-    return (*tables(), "exclude", "force")
+    return (*tables(), ISOLATION, "exclude", "force")
 
 
 @dataclass(frozen=True)
@@ -104,8 +106,8 @@ class Configuration:
     Parameters
     ----------
     tables : mapping
-        The TOML tables as written, by name: those of the analyses, ``aircraft``, ``site``, ``thresholds``
-        and ``rules``.
+        The TOML tables as written, by name: those of the analyses, ``aircraft``, ``site``, ``thresholds``,
+        ``rules`` and ``isolation``.
     exclude, force : tuple of Interval
     profile : str, optional
         Path of the layout of logs that no reader knows.
@@ -136,7 +138,8 @@ class Configuration:
     def __post_init__(self) -> None:
         self.thresholds  # noqa: B018 -- a slip is told now
         self.rules  # noqa: B018
-        if self.tables.keys() - {"thresholds", "rules"}:
+        self.isolation  # noqa: B018
+        if self.tables.keys() - {"thresholds", "rules", ISOLATION}:
             self.settings  # noqa: B018
 
     @cached_property
@@ -148,6 +151,11 @@ class Configuration:
     def rules(self) -> RulesLabel:
         """Name of the limits."""
         return self._table("rules", RulesLabel)
+
+    @cached_property
+    def isolation(self) -> Isolation:
+        """What a log may take that is read apart."""
+        return self._table(ISOLATION, Isolation)
 
     @cached_property
     def settings(self) -> UserSettings:

@@ -41,12 +41,13 @@ COUNTED_CAUSES = ("dropout", "stuck", "out_of_range", "sequence")  # of spans: c
 class Converted:
     """What an MCAP holds and what was found while it was made.
 
-    ``has_lost_data``: something of the log could not be kept (exit code 3).
+    ``has_lost_data``: something of the log could not be kept (exit code 3). ``sha256`` is the digest of the MCAP.
     """
 
     info: StoreInfo
     findings: tuple[Finding, ...]
     has_lost_data: bool
+    sha256: str = ""
 
 
 def convert_log(
@@ -108,8 +109,17 @@ def survey_of(log: Log, items: Iterable[Item], limits: Thresholds) -> "Survey":
 
     found = survey(items, thresholds=limits)
     if not found.ledger.topics:
-        raise UnreadableLogError(log.path.name, "no readable record", "", "`info` shows what the file is")
+        from groundstation.integrity.ledger_findings import ledger_findings
+
+        why = why_nothing_is_placed(ledger_findings(found.ledger))
+        raise UnreadableLogError(log.path.name, why, "", "`info` shows what the file is")
     return found
+
+
+def why_nothing_is_placed(findings: Iterable[Finding]) -> str:
+    """Reason why a log has no topic: its records have no time, or it has no record that can be read."""
+    timeless = next((one.count for one in findings if one.code == "clock.no_times"), 0)
+    return f"no readable record has a time, of {timeless}" if timeless else "no readable record"
 
 
 def _segments(log: Log, found: "Survey") -> tuple[Segment, ...]:
@@ -149,7 +159,7 @@ def _convert_recorded(log: Log, items: Replay, found: "Survey", target: Path, re
     with StoreWriter(target, info) as writer:
         for batch in chain(corrected(items, found.clock), laid.batches):
             writer.write(batch)
-    return Converted(info, info.findings, any(damage.loses_data for damage in found.damages))
+    return Converted(info, info.findings, any(damage.loses_data for damage in found.damages), writer.sha256)
 
 
 def _facts_of(log: Log, found: "Survey", laid: Laid) -> StoreInfo:
@@ -250,7 +260,7 @@ def _copy_store(log: Log, target: Path, limits: Thresholds, references: Referenc
             raise UnreadableLogError(log.path.name, "no intact record", "", "the file is damaged beyond its index")
         if damages or has_other_limits(info, limits):
             info = writer.info = recounted(info, damages, census)
-    return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages))
+    return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages), writer.sha256)
 
 
 def _laid_beside_store(log: Log, info: StoreInfo, references: References) -> Laid:

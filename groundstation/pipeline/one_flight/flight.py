@@ -1,30 +1,34 @@
 """One log from beginning to end: MCAP, answers, recording and report in a folder of its own."""
 
 import os
+import secrets
 import shutil
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial as bound
 from pathlib import Path, PurePosixPath
 from typing import TypeVar
 
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
-from groundstation.base.findings import SEVERITIES, Severity, worst
+from groundstation.base.failures import attempt, failures, gathered_failures, is_incomplete, with_failures
+from groundstation.base.findings import SEVERITIES, Finding, worst
 from groundstation.base.records import RecordBatch
+from groundstation.base.to_disk import sync_folder
 from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES
 from groundstation.pipeline.one_flight.analyse import Given, analyse
 from groundstation.pipeline.one_flight.apply_deviation import apply_deviation, corrected_name, write_corrected
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_flight, parts_told
-from groundstation.pipeline.one_flight.identity import flight_id
+from groundstation.pipeline.one_flight.identity import flight_id, sha256_of
 from groundstation.pipeline.one_flight.log import Log, as_log, digest_of, open_log, open_parts
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.parts import part_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, Keys, Step, keys_of, remember_reports
+from groundstation.pipeline.one_flight.sealing import note, seal
 from groundstation.reports.flight_report import PDF, REPORT, flight_report_begun, write_flight_report
 from groundstation.reports.steer_card import write_exports
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
@@ -34,6 +38,8 @@ from groundstation.results.manifest import PartOfRun, PowerUpOfRun, Resume
 from groundstation.tables.table import Flight
 
 PARTIAL_PREFIX = ".partial-"
+OF_THE_WORLD = OSError, GroundstationError  # a full disk, a setting: no defect of the part that meets it
+REPORT_FILES = (REPORT, PDF, DEVIATION_CSV, STEER_CARD)
 MOST_APART = 50  # records that a part read alone may have more than as part of a flight, at each joint
 Inside = TypeVar("Inside")
 Version = tuple[tuple[int, int], ...]  # of each file of a log: time and size
@@ -149,12 +155,15 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
     """Run one log into a partial folder in ``out``; the caller moves it into place (see :func:`place`).
 
     A log that cannot be read or computed gives an outcome with the reason, never an exception: one bad log never
-    stops the others. Of a log with several power-ups each has its own folder, those behind the first in ``more``.
+    stops the others. Nor does one part of a flight that fails by a defect (an analysis, a figure, a tab) stop the rest
+    of it: the flight is then incomplete, and a finding says what it lacks. Of a log with several power-ups each has its
+    own folder, those behind the first in ``more``.
     """
     watch = Stopwatch(listen, job.path.name)
     try:
         if job.finished is not None and job.step in ("nothing", "reports"):
-            return _run_reports(job, job.finished, watch)
+            with gathered_failures():
+                return _run_reports(job, job.finished, watch)
         paths = [Path(part.path) for part in job.parts] or [job.path]
         version = tuple(map(_version, paths))
         log = open_parts(paths, job.configuration.profile_path, job.configuration.icds)
@@ -168,10 +177,10 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
 
 def _run_log(log: Log, version: Version, job: Job, watch: Stopwatch) -> Outcome:
     """Run a log, or one power-up of it, into a partial folder; of a log with several each into its own."""
-    partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=job.out))
+    partial = partial_folder(job.out)
     try:
-        partial.chmod(0o755)  # mkdtemp's folders are private
-        found = _run(log, version, job, partial, watch)
+        with gathered_failures():
+            found = _run(log, version, job, partial, watch)
         if isinstance(found, Outcome):
             return found
         wanted = [one for one in found if job.power_up in (0, _power_up_of(one))]
@@ -197,6 +206,13 @@ def _failed(job: Job, error: Exception, watch: Stopwatch, log: Log | None = None
     return Outcome(job.log, "failed", reason, sha256=sha256, times_s=watch.times_s, trace=trace, power_up=power_up)
 
 
+def partial_folder(out: Path) -> Path:
+    """A new folder in ``out`` for what is not finished; as every other it is open to whom the user's mask leaves it."""
+    partial = out / f"{PARTIAL_PREFIX}{secrets.token_hex(8)}"
+    partial.mkdir()
+    return partial
+
+
 def _version(path: Path) -> tuple[int, int]:
     """What tells that a file was written to: time and size."""
     found = path.stat()
@@ -213,12 +229,12 @@ def _require_unchanged(log: Log, version: Version) -> None:
 
 def _run(log: Log, version: Version, job: Job, partial: Path, watch: Stopwatch) -> Outcome | tuple[Log, ...]:
     """Run one flight into a folder; of a log with several power-ups nothing is run, they are told."""
-    from groundstation.results.files import save
+    from groundstation.results.files import put_failures, save
 
     mcap = partial / "flight.mcap"
     converted: Converted | tuple[Log, ...]
     if job.step == "analysis" and job.finished is not None:
-        converted = _taken_over(job.finished.mcap, mcap)
+        converted = _taken_over(job.finished, mcap)
     else:
         with watch.stage("converting"):
             converted = convert_flight(log, mcap, job.configuration.thresholds, job.configuration.references)
@@ -234,11 +250,16 @@ def _run(log: Log, version: Version, job: Job, partial: Path, watch: Stopwatch) 
     identity = flight_id(start_utc_ns, flight.metadata, log.source.sha256, number, add_suffix=job.add_suffix)
     with watch.stage("estimating"):
         results = analyse(flight, given_of(log, converted, identity), job.configuration)
-        applied = apply_deviation(flight, results, job.configuration.apply, job.configuration.settings)
-        results = applied.results
+        asked = job.configuration.apply, job.configuration.settings
+        applied = attempt("applied deviation", "all", apply_deviation, flight, results, *asked, unless=OF_THE_WORLD)
+        results = results if applied is None else applied.results
+        for one in FLIGHT_ANALYSES:
+            attempt("columns", one.name, one.values, results.answers)  # of the tables of flights
     with watch.stage("saving"):
-        corrected = partial / corrected_name(identity)
-        write_corrected(corrected, converted.info, flight, applied, job.configuration.thresholds)
+        if applied is not None:
+            corrected = partial / corrected_name(identity)
+            write_corrected(corrected, converted.info, flight, applied, job.configuration.thresholds)
+        results = replace(results, findings=with_failures(results.findings, failures()))
         mcap.rename(partial / f"{identity}.mcap")
         text = sentence(results)
         keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf, digests=log.digests)
@@ -247,14 +268,19 @@ def _run(log: Log, version: Version, job: Job, partial: Path, watch: Stopwatch) 
         manifest = manifest_of(results, settings, path=path, resume=resume, power_up=power_up, parts=parts)
         save(partial, results, manifest)
     problem = _show(partial, flight, results, job, watch)
+    put_failures(partial, failures())
+    findings = with_failures(results.findings, failures())
+    with watch.stage("saving"):
+        seal(partial, manifest, {f"{identity}.mcap": converted.sha256})
     return Outcome(
         job.log,
-        state_of(worst(results.findings), converted.has_lost_data, job.fail_on),
+        state_of(findings, converted.has_lost_data, job.fail_on),
         "; ".join(filter(None, (text, problem))),
         flight_id=identity,
         folder=str(partial),
         sha256=log.source.sha256,
         times_s=watch.times_s,
+        failures=failures(),
         power_up=number,
         parts=parts,
     )
@@ -302,7 +328,8 @@ def _show(partial: Path, flight: Flight, results: FlightResults, job: Job, watch
         with watch.stage("recording"):  # while the other painters are at the report's figures
             from groundstation.viewer.recording import write_recording  # Rerun is loaded after they were forked
 
-            write_recording(partial / f"{results.flight_id}.rrd", flight, results)
+            path = partial / f"{results.flight_id}.rrd"
+            attempt("recording", "flight", write_recording, path, flight, results, unless=OF_THE_WORLD)
         with watch.stage("reporting"):
             return finish().problem
 
@@ -311,43 +338,52 @@ def _export(folder: Path) -> str:
     """Write the tables that reports write beside them; returns what went wrong."""
     from groundstation.results.files import load
 
-    return write_exports(load(folder, ANSWER_TYPES), with_pdf=False)[1]
+    saved = load(folder, ANSWER_TYPES)
+    written = attempt("report", "exports", bound(write_exports, saved, with_pdf=False), unless=OF_THE_WORLD)
+    return "" if written is None else written[1]
 
 
 def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
     """The outcome of a flight that is finished, its reports made again where that is asked for."""
+    from groundstation.results.files import put_failures
+
     problem = ""
     if job.step == "reports" and job.only_results:
         problem = _export(finished.folder)
+        put_failures(finished.folder, failures())
+        note(finished.folder, [finished.folder / DEVIATION_CSV])
     elif job.step == "reports":
         with watch.stage("reporting"):
             written = write_flight_report(finished.folder, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters)
             problem = written.problem
+            put_failures(finished.folder, failures())
+            note(finished.folder, written.paths, removed=REPORT_FILES)
             remember_reports(finished, with_pdf=job.with_pdf)
     return Outcome(
         job.log,
-        state_of(finished.gravest, finished.has_lost_data, job.fail_on),
+        state_of(with_failures(finished.findings, failures()), finished.has_lost_data, job.fail_on),
         "; ".join(filter(None, (finished.text, problem))),
         flight_id=finished.flight_id,
         folder=str(finished.folder),
         sha256=finished.sha256,
         times_s=watch.times_s,
         was_finished=job.step == "nothing",
+        failures=failures(),
         power_up=job.power_up,
         parts=finished.parts,
     )
 
 
-def _taken_over(mcap: Path, target: Path) -> Converted:
+def _taken_over(finished: Finished, target: Path) -> Converted:
     """The MCAP of a finished flight, as if it had just been converted."""
     from groundstation.store.reader import read_info
 
     try:
-        os.link(mcap, target)
+        os.link(finished.mcap, target)
     except OSError:  # no links here, or another file system
-        shutil.copyfile(mcap, target)
-    info = read_info(target)
-    return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages))
+        shutil.copyfile(finished.mcap, target)
+    info, sha256 = read_info(target), finished.mcap_sha256 or sha256_of(target)
+    return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages), sha256)
 
 
 def given_of(log: Log, converted: Converted, identity: str) -> Given:
@@ -366,8 +402,11 @@ def read_flight(mcap: Path, converted: Converted) -> Flight:
     return flight_from_batches(batches, metadata=info.metadata, has_utc=info.has_utc, source_name=info.source_name)
 
 
-def state_of(gravest: Severity | None, has_lost_data: bool, fail_on: str) -> State:
-    """State of a run from its worst finding and whether data was lost."""
+def state_of(findings: tuple[Finding, ...], has_lost_data: bool, fail_on: str) -> State:
+    """State of a run from its findings and whether data was lost."""
+    if is_incomplete(findings):
+        return "incomplete"
+    gravest = worst(findings)
     if fail_on in SEVERITIES and gravest and SEVERITIES.index(gravest) >= SEVERITIES.index(fail_on):
         return "limit_reached"
     return "data_lost" if has_lost_data else "done"
@@ -375,7 +414,8 @@ def state_of(gravest: Severity | None, has_lost_data: bool, fail_on: str) -> Sta
 
 def sentence(results: FlightResults) -> str:
     """What was found, in one line."""
-    found = [text for analysis in FLIGHT_ANALYSES if (text := analysis.sentence(results.answers))]
+    told = (attempt("line", one.name, one.sentence, results.answers) for one in FLIGHT_ANALYSES)
+    found = [text for text in told if text]
     if found:
         return "; ".join(found)
     if not results.not_assessable:
@@ -420,11 +460,14 @@ def place(partial: Path, target: Path) -> None:
         partial.rename(target)
         return
     (target / MANIFEST).unlink(missing_ok=True)  # the mark of a whole folder goes first and comes back last
+    sync_folder(target)
     for name in optional_files(target.name):
         (target / name).unlink(missing_ok=True)
     shutil.rmtree(target / OLD_ARRAYS, ignore_errors=True)
     for entry in sorted(partial.iterdir(), key=lambda path: path.name == MANIFEST):
         old = target / entry.name
+        if entry.name == MANIFEST:
+            sync_folder(target)
         if old.is_dir() and not old.is_symlink():
             shutil.rmtree(old)
         else:

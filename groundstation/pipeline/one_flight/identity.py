@@ -5,6 +5,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
+from groundstation.base.reading import open_to_read
 from groundstation.base.timescales import utc_ns_to_stamp
 
 _NOT_ALLOWED = re.compile(r"[^A-Za-z0-9_-]+")
@@ -16,7 +17,7 @@ def sha256_of(*paths: Path) -> str:
     """SHA-256 of a file, hexadecimal; of several as of one that holds them in this order."""
     digest = hashlib.sha256()
     for path in paths:
-        with path.open("rb") as stream:
+        with open_to_read(path) as stream:
             hashlib.file_digest(stream, lambda: digest)
     return digest.hexdigest()
 

@@ -6,11 +6,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from groundstation.base.errors import GroundstationError
+from groundstation.base.errors import GroundstationError, lack_of_memory
+from groundstation.base.failures import Failure
+from groundstation.base.failures import reason_of as why
 from groundstation.results.manifest import PartOfRun
 
-State = Literal["done", "data_lost", "limit_reached", "failed", "skipped"]
-EXIT_CODE: Mapping[State, int] = {"done": 0, "skipped": 0, "data_lost": 3, "limit_reached": 4, "failed": 1}
+State = Literal["done", "data_lost", "limit_reached", "incomplete", "failed", "skipped"]
+EXIT_CODE: Mapping[State, int] = {
+    "done": 0,
+    "skipped": 0,
+    "data_lost": 3,
+    "limit_reached": 4,
+    "incomplete": 1,
+    "failed": 1,
+}
 WORST_FIRST = (1, 4, 3, 0)
 
 
@@ -22,7 +31,8 @@ class Outcome:
     ----------
     source : str
         Path of the log as the user would type it.
-    state : {'done', 'data_lost', 'limit_reached', 'failed', 'skipped'}
+    state : {'done', 'data_lost', 'limit_reached', 'incomplete', 'failed', 'skipped'}
+        A flight that lacks a part which failed by a defect is incomplete; all else of it is there.
     text : str
         One line for people: the verdict, or the reason of a failure.
     flight_id, folder : str
@@ -35,6 +45,10 @@ class Outcome:
         Whether it is of a session: ``source`` are then the names of its logs, and ``flight_id`` is that of the session.
     was_finished : bool
         Whether an earlier run had finished it, so that nothing was computed.
+    failures : tuple of Failure
+        The parts that failed.
+    is_beside : bool
+        Whether it is of what stands beside the flights, and of no log: the index, the page of all, another store.
     power_up : int
         Which of several power-ups in the log, from 1; 0 where the log holds one.
     more : tuple of Outcome
@@ -53,6 +67,8 @@ class Outcome:
     trace: str = ""
     is_session: bool = False
     was_finished: bool = False
+    failures: tuple[Failure, ...] = ()
+    is_beside: bool = False
     power_up: int = 0
     more: "tuple[Outcome, ...]" = ()
     parts: tuple[PartOfRun, ...] = ()
@@ -67,13 +83,11 @@ def reason_of(name: str, error: Exception) -> tuple[str, str]:
     """Why a log failed, in one line, and where an error that is ours to mend came from (empty for the others)."""
     if isinstance(error, GroundstationError):
         return str(error), ""
-    if isinstance(error, OSError):
+    if isinstance(error, OSError) and not lack_of_memory(error):
         file = f"{Path(error.filename).name}: " if error.filename and Path(error.filename).name != name else ""
         return f"{name}: {file}{error.strerror or error}", ""
-    if isinstance(error, MemoryError):
-        return f"{name}: not enough memory", ""
-    trace = "".join(traceback.format_exception(error))
-    return f"{name}: internal error ({type(error).__name__}: {error}); please report it", trace
+    trace = "" if lack_of_memory(error) else "".join(traceback.format_exception(error))
+    return f"{name}: {why(error)}", trace
 
 
 def worst_code(outcomes: "tuple[Outcome, ...]") -> int:

@@ -7,6 +7,7 @@ reports whether there is a PDF.
 
 import hashlib
 import json
+import os
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -17,21 +18,25 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from groundstation.base.errors import GroundstationError
-from groundstation.base.findings import Severity, worst
+from groundstation.base.failures import is_incomplete
+from groundstation.base.findings import Finding
 from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.apply_deviation import APPLIED, corrected_name
-from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.configuration import ISOLATION, Configuration
 from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.log import as_log, digest_of
+from groundstation.pipeline.one_flight.sealing import spoiled_files
 from groundstation.reports.flight_report import PDF, REPORT
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.document import SummaryDocument
+from groundstation.results.file_names import ARRAYS, SUMMARY, TABLES
 from groundstation.results.files import load_document, load_manifest, save_manifest
 from groundstation.results.flight import Source
 from groundstation.results.manifest import Keys as Keys
 from groundstation.results.manifest import Manifest, PartOfRun, PowerUpOfRun
 
 Step = Literal["everything", "analysis", "reports", "nothing"]  # what has to be done for a log
+_OF_RESULTS = (SUMMARY, f"{ARRAYS}/", f"{TABLES}/")
 PACKAGES = (
     *("mcap", "numpy", "pandas", "numba", "scipy", "pyarrow", "rerun-sdk"),
     *("protobuf", "matplotlib", "typst", "pygeomag", "ppigrf"),
@@ -53,10 +58,13 @@ class Finished:
     text : str
         What was found, in one line.
     has_lost_data : bool
-    gravest : {'info', 'warn', 'fail'} or None
-        Severity of its gravest finding.
+    findings : tuple of Finding
     has_deviation, has_applied : bool
         Whether a magnetic deviation was found, and whether one was added to the log: there are files of both.
+    spoiled : frozenset of str
+        Paths in the folder of files that are missing or not as the run left them; ``files`` has none of them.
+    mcap_sha256 : str
+        Empty where an earlier version made the flight.
     power_up : PowerUpOfRun, optional
         Which of several in its log.
     parts : tuple of PartOfRun
@@ -72,9 +80,11 @@ class Finished:
     keys: Keys
     text: str
     has_lost_data: bool
-    gravest: Severity | None
+    findings: tuple[Finding, ...]
     has_deviation: bool = False
     has_applied: bool = False
+    spoiled: frozenset[str] = frozenset()
+    mcap_sha256: str = ""
     power_up: PowerUpOfRun | None = None
     parts: tuple[PartOfRun, ...] = ()
     source: Source = field(default_factory=lambda: Source("", "", 0, ""))
@@ -94,16 +104,20 @@ class Finished:
         return plain_id(self.flight_id, self.sha256) != self.flight_id
 
     def step(self, keys: Keys, *, with_pdf: bool, only_results: bool = False) -> Step:
-        """What has to be done for the results to be those of ``keys``; a file that somebody took away is made again.
+        """What has to be done for the results to be those of ``keys``.
 
-        With ``only_results`` neither recording nor reports are asked for; what there is of them stays.
+        A file that somebody took away, or that is not as the run left it, is made again.
+
+        With ``only_results`` neither recording nor reports are asked for; what there is of them stays. A part that
+        failed is tried again.
         """
         if keys.conversion != self.keys.conversion or self.mcap.name not in self.files:
             return "everything"
         analysed = {corrected_name(self.flight_id)} if self.has_applied else set()
         if not only_results:
             analysed.add(f"{self.flight_id}.rrd")
-        if keys.analysis != self.keys.analysis or not analysed <= self.files:
+        is_spoiled = self._has_spoiled_results or is_incomplete(self.findings)
+        if keys.analysis != self.keys.analysis or not analysed <= self.files or is_spoiled:
             return "analysis"
         wanted = {DEVIATION_CSV} if self.has_deviation else set()
         if only_results:
@@ -112,6 +126,10 @@ class Finished:
         if with_pdf:
             wanted |= {PDF, *([STEER_CARD] if self.has_deviation else [])}
         return "nothing" if keys.reports == self.keys.reports and wanted <= self.files else "reports"
+
+    @property
+    def _has_spoiled_results(self) -> bool:
+        return any(name.startswith(_OF_RESULTS) for name in self.spoiled)
 
 
 @cache
@@ -139,6 +157,7 @@ def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool, dig
     """
     tables = dict(configuration.tables)
     thresholds = tables.pop("thresholds", {})
+    tables.pop(ISOLATION, None)
     conversion = _digest(
         *(asdict(source), _layouts_of(configuration), thresholds, dict(versions()), platform.python_version()),
         *([list(digests)] if len(digests) > 1 else []),
@@ -185,18 +204,30 @@ def remember_reports(flight: "Finished", *, with_pdf: bool) -> None:
         save_manifest(flight.folder, replace(manifest, resume=replace(manifest.resume, keys=keys)))
 
 
-def finished(folder: Path) -> Finished | None:
-    """What a flight folder remembers; None when it is not whole, or was not made by such a run."""
+def finished(folder: Path, sizes: Mapping[str, int] | None = None) -> Finished | None:
+    """What a flight folder remembers; None when it is not whole, or was not made by such a run.
+
+    ``sizes`` are those of its files by their path in it, where ``folder`` holds but its documents.
+    """
     try:
         manifest, summary = load_manifest(folder), load_document(folder)
-        files = frozenset(path.name for path in folder.iterdir())
+        files = _not_empty(folder) if sizes is None else {name for name, size in sizes.items() if size}
     except (OSError, GroundstationError):
         return None
-    return _finished(folder, files, manifest, summary)
+    spoiled = spoiled_files(folder, manifest, None if sizes is None else sizes.get)
+    return _finished(folder, frozenset(files) - spoiled, manifest, summary, spoiled)
 
 
-def _finished(folder: Path, files: frozenset[str], manifest: Manifest, summary: SummaryDocument) -> Finished | None:
-    resume = manifest.resume
+def _not_empty(folder: Path) -> set[str]:
+    """Names of the folders and files in a folder, without those that are empty: no file of a run is."""
+    with os.scandir(folder) as entries:
+        return {entry.name for entry in entries if entry.is_dir() or (entry.is_file() and entry.stat().st_size)}
+
+
+def _finished(
+    folder: Path, files: frozenset[str], manifest: Manifest, summary: SummaryDocument, spoiled: frozenset[str]
+) -> Finished | None:
+    resume, mcap = manifest.resume, manifest.files.get(f"{folder.name}.mcap")
     if resume is None:
         return None
     return Finished(
@@ -207,9 +238,11 @@ def _finished(folder: Path, files: frozenset[str], manifest: Manifest, summary: 
         resume.keys,
         resume.text,
         resume.has_lost_data,
-        worst(summary.findings),
+        summary.findings,
         bool(summary.results.get("magnetic")),
         any(finding.code == APPLIED for finding in summary.findings),
+        spoiled,
+        "" if mcap is None else mcap.sha256,
         manifest.power_up,
         manifest.parts,
         Source(manifest.source.name, manifest.source.sha256, manifest.source.size_bytes, manifest.source.reader),

@@ -20,6 +20,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.clock import Clock
+from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.ledger import DamagedSpan, Ledger
 from groundstation.base.records import HEADING_IS_TRACK, BoolArray, Column, Damage, Int64Array, RecordBatch
@@ -27,7 +28,6 @@ from groundstation.base.signals import TOPICS, is_canonical, kind_of
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.inertial.noise import class_names
-from groundstation.tables.declination import declination_along
 from groundstation.tables.headings import positions_for
 from groundstation.tables.phases import ALWAYS_ON_GROUND, YES
 from groundstation.tables.table import Flight

@@ -14,7 +14,13 @@ from groundstation.base.serial import to_json_exactly
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.convert import census_of, has_other_limits, recounted, told_of_fields
+from groundstation.pipeline.one_flight.convert import (
+    census_of,
+    has_other_limits,
+    recounted,
+    told_of_fields,
+    why_nothing_is_placed,
+)
 from groundstation.pipeline.one_flight.log import Log, as_log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
@@ -96,23 +102,49 @@ def check_many(
     UsageError
         When a log is missing, is a folder, a threshold is wrong, or there is no such purpose.
     """
+    logs, is_session = require_logs(paths, purpose)
+    listen(Event("begin", total=len(logs)))
+    return check_here(logs, configuration, purpose, is_session, fail_on, listen)
+
+
+def require_logs(paths: Sequence[Path], purpose: str) -> tuple[list[Path], bool]:
+    """The logs that are named, and whether the purpose is that of a session.
+
+    Raises
+    ------
+    UsageError
+        As :func:`check_many`.
+    """
+    is_session = False
     if purpose:
         from groundstation.pipeline.verbs.usable import SESSION_PURPOSES, require_purpose
 
         require_purpose(purpose)
-    paths = [as_log(path) for path in paths]
-    for path in paths:
+        is_session = purpose in SESSION_PURPOSES
+    logs = [as_log(path) for path in paths]
+    for path in logs:
         if not path.exists():
             raise UsageError(str(path), "no such file")
         if path.is_dir():
             raise no_log(path)
-    listen(Event("begin", total=len(paths)))
+    return logs, is_session
+
+
+def check_here(
+    paths: Sequence[Path],
+    configuration: Configuration,
+    purpose: str,
+    is_session: bool,
+    fail_on: str,
+    listen: Listener,
+) -> tuple[Checked, ...]:
+    """The checks of logs that are there; parameters as of :func:`check_many`."""
     found = []
     flights: dict[int, Flight] = {}
     for number, path in enumerate(paths):
         listen(Event("stage", path.name, "reading"))
         checked, flight = _check_or_reason(path, configuration, fail_on, with_flight=bool(purpose))
-        if flight is not None and purpose in SESSION_PURPOSES:
+        if flight is not None and is_session:
             flights[number] = flight
         elif flight is not None:
             checked = _for_purpose(checked, purpose, flight, configuration, fail_on)
@@ -165,7 +197,12 @@ def _check_or_reason(
         return checked_with_flight(log, configuration.thresholds, fail_on, with_flight=with_flight)
     except Exception as error:
         reason, trace = reason_of(path.name, error)
-    return Checked(Outcome(str(path), "failed", reason, trace=trace), {}, Ledger(), Clock(), ()), None
+    return unread(path, reason, trace), None
+
+
+def unread(path: Path, reason: str, trace: str = "") -> Checked:
+    """The check of a log that could not be read."""
+    return Checked(Outcome(str(path), "failed", reason, trace=trace), {}, Ledger(), Clock(), ())
 
 
 def checked_with_flight(
@@ -246,7 +283,7 @@ def _checked(
     fail_on: str,
 ) -> Checked:
     if not ledger.topics:
-        reason = f"{log.path.name}: no readable record: `info` shows what the file is"
+        reason = f"{log.path.name}: {why_nothing_is_placed(findings)}: `info` shows what the file is"
         outcome = Outcome(str(log.path), "failed", reason, sha256=log.source.sha256)
         return Checked(outcome, facts, ledger, clock, findings)
     gravest = worst(findings)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from groundstation.base.errors import SettingsError, UnreadableLogError, UsageError, told_in_a_line
+from groundstation.base.failures import Failure, attempt, failures, gathered_failures
 from groundstation.base.ledger import DamagedSpan, Ledger
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.base.timescales import iso_to_utc_ns, utc_ns_to_iso
@@ -18,11 +19,11 @@ from groundstation.pipeline.many_flights.inputs import file_in
 from groundstation.pipeline.one_flight.analyse import analyse
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, census_of, convert_flight, convert_log, recounted
-from groundstation.pipeline.one_flight.flight import given_of, read_flight
+from groundstation.pipeline.one_flight.flight import OF_THE_WORLD, given_of, read_flight
 from groundstation.pipeline.one_flight.identity import flight_id
 from groundstation.pipeline.one_flight.intervals import flight_seconds
 from groundstation.pipeline.one_flight.log import Log, open_log
-from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.one_flight.outcome import Outcome, State
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.segments import Segment, segments_in
 from groundstation.pipeline.verbs.anonymous import ANONYMOUS, Disguise, disguise_of
@@ -116,12 +117,16 @@ def clip(
         target.parent.mkdir(parents=True, exist_ok=True)
         with _as_mcap(log, target.parent, limits, wanted) as (log, mcap):
             done = _cut(log, mcap, target, wanted, limits)
+    found: tuple[Failure, ...] = ()
     if with_recording:
         listen(Event("stage", path.name, "recording"))
-        _record(target, done, settings)
+        with gathered_failures():
+            _record(target, done, settings)
+            found = failures()
     text = f"-> {target} ({_told(done.info)}, {target.stat().st_size / 1e6:.2f} MB)"
     listen(Event("end", path.name, text))
-    return Outcome(str(path), "data_lost" if done.has_lost_data else "done", text, folder=str(target))
+    state: State = "incomplete" if found else "data_lost" if done.has_lost_data else "done"
+    return Outcome(str(path), state, text, folder=str(target), failures=found)
 
 
 def _expect_free(source: Path, target: Path, with_recording: bool, force: bool) -> None:
@@ -209,10 +214,10 @@ def _cut(log: Log, mcap: Path, target: Path, wanted: Wanted, limits: Thresholds)
         inside = _inside(info, zero_ns, first_ns, part)
         metadata = {**info.metadata, **_origin(log.source, info, zero_ns, first_ns, part, wanted)}
         # Neither name nor digest of the log: the part is a log of its own, and two parts of one log are no twins.
+        # Nor its own name: equal parts are equal to the byte whatever they are called.
         cut = replace(inside, start_ns=first_ns, metadata=metadata)
         cut = cut if disguise is None else disguise.info(cut)
-        # Not the file's name either where it is to tell nothing: renamed, it would still stand inside.
-        cut = replace(cut, source_name=target.name if disguise is None else f"{ANONYMOUS}.mcap", source_sha256="")
+        cut = replace(cut, source_name="" if disguise is None else f"{ANONYMOUS}.mcap", source_sha256="")
         info = writer.info = recounted(cut, damages, census)
     return Converted(info, info.findings, any(entry.get("loses_data") for entry in info.damages))
 
@@ -341,7 +346,8 @@ def _record(target: Path, done: Converted, configuration: Configuration) -> None
     log = open_log(target)
     flight = read_flight(target, done)
     identity = flight_id(flight.start_ns if flight.has_utc else None, flight.metadata, log.source.sha256)
-    write_recording(target.with_suffix(".rrd"), flight, analyse(flight, given_of(log, done, identity), configuration))
+    results = analyse(flight, given_of(log, done, identity), configuration)
+    attempt("recording", "part", write_recording, target.with_suffix(".rrd"), flight, results, unless=OF_THE_WORLD)
 
 
 def _told(info: "StoreInfo") -> str:

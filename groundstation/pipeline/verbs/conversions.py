@@ -1,18 +1,24 @@
 """Recorded logs to MCAP files, one by one; a flight to Chapter 10."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.signals import is_canonical
 from groundstation.integrity.limits import Thresholds
+from groundstation.pipeline.many_flights.apart import outcomes_apart
+from groundstation.pipeline.many_flights.confined import Bounds
 from groundstation.pipeline.many_flights.inputs import no_log
+from groundstation.pipeline.many_flights.workers import Crew, in_turn
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
 from groundstation.pipeline.one_flight.log import Log, as_log, log_name, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.store.writer import clear_parts
 
 
 def convert_many(
@@ -21,12 +27,14 @@ def convert_many(
     *,
     configuration: Configuration | None = None,
     force: bool = False,
+    bounds: Bounds | None = None,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Convert logs to MCAP: one to the file ``output``, several into the folder ``output``.
 
     A file ``*.ch10`` is written as Chapter 10, with the ICD of its buses beside it. Of the configuration, the profile,
-    the ICDs, the thresholds of the ledger and the references count.
+    the ICDs, the thresholds of the ledger and the references count. With ``bounds`` each log is converted in a process
+    of its own, which may take so much.
 
     Raises
     ------
@@ -51,12 +59,34 @@ def convert_many(
             raise UsageError(str(target), "a file that exists", "a new name", "-f overwrites it")
         target.parent.mkdir(parents=True, exist_ok=True)
     listen(Event("begin", total=len(logs)))
+    jobs = [_Job(log, target, configuration) for log, target in zip(logs, targets, strict=True)]
+    crew: Crew = partial(in_turn, listen=listen)
+    if bounds is not None:
+        crew = partial(outcomes_apart, workers=1, listen=listen, bounds=bounds)
     outcomes = []
-    for log, target in zip(logs, targets, strict=True):
-        listen(Event("stage", log.name, "converting"))
-        outcomes.append(_convert_one(log, target, configuration))
-        listen(Event("end", log.name, outcomes[-1].text))
+    for number, outcome in crew(enumerate(jobs), _convert_one):
+        if outcome.state == "failed":
+            clear_parts(jobs[number].target)
+        listen(Event("end", jobs[number].name, outcome.text))
+        outcomes.append(outcome)
     return tuple(outcomes)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One log to convert."""
+
+    path: Path
+    target: Path
+    configuration: Configuration
+
+    @property
+    def log(self) -> str:
+        return str(self.path)
+
+    @property
+    def name(self) -> str:
+        return self.path.name
 
 
 def convert_together(
@@ -94,7 +124,9 @@ def convert_together(
     return (outcome,)
 
 
-def _convert_one(path: Path, target: Path, configuration: Configuration) -> Outcome:
+def _convert_one(job: _Job, listen: Listener) -> Outcome:
+    path, target, configuration = job.path, job.target, job.configuration
+    listen(Event("stage", job.name, "converting"))
     told, thresholds, references = "", configuration.thresholds, configuration.references
     try:
         log = open_log(path, configuration.profile_path, configuration.icds)

@@ -2,25 +2,26 @@
 
 import hashlib
 import shutil
-import tempfile
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from groundstation.base.errors import UsageError
+from groundstation.base.failures import attempt, failures, gathered_failures, with_failures
 from groundstation.base.findings import worst
 from groundstation.estimators.analyses import ANSWER_TYPES, PLANS
 from groundstation.estimators.plan import Plan, Planned
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, PLAN_MARK
 from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
 from groundstation.pipeline.one_flight.cores import cores
-from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX, Stopwatch, place, state_of
+from groundstation.pipeline.one_flight.flight import OF_THE_WORLD, Stopwatch, partial_folder, place, state_of
 from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.pipeline.one_flight.sealing import seal
 from groundstation.reports.flight_report import write_flight_report
-from groundstation.results.files import save, write_text
+from groundstation.results.files import put_failures, save, write_text
 from groundstation.results.flight import FlightResults, Source
 from groundstation.studies.shipped_plans import LoadedPlan, load_plan, plan_names
 
@@ -87,10 +88,10 @@ def run_plan(
 def _run(
     plan: Plan[Any], loaded: LoadedPlan[Any], target: Path, fail_on: str, with_pdf: bool, watch: Stopwatch
 ) -> Outcome:
-    partial = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=target.parent))
-    partial.chmod(0o755)  # mkdtemp's folders are private
+    partial = partial_folder(target.parent)
     try:
-        return _run_into(partial, plan, loaded, target, fail_on, with_pdf, watch)
+        with gathered_failures():
+            return _run_into(partial, plan, loaded, target, fail_on, with_pdf, watch)
     except Exception as error:
         reason, trace = reason_of(loaded.name, error)
         return Outcome(loaded.name, "failed", reason, sha256=_digest(loaded), times_s=watch.times_s, trace=trace)
@@ -113,17 +114,23 @@ def _run_into(
         planned = plan.run(loaded.scenario)
     results = _results(plan, loaded, planned, target.name)
     with watch.stage("saving"):
-        save(partial, results, manifest_of(results, {"scenario": asdict(loaded.scenario)}))
+        manifest = manifest_of(results, {"scenario": asdict(loaded.scenario)})
+        save(partial, results, manifest)
         write_text(partial / PLAN_MARK, loaded.text)
     with watch.stage("recording"):
-        write_plan_recording(partial / f"{results.flight_id}.rrd", results)
+        path = partial / f"{results.flight_id}.rrd"
+        attempt("recording", "plan", write_plan_recording, path, results, unless=OF_THE_WORLD)
     with watch.stage("reporting"):
         problem = write_flight_report(partial, ANSWER_TYPES, with_pdf=with_pdf, painters=cores()).problem
-    place(partial, target)
     warned = (f"warning: {finding.text}" for finding in results.findings if finding.severity != "info")
-    told = "; ".join(filter(None, (plan.sentence(results.answers), *warned, problem)))
-    state = state_of(worst(results.findings), False, fail_on)
-    return Outcome(loaded.name, state, told, results.flight_id, str(target), _digest(loaded), watch.times_s)
+    sentence = attempt("line", plan.name, plan.sentence, results.answers) or ""
+    told = "; ".join(filter(None, (sentence, *warned, problem)))
+    put_failures(partial, failures())
+    seal(partial, manifest)
+    place(partial, target)
+    state = state_of(with_failures(results.findings, failures()), False, fail_on)
+    done = Outcome(loaded.name, state, told, results.flight_id, str(target), _digest(loaded), watch.times_s)
+    return replace(done, failures=failures())
 
 
 def _digest(loaded: LoadedPlan[Any]) -> str:

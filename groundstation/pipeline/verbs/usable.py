@@ -59,6 +59,14 @@ class Usability:
         return {"purpose": self.purpose, "state": self.state, "lacking": lacking}
 
 
+def usability_from(told: Mapping[str, Any]) -> Usability:
+    """What :meth:`Usability.to_dict` made of one, as it was."""
+    lacking = (
+        Shortfall(one["text"], tuple((float(a), float(b)) for a, b in one["spans_s"])) for one in told["lacking"]
+    )
+    return Usability(told["purpose"], told["state"], tuple(lacking))
+
+
 def require_purpose(name: str) -> None:
     """Refuse a purpose that no analysis serves.
 

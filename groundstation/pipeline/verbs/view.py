@@ -70,6 +70,8 @@ def look_at(
                 raise GroundstationError(where, found)
             if outcome.power_up and (told := load_manifest(Path(outcome.folder)).power_up) is not None:
                 say(f"power-up {told.number} of {told.count} in {path.name}; --power-up shows another one")
+            for failure in outcome.failures:
+                say(f"error: {path.name}: {failure.text}")
             code = open_viewer(_recording(Path(outcome.folder)), web=web, host=host, port=port, say=say)
     if code:
         raise GroundstationError("the Rerun viewer", f"ended with code {code}; see its output above")

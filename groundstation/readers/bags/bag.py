@@ -1,40 +1,48 @@
 """A log of messages as one: a single file, or the files that a bag of ROS 2 was split into."""
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeAlias
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Damage
 from groundstation.readers.bags.mcap import MAGIC as MCAP_MAGIC
 from groundstation.readers.bags.mcap import Mcap
-from groundstation.readers.bags.messages import Block, Connection, Part
-from groundstation.readers.bags.ros1 import MAGIC as ROS1_MAGIC
-from groundstation.readers.bags.ros1 import Ros1Bag, has_chunk
+from groundstation.readers.bags.messages import Block, Connection, Missing, Part, counted_by
+from groundstation.readers.bags.ros1 import Ros1Bag
+from groundstation.readers.bags.ros1_records import MAGIC as ROS1_MAGIC
+from groundstation.readers.bags.ros1_records import has_chunk
+from groundstation.readers.bags.rosbag2_metadata import BagMetadata
+from groundstation.readers.bags.sources import Key, key_of
 from groundstation.readers.bags.sqlite import MAGIC as SQLITE_MAGIC
 from groundstation.readers.bags.sqlite import Ros2Sqlite
 from groundstation.readers.joined import JoinedSource
 from groundstation.readers.source import Source
 
 METADATA = "metadata.yaml"
-METADATA_MARK = b"rosbag2_bagfile_information:"
+MARK = b"rosbag2_bagfile_information:"
 KEPT_BYTES, MESSAGE_BYTES = 64 << 20, 64  # of messages kept for the second pass; beside its own, of each
+MOST_METADATA_BYTES = 16 << 20
 _ENDINGS = ("", ".zstd")  # rosbag2 names a file it compressed later without the ending
+Item: TypeAlias = Block | Damage
 _CONTAINERS: Mapping[bytes, tuple[str, Callable[[Source], Iterable[Part]]]] = {
     MCAP_MAGIC: ("MCAP", Mcap),
     ROS1_MAGIC: ("ROS 1", Ros1Bag),
     SQLITE_MAGIC: ("ROS 2", Ros2Sqlite),
 }
-_TABLES = (b"CREATE TABLE topics", b"CREATE TABLE messages")  # in the head of an sqlite3 file that is a bag
+# In the head of an sqlite3 file that is a bag; a table that was renamed has its name in quotes.
+_TABLES = tuple(re.compile(rb"(?i)CREATE TABLE (IF NOT EXISTS )?[\"'`\[]?" + name) for name in (b"topics", b"messages"))
 
 
 def kind_of(source: Source) -> str:
     """What kind of bag a file is, by its first bytes; empty for none."""
-    if source.head.lstrip().startswith(METADATA_MARK):
+    if source.head.lstrip().startswith(MARK):
         return "ROS 2"
     if source.head.startswith(SQLITE_MAGIC):
-        return "ROS 2" if all(table in source.head for table in _TABLES) else ""
+        return "ROS 2" if all(table.search(source.head) for table in _TABLES) else ""
     kind = next((name for magic, (name, _container) in _CONTAINERS.items() if source.head.startswith(magic)), "")
     if not kind and has_chunk(source.head):
         return "ROS 1"
@@ -43,7 +51,7 @@ def kind_of(source: Source) -> str:
 
 def is_begun(source: Source) -> bool:
     """Whether a file has the first bytes of a bag, or is the metadata of one."""
-    return source.head.lstrip().startswith(METADATA_MARK) or source.head.startswith(tuple(_CONTAINERS))
+    return source.head.lstrip().startswith(MARK) or source.head.startswith(tuple(_CONTAINERS))
 
 
 def _is_ours(source: Source) -> bool:
@@ -57,7 +65,7 @@ def is_bag_folder(folder: Path) -> bool:
     """Whether a folder is a bag of ROS 2: rosbag2 lays its metadata into it."""
     try:
         with (folder / METADATA).open("rb") as stream:
-            return stream.read(4096).lstrip().startswith(METADATA_MARK)
+            return stream.read(4096).lstrip().startswith(MARK)
     except OSError:
         return False
 
@@ -67,18 +75,21 @@ def files_of(metadata: Path) -> tuple[Path, ...]:
 
     Names outside the folder of the metadata are left out.
     """
-    text = metadata.read_text(encoding="utf-8", errors="replace")
-    found = re.search(r"^\s*relative_file_paths:\s*\n((?:\s*-\s*.+\n?)+)", text, re.MULTILINE)
-    names = re.findall(r"^\s*-\s*(.+?)\s*$", found.group(1), re.MULTILINE) if found else []
+    names = _account_of(metadata).files
     files = []
     for name in names:
-        plain = Path(name.strip("'\""))
+        plain = Path(name)
         if plain.is_absolute() or ".." in plain.parts:
             continue
         known = [metadata.parent / f"{plain}{ending}" for ending in _ENDINGS]
         known += [metadata.parent / f"{plain.name}{ending}" for ending in _ENDINGS]  # old bags begin with the folder
         files.append(next((path for path in known if path.is_file()), known[0]))
     return tuple(files)
+
+
+def _account_of(metadata: Path) -> BagMetadata:
+    with metadata.open("rb") as stream:
+        return BagMetadata.of(stream.read(MOST_METADATA_BYTES).decode("utf-8", "replace"))
 
 
 @dataclass
@@ -91,21 +102,25 @@ class Bag:
     """
 
     source: Source
-    _kept: list[Part] | None = None
+    _kept: list[Item] | None = None
 
     def files(self) -> tuple[Source, ...]:
         """The files that hold messages."""
         if isinstance(self.source, JoinedSource):
             return self.source.files
-        if not self.source.head.lstrip().startswith(METADATA_MARK):
+        if not self._is_folder:
             return (self.source,)
         return tuple(Source(path) for path in files_of(self.source.path))
 
-    def __iter__(self) -> Iterator[Part]:
+    @property
+    def _is_folder(self) -> bool:
+        return self.source.head.lstrip().startswith(MARK)
+
+    def __iter__(self) -> Iterator[Item]:
         if self._kept is not None:
             yield from self._kept
             return
-        kept: list[Part] | None = []
+        kept: list[Item] | None = []
         size, last_buffer = 0, None
         for part in self._read():
             if kept is not None and isinstance(part, Block):
@@ -118,19 +133,39 @@ class Bag:
             yield part
         self._kept = kept
 
-    def _read(self) -> Iterator[Part]:
-        known: dict[tuple[str, str, str, bytes], Connection] = {}
+    def _read(self) -> Iterator[Item]:
+        """Messages and damages, then what the metadata of the bag counts beyond what its files tell."""
+        account = _account_of(self.source.path).messages if self._is_folder else {}
+        told: Counter[str] = Counter()
+        for part in self._of_files():
+            if isinstance(part, Block):
+                told[part.connection.topic] += len(part)
+                yield part
+            elif isinstance(part, Missing):
+                told[part.topic] += part.count
+                yield part.damage()
+            else:
+                yield part
+        for topic, count in account.items():
+            if count > told[topic]:
+                yield Missing(topic, count - told[topic], counted_by(f"{METADATA} of the bag")).damage()
+
+    def _of_files(self) -> Iterator[Part]:
+        known: dict[tuple[Key, str, int], Connection] = {}
         files = self.files()
         first = 0
         for file in files:
             behind = first
             try:
                 for part in _parts(file):
+                    if isinstance(part, Missing):
+                        yield part
+                        continue
                     if isinstance(part, Damage):
                         yield part if len(files) == 1 else replace(part, place=f"{file.name}, {part.place}")
                         continue
                     one = part.connection
-                    key = one.topic, one.type, one.encoding, one.schema
+                    key = key_of(one), one.publisher, one.number  # a part of a split bag goes on with its connections
                     connection = known.setdefault(key, replace(one, number=len(known)))
                     yield replace(part, connection=connection, record_index=part.record_index + first)
                     behind = max(behind, first + int(part.record_index[-1]) + 1)

@@ -84,7 +84,27 @@ def navsatfix(values: Values) -> Columns:
         "longitude_deg": Column(values["longitude"], has_fix),
         "altitude_ellipsoid_m": _where(altitude, has_fix & ~np.isnan(altitude)),
         "integrity_ok": Column(has_fix),
+        **sigmas(values, has_fix),
     }
+
+
+def sigmas(values: Values, present: np.ndarray) -> Columns:
+    """Standard deviations of a position by its covariance, east-north-up, where the message says that it is known."""
+    if not all(name in values for name in _COVARIANCE):
+        return {}
+    east, north, up = (values[name] for name in _COVARIANCE[:3])
+    kind = values.column(_COVARIANCE[3])
+    of_kind = ~np.isin(kind.values, _UNKNOWN) if kind.values.dtype.kind == "U" else kind.values > 0
+    with np.errstate(invalid="ignore", over="ignore"):
+        level = east + north
+        is_known = present & kind.mask & of_kind
+        columns = {"horizontal_sigma_m": level, "vertical_sigma_m": up}
+        known = {name: is_known & np.isfinite(one) & (one > 0.0) for name, one in columns.items()}
+    return {name: _where(np.sqrt(np.where(known[name], one, 0.0)), known[name]) for name, one in columns.items()}
+
+
+_COVARIANCE = (*(f"position_covariance[{place}]" for place in (0, 4, 8)), "position_covariance_type")
+_UNKNOWN = ("UNKNOWN", "COVARIANCE_TYPE_UNKNOWN", "")  # names of the number 0, where a message has names
 
 
 def location_fix(values: Values) -> Columns:
@@ -94,7 +114,7 @@ def location_fix(values: Values) -> Columns:
     if "altitude" in values:
         altitude = values["altitude"]
         found["altitude_ellipsoid_m"] = _where(altitude, np.isfinite(altitude) & (altitude != 0.0))
-    return found
+    return found | sigmas(values, found["latitude_deg"].mask & found["longitude_deg"].mask)
 
 
 def gps_fix(values: Values) -> Columns:
@@ -113,7 +133,7 @@ def gps_fix(values: Values) -> Columns:
     columns["integrity_ok"] = Column(has_fix)
     if "status.satellites_used" in values:
         columns["satellites_used"] = Column(values["status.satellites_used"])
-    return columns
+    return columns | sigmas(values, has_fix)
 
 
 _GPS_FIX: Mapping[str, tuple[str, float]] = MappingProxyType(

@@ -20,6 +20,8 @@ from groundstation.readers.bags.shapes import (
     ROS1,
     Shape,
     ShapeError,
+    at_any_byte,
+    values_of,
     walk,
 )
 
@@ -56,7 +58,7 @@ class Decoder:
     _shapes: dict[tuple[int, tuple[tuple[int, int], ...]], Shape] = field(default_factory=dict)
     _definition: Definition | None = None
     _object: Callable[[bytes], Any] | None = None
-    _kinds: dict[str, str] = field(default_factory=dict)
+    kinds: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         connection = self.connection
@@ -78,6 +80,31 @@ class Decoder:
                 self.reason = f"a flatbuffer definition of {connection.type} that cannot be used ({error})"
         else:
             self.reason = f"encoding {connection.encoding!r}"
+
+    @property
+    def has_places(self) -> bool:
+        """Whether the values of messages stand at places that many share."""
+        return self._definition is not None and not self.reason
+
+    def stands_at_one_place(self, name: str) -> bool:
+        """Whether a value stands at one place in all messages."""
+        shape = next(iter(self._shapes.values()), None)
+        return shape is not None and shape.at_one_place(name) is not None
+
+    def values_at_one_place(self, block: Block, name: str) -> tuple[Int64Array, Column] | None:
+        """Rows of messages that are long enough, and a value of them that stands at one place in all; None else."""
+        shape = next(iter(self._shapes.values()), None)
+        leaf = shape.at_one_place(name) if shape is not None else None
+        if shape is None or leaf is None:
+            return None
+        fits = block.sizes >= leaf.offset + leaf.dtype.itemsize
+        if shape.start:
+            place, mark = shape.guards[0]
+            rows = np.flatnonzero(fits)
+            words = at_any_byte(block.buffer, np.dtype(f"{shape.order}u4"))
+            fits[rows] = words[block.starts[rows] + place] == mark
+        rows = np.flatnonzero(fits)
+        return rows, Column(values_of(leaf, block.buffer, block.starts[rows]))
 
     def decode(self, block: Block) -> Iterator[Decoded]:
         """Columns of the messages; those that cannot be read have their length alone."""
@@ -149,9 +176,9 @@ class Decoder:
         columns: dict[str, Column] = {}
         for name in dict.fromkeys(name for one in found for name in one):
             values = [one.get(name) for one in found]
-            kind = self._kinds.setdefault(name, _kind(next(value for value in values if value is not None)))
+            kind = self.kinds.setdefault(name, _kind(next(value for value in values if value is not None)))
             if kind == "i" and self.connection.encoding == "json" and not name.endswith("_ns"):
-                kind = self._kinds[name] = "f"  # text tells no integers from other numbers
+                kind = self.kinds[name] = "f"  # text tells no integers from other numbers
             columns[name] = _column(values, kind)
         has_any = np.zeros(len(rows), dtype=bool)
         for column in columns.values():

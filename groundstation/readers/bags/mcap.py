@@ -3,9 +3,11 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from groundstation.base.records import Damage
 from groundstation.readers.bags.definitions import plain_name
-from groundstation.readers.bags.messages import Block, Connection, Part
+from groundstation.readers.bags.messages import Block, Connection, Missing, Part
 from groundstation.readers.skipped import bytes_place
 from groundstation.readers.source import Source
 
@@ -26,28 +28,30 @@ class Mcap:
 
     def __init__(self, source: Source) -> None:
         self._source = source
-        self._connections: dict[tuple[str, str, str, bytes], Connection] = {}
+        self._connections: dict[tuple[int, str, str, bytes], Connection] = {}
 
     def __iter__(self) -> Iterator[Part]:
-        from groundstation.store.foreign import ForeignLost, ForeignMcap, ForeignMessages, Missing
+        from groundstation.store.foreign import ForeignLost, ForeignMcap, ForeignMessages
+        from groundstation.store.foreign import Missing as ForeignMissing
 
         with self._source.open() as stream:
             for found in ForeignMcap(stream, self._source.size):
                 if isinstance(found, ForeignMessages):
                     messages = found.messages
+                    log_ns, publish_ns = messages.head("log_time"), messages.head("publish_time")
                     yield Block(
                         self._connection(found),
                         messages.buffer,
                         messages.starts + _HEAD_BYTES,
                         messages.sizes - _HEAD_BYTES,
-                        messages.head("log_time"),
-                        messages.head("publish_time"),
+                        np.where(log_ns == 0, publish_ns, log_ns),  # some writers leave it out
+                        publish_ns,
                         found.places,
                     )
                 elif isinstance(found, ForeignLost):
                     yield _damage(found)
-                elif isinstance(found, Missing):
-                    yield Damage("dropped_rows", "the whole log", found.count, f"{found.what} (topic {found.topic})")
+                elif isinstance(found, ForeignMissing):
+                    yield Missing(found.topic, found.count, found.what)
                 else:
                     what = "messages of a channel that no record of the file defines"
                     yield Damage("dropped_channel", "the whole log", found.messages, what)
@@ -55,10 +59,11 @@ class Mcap:
     def _connection(self, found: "ForeignMessages") -> Connection:
         channel, schema = found.channel, found.schema
         kind, form, text = ("", "", b"") if schema is None else (plain_name(schema.name), schema.encoding, schema.data)
-        key = channel.topic, channel.message_encoding, kind, text
+        key = channel.id, channel.message_encoding, kind, text
         if key not in self._connections:
-            encoding = channel.message_encoding
-            self._connections[key] = Connection(len(self._connections), channel.topic, kind, encoding, form, text)
+            encoding, number = channel.message_encoding, len(self._connections)
+            publisher = channel.metadata.get("callerid") or f"channel {channel.id}"  # of ROS 1, by its converters
+            self._connections[key] = Connection(number, channel.topic, kind, encoding, form, text, publisher)
         return self._connections[key]
 
 

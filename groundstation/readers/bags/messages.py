@@ -29,6 +29,8 @@ class Connection:
         Of the definition: ``ros2msg``, ``ros1msg``, ``protobuf``, ``jsonschema`` or what the log says.
     schema : bytes
         The definition; empty where the log has none.
+    publisher : str
+        Who wrote it, as far as the log tells: the name of a node, or the number of its channel.
     """
 
     number: int
@@ -37,6 +39,7 @@ class Connection:
     encoding: str
     schema_encoding: str
     schema: bytes
+    publisher: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +86,31 @@ class Block:
         return self.buffer[start : start + int(self.sizes[row])].tobytes()
 
 
-Part: TypeAlias = Block | Damage
+@dataclass(frozen=True)
+class Missing:
+    """Messages of a topic that are not in the log although something in it counts them, as ``what`` says."""
+
+    topic: str
+    count: int
+    what: str
+
+    def damage(self) -> Damage:
+        """As damage of the log."""
+        return Damage("dropped_rows", "the whole log", self.count, f"{self.what} (topic {self.topic})")
+
+
+def counted_by(account: str) -> str:
+    """What is missing by an account that a log has of itself.
+
+    Examples
+    --------
+    >>> counted_by("index of the bag")
+    'messages that the index of the bag counts and that are not in it'
+    """
+    return f"messages that the {account} counts and that are not in it"
+
+
+Part: TypeAlias = Block | Damage | Missing
 
 
 def joined(gathered: dict[int, list[Block]]) -> list[Block]:

@@ -1,26 +1,39 @@
 """The second pass over a bag: batches of every topic, raw and canonical, then remarks and damages."""
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
 
-from groundstation.base.records import Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
+from groundstation.base.records import (
+    MAX_TEXT_CHARACTERS,
+    BoolArray,
+    Column,
+    Damage,
+    Int64Array,
+    Item,
+    LogHeader,
+    RecordBatch,
+    Remark,
+)
 from groundstation.base.signals import RAW_PREFIX
-from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags.bag import Bag, kind_of
+from groundstation.readers.bags.clocks import LARGEST_LAG_S
 from groundstation.readers.bags.decode import Decoded, Decoder
 from groundstation.readers.bags.messages import Block, Connection, joined
 from groundstation.readers.bags.profile import MessageProfile
-from groundstation.readers.bags.survey import LARGEST_LAG_S, Survey, survey
-from groundstation.readers.parts import Part, bounded, merged, occupied
+from groundstation.readers.bags.sources import Key, key_of
+from groundstation.readers.bags.survey import Survey, survey
+from groundstation.readers.parts import Part, bounded, merged, occupied, one_row_each
+from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
 
 GATHERED_BYTES = 8 << 20  # of messages that are decoded together
 MESSAGE_BYTES = 64  # that a message takes beside its own
 LATEST_NS = 1 << 62
 MAX_NAME_CHARACTERS = 200
-PUBLISHED = "publish_time_ns"
+PUBLISHED, PUBLISHER = "publish_time_ns", "publisher"
 _ODD = re.compile(r"[^A-Za-z0-9_\-/]")
 
 
@@ -33,7 +46,8 @@ def items(source: Source, reader_name: str, profile: MessageProfile | None = Non
         f"{reader_name} {kind_of(source)}",
         {f"type.{names[number]}": _type_text(seen.connection) for number, seen in sorted(found.seen.items())},
         utc_of_zero_ns=0,
-        has_counting_clock=not found.steps_back,
+        has_counting_clock=not found.is_set,
+        clock_offsets=found.offsets.stated,
     )
     topics = _Topics(found, names)
     gathered: dict[int, list[Block]] = {}
@@ -59,62 +73,77 @@ def _type_text(connection: Connection) -> str:
 
 
 def _raw_names(found: Survey) -> dict[int, str]:
-    """Raw topic of each connection; a name that clashes gets a number."""
+    """Raw topic of each connection, the same for all that write one topic; a name that clashes gets a number."""
     names: dict[int, str] = {}
+    given: dict[Key, str] = {}
     for number, seen in sorted(found.seen.items()):
-        plain = _ODD.sub("_", seen.connection.topic.strip("/")[:MAX_NAME_CHARACTERS]) or "_"
-        name = base = RAW_PREFIX + plain
-        copy = 1
-        while name in names.values():
-            copy += 1
-            name = f"{base}_{copy}"
-        names[number] = name
+        key = key_of(seen.connection)
+        if key not in given:
+            plain = _ODD.sub("_", seen.connection.topic.strip("/")[:MAX_NAME_CHARACTERS]) or "_"
+            name = base = RAW_PREFIX + plain
+            copy = 1
+            while name in given.values():
+                copy += 1
+                name = f"{base}_{copy}"
+            given[key] = name
+        names[number] = given[key]
     return names
 
 
-def _one_row_each(batch: RecordBatch) -> RecordBatch:
-    """Records of one header stamp as one row: what a unit says of one instant. Not where two have the same field."""
-    stamps = batch.validity_time_ns
-    if stamps is None:
-        return batch
-    _stamps, first, place = np.unique(stamps, return_index=True, return_inverse=True)
-    masks = {name: column.mask for name, column in batch.columns.items()}
-    if any(np.bincount(place[mask], minlength=1).max() > 1 for mask in masks.values()):
-        return batch
-    columns = {}
-    for name, column in batch.columns.items():
-        values, present = np.zeros(len(first), dtype=column.values.dtype), np.zeros(len(first), dtype=bool)
-        values[place[masks[name]]], present[place[masks[name]]] = column.values[masks[name]], True
-        columns[name] = Column(values, None if present.all() else present)
-    index, time = batch.record_index[first], batch.device_time_ns.take(first)
-    return RecordBatch(batch.topic, index, time, columns, validity_time_ns=stamps[first]).take(np.argsort(index))
+def _publishers(found: Survey, names: dict[int, str]) -> dict[int, str]:
+    """Who wrote each connection, where several sources write its raw topic."""
+    writers = Counter(names[seen.connection.number] for seen in found.sources)
+    return {
+        number: seen.connection.publisher
+        for seen in found.sources
+        for number in seen.numbers
+        if writers[names[number]] > 1
+    }
+
+
+def _fits_in(time_ns: Int64Array, record_index: Int64Array, is_far: BoolArray) -> BoolArray:
+    """Whether times lie between those of the records before and behind that are not far, shape (n,)."""
+    order = np.argsort(record_index)
+    time_ns, near = time_ns[order], np.flatnonzero(~is_far[order])
+    fits = np.zeros(len(order), dtype=bool)
+    if len(near):
+        at = np.searchsorted(near, np.arange(len(order)))
+        before = np.where(at > 0, time_ns[near[np.maximum(at - 1, 0)]], np.iinfo(np.int64).min)
+        behind = np.where(at < len(near), time_ns[near[np.minimum(at, len(near) - 1)]], np.iinfo(np.int64).max)
+        fits[order] = (before <= time_ns) & (time_ns <= behind)
+    return fits
 
 
 class _Topics:
     """Decodes blocks and lays them on topics."""
 
     def __init__(self, found: Survey, names: dict[int, str]) -> None:
-        self._found, self._names = found, names
+        self._found, self._names, self._publishers = found, names, _publishers(found, names)
         self._decoders: dict[int, Decoder] = {}
+        self._kinds: dict[str, dict[str, str]] = {}
         self._far_stamps: dict[str, int] = {}
+        self._nowhere: Counter[str] = Counter()
 
     def batches(self, gathered: dict[int, list[Block]]) -> Iterator[RecordBatch]:
         """Batches of blocks that stand together in the log."""
         canonical: dict[str, list[Part]] = {}
+        raw: dict[str, list[Part]] = {}
         for block in joined(gathered):
             number = block.connection.number
-            decoder = self._decoders.setdefault(number, Decoder(block.connection))
-            raw: list[Part] = []
+            decoder = self._decoder(block.connection)
             for decoded in decoder.decode(block):
                 part = self._part(block, decoded)
-                raw.append(part)
+                raw.setdefault(self._names[number], []).append(part)
                 for feed in self._found.feeds.get(number, ()):
-                    of_topic = occupied(Part(part.index, part.time, feed.of(decoded.columns), part.validity_ns))
+                    columns, zeros = placed(feed.topic, feed.of(decoded.columns))
+                    self._nowhere[feed.topic] += len(zeros)
+                    of_topic = occupied(Part(part.index, part.time, columns, part.validity_ns))
                     if of_topic is not None:
                         canonical.setdefault(feed.topic, []).append(of_topic)
-            yield from bounded(merged(self._names[number], raw))
+        for topic, parts in raw.items():
+            yield from bounded(merged(topic, parts))
         for topic, parts in sorted(canonical.items()):
-            yield from bounded(_one_row_each(merged(topic, parts)) if len(parts) > 1 else merged(topic, parts))
+            yield from bounded(one_row_each(merged(topic, parts)) if len(parts) > 1 else merged(topic, parts))
 
     def _part(self, block: Block, decoded: Decoded) -> Part:
         """Raw columns of decoded messages, with their three times."""
@@ -123,20 +152,41 @@ class _Topics:
         columns = dict(decoded.columns)
         if (publish_ns != log_ns).any():
             columns[PUBLISHED] = Column(publish_ns)
+        publisher = self._publishers.get(block.connection.number)
+        if publisher is not None:
+            columns[PUBLISHER] = Column(np.full(len(log_ns), publisher[:MAX_TEXT_CHARACTERS] or "_"))
         time = Column(log_ns, None if is_time.all() else is_time)
-        return Part(block.record_index[decoded.rows], time, columns, self._validity(block.connection, decoded, log_ns))
+        index = block.record_index[decoded.rows]
+        return Part(index, time, columns, self._validity(block.connection.number, decoded, index, log_ns))
 
-    def _validity(self, connection: Connection, decoded: Decoded, log_ns: Int64Array) -> Int64Array | None:
-        """Header stamps where they are believed, log time where one is far from it."""
-        is_stamped = connection.number in self._found.stamped
-        stamp_ns = self._found.seen[connection.number].stamp_of(decoded.columns) if is_stamped else None
-        if stamp_ns is None:
+    def _decoder(self, connection: Connection) -> Decoder:
+        kinds = self._kinds.setdefault(self._names[connection.number], {})
+        return self._decoders.setdefault(connection.number, Decoder(connection, kinds=kinds))
+
+    def _validity(
+        self, number: int, decoded: Decoded, record_index: Int64Array, log_ns: Int64Array
+    ) -> Int64Array | None:
+        """Header stamps where they are believed, by the recorder's clock; log time where one is far from it.
+
+        A log time that is out of order while the stamps are in order is not believed either.
+        """
+        lags = self._found.lags.get(number)
+        stamp_ns = self._found.seen[number].stamp_of(decoded.columns) if lags is not None else None
+        if stamp_ns is None or lags is None:
             return None
-        is_far = np.abs(log_ns - stamp_ns) > LARGEST_LAG_S * NS_PER_S
+        stamp_ns = stamp_ns - lags.offsets.at(record_index)
+        is_far = ~lags.believed(log_ns - stamp_ns)
+        if not is_far.any():
+            return stamp_ns
+        is_in_order = _fits_in(stamp_ns, record_index, is_far)
+        is_late = is_in_order & lags.may_be_late(log_ns - stamp_ns)
+        has_log_time = _fits_in(log_ns, record_index, is_far)
+        is_far &= ~is_late & ~(is_in_order & ~has_log_time)
         if is_far.any():
-            name = self._names[connection.number]
+            name = self._names[number]
             self._far_stamps[name] = self._far_stamps.get(name, 0) + int(is_far.sum())
-        return np.where(is_far, log_ns, stamp_ns)
+        logged_ns = np.where(has_log_time, log_ns - lags.usual_ns, log_ns)  # of no log time the clock's model has one
+        return np.where(is_far, logged_ns, stamp_ns)
 
     def remarks(self) -> Iterator[Remark]:
         """What was not kept as columns, and stamps that were not believed."""
@@ -146,11 +196,17 @@ class _Topics:
                 text = f"arrays too long for columns: of {names} the number of elements is kept"
                 yield Remark("shortened", text, self._names[number])
         for topic, count in self._far_stamps.items():
-            text = f"{count} header stamps more than {LARGEST_LAG_S:g} s from the log time: log time is used for them"
+            text = (
+                f"{count} header stamps more than {LARGEST_LAG_S:g} s from the log time: log time is used for them, "
+                "less what the others are logged after their stamp"
+            )
             yield Remark("clock_used", text, topic)
 
     def damages(self) -> Iterator[Damage]:
-        """Messages that could not be read; their time and length are kept."""
+        """Messages that could not be read, of which time and length are kept, and positions that are none."""
+        for topic, count in sorted(self._nowhere.items()):
+            if count:
+                yield nowhere(topic, count)
         for number, decoder in sorted(self._decoders.items()):
             if decoder.unreadable:
                 why = f"of {decoder.reason}" if decoder.reason else "that their definition does not describe"

@@ -1,18 +1,15 @@
 """Bags of ROS 1 (version 2.0): records of a header and data, most of them in compressed chunks.
 
-The index at the end is not used: a bag that was cut has none. Where no record can be recognised the next one is
-searched for. A bag has no checksums.
+The index at the end tells the connections before the first chunk is read, and how many messages there should be; a bag
+that was cut has none, and is read without. A bag has no checksums.
 
 Source: http://wiki.ros.org/Bags/Format/2.0.
 """
 
 import bz2
-import re
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import islice
-from typing import BinaryIO, NamedTuple
 
 import lz4.frame
 import numpy as np
@@ -20,87 +17,29 @@ import numpy as np
 from groundstation.base.records import Damage
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags.definitions import plain_name
-from groundstation.readers.bags.messages import Block, Connection, Part
+from groundstation.readers.bags.messages import Block, Connection, Missing, Part, counted_by
+from groundstation.readers.bags.ros1_records import (
+    CHUNK,
+    CONNECTION,
+    MAGIC,
+    MESSAGE,
+    OP,
+    Head,
+    Index,
+    Record,
+    Records,
+    head_at,
+    heads_in,
+    number_of,
+    parse_header,
+)
+from groundstation.readers.compressed import MAX_RATIO, MIN_LIMIT_BYTES
 from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 
-MAGIC = b"#ROSBAG V2.0\n"
-MESSAGE, HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
-MAX_HEADER_BYTES = 1 << 20
 MAX_CHUNK_BYTES = 256 << 20  # decompressed; recorders close a chunk at 768 kB
-SEARCH_BYTES = 1 << 20
-BEYOND_BYTES = 4096  # room for a header that begins within a record and ends behind it
-LOOKED_AT, MOST_TRIED = 1 << 16, 200  # bytes of a file without the first ones of a bag, and headers in them
-# Every record's header has the field "op" of one byte: 4 bytes of length, "op=", the number.
-_OP = re.compile(rb"\x04\0\0\0op=[\x02-\x07]")
-_OP_OUTSIDE = re.compile(rb"\x04\0\0\0op=[\x04-\x06]")  # of records that stand in no chunk
-
-
+MOST_SEARCHED = 20_000  # times that a record is searched for in the contents of chunks
 _TIME = struct.Struct("<II")
-
-
-class _Head(NamedTuple):
-    """Header of a record, and where its data begins and ends."""
-
-    op: int
-    fields: dict[bytes, bytes]
-    data_at: int
-    end: int
-
-
-def parse_header(data: bytes) -> dict[bytes, bytes] | None:
-    """Fields of a header; None when the bytes are none.
-
-    Examples
-    --------
-    >>> parse_header(b"\\x04\\0\\0\\0op=\\x05")
-    {b'op': b'\\x05'}
-    """
-    fields: dict[bytes, bytes] = {}
-    at = 0
-    while at < len(data):
-        length = int.from_bytes(data[at : at + 4], "little")
-        name, equals, value = data[at + 4 : at + 4 + length].partition(b"=")
-        at += 4 + length
-        if not equals or at > len(data):
-            return None
-        fields[name] = value
-    return fields
-
-
-def _number(fields: dict[bytes, bytes], name: bytes) -> int | None:
-    value = fields.get(name)
-    return int.from_bytes(value, "little") if value is not None and len(value) <= 8 else None
-
-
-def _head_at(data: bytes, at: int, size: int) -> _Head | None:
-    """The record at a place of ``data`` (which may end behind its header); ``size`` bounds its end."""
-    length = int.from_bytes(data[at : at + 4], "little")
-    if not 8 <= length <= MAX_HEADER_BYTES or at + 8 + length > len(data):
-        return None
-    fields = parse_header(data[at + 4 : at + 4 + length])
-    op = _number(fields, b"op") if fields else None
-    if fields is None or op is None or not MESSAGE <= op <= CONNECTION:
-        return None
-    data_at = at + 8 + length
-    return _Head(op, fields, data_at, data_at + int.from_bytes(data[data_at - 4 : data_at], "little"))
-
-
-def _heads_in(block: bytes, ops: re.Pattern[bytes]) -> Iterator[tuple[int, _Head]]:
-    """Headers of records in some bytes, told by their operation, with where each begins."""
-    for match in ops.finditer(block):
-        # The fields of a header have no order: it begins at one of the lengths before.
-        for back in range(4, min(match.start(), 512) + 1):
-            head = _head_at(block, match.start() - back, len(block))
-            if head is not None and match.end() <= head.data_at - 4:
-                yield match.start() - back, head
-                break
-
-
-def has_chunk(head: bytes) -> bool:
-    """Whether a chunk of a bag begins in the first bytes of a file, whatever stands before it."""
-    heads = islice(_heads_in(head[:LOOKED_AT], _OP_OUTSIDE), MOST_TRIED)
-    return any(one.op == CHUNK and {b"compression", b"size"} <= one.fields.keys() for _, one in heads)
 
 
 @dataclass
@@ -124,8 +63,9 @@ class Ros1Bag:
     def __init__(self, source: Source) -> None:
         self._source = source
         self._connections: dict[int, Connection] = {}
-        self._count = 0
-        self._unknown = 0
+        self._met: dict[int, int] = {}
+        self._count = self._chunks = 0
+        self._unknown = self._searched = self._expanded = 0
         self._skipped = SkippedBytes("record")
         # Headers of messages differ in their time alone: where it stands by their length, the connection by the rest.
         self._time_places: dict[int, int] = {}
@@ -133,74 +73,57 @@ class Ros1Bag:
 
     def __iter__(self) -> Iterator[Part]:
         with self._source.open() as stream:
-            yield from self._records(stream, self._source.size)
+            index = Index.of(stream, self._source.size)
+            for head, data in index.connections.values():
+                self._connect(head, data)
+            records = Records(stream, self._source.size)
+            for record in records:
+                yield from self._record(records, record)
         yield from self._skipped.damages()
         if self._unknown:
             what = "messages of a connection that is not in the file"
             yield Damage("dropped_channel", "the whole log", self._unknown, what)
+        yield from self._missing(index)
 
-    def _records(self, stream: BinaryIO, size: int) -> Iterator[Part]:
-        at = len(MAGIC) if self._source.head.startswith(MAGIC) else 0
-        while at < size:
-            head = self._read_head(stream, at, size)
-            if head is None:
-                place = self._next_record(stream, at + 1, size)
-                self._skipped.add(at, place, self._count)
-                at = place
-                continue
-            stream.seek(head.data_at)
-            is_cut = head.end > size
-            if is_cut and (head.op != CHUNK or self._next_record(stream, head.data_at, size, _OP_OUTSIDE) < size):
-                place = self._next_record(stream, at + 1, size)  # its length is not to be trusted, or the end is cut
-                if place == size:
-                    yield Damage("truncated", bytes_place(at, size), size - at, "bytes of a record cut off")
-                else:
-                    self._skipped.add(at, place, self._count)
-                at = place
-                continue
-            if not is_cut and (place := self._record_inside(stream, head, size)):
-                self._skipped.add(at, place, self._count)  # bytes are missing in it, and its length leads too far
-                at = place
-                continue
-            if head.op == CHUNK:
-                stream.seek(head.data_at)
-                yield from self._chunk(head, stream.read(min(head.end, size) - head.data_at), at, is_cut)
-            elif head.op in (MESSAGE, CONNECTION):
-                yield from self._messages(_read(stream, at, head.end - at), bytes_place(at, head.end))
-            at = head.end if not is_cut else size
+    def _record(self, records: Records, record: Record) -> Iterator[Part]:
+        head, start, end = record.head, record.start, record.end
+        if head is None:
+            if record.is_cut:
+                yield Damage("truncated", bytes_place(start, end), end - start, "bytes of a record cut off")
+            else:
+                self._skipped.add(start, end, self._count)
+        elif head.op == CHUNK:
+            self._chunks += 1
+            yield from self._chunk(head, records.read(head.data_at, end - head.data_at), start, record.is_cut)
+        elif head.op in (MESSAGE, CONNECTION):
+            yield from self._messages(records.read(start, end - start), bytes_place(start, end))
 
-    def _record_inside(self, stream: BinaryIO, head: _Head, size: int) -> int:
-        """Where the next record begins within one behind which none does; 0 for a record that ends where it says."""
-        if head.end >= size or self._read_head(stream, head.end, size) is not None:
-            return 0
-        place = self._next_record(stream, head.data_at, min(size, head.end + BEYOND_BYTES), _OP_OUTSIDE)
-        return place if place < head.end else 0
+    def _missing(self, index: Index) -> Iterator[Missing | Damage]:
+        """Messages and chunks that the bag counts and that were not met; a bag without its index was cut."""
+        is_told = False
+        if not self._source.head.startswith(MAGIC) and not self._skipped:
+            yield Damage("corrupt", "byte 0", 1, "header of the bag is missing", loses_data=False)
+        for number, count in sorted(index.messages.items()):
+            lost = count - self._met.get(number, 0)
+            if lost > 0 and number in self._connections:
+                yield Missing(self._connections[number].topic, lost, counted_by("index of the bag"))
+                is_told = True
+        chunks, end = max(index.listed, index.chunks or 0), f"byte {self._source.size}"
+        lost = chunks - self._chunks
+        if not index.is_there and not (index.chunks == 0 and index.index_at == self._source.size):
+            what = f"chunks of the {chunks} that the bag counts are gone; the index at its end is gone too"
+            if lost <= 0:
+                lost, what = 1, "index at the end of the bag is missing: it was not closed, or it is cut"
+            yield Damage("truncated", end, lost, what)
+        elif lost > 0 and not is_told:
+            yield Damage("dropped_rows", "the whole log", lost, f"chunks of the {chunks} that the bag counts are gone")
 
-    def _read_head(self, stream: BinaryIO, at: int, size: int) -> _Head | None:
-        data = _read(stream, at, 4096)
-        length = int.from_bytes(data[:4], "little")
-        if 4096 < length + 8 <= MAX_HEADER_BYTES:
-            data = _read(stream, at, length + 8)
-        head = _head_at(data, 0, size)
-        return None if head is None else head._replace(data_at=at + head.data_at, end=at + head.end)
-
-    def _next_record(self, stream: BinaryIO, start: int, size: int, ops: re.Pattern[bytes] = _OP) -> int:
-        """Where a record begins from ``start`` on, told by its operation; ``size`` when none does."""
-        at = start
-        while at < size:
-            block = _read(stream, at, min(SEARCH_BYTES, size - at) + 64)
-            for begin, head in _heads_in(block, ops):
-                if at + head.data_at <= size:
-                    return at + begin
-            if len(block) <= SEARCH_BYTES:
-                return size
-            at += SEARCH_BYTES
-        return size
-
-    def _chunk(self, head: _Head, data: bytes, at: int, is_cut: bool) -> Iterator[Part]:
+    def _chunk(self, head: Head, data: bytes, at: int, is_cut: bool) -> Iterator[Part]:
         compression = head.fields.get(b"compression", b"")
-        size = _number(head.fields, b"size") or 0
-        content, reason = _decompress(compression, data, min(size, MAX_CHUNK_BYTES))
+        size = number_of(head.fields, b"size") or 0
+        left = max(MIN_LIMIT_BYTES, MAX_RATIO * self._source.size) - self._expanded
+        content, reason = _decompress(compression, data, min(size, MAX_CHUNK_BYTES, left))
+        self._expanded += len(content)
         place = bytes_place(at, head.data_at + len(data))
         if is_cut:
             what = f"chunk that the end of the file cuts off, {len(content)} of {size} bytes kept"
@@ -219,11 +142,9 @@ class Ros1Bag:
             if end:
                 at = end
                 continue
-            head = _head_at(content, at, len(content))
+            head = head_at(content, at)
             if head is None or head.end > len(content):
-                match = next((one.start() for one in _OP.finditer(content, at + 5)), len(content))
-                begins = (begin for begin in range(max(at + 1, match - 512), match) if _fits(content, begin, match))
-                behind = next(begins, match + 1 if match < len(content) else match)
+                behind = self._behind(content, at)
                 lost += behind - at if behind < len(content) or not is_told else 0
                 at = behind
                 continue
@@ -236,6 +157,7 @@ class Ros1Bag:
             yield Damage("corrupt", place, lost, "bytes of a chunk's content that are no record")
         buffer = np.frombuffer(content, np.uint8)
         for number, one in found.items():
+            self._met[number] = self._met.get(number, 0) + len(one.times)
             times = np.array(one.times, dtype=np.int64)
             yield Block(
                 self._connections[number],
@@ -247,8 +169,19 @@ class Ros1Bag:
                 np.array(one.index, dtype=np.int64),
             )
 
-    def _message(self, content: bytes, at: int, head: _Head, found: dict[int, _Gathered]) -> None:
-        number, time = _number(head.fields, b"conn"), head.fields.get(b"time", b"")
+    def _behind(self, content: bytes, at: int) -> int:
+        """Where the next record stands behind bytes that are none; the end of the content when none does.
+
+        Where that was asked too often the rest is given up.
+        """
+        self._searched += 1
+        if self._searched > MOST_SEARCHED:
+            return len(content)
+        heads = heads_in(content, OP, at + 1)
+        return next((begin for begin, head in heads if head.end <= len(content)), len(content))
+
+    def _message(self, content: bytes, at: int, head: Head, found: dict[int, _Gathered]) -> None:
+        number, time = number_of(head.fields, b"conn"), head.fields.get(b"time", b"")
         if number not in self._connections or number is None or len(time) != 8:
             self._unknown += 1
             return
@@ -276,24 +209,16 @@ class Ros1Bag:
         self._count += 1
         return end
 
-    def _connect(self, head: _Head, data: bytes) -> None:
-        number, more = _number(head.fields, b"conn"), parse_header(data)
+    def _connect(self, head: Head, data: bytes) -> None:
+        number, more = number_of(head.fields, b"conn"), parse_header(data)
         if number is None or more is None or number in self._connections:
             return
         topic = head.fields.get(b"topic", more.get(b"topic", b"")).decode("utf-8", "replace")
         kind = plain_name(more.get(b"type", b"").decode("utf-8", "replace"))
         schema = more.get(b"message_definition", b"")
-        self._connections[number] = Connection(len(self._connections), topic, kind, "ros1", "ros1msg", schema)
-
-
-def _fits(content: bytes, begin: int, within: int) -> bool:
-    head = _head_at(content, begin, len(content))
-    return head is not None and head.end <= len(content) and head.data_at > within
-
-
-def _read(stream: BinaryIO, at: int, size: int) -> bytes:
-    stream.seek(at)
-    return stream.read(size)
+        publisher = more.get(b"callerid", b"").decode("utf-8", "replace") or f"connection {number}"
+        place = len(self._connections)
+        self._connections[number] = Connection(place, topic, kind, "ros1", "ros1msg", schema, publisher)
 
 
 def _decompress(compression: bytes, data: bytes, size: int) -> tuple[bytes, str]:

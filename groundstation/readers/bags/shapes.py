@@ -83,6 +83,8 @@ class Shape:
     order : {'<', '>'}
     shortened : tuple of str
         Arrays of which the length alone is kept.
+    start : int
+        Byte of the first value; the encapsulation stands before it.
     """
 
     size: int
@@ -90,6 +92,7 @@ class Shape:
     guards: tuple[tuple[int, int], ...]
     order: str
     shortened: tuple[str, ...]
+    start: int = 0
 
     def holds(self, buffer: ByteArray, starts: Int64Array) -> BoolArray:
         """Which messages of this size have this shape, shape (n,)."""
@@ -98,6 +101,12 @@ class Shape:
         for offset, value in self.guards:
             fits &= words[starts + offset] == value
         return fits
+
+    def at_one_place(self, name: str) -> Leaf | None:
+        """The value of that name where no length before it moves it: it stands there in all messages of the type."""
+        leaf = next((leaf for leaf in self.leaves if leaf.name == name), None)
+        lengths = [offset for offset, _value in self.guards[1 if self.start else 0 :]]
+        return None if leaf is None or any(offset < leaf.offset for offset in lengths) else leaf
 
     @cached_property
     def _dtype(self) -> np.dtype[Any]:
@@ -120,6 +129,11 @@ class Shape:
             return {}
         rows = at_any_byte(buffer, np.dtype(f"V{self._reach}"))[starts].view(self._dtype)
         return {leaf.name: Column(_values(rows[leaf.name], leaf.kind)) for leaf in self.leaves}
+
+
+def values_of(leaf: Leaf, buffer: ByteArray, starts: Int64Array) -> NDArray[Any]:
+    """One value of messages in which it stands at one place."""
+    return _values(at_any_byte(buffer, leaf.dtype)[starts + leaf.offset], leaf.kind)
 
 
 def at_any_byte(buffer: ByteArray, dtype: np.dtype[Any]) -> NDArray[Any]:
@@ -161,7 +175,8 @@ def walk(definition: Definition, message: bytes, serialisation: Serialisation) -
         raise ShapeError(f"{left} bytes behind the last value")
     first = [(0, int.from_bytes(message[:4], "little" if serialisation.order == "<" else "big"))]
     guards = (first if serialisation.start else []) + walker.guards
-    return Shape(len(message), tuple(walker.leaves), tuple(guards), serialisation.order, tuple(walker.shortened))
+    leaves, shortened = tuple(walker.leaves), tuple(walker.shortened)
+    return Shape(len(message), leaves, tuple(guards), serialisation.order, shortened, serialisation.start)
 
 
 class _Walker:

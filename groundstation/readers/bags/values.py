@@ -14,7 +14,7 @@ from groundstation.readers.mapping import Columns
 
 
 class Values:
-    """Columns by name, as floating-point numbers; NaN where a message lacks the field.
+    """Columns by name, as floating-point numbers; NaN where a message lacks the field. Texts are no numbers.
 
     Parameters
     ----------
@@ -33,6 +33,8 @@ class Values:
 
     def __getitem__(self, name: str) -> FloatArray:
         column = self._columns[name]
+        if column.values.dtype.kind == "U":
+            raise KeyError(name)
         with np.errstate(invalid="ignore"):
             values = column.values.astype(np.float64)
         return values if column.present is None else np.where(column.present, values, np.nan)

@@ -1,5 +1,6 @@
 """Words of the buses become signals by ICDs: a mapping over the raw topics, of a recording or of its MCAP alike."""
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -24,6 +25,7 @@ from groundstation.readers.icd import (
     usable_1553,
 )
 from groundstation.readers.icd.model import REVERSED_BYTE
+from groundstation.readers.places import nowhere, placed
 
 # Codes of the remarks that naming makes.
 NAMING_CODES = ("icd", "icd_of_another", "mapped", "several_units", "derived", "bus_errors", "not_used")
@@ -166,6 +168,7 @@ class Namer:
         self._tags: dict[str, int] = {}
         self._derived: dict[str, None] = {}
         self._flagged: dict[str, tuple[int, int]] = {}
+        self._nowhere: Counter[str] = Counter()
         every: list[Element] = [one for word in found.words for one in word.elements if one.signal]
         every += [one for message in found.messages for one in message.elements if one.signal]
         signals = [str(one.signal).rpartition(".") for one in every]
@@ -193,7 +196,16 @@ class Namer:
                 self._derived[topic] = None
             made = merged(topic, ready, SAMPLE_NS if is_429 else 0) if ready else None
             if made is not None:
-                yield from bounded(made)
+                yield from bounded(self._placed(made))
+
+    def _placed(self, batch: RecordBatch) -> RecordBatch:
+        """The batch without positions of zeros, which a unit sends before it has one."""
+        columns, zeros = placed(batch.topic, batch.columns)
+        if not len(zeros):
+            return batch
+        self._nowhere[batch.topic] += len(zeros)
+        rows = np.logical_or.reduce([column.mask for column in columns.values()] or [np.zeros(len(batch), dtype=bool)])
+        return RecordBatch(batch.topic, batch.record_index, batch.device_time_ns, columns).take(rows)
 
     def _of_429(self, batch: RecordBatch, table: _Table) -> Iterator[tuple[str, Piece]]:
         words = batch.columns["word"].values.astype(np.uint32, copy=False)
@@ -284,7 +296,7 @@ class Namer:
     def _tally(self, holder: Any) -> _Tally:
         return self._tallies.setdefault(_title(holder), _Tally())
 
-    def remarks(self) -> Iterator[Remark]:
+    def remarks(self) -> Iterator[Item]:
         """What serves as what, and what was not used."""
         for topic, sources in sorted(self._sources.items()):
             yield Remark("mapped", f"{topic} from {'; '.join(sources)}", topic)
@@ -301,6 +313,8 @@ class Namer:
                 yield Remark(
                     "bus_errors", f"{topic}: {errors} of {total} messages have an error: kept, not used", topic
                 )
+        for topic, count in sorted(self._nowhere.items()):
+            yield nowhere(topic, count)
         for title, tally in self._tallies.items():
             why = [
                 f"{count} {text}"

@@ -12,11 +12,14 @@ from groundstation.base.records import Int64Array, Remark, UtcReadings
 from groundstation.base.timescales import leap_seconds_at, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.chapter10.tmats import YEARS, Tmats
+from groundstation.readers.rollover import OtherDate, rollovers
+from groundstation.readers.start import zero_of_readings
 
 NS_PER_DAY = 86_400 * NS_PER_S
 _GPS_NATIVE, _NONE = 5, 15
 _RESTART_NS = -NS_PER_S  # of the counter: recordings joined end to end
 _SPREAD_NS = 500_000_000  # readings that differ by more are of a clock that was set
+_TMATS_DAYS = 40.0
 _LABEL_260 = 0x0D  # octal 260 as it stands in a word, its first bit last
 
 
@@ -118,6 +121,9 @@ class Start:
 def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) -> Start:
     """UTC of the counter's zero: the median over the readings of the channel that has most of them.
 
+    Of a time source that was set in the recording, the readings count that it told in the end. A date that is behind
+    that of TMATS by whole rollovers of the GPS week is of a source that missed them.
+
     Examples
     --------
     >>> one = Reading(1, 5_000_000_000, None, 343, 60_000_000_000)
@@ -134,16 +140,32 @@ def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) ->
         return Start(None, remarks)
     every = _every_zero(used, year)
     zeros = every[_last_start(used) :]
-    utc_ns = int(np.sort(zeros)[len(zeros) // 2])
+    zero = zero_of_readings(zeros)
+    moment_ns = zero.ns + used[-1].device_ns
+    behind = rollovers(moment_ns, others=_of_tmats(tmats) if used[0].year is not None else ())
+    shift_ns = behind.shift_ns(moment_ns, is_gps_time=used[-1].is_gps)
+    utc_ns = zero.ns + shift_ns
     text = f"UTC from {len(used)} time packets of channel {chosen}: the counter's zero is {utc_ns_to_iso(utc_ns, 6)}"
+    name = f"time channel {chosen}"
+    parted = [*zero.remarks(name)] if zero.passed_over else [*_spread(zeros, chosen)]
     others = [
-        _other(channel, [one for one in readings if one.channel == channel], year, utc_ns)
+        _other(channel, [one for one in readings if one.channel == channel], year, zero.ns)
         for channel in sorted(channels)
         if channel != chosen
     ]
+    remarks = (Remark("utc_from_time_packets", text), *remarks, *parted, *behind.remarks, *others)
     places = np.array([one.place for one in used], dtype=np.int64)
-    told = (Remark("utc_from_time_packets", text), *remarks, *_spread(zeros, chosen), *others)
-    return Start(utc_ns, told, UtcReadings(places, every) if len(zeros) < len(every) else None)
+    is_one = len(zeros) == len(every)
+    return Start(utc_ns, remarks, None if is_one else UtcReadings(places, every + shift_ns))
+
+
+def _of_tmats(tmats: Tmats) -> tuple[OtherDate, ...]:
+    """The date of TMATS, which may be some weeks older than the recording."""
+    if tmats.day is None:
+        return ()
+    day, code = tmats.day
+    noon_ns = int(datetime(day.year, day.month, day.day, 12, tzinfo=UTC).timestamp()) * NS_PER_S
+    return (OtherDate(f"TMATS ({code})", noon_ns, within_days=_TMATS_DAYS),)
 
 
 def _year_of(first: Reading, dates: Counter[date], tmats: Tmats) -> tuple[int | None, tuple[Remark, ...]]:

@@ -1,22 +1,24 @@
 """Canonical topics from the records of a block: ins, gnss, magnetometer, baro, air, electric, discrete."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.atmosphere import REFUSED, pressure_altitude_m
-from groundstation.base.records import BoolArray, Column, Damage, RecordBatch, frozen
+from groundstation.base.geodesy import has_position
+from groundstation.base.records import BoolArray, Column, Damage, RecordBatch, Remark, frozen
 from groundstation.readers.dataflash import rules
 from groundstation.readers.dataflash.choices import Choices
 from groundstation.readers.dataflash.events import event_names
 from groundstation.readers.dataflash.overview import Overview, Unit
-from groundstation.readers.dataflash.rules import Rule
+from groundstation.readers.dataflash.rules import FIX_2D, FIX_3D, Rule, UnknownUnits
 from groundstation.readers.dataflash.values import Rows, as_double
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.parts import Part, bounded, merged, occupied
+from groundstation.readers.places import nowhere
 
-FIX_2D, FIX_3D = 2, 3
 RANGE_GOOD, FACING_DOWN = 4, 25
 
 
@@ -34,7 +36,10 @@ class Mapper:
         self._found, self._choices = found, choices
         self._parts: dict[str, list[Part]] = {}
         self.fields: dict[str, dict[str, None]] = {}  # what was yielded, for the remarks
-        self._refused: dict[str, int] = {}
+        self._refused: dict[tuple[str, str], int] = {}
+        self._nowhere: Counter[str] = Counter()
+        self._unknown = UnknownUnits()
+        self._passed_over: dict[tuple[str, str], tuple[float, str]] = {}
         self._takers = self._all_takers()
 
     def take(self, rows: Rows) -> None:
@@ -53,9 +58,23 @@ class Mapper:
                 yield piece
 
     def damages(self) -> Iterator[Damage]:
-        """Pressures that are none, one line for each topic; the log's own values are kept."""
-        for topic, count in self._refused.items():
-            yield Damage("unreadable_cells", topic, count, REFUSED, topic, loses_data=False)
+        """Pressures and positions that are none, values in unknown units; the log's own values are kept."""
+        for (topic, what), count in self._refused.items():
+            yield Damage("unreadable_cells", topic, count, what, topic, loses_data=False)
+        yield from (nowhere(topic, count) for topic, count in self._nowhere.items() if count)
+        yield from self._unknown.damages()
+
+    def remarks(self) -> Iterator[Remark]:
+        """Multipliers of floats that were passed over."""
+        for (topic, field), (multiplier, source) in self._passed_over.items():
+            text = (
+                f"{source} is a float in its unit; the multiplier {multiplier:g} that the log gives it is not applied"
+            )
+            yield Remark("converted", text, topic, (field,))
+
+    def _refuse(self, topic: str, what: str, count: int) -> None:
+        if count:
+            self._refused[topic, what] = self._refused.get((topic, what), 0) + count
 
     def _all_takers(self) -> Mapping[Unit, list[tuple[str, Callable[[str, Rows], dict[str, Column]]]]]:
         """For each sensor the topics it gives to, and the function that makes the columns."""
@@ -89,14 +108,29 @@ class Mapper:
         return takers
 
     def _values(self, topic: str, rows: Rows, wanted: tuple[Rule, ...]) -> dict[str, FloatArray]:
-        """Values of the rules whose field the type has, in canonical units."""
+        """Values of the rules whose field the type has, in canonical units; none of a field in an unknown unit."""
         found = {}
+        definition, units = rows.definition, self._found.units
         for rule in wanted:
-            if rows.definition.has_numbers(rule.source):
-                factor = rule.scale(topic, rows.definition, self._found.units)
-                values = as_double(rows.values(rule.source))
-                found[rule.field] = values if factor == 1.0 else values * factor
+            if not definition.has_numbers(rule.source):
+                continue
+            factor = rule.scale(definition, units)
+            if factor is None:
+                self._unknown.add(rule, definition, units, len(rows), topic)
+                continue
+            passed_over = rule.passed_over(definition, units)
+            if passed_over is not None:
+                self._passed_over[topic, rule.field] = (passed_over, f"{definition.name}.{rule.source}")
+            values = as_double(rows.values(rule.source))
+            found[rule.field] = values if factor == 1.0 else values * factor
         return found
+
+    def _placed(self, topic: str, values: Mapping[str, FloatArray], claimed: BoolArray | bool = True) -> BoolArray:
+        """Records with a position among those that claim one; zeros in its place are counted, a NaN stays one."""
+        latitude, longitude = values["latitude_deg"], values["longitude_deg"]
+        placed = has_position(latitude, longitude) | np.isnan(latitude) | np.isnan(longitude)
+        self._nowhere[topic] += int(np.count_nonzero(claimed & ~placed))
+        return frozen(claimed & placed)
 
     def _plain(self, wanted: tuple[Rule, ...]) -> Callable[[str, Rows], dict[str, Column]]:
         def columns_of(topic: str, rows: Rows) -> dict[str, Column]:
@@ -120,7 +154,7 @@ class Mapper:
         values = self._values(topic, rows, rules.POSITION)
         if not {"latitude_deg", "longitude_deg"} <= values.keys():
             return {}
-        known = frozen((values["latitude_deg"] != 0.0) | (values["longitude_deg"] != 0.0))  # both zero: not known yet
+        known = self._placed(topic, values)
         return self._with_mode(rows, {name: Column(column, known) for name, column in values.items()})
 
     def _backup(self, topic: str, rows: Rows) -> dict[str, Column]:
@@ -129,13 +163,14 @@ class Mapper:
     def _of_core(
         self, core: int | None, wanted: tuple[Rule, ...], is_solution: bool
     ) -> Callable[[str, Rows], dict[str, Column]]:
-        """Columns that are present while this core of the filter is the one in use."""
+        """Columns that are present while this core of the filter is the one in use; at first the first one told."""
+        primary = self._choices.primary_core
 
         def columns_of(topic: str, rows: Rows) -> dict[str, Column]:
             values = self._values(topic, rows, wanted)
             used = None
             if core is not None:
-                used = frozen(self._choices.primary_core.at(rows.record_index, before=0) == core)
+                used = frozen(primary.at(rows.record_index, before=primary.first) == core)
             columns = {name: Column(column, used) for name, column in values.items()}
             if is_solution and columns:
                 columns["mode"] = self._mode(rows, used)
@@ -144,12 +179,21 @@ class Mapper:
         return columns_of
 
     def _gnss(self, topic: str, rows: Rows) -> dict[str, Column]:
-        status = rows.values("Status") if rows.definition.has_numbers("Status") else np.full(len(rows), FIX_3D)
-        has_2d, has_3d = frozen(status >= FIX_2D), frozen(status >= FIX_3D)
-        columns = {}
-        for name, values in self._values(topic, rows, rules.POSITION).items():
-            columns[name] = Column(values, has_3d if name == "altitude_msl_m" else has_2d)
-        motion = self._values(topic, rows, rules.GNSS_VELOCITY)
+        position, motion = self._values(topic, rows, rules.POSITION), self._values(topic, rows, rules.GNSS_VELOCITY)
+        everywhere = np.ones(len(rows), dtype=bool)
+        has_status = rows.definition.has_numbers("Status")
+        has_2d, has_3d = (
+            frozen(rows.values("Status") >= least if has_status else everywhere) for least in (FIX_2D, FIX_3D)
+        )
+        placed = has_2d
+        if {"latitude_deg", "longitude_deg"} <= position.keys():
+            placed = self._placed(topic, position, has_2d)
+        if not has_status:  # then a record with a position has a fix
+            has_2d = has_3d = placed
+        placed_3d = frozen(placed & has_3d)
+        columns = {
+            name: Column(values, placed_3d if name == "altitude_msl_m" else placed) for name, values in position.items()
+        }
         if "track_deg" in motion:
             motion["track_deg"] = wrap_360(motion["track_deg"])
         if {"track_deg", "ground_speed_mps"} <= motion.keys():
@@ -176,12 +220,12 @@ class Mapper:
         return {name: Column(values, healthy) for name, values in self._values(topic, rows, rules.FIELD).items()}
 
     def _baro(self, topic: str, rows: Rows) -> dict[str, Column]:
-        if not rows.definition.has_numbers("Press"):
-            return {}
-        altitude, is_refused = pressure_altitude_m(as_double(rows.values("Press")))
-        if is_refused.any():
-            self._refused[topic] = self._refused.get(topic, 0) + int(is_refused.sum())
-        return {"pressure_altitude_m": Column(altitude, ~is_refused)}
+        columns = {}
+        for name, pressure_pa in self._values(topic, rows, (rules.PRESSURE,)).items():
+            altitude, is_refused = pressure_altitude_m(pressure_pa)
+            self._refuse(topic, REFUSED, int(np.count_nonzero(is_refused)))
+            columns[name] = Column(altitude, ~is_refused)
+        return columns
 
     def _height(self, topic: str, rows: Rows) -> dict[str, Column]:
         if not rows.definition.has_numbers("Dist", "Stat", "Orient"):

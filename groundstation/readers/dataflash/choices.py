@@ -87,7 +87,7 @@ def choose(found: Overview, vehicle: str) -> Choices:
     rates = next((kinds for kinds in (("IMU",), ("GYR", "ACC")) if any(kind in found.types for kind in kinds)), ())
     return Choices(
         sensor_topics=_sensor_topics(found),
-        rates=tuple(min(_units_of(found, name), key=_instance) for name in rates if name in found.types),
+        rates=tuple(min(units, key=_instance) for name in rates if (units := _units_of(found, name))),
         ekf=ekf,
         ekf_topic="ins.2" if is_second else "ins",
         ekf_velocity=_cores(found, "EKF" if is_second else ekf, "1"),
@@ -149,11 +149,11 @@ def _yaw(found: Overview, ekf: str) -> tuple[Rule, str]:
     names = {"XKF": "EKF3", "NKF": "EKF2", "EKF": "the EKF"}
     origin = f"yaw of ATT ({names.get(ekf, 'DCM or a filter that is not logged')})"
     automatic, fixed_rad = found.parameters.get("COMPASS_AUTODEC"), found.parameters.get("COMPASS_DEC")
-    if automatic is None and fixed_rad is None:
+    if (automatic is None and not fixed_rad) or (fixed_rad is None and not automatic):
         return rules.TRUE_YAW, f"{origin}; the log does not tell which declination is in it"
     if found.parameters.get("COMPASS_USE") == 0.0:
         return rules.TRUE_YAW, f"{origin}, without a compass: aligned by GPS course"
-    declination = f"{math.degrees(fixed_rad or 0.0):+.2f} deg"
+    declination = "not logged" if fixed_rad is None else f"{math.degrees(fixed_rad):+.2f} deg"
     if automatic:
         return (
             rules.TRUE_YAW,

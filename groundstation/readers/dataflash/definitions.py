@@ -3,6 +3,7 @@
 Source: ArduPilot, libraries/AP_Logger/README.md ("Format Types", "Units", "Multipliers") and LogStructure.h.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -49,10 +50,10 @@ DIVISORS: Mapping[str, float] = MappingProxyType({"c": 100.0, "C": 100.0, "e": 1
 
 @dataclass(frozen=True)
 class Unit:
-    """Unit of a field by FMTU: ``text`` ("Gauss"), and what the stored number is multiplied by (0: not given)."""
+    """Unit of a field by FMTU: ``text`` ("Gauss"), and what the stored number is multiplied by (None: not given)."""
 
     text: str = ""
-    multiplier: float = 0.0
+    multiplier: float | None = None
 
 
 @dataclass(frozen=True)
@@ -208,24 +209,32 @@ def _text(raw: bytes) -> str:
 
 @dataclass
 class Units:
-    """Units, multipliers and instance fields of the types of a log, as its FMTU, UNIT and MULT records give them."""
+    """Units, multipliers and instance fields of the types of a log, as its FMTU, UNIT and MULT records give them.
+
+    What FMTU says holds for the definition that was in force: in logs joined end to end an id may be another type's.
+    """
 
     texts: dict[str, str] = field(default_factory=dict)
     multipliers: dict[str, float] = field(default_factory=dict)
-    of_type: dict[int, tuple[str, str]] = field(default_factory=dict)
+    of_definition: dict[Definition, tuple[str, str]] = field(default_factory=dict)
 
     def of(self, definition: Definition, name: str) -> Unit:
         """Unit of a field; an empty one when the log gives none."""
-        unit_ids, multiplier_ids = self.of_type.get(definition.type_id, ("", ""))
+        unit_ids, multiplier_ids = self.of_definition.get(definition, ("", ""))
         at = next((at for at, spec in enumerate(definition.fields) if spec.name == name), len(definition.fields))
         unit = Unit(self.texts.get(unit_ids[at], "")) if at < len(unit_ids) else Unit()
         if at < len(multiplier_ids):
-            unit = replace(unit, multiplier=self.multipliers.get(multiplier_ids[at], 0.0))
+            unit = replace(unit, multiplier=self._multiplier(multiplier_ids[at]))
         return unit
+
+    def _multiplier(self, code: str) -> float | None:
+        """The multiplier of an id; None when it is that of a text (0), not worked out (``?``) or no factor at all."""
+        value = self.multipliers.get(code)
+        return value if value is not None and code != "?" and 0.0 < value < math.inf else None
 
     def instance_field(self, definition: Definition) -> str | None:
         """The field that tells instances of a type apart (unit ``#``); None when there is none or it is a text."""
-        at = self.of_type.get(definition.type_id, ("", ""))[0].find("#")
+        at = self.of_definition.get(definition, ("", ""))[0].find("#")
         if not 0 <= at < len(definition.fields) or not definition.fields[at].is_integer:
             return None
         return definition.fields[at].name
@@ -237,7 +246,7 @@ class Units:
             unit = self.of(definition, spec.name)
             if not unit.text or unit.text in ("UNKNOWN", "instance"):
                 continue
-            scale = unit.multiplier * (spec.divisor or 1.0)
-            plain = scale == 0.0 or abs(scale - 1.0) < 1e-6
+            scale = None if spec.divisor else unit.multiplier
+            plain = scale is None or math.isclose(scale, 1.0)
             parts.append(f"{spec.name} {unit.text}" + ("" if plain else f" x {scale:.7g}"))
         return ", ".join(parts)

@@ -29,7 +29,7 @@ _GPS = (*_sources(rules.POSITION, rules.GNSS_VELOCITY, rules.GNSS_QUALITY, rules
 _SENSORS = {
     "gnss": _GPS,
     "magnetometer": _sources(rules.FIELD),
-    "baro": ("Press",),
+    "baro": (rules.PRESSURE.source,),
     "electric": _sources(rules.CURRENT),
     "radio_altimeter": (*_sources(rules.HEIGHT), "Stat", "Orient"),
 }
@@ -41,7 +41,7 @@ WANTED: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "IMU": _sources(rules.RATES, rules.ACCELERATIONS),
         "GYR": _sources(rules.RATES),
         "ACC": _sources(rules.ACCELERATIONS),
-        **dict.fromkeys(("GPA", "GPA2"), ("VDop", "HAcc", "VAcc", "SAcc")),
+        **dict.fromkeys(("GPA", "GPA2"), ("VDop", "HAcc", "VAcc", rules.SPEED_SIGMA.source)),
         "PARM": ("Name", "Value"),
         "MSG": ("Message",),
         "EV": ("Id",),

@@ -10,6 +10,8 @@ from groundstation.base.source_units import PREFIX
 from groundstation.base.timescales import gps_week_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.dataflash.overview import GpsTimes, Overview
+from groundstation.readers.rollover import Earliest, rollovers
+from groundstation.readers.start import zero_of_readings
 
 _VEHICLE = re.compile(r"\b(Ardu(?:Plane|Copter|Rover|Sub)|APM:(?:Plane|Copter|Rover)|Blimp|AntennaTracker|Rover)\b")
 # Parameters that change what the navigation data mean.
@@ -19,6 +21,20 @@ _KEY_PARAMETERS = re.compile(
     r"GPS_(TYPE|TYPE2|AUTO_SWITCH|DELAY_MS|POS1_[XYZ])|INS_POS1_[XYZ]|LOG_BITMASK|SYSID_THISMAV|FRAME_CLASS"
 )
 _FIRST_WEEK, _LAST_WEEK = 1_000, 4_000  # 1999 to 2056: other numbers are no date of a log
+_FEWEST = 3  # fixes in earlier weeks, as a receiver tells that counts to 1023 alone
+_VERSION = re.compile(r"\bV(\d+)\.(\d+)")
+# Version of ArduPilot -> the year its development began. Source: its releases on GitHub.
+_YEARS = {
+    (2, 0): 2012,
+    (3, 0): 2013,
+    (4, 0): 2019,
+    (4, 1): 2020,
+    (4, 2): 2021,
+    (4, 3): 2022,
+    (4, 5): 2023,
+    (4, 6): 2024,
+}
+_FORMAT = Earliest(2010, "the DataFlash format", moves=False)
 _MS_PER_WEEK = 604_800_000
 _RESTART_NS = -NS_PER_S
 _SPREAD_NS = 2 * NS_PER_S
@@ -43,26 +59,23 @@ def metadata(found: Overview) -> dict[str, str]:
     return facts
 
 
-def utc_readings(times: GpsTimes) -> UtcReadings | None:
+def utc_readings(times: GpsTimes, firmware: str = "") -> UtcReadings | None:
     """UTC of the autopilot's time zero by each fix, where that zero changes: the autopilot was started again."""
-    good, device_ns = _plausible(times), times.device_ns
+    good, device_ns = _dated(times), times.device_ns
     if not (np.diff(device_ns[good]) < _RESTART_NS).any():
         return None
-    zeros = gps_week_to_utc_ns(times.week[good], times.week_ms[good]) - device_ns[good]
-    return UtcReadings(times.record_index[good], zeros)
+    utc_ns = gps_week_to_utc_ns(times.week[good], times.week_ms[good])
+    behind = rollovers(int(utc_ns[-1]), earliest=_earliest(firmware))
+    utc_ns = utc_ns + behind.shift_ns(int(utc_ns[-1]), is_gps_time=True)
+    return UtcReadings(times.record_index[good], utc_ns - device_ns[good])
 
 
-def _plausible(times: GpsTimes) -> BoolArray:
-    """Fixes whose week and time may be those of a log, shape (n,)."""
-    is_week = (times.week >= _FIRST_WEEK) & (times.week < _LAST_WEEK)
-    return np.asarray(is_week & (times.week_ms >= 0) & (times.week_ms < _MS_PER_WEEK))
-
-
-def utc_of_power_up(times: GpsTimes) -> tuple[int | None, list[Remark]]:
+def utc_of_power_up(times: GpsTimes, firmware: str = "") -> tuple[int | None, list[Remark]]:
     """UTC nanoseconds of the autopilot's time zero, None when no receiver told the time, and what was assumed.
 
-    The median over all fixes of UTC by GPS week minus the autopilot's clock. Where the clock starts again (logs joined
-    end to end) the fixes after its last start count: the clock model believes what comes after the last step.
+    The median over the fixes that count of UTC by GPS week minus the autopilot's clock. Where the clock starts again
+    (logs joined end to end) the fixes after its last start count: the clock model believes what comes after the last
+    step. ``firmware`` shows whether the date can be true.
 
     Examples
     --------
@@ -71,7 +84,7 @@ def utc_of_power_up(times: GpsTimes) -> tuple[int | None, list[Remark]]:
     >>> utc_ns_to_iso(utc)
     '2018-05-05T23:59:35.000Z'
     """
-    good = _plausible(times)
+    good = _dated(times)
     if not good.any():
         return None, []
     device_ns = times.device_ns[good]
@@ -80,12 +93,41 @@ def utc_of_power_up(times: GpsTimes) -> tuple[int | None, list[Remark]]:
     if len(restarts) and len(device_ns) - restarts[-1] > 2:
         zeros = zeros[restarts[-1] + 1 :]
         device_ns = device_ns[restarts[-1] + 1 :]
-    utc_ns = int(np.sort(zeros)[len(zeros) // 2])
+    told = zero_of_readings(zeros)
+    moment_ns = told.ns + int(device_ns[-1])
+    found = rollovers(moment_ns, earliest=_earliest(firmware))
+    utc_ns = told.ns + found.shift_ns(moment_ns, is_gps_time=True)
     text = (
-        f"UTC from GPS week and time of {len(zeros)} fixes less leap seconds: power-up at {utc_ns_to_iso(utc_ns)}; "
-        "late by the receiver's delay, some 0.1 to 0.2 s"
+        f"UTC from GPS week and time of {len(told.zeros_ns)} fixes less leap seconds: power-up at "
+        f"{utc_ns_to_iso(utc_ns)}; late by the receiver's delay, some 0.1 to 0.2 s"
     )
-    return utc_ns, [Remark("utc_from_gps", text), *_disagreement(zeros, device_ns)]
+    remarks = [Remark("utc_from_gps", text), *told.remarks("GPS time"), *found.remarks]
+    unknown = int((times.week == 0).sum())
+    if unknown:
+        text = f"GPS time: {unknown} fixes told week 0: the week was not known yet"
+        remarks.append(Remark("week_number", text))
+    return utc_ns, remarks if told.passed_over else [*remarks, *_disagreement(zeros, device_ns)]
+
+
+def _dated(times: GpsTimes) -> BoolArray:
+    """Fixes whose week can be that of a log, shape (n,); else a few that agree on any."""
+    in_week = (times.week_ms >= 0) & (times.week_ms < _MS_PER_WEEK)
+    good = in_week & (times.week >= _FIRST_WEEK) & (times.week < _LAST_WEEK)
+    early = in_week & (times.week > 0) & (times.week < _FIRST_WEEK)
+    return early if not good.any() and early.sum() >= _FEWEST else good
+
+
+def _earliest(firmware: str) -> Earliest:
+    """Year before which a firmware did not exist; without a version that of the format.
+
+    Examples
+    --------
+    >>> _earliest("ArduCopter V4.2.3 (b11c6af3)").year, _earliest("ArduPlane V4.7.0-dev").year, _earliest("").year
+    (2021, 2024, 2010)
+    """
+    found = _VERSION.search(firmware)
+    years = [year for version, year in _YEARS.items() if found and version <= (int(found[1]), int(found[2]))]
+    return Earliest(max(years), f"ArduPilot {found[0]}") if found and years else _FORMAT
 
 
 def _disagreement(zeros_ns: Int64Array, device_ns: Int64Array) -> list[Remark]:

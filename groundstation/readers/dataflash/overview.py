@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.records import Damage, Int64Array
+from groundstation.base.geodesy import has_position
+from groundstation.base.records import BoolArray, Damage, Int64Array
 from groundstation.readers.dataflash.blocks import Block, Scanner
 from groundstation.readers.dataflash.definitions import Definition, Units
+from groundstation.readers.dataflash.rules import FIX_3D, SPEED_SIGMA, UnknownUnits
 from groundstation.readers.dataflash.values import Rows, as_double, by_instance, rows_of
 
 MESSAGES_KEPT = 100
@@ -34,6 +36,11 @@ class States:
         at = np.searchsorted(self.record_index, record_index, side="right")
         return np.concatenate(([before], self.values))[at]
 
+    @property
+    def first(self) -> int:
+        """The first state that was logged, -1 when none was."""
+        return int(self.values[0]) if len(self.values) else -1
+
 
 @dataclass(frozen=True, eq=False)
 class GpsTimes:
@@ -56,8 +63,8 @@ class Overview:
         Types that have records which can be read, by name.
     sensors : tuple of (type, instance)
         Each type that has records; several entries where it has an instance field.
-    split : set of int
-        Ids of the types whose records are told apart by their instance field.
+    split : set of (type id, name)
+        The types whose records are told apart by their instance field.
     parameters : mapping of str to float
         The last value of each.
     messages : tuple of str
@@ -76,7 +83,7 @@ class Overview:
     units: Units
     types: Mapping[str, Definition]
     sensors: tuple[Unit, ...]
-    split: frozenset[int]
+    split: frozenset[tuple[int, str]]
     parameters: Mapping[str, float]
     messages: tuple[str, ...]
     gps_times: GpsTimes
@@ -100,6 +107,7 @@ class _Survey:
 
     def __init__(self) -> None:
         self._units = Units()
+        self._definitions: Mapping[int, Definition] = {}  # in force in the block at hand
         self._types: dict[str, Definition] = {}
         self._instances: dict[tuple[int, str], set[int]] = {}
         self._parameters: dict[str, float] = {}
@@ -107,6 +115,7 @@ class _Survey:
         self._gps: list[tuple[Any, ...]] = []
         self._has_fix = False
         self._sigma: dict[Unit, list[tuple[Any, Any]]] = {}
+        self._unknown = UnknownUnits()
         self._cores: dict[str, list[tuple[Any, Any]]] = {}
         self._landed: list[tuple[Any, Any]] = []
         self._unread: dict[str, tuple[int, str]] = {}
@@ -125,6 +134,7 @@ class _Survey:
 
     def add(self, block: Block) -> None:
         """Take in one block; units first, as they say which field tells instances apart."""
+        self._definitions = block.definitions
         groups = sorted(block.groups(), key=lambda group: group[0].name not in ("UNIT", "MULT", "FMTU"))
         for definition, which in groups:
             name = definition.name
@@ -146,10 +156,10 @@ class _Survey:
 
     def result(self, scanner: Scanner) -> Overview:
         """What was found."""
-        split = frozenset(key[0] for key, seen in self._instances.items() if 0 < len(seen) <= MOST_INSTANCES)
+        split = frozenset(key for key, seen in self._instances.items() if 0 < len(seen) <= MOST_INSTANCES)
         sensors: list[Unit] = []
-        for (type_id, name), seen in self._instances.items():
-            sensors += [(name, value) for value in sorted(seen)] if type_id in split else [(name, None)]
+        for key, seen in self._instances.items():
+            sensors += [(key[1], value) for value in sorted(seen)] if key in split else [(key[1], None)]
         return Overview(
             units=self._units,
             types=self._types,
@@ -162,7 +172,7 @@ class _Survey:
             speed_sigma={unit: _sorted_pairs(parts) for unit, parts in self._sigma.items()},
             primary_core={name: _states(parts) for name, parts in self._cores.items()},
             landed=_states(self._landed),
-            damages=(*scanner.spans.damages(), *self._more_damages(scanner)),
+            damages=(*scanner.spans.damages(), *self._more_damages(scanner), *self._unknown.damages()),
         )
 
     def _more_damages(self, scanner: Scanner) -> list[Damage]:
@@ -181,7 +191,7 @@ class _Survey:
     def _unit(self, rows: Rows) -> None:
         if rows.definition.has_integers("Id") and rows.definition.has_texts("Label"):
             for code, text in zip(rows.values("Id").tolist(), rows.values("Label").tolist(), strict=True):
-                self._units.texts[_character(code)] = str(text)
+                self._units.texts[_character(code)] = str(text).strip()
 
     def _multiplier(self, rows: Rows) -> None:
         if rows.definition.has_integers("Id") and rows.definition.has_numbers("Mult"):
@@ -191,7 +201,9 @@ class _Survey:
     def _field_units(self, rows: Rows) -> None:
         if rows.definition.has_integers("FmtType") and rows.definition.has_texts("UnitIds", "MultIds"):
             columns = (rows.values(name).tolist() for name in ("FmtType", "UnitIds", "MultIds"))
-            self._units.of_type.update({type_id: (unit, scale) for type_id, unit, scale in zip(*columns, strict=True)})
+            for type_id, unit_ids, multiplier_ids in zip(*columns, strict=True):
+                if type_id in self._definitions:
+                    self._units.of_definition[self._definitions[type_id]] = (unit_ids, multiplier_ids)
 
     def _parameter(self, rows: Rows) -> None:
         if rows.definition.has_texts("Name") and rows.definition.has_numbers("Value"):
@@ -215,7 +227,7 @@ class _Survey:
     def _fixes(self, rows: Rows) -> None:
         definition = rows.definition
         names = next((pair for pair in (("GWk", "GMS"), ("Week", "TimeMS")) if definition.has_integers(*pair)), None)
-        fixed = rows.values("Status") >= 3 if definition.has_numbers("Status") else np.ones(len(rows), dtype=bool)
+        fixed = _fixed(rows)
         self._has_fix |= bool(fixed.any())
         if names is not None:
             timed = fixed & rows.time_ns.mask
@@ -226,9 +238,14 @@ class _Survey:
         if not rows.definition.has_numbers("SAcc"):
             return
         instance_field = self._units.instance_field(rows.definition)
+        factor = SPEED_SIGMA.scale(rows.definition, self._units)
+        if factor is None:
+            self._unknown.add(SPEED_SIGMA, rows.definition, self._units, len(rows), "gnss")
+            return
         for part in by_instance(rows, instance_field) if instance_field else (rows,):
             receiver = (_ACCURACY_TYPES[rows.definition.name], part.instance)
-            self._sigma.setdefault(receiver, []).append((part.time_ns.values, as_double(part.values("SAcc"))))
+            sigma = as_double(part.values("SAcc")) * factor
+            self._sigma.setdefault(receiver, []).append((part.time_ns.values, sigma))
 
     def _core(self, rows: Rows) -> None:
         if rows.definition.has_integers("PI"):
@@ -248,6 +265,15 @@ def _joined(parts: list[Any]) -> Int64Array:
 
 def _states(parts: list[tuple[Any, Any]]) -> States:
     return States(_joined([index for index, _values in parts]), _joined([values for _index, values in parts]))
+
+
+def _fixed(rows: Rows) -> BoolArray:
+    """Records of a receiver with a 3D fix; a type without a status has one where it has a position."""
+    if rows.definition.has_numbers("Status"):
+        return np.asarray(rows.values("Status") >= FIX_3D)
+    if rows.definition.has_numbers("Lat", "Lng"):
+        return has_position(rows.values("Lat"), rows.values("Lng"))
+    return np.zeros(len(rows), dtype=bool)
 
 
 def _sorted_pairs(parts: list[tuple[Any, Any]]) -> tuple[Int64Array, FloatArray]:

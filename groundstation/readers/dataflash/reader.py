@@ -23,8 +23,10 @@ def items(source: Source) -> Iterator[Item]:
     scanner = Scanner(source)
     found = overview(scanner)
     facts = metadata(found)
-    utc_ns, remarks = utc_of_power_up(found.gps_times)
-    yield LogHeader(READER, facts, utc_ns, has_counting_clock=True, utc_readings=utc_readings(found.gps_times))
+    firmware = facts.get("firmware", "")
+    utc_ns, remarks = utc_of_power_up(found.gps_times, firmware)
+    readings = utc_readings(found.gps_times, firmware)
+    yield LogHeader(READER, facts, utc_ns, has_counting_clock=True, utc_readings=readings)
     yield from map(NewLog, scanner.log_starts)
     choices = choose(found, facts.get("vehicle", ""))
     mapper, topics = Mapper(found, choices), _Topics()
@@ -42,6 +44,7 @@ def items(source: Source) -> Iterator[Item]:
         yield from mapper.batches()
     yield from remarks
     yield from choices.remarks(found, mapper.fields)
+    yield from mapper.remarks()
     yield from found.damages
     yield from mapper.damages()
     yield from doubts(scanner.payloads, scanner.definitions, by_type)
@@ -58,7 +61,7 @@ def _rows(block: Block, found: Overview) -> Iterator[Rows]:
             continue
         rows = rows_of(definition, block.records(definition, which), block.first_index + which)
         name = found.units.instance_field(definition)
-        if name is None or definition.type_id not in found.split:
+        if name is None or (definition.type_id, definition.name) not in found.split:
             yield rows
         else:
             yield from by_instance(rows, name)

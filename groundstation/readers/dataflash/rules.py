@@ -1,27 +1,37 @@
 """Which fields of which record types become canonical fields, and in what unit they are when the log does not say."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import isclose
 from types import MappingProxyType
 
-from groundstation.base.signals import field_of
-from groundstation.base.units import CONVERSIONS, DEG_PER_RAD, NT_PER_GAUSS
+from groundstation.base.records import Damage
+from groundstation.base.units import CONVERSIONS
 from groundstation.readers.dataflash.definitions import Definition, Units
 
-# Unit of FMTU -> unit of a profile.
-_NAMES = {
-    **dict.fromkeys(("deg", "degheading", "deglatitude", "deglongitude"), "deg"),
-    "rad": "rad",
-    "deg/s": "dps",
-    "rad/s": "radps",
-    "m": "m",
-    "m/s": "mps",
-    "m/s/s": "mps2",
-    "Gauss": "gauss",
-    "A": "a",
-}
-# Unit of FMTU -> unit of a canonical field and factor.
-_FACTORS = {name: CONVERSIONS[unit] for name, unit in _NAMES.items()}
+# Unit of FMTU -> what it measures, and factor to the canonical unit.
+_UNITS: Mapping[str, tuple[str, float]] = MappingProxyType(
+    {
+        **dict.fromkeys(("deg", "degheading", "deglatitude", "deglongitude"), CONVERSIONS["deg"]),
+        "rad": CONVERSIONS["rad"],
+        "deg/s": CONVERSIONS["dps"],
+        "rad/s": CONVERSIONS["radps"],
+        "m": CONVERSIONS["m"],
+        "m/s": CONVERSIONS["mps"],
+        "m/s/s": CONVERSIONS["mps2"],
+        "Gauss": CONVERSIONS["gauss"],
+        "A": CONVERSIONS["a"],
+        "Pa": ("pa", 1.0),
+        **dict.fromkeys(("", "satellites"), CONVERSIONS[""]),
+    }
+)
+# The other units of ArduPilot's list, of any version.
+_OF_OTHER_FIELDS = frozenset(
+    (
+        *("Ah", "A.s", "B", "B/s", "deg/s/s", "degC", "Hz", "instance", "l", "l/s", "N", "N.m", "Ohm", "ppm"),
+        *("rad/s/s", "rpm", "s", "us", "V", "W", "Watt", "W.h", "W.s", "%"),
+    )
+)
 
 
 @dataclass(frozen=True)
@@ -32,62 +42,108 @@ class Rule:
     ----------
     source, field : str
         ``Roll`` of the log, ``roll_deg`` of the canonical topic.
-    factor : float
-        To the canonical unit, where the log gives no unit.
-    integer_factor : float, optional
-        The same for a plain integer (old firmware logged hundredths without saying so); None: as ``factor``.
+    unit : str
+        In which ArduPilot documents it, as FMTU writes units; empty for a count or a ratio.
+    multiplier : float
+        Of that unit, where the log gives none: 1e-3 for a field logged in milligauss.
+    integer_multiplier : float, optional
+        The same for a plain integer (old firmware logged hundredths without saying so); None: as ``multiplier``.
     """
 
     source: str
     field: str
-    factor: float = 1.0
-    integer_factor: float | None = None
+    unit: str = ""
+    multiplier: float = 1.0
+    integer_multiplier: float | None = None
 
-    def scale(self, topic: str, definition: Definition, units: Units) -> float:
-        """Factor from the values of the raw column to the canonical unit; the log's own unit comes first."""
-        spec, known = definition.find(self.source), field_of(topic, self.field)
-        assert spec is not None and known is not None
-        unit = units.of(definition, self.source)
-        kind, factor = _FACTORS.get(unit.text, ("", 0.0))
-        if unit.multiplier and kind == known.unit:
-            further = unit.multiplier * (spec.divisor or 1.0)  # the multiplier is that of the stored number
-            return factor if abs(further - 1.0) < 1e-6 else further * factor
-        if spec.is_integer and self.integer_factor is not None:
-            return self.integer_factor
-        return self.factor
+    def scale(self, definition: Definition, units: Units) -> float | None:
+        """Factor from the values of the raw column to the canonical unit; None when the log's unit is unknown.
+
+        The unit of FMTU counts if it measures what the field measures. Where it is another of ArduPilot's units, it is
+        a slip (HDop in m, the longitude in us, ACC in m/s) and the documented unit counts. A multiplier counts for
+        plain integers, and for numbers whose documented unit has one. A scale of the format character is in the values
+        already, and firmware that gives a multiplier for floats in SI (3.6 betas: GPS.Spd) logged them without it.
+
+        Source: ArduPilot, libraries/AP_Logger/LogStructure.h and README.md; pull request 8643 (floats of GPS).
+        """
+        spec, stated = definition.find(self.source), units.of(definition, self.source)
+        assert spec is not None
+        quantity, factor = _UNITS[self.unit]
+        if stated.text in _UNITS:
+            stated_quantity, stated_factor = _UNITS[stated.text]
+            factor = stated_factor if stated_quantity == quantity else factor
+        elif stated.text not in _OF_OTHER_FIELDS:
+            return None
+        multiplier = self.multiplier
+        if spec.divisor is not None:
+            return factor * multiplier
+        if spec.is_integer and self.integer_multiplier is not None:
+            multiplier = self.integer_multiplier
+        if stated.multiplier is not None and (spec.is_integer or self.multiplier != 1.0):
+            multiplier = stated.multiplier
+        return factor * multiplier
+
+    def passed_over(self, definition: Definition, units: Units) -> float | None:
+        """The log's multiplier of a float that is not applied, None where there is none."""
+        spec, stated = definition.find(self.source), units.of(definition, self.source).multiplier
+        assert spec is not None
+        if stated is None or isclose(stated, 1.0) or spec.divisor is not None or spec.is_integer:
+            return None
+        return stated if self.multiplier == 1.0 else None
+
+
+class UnknownUnits:
+    """Counts the values that stay raw because the log gives them a unit that nobody knows."""
+
+    def __init__(self) -> None:
+        self._counts: dict[tuple[str, str, str], int] = {}
+
+    def add(self, rule: Rule, definition: Definition, units: Units, count: int, topic: str) -> None:
+        """Take in the values of a field in some records."""
+        key = (f"{definition.name}.{rule.source}", units.of(definition, rule.source).text, topic)
+        self._counts[key] = self._counts.get(key, 0) + count
+
+    def damages(self) -> Iterator[Damage]:
+        """One for each field; the log's own values are kept."""
+        for (source, unit, topic), count in self._counts.items():
+            what = f"values of {source} in the unit {unit!r}, which is unknown, kept as raw values alone"
+            yield Damage("unreadable_cells", f"raw.{source}", count, what, topic, loses_data=False)
 
 
 ATTITUDE = (
-    Rule("Roll", "roll_deg", integer_factor=0.01),
-    Rule("Pitch", "pitch_deg", integer_factor=0.01),
+    Rule("Roll", "roll_deg", "deg", integer_multiplier=0.01),
+    Rule("Pitch", "pitch_deg", "deg", integer_multiplier=0.01),
 )
-TRUE_YAW = Rule("Yaw", "true_heading_deg", integer_factor=0.01)
-MAGNETIC_YAW = Rule("Yaw", "magnetic_heading_deg", integer_factor=0.01)
+TRUE_YAW = Rule("Yaw", "true_heading_deg", "deg", integer_multiplier=0.01)
+MAGNETIC_YAW = Rule("Yaw", "magnetic_heading_deg", "deg", integer_multiplier=0.01)
 POSITION = (
-    Rule("Lat", "latitude_deg", integer_factor=1e-7),
-    Rule("Lng", "longitude_deg", integer_factor=1e-7),
-    Rule("Alt", "altitude_msl_m", integer_factor=0.01),
+    Rule("Lat", "latitude_deg", "deg", integer_multiplier=1e-7),
+    Rule("Lng", "longitude_deg", "deg", integer_multiplier=1e-7),
+    Rule("Alt", "altitude_msl_m", "m", integer_multiplier=0.01),
 )
 VELOCITY = tuple(
-    Rule(source, f"velocity_{axis}_mps") for source, axis in (("VN", "north"), ("VE", "east"), ("VD", "down"))
+    Rule(source, f"velocity_{axis}_mps", "m/s") for source, axis in (("VN", "north"), ("VE", "east"), ("VD", "down"))
 )
-RATES = tuple(Rule(f"Gyr{axis.upper()}", f"rate_{axis}_dps", DEG_PER_RAD) for axis in "xyz")
-ACCELERATIONS = tuple(Rule(f"Acc{axis.upper()}", f"accel_{axis}_mps2") for axis in "xyz")
+RATES = tuple(Rule(f"Gyr{axis.upper()}", f"rate_{axis}_dps", "rad/s") for axis in "xyz")
+ACCELERATIONS = tuple(Rule(f"Acc{axis.upper()}", f"accel_{axis}_mps2", "m/s/s") for axis in "xyz")
 GNSS_VELOCITY = (
-    Rule("Spd", "ground_speed_mps", integer_factor=0.01),
-    Rule("GCrs", "track_deg", integer_factor=0.01),
-    Rule("VZ", "velocity_down_mps", integer_factor=0.01),
+    Rule("Spd", "ground_speed_mps", "m/s", integer_multiplier=0.01),
+    Rule("GCrs", "track_deg", "deg", integer_multiplier=0.01),
+    Rule("VZ", "velocity_down_mps", "m/s", integer_multiplier=0.01),
 )
-GNSS_QUALITY = (Rule("HDop", "hdop", integer_factor=0.01),)
+SPEED_SIGMA = Rule("SAcc", "velocity_sigma_mps", "m/s", integer_multiplier=0.01)
+GNSS_QUALITY = (Rule("HDop", "hdop", integer_multiplier=0.01),)
 SATELLITES = (Rule("NSats", "satellites_used"),)
 FIELD = tuple(
-    Rule(f"Mag{axis}", f"field_{name}_nt", NT_PER_GAUSS * 1e-3)
+    Rule(f"Mag{axis}", f"field_{name}_nt", "Gauss", multiplier=1e-3)
     for axis, name in (("X", "forward"), ("Y", "right"), ("Z", "down"))
 )
-CURRENT = (Rule("Curr", "current_a", integer_factor=0.01),)
-WIND = (Rule("VWN", "wind_north_mps"), Rule("VWE", "wind_east_mps"))
-HEIGHT = (Rule("Dist", "height_m", integer_factor=0.01),)
+PRESSURE = Rule("Press", "pressure_altitude_m", "Pa")
+CURRENT = (Rule("Curr", "current_a", "A", integer_multiplier=0.01),)
+WIND = (Rule("VWN", "wind_north_mps", "m/s"), Rule("VWE", "wind_east_mps", "m/s"))
+HEIGHT = (Rule("Dist", "height_m", "m", integer_multiplier=0.01),)
 
+FIX_2D, FIX_3D = 2, 3  # states of a receiver
 MOST_SENSORS = 16  # of one type; another instance is damage
 # Sensors of one kind in the order in which their topics are numbered; the first group that has records is taken.
 SENSOR_TYPES: Mapping[str, tuple[tuple[str, ...], ...]] = MappingProxyType(

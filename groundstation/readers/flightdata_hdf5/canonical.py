@@ -140,7 +140,8 @@ def values_at(feed: Feed, times_ns: Int64Array) -> tuple[FloatArray, BoolArray]:
     if last <= first:
         return nothing
     known_ns = parameter.times_ns(first, last)
-    values, is_valid = parameter.read(first, last)
+    samples = parameter.read(first, last)
+    values, is_valid = samples.values, samples.is_valid
     before = np.clip(np.searchsorted(known_ns, times_ns, side="right") - 1, 0, len(known_ns) - 1)
     since_ns = times_ns - known_ns[before]
     if feed.way == "step":

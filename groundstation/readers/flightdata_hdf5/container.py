@@ -1,33 +1,37 @@
 """The HDF5 container: parameters with their data, masks and rates. Only this module imports h5py.
 
-Nothing in a file is believed before it is checked: links that leave the file, data stored elsewhere, shapes that the
-file cannot hold and attributes of any type are refused, each with its reason.
+Nothing in a file is believed before it is checked: links, data stored elsewhere or never written, more data than a file
+of its size holds and attributes of any type are refused, each with its reason.
 """
 
 import io
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
+from h5py import h5o, h5t
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.flightdata_hdf5.soundness import check_pieces, endless_heaps
+from groundstation.readers.flightdata_hdf5.heaps import endless_heaps
+from groundstation.readers.flightdata_hdf5.storage import Storage, storage_of
 from groundstation.readers.source import Source
 
 HIGHEST_RATE_HZ = 128.0
 LONGEST_S = 7 * 86_400.0
-MOST_PARAMETERS = 5_000
-MOST_CHUNK_BYTES = 1 << 26
-MOST_EXPANSION = 1_100  # deflate makes at most 1032 bytes of one
+MOST_PARAMETERS, MOST_NAMES = 5_000, 4  # in a file, of a parameter
+# Recorded files hold two to five times their size, most of it numbers of eight bytes with a mask of one.
+MOST_EXPANSION, FREE_BYTES, SAMPLE_BYTES = 64, 1 << 24, 9
 LARGEST_BYTES = 1 << 34
-MOST_TEXT = 200
+MOST_TEXT, MOST_ATTRIBUTE_BYTES = 200, 1 << 16
+_NUMBERS, _TEXTS = frozenset((h5t.INTEGER, h5t.FLOAT, h5t.ENUM)), frozenset((h5t.STRING,))
 # Whatever h5py raises for a file that is not what it says it is.
 FAILURES = (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, ArithmeticError, MemoryError)
 
@@ -44,7 +48,7 @@ class Parameter:
     samples : int
     is_derived : bool
         Computed by the ground software from others, not recorded.
-    data, mask : h5py.Dataset
+    data, mask : Storage
         A sample is valid where the mask is false.
     """
 
@@ -54,9 +58,8 @@ class Parameter:
     offset_s: float
     samples: int
     is_derived: bool
-    data: Any
-    mask: Any
-    _checked: tuple[set[int], set[int]] = field(default_factory=lambda: (set(), set()))  # pieces of data, of mask
+    data: Storage
+    mask: Storage
 
     def times_ns(self, first: int, last: int) -> Int64Array:
         """Device times of samples [first, last), nanoseconds since the start of the recording."""
@@ -70,18 +73,38 @@ class Parameter:
         reached = self.times_ns(int(around[0]), int(around[-1]) + 1) >= time_ns
         return min(int(around[np.argmax(reached)]) if reached.any() else int(around[-1]) + 1, self.samples)
 
-    def read(self, first: int, last: int) -> tuple[FloatArray, BoolArray]:
-        """Values and where they are valid, samples [first, last).
+    def read(self, first: int, last: int) -> "Samples":
+        """Values and where they are valid, samples [first, last); those that are lost are not valid.
 
-        Raises one of :data:`FAILURES` where the file is damaged.
+        Raises one of :data:`FAILURES` where the library cannot read it.
         """
-        check_pieces(self.data, first, last, self._checked[0])
-        check_pieces(self.mask, first, last, self._checked[1])
-        values = np.asarray(self.data[first:last], dtype=np.float64)
-        is_valid = np.asarray(self.mask[first:last]) == 0
-        if values.shape != (last - first,) or is_valid.shape != values.shape:
-            raise ValueError(f"{values.shape} samples where {last - first} were announced")
-        return values, is_valid
+        count = last - first
+        values, is_valid = np.zeros(count), np.zeros(count, dtype=bool)
+        spans = [*self.data.lost(first, last), *self.mask.lost(first, last)]
+        is_lost = np.zeros(count, dtype=bool)
+        for start, end, _ in spans:
+            is_lost[start - first : end - first] = True
+        for start, end in _runs(~is_lost) if spans else [(0, count)]:
+            part = slice(first + start, first + end)
+            values[start:end] = self.data.dataset[part]
+            is_valid[start:end] = self.mask.dataset[part] == 0
+        return Samples(values, is_valid, int(is_lost.sum()), spans[0][2] if spans else "")
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Samples of a parameter; ``lost`` of them cannot be read, for a reason."""
+
+    values: FloatArray
+    is_valid: BoolArray
+    lost: int = 0
+    reason: str = ""
+
+
+def _runs(wanted: BoolArray) -> list[tuple[int, int]]:
+    """First and last number (exclusive) of each run of true ones."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], wanted, [False]))))
+    return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
 
 
 @dataclass(frozen=True)
@@ -116,7 +139,11 @@ def opened(source: Source) -> Iterator[Container]:
         When it is no HDF5 file, or one without parameters.
     """
     with source.open() as stream:
-        mended, whole = endless_heaps(stream), max(_announced_size(source.head), source.size)
+        try:
+            mended = endless_heaps(stream, source.size)
+        except ValueError as error:
+            raise _unreadable(source, error) from error
+        whole = max(_announced_size(source.head), source.size)
         is_sound = not mended and whole == source.size
         try:
             file = h5py.File(stream if is_sound else _Mended(stream, whole, mended), "r")
@@ -182,64 +209,87 @@ def _announced_size(head: bytes) -> int:
     return announced if announced <= LARGEST_BYTES else 0
 
 
+@dataclass
+class _Room:
+    """How much more a file of its size may hold: bytes that are stored in it, and bytes that come out of those."""
+
+    stored_bytes: int
+    held_bytes: int
+
+    def take(self, parameter: Parameter) -> None:
+        """Make room for a parameter; ValueError where there is none."""
+        stored = parameter.data.stored_bytes + parameter.mask.stored_bytes
+        held = max(parameter.data.held_bytes + parameter.mask.held_bytes, SAMPLE_BYTES * parameter.samples)
+        if stored > self.stored_bytes or held > self.held_bytes:
+            raise ValueError(f"{parameter.samples} samples of data, more than the file can hold")
+        self.stored_bytes -= stored
+        self.held_bytes -= held
+
+
 def _contents(file: Any, size: int, missing: int, mended: tuple[int, ...]) -> Container:
     start = _number(file.attrs, "start_timestamp")
     parameters: list[Parameter] = []
     refused: list[Refused] = []
     series = _inside(file, "series", h5py.Group)
+    room, names = _Room(size, FREE_BYTES + MOST_EXPANSION * size), Counter[int]()
     for count, name in enumerate(series):
         if count >= MOST_PARAMETERS:
             refused.append(Refused("series", f"more than {MOST_PARAMETERS} parameters"))
             break
         try:
-            parameters.append(_parameter(series, name, size, missing))
+            place = _place_of(series, name)
+            if names[place] >= MOST_NAMES:
+                continue  # its data are there already
+            parameter = _parameter(series, name, size)
+            room.take(parameter)
         except FAILURES as error:
             refused.append(Refused(_text(name), " ".join(str(error).split())[:MOST_TEXT]))
+        else:
+            parameters.append(parameter)
+            names[place] += place >= 0
     known_start = start if math.isfinite(start) and 0 < start < 2**32 else None
     return Container(known_start, tuple(parameters), tuple(refused), missing, mended)
 
 
-def _parameter(series: Any, name: str, size: int, missing: int) -> Parameter:
+def _parameter(series: Any, name: str, size: int) -> Parameter:
     """A parameter whose data can be read; ValueError with the reason where they cannot."""
     group = _inside(series, name, h5py.Group)
-    data, mask = (_dataset(group, part, size, missing) for part in ("data", "mask"))
-    samples = int(data.shape[0])
-    if mask.shape != data.shape:
-        raise ValueError(f"{mask.shape[0]} samples of its mask for {samples} of data")
+    data, mask = (_dataset(group, part, size) for part in ("data", "mask"))
+    if mask.samples != data.samples:
+        raise ValueError(f"{mask.samples} samples of its mask for {data.samples} of data")
     frequency, offset = _number(group.attrs, "frequency"), _number(group.attrs, "supf_offset")
     if not 0.0 < frequency <= HIGHEST_RATE_HZ:
         raise ValueError(f"a rate of {frequency:g} Hz")
-    if not 0.0 <= offset <= LONGEST_S or samples / frequency > LONGEST_S:
-        raise ValueError(f"{samples} samples at {frequency:g} Hz after {offset:g} s")
+    if not 0.0 <= offset <= LONGEST_S or data.samples / frequency > LONGEST_S:
+        raise ValueError(f"{data.samples} samples at {frequency:g} Hz after {offset:g} s")
     is_derived = "lfl" in group.attrs and not bool(_number(group.attrs, "lfl"))
-    return Parameter(
-        _text(name), _text(_attribute(group.attrs, "units")), frequency, offset, samples, is_derived, data, mask
-    )
+    unit = _text(_attribute(group.attrs, "units", _TEXTS))
+    return Parameter(_text(name), unit, frequency, offset, data.samples, is_derived, data, mask)
 
 
-def _dataset(group: Any, part: str, size: int, missing: int) -> Any:
+def _dataset(group: Any, part: str, size: int) -> Storage:
     """A dataset of numbers in one row that lies within the file."""
     dataset = _inside(group, part, h5py.Dataset)
     if dataset.dtype.kind not in "fiub" or len(dataset.shape or ()) != 1:
         raise ValueError(f"{part} that is no row of numbers")
-    if dataset.external or dataset.is_virtual:
-        raise ValueError(f"{part} that is stored in another file")
-    if dataset.shape[0] * dataset.dtype.itemsize > MOST_EXPANSION * size:
+    if dataset.shape[0] * SAMPLE_BYTES > FREE_BYTES + MOST_EXPANSION * size:
         raise ValueError(f"{dataset.shape[0]} samples of {part}, more than the file can hold")
-    if dataset.chunks and dataset.chunks[0] * dataset.dtype.itemsize > MOST_CHUNK_BYTES:
-        raise ValueError(f"{part} in pieces of {dataset.chunks[0]} samples")
-    if dataset.chunks and dataset.id.get_num_chunks() != -(-dataset.shape[0] // dataset.chunks[0]):
-        raise ValueError(f"pieces of {part} missing")  # they would read as zeros
-    if missing and not dataset.compression:
-        raise ValueError(f"{part} of which one cannot tell what was cut off")
-    return dataset
+    return storage_of(dataset, part, size)
+
+
+def _place_of(group: Any, name: str) -> int:
+    """Where a member of a group stands in the file, -1 for one that is only a link."""
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        return -1
+    return int(h5o.get_info(group.id, name.encode("utf-8", "surrogateescape")).addr)
 
 
 def _inside(group: Any, name: str, kind: type) -> Any:
-    """A member of a group that lies in the same file and is of that kind."""
-    if name not in group:
+    """A member of a group that lies in the same file and is of that kind; no link is followed."""
+    link = group.get(name, getlink=True)
+    if link is None:
         raise ValueError(f"no {name}")
-    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+    if not isinstance(link, h5py.HardLink):
         raise ValueError(f"{name} that is a link")
     member = group[name]
     if not isinstance(member, kind):
@@ -247,9 +297,13 @@ def _inside(group: Any, name: str, kind: type) -> Any:
     return member
 
 
-def _attribute(attributes: Any, name: str) -> Any:
+def _attribute(attributes: Any, name: str, kinds: frozenset[int] = _NUMBERS) -> Any:
+    """An attribute of one of these kinds of values, None where there is none or a large one."""
     try:
-        return attributes.get(name)
+        found = attributes.get_id(name)
+        if found.get_type().get_class() not in kinds or found.get_storage_size() > MOST_ATTRIBUTE_BYTES:
+            return None
+        return attributes[name]
     except FAILURES:
         return None
 
@@ -257,7 +311,7 @@ def _attribute(attributes: Any, name: str) -> Any:
 def _number(attributes: Any, name: str) -> float:
     """A numeric attribute, NaN where there is none."""
     try:
-        return float(np.asarray(attributes[name]).reshape(-1)[0])
+        return float(np.asarray(_attribute(attributes, name)).reshape(-1)[0])
     except (*FAILURES, IndexError):
         return math.nan
 

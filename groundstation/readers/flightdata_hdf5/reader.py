@@ -2,7 +2,8 @@
 
 import math
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,9 +15,11 @@ from groundstation.base.units import NS_PER_S
 from groundstation.readers.flightdata_hdf5.canonical import TRACK, Feed, feeds_of, track_feed, values_at
 from groundstation.readers.flightdata_hdf5.container import FAILURES, HIGHEST_RATE_HZ, Container, Parameter, opened
 from groundstation.readers.layout import velocity_from_track
+from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
 
 SLICE_S = MAX_BATCH_ROWS / HIGHEST_RATE_HZ
+SLICE_ROWS = 1 << 20  # samples of all parameters: slices with fewer are read together
 SPEED = "ground_speed_mps"
 _NO_TIMES = np.zeros(0, dtype=np.int64)
 _ODD = re.compile(r"[^A-Za-z0-9_\-]+")
@@ -24,18 +27,21 @@ _ODD = re.compile(r"[^A-Za-z0-9_\-]+")
 
 @dataclass
 class _Losses:
-    """Parameters whose data turned out to be damaged, and by what."""
+    """Parameters whose data turned out to be damaged, and by what; positions that are none, by topic."""
 
     broken: dict[str, str] = field(default_factory=dict)
     lost: dict[str, int] = field(default_factory=dict)
+    nowhere: Counter[str] = field(default_factory=Counter)
 
-    def add(self, name: str, error: BaseException, samples: int) -> None:
-        self.broken.setdefault(name, " ".join(str(error).split())[:100])
+    def add(self, name: str, reason: object, samples: int) -> None:
+        self.broken.setdefault(name, " ".join(str(reason).split())[:100])
         self.lost[name] = self.lost.get(name, 0) + samples
 
     def damages(self) -> Iterator[Damage]:
         for name, reason in self.broken.items():
             yield Damage("corrupt", f"parameter {name}", self.lost[name], f"samples that cannot be read ({reason})")
+        for topic, count in self.nowhere.items():
+            yield nowhere(topic, count)
 
 
 def items(source: Source, reader_name: str) -> Iterator[Item]:
@@ -48,16 +54,16 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
         yield LogHeader(reader_name, units, utc_ns, has_counting_clock=True)
         feeds, said = feeds_of(container)
         track = track_feed(container) if any(one.field.name == SPEED for one in feeds.get("ins", ())) else None
-        next_index, end_ns = 0, max(_end_ns(parameter) for parameter in container.parameters)
-        for start_ns in range(0, end_ns + 1, round(SLICE_S * NS_PER_S)):
+        next_index = 0
+        for span in _slices(container.parameters):
             batches = [
-                *_raw_batches(topics, start_ns, losses),
-                *_canonical_batches(feeds, track, start_ns, losses),
+                *_raw_batches(topics, span, losses),
+                *_canonical_batches(feeds, track, span, losses),
             ]
             for batch in batches:
                 steps.see(batch)
             instants = np.unique(np.concatenate([_NO_TIMES, *(batch.device_time_ns.values for batch in batches)]))
-            yield from (_numbered(batch, instants, next_index) for batch in batches)
+            yield from (part for batch in batches for part in _numbered(batch, instants, next_index))
             next_index += len(instants)
         yield from _remarks(feeds, track, container)
         yield from (Remark("converted", text, topic) for topic, text in said)
@@ -84,37 +90,58 @@ def _raw_topics(container: Container) -> dict[str, Parameter]:
     return topics
 
 
-def _end_ns(parameter: Parameter) -> int:
-    return round((parameter.offset_s + parameter.samples / parameter.frequency_hz) * NS_PER_S)
+Span = tuple[int, int]  # of time: nanoseconds since the start, the second one exclusive
 
 
-def _times_in(parameter: Parameter, start_ns: int) -> tuple[int, int]:
-    """First and last number (exclusive) of the samples within the slice that begins at ``start_ns``."""
-    return parameter.first_from(start_ns), parameter.first_from(start_ns + round(SLICE_S * NS_PER_S))
+def _slices(parameters: Sequence[Parameter]) -> list[Span]:
+    """Spans of time that are read one after the other, as long as ``SLICE_ROWS`` allow."""
+    end_s = max(one.offset_s + one.samples / one.frequency_hz for one in parameters)
+    edges_s = SLICE_S * np.arange(math.floor(end_s / SLICE_S) + 2)
+    rows = np.zeros(len(edges_s) - 1)
+    for one in parameters:
+        rows += np.diff(np.clip((edges_s - one.offset_s) * one.frequency_hz, 0, one.samples))
+    spans, start, held = list[Span](), 0, 0.0
+    for number, here in enumerate(rows):
+        if held + here > SLICE_ROWS and number > start:
+            spans.append((_slice_ns(start), _slice_ns(number)))
+            start, held = number, 0.0
+        held += here
+    return [*spans, (_slice_ns(start), _slice_ns(len(rows)))]
 
 
-def _raw_batches(topics: dict[str, Parameter], start_ns: int, losses: _Losses) -> Iterator[RecordBatch]:
+def _slice_ns(number: int) -> int:
+    return number * round(SLICE_S * NS_PER_S)
+
+
+def _times_in(parameter: Parameter, span: Span) -> tuple[int, int]:
+    """First and last number (exclusive) of the samples within a span of time."""
+    return parameter.first_from(span[0]), parameter.first_from(span[1])
+
+
+def _raw_batches(topics: dict[str, Parameter], span: Span, losses: _Losses) -> Iterator[RecordBatch]:
     for topic, parameter in topics.items():
-        first, last = _times_in(parameter, start_ns)
+        first, last = _times_in(parameter, span)
         if last <= first:
             continue
         try:
-            values, is_valid = parameter.read(first, last)
+            samples = parameter.read(first, last)
         except FAILURES as error:
             losses.add(parameter.name, error, last - first)
             continue
+        if samples.lost:
+            losses.add(parameter.name, samples.reason, samples.lost)
         times_ns = parameter.times_ns(first, last)
-        batch = _batch(topic, times_ns, {"value": Column(values, is_valid)})
+        batch = _batch(topic, times_ns, {"value": Column(samples.values, samples.is_valid)})
         if batch is not None:
             yield batch
 
 
 def _canonical_batches(
-    feeds: dict[str, tuple[Feed, ...]], track: Feed | None, start_ns: int, losses: _Losses
+    feeds: dict[str, tuple[Feed, ...]], track: Feed | None, span: Span, losses: _Losses
 ) -> Iterator[RecordBatch]:
     for topic, several in feeds.items():
         leader = several[0].parameter
-        times_ns = leader.times_ns(*_times_in(leader, start_ns))
+        times_ns = leader.times_ns(*_times_in(leader, span))
         columns: dict[str, Column] = {}
         for feed in (*several, *((track,) if track is not None and topic == "ins" else ())):
             try:
@@ -125,9 +152,22 @@ def _canonical_batches(
             is_flag = feed.field.kind == "bool"
             columns[feed.field.name] = Column(values != 0.0 if is_flag else values, present)
         _with_velocities(columns)
+        known, zeros = placed(topic, columns)
+        if len(zeros):
+            losses.nowhere[topic] += len(zeros)
+            clocks = {(one.parameter.offset_s, one.parameter.frequency_hz) for one in several}
+            columns = known | (_apart(columns, known) if len(clocks) > 1 and "latitude_deg" in known else {})
         batch = _batch(topic, times_ns, columns)
         if batch is not None:
             yield batch
+
+
+def _apart(columns: dict[str, Column], placed: dict[str, Column]) -> dict[str, Column]:
+    """Positions but for those beside a row of zeros, which were interpolated from it."""
+    is_zero = columns["latitude_deg"].mask & ~placed["latitude_deg"].mask
+    beside = np.append(False, is_zero[:-1]) | np.append(is_zero[1:], False)
+    names = ("latitude_deg", "longitude_deg")
+    return {name: Column(placed[name].values, placed[name].mask & ~beside) for name in names}
 
 
 def _with_velocities(columns: dict[str, Column]) -> None:
@@ -151,10 +191,12 @@ def _batch(topic: str, times_ns: Int64Array, columns: dict[str, Column]) -> Reco
     return RecordBatch(topic, np.zeros(int(rows.sum()), dtype=np.int64), Column(times_ns[rows]), kept)
 
 
-def _numbered(batch: RecordBatch, instants: Int64Array, next_index: int) -> RecordBatch:
-    """A batch with its place in the source: the instants of the recording are numbered in order of time."""
+def _numbered(batch: RecordBatch, instants: Int64Array, next_index: int) -> Iterator[RecordBatch]:
+    """A batch, in parts that are not too long, with its place in the source: instants are numbered in order of time."""
     index = next_index + np.searchsorted(instants, batch.device_time_ns.values).astype(np.int64)
-    return RecordBatch(batch.topic, index, batch.device_time_ns, batch.columns)
+    whole = RecordBatch(batch.topic, index, batch.device_time_ns, batch.columns)
+    for start in range(0, len(whole), MAX_BATCH_ROWS):
+        yield whole if len(whole) <= MAX_BATCH_ROWS else whole.take(slice(start, start + MAX_BATCH_ROWS))
 
 
 @dataclass

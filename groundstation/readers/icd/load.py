@@ -21,7 +21,7 @@ from groundstation.readers.icd.model import (
     Transform,
     Word429,
 )
-from groundstation.readers.icd.signals import by_name, canonical_factor, unit_of
+from groundstation.readers.icd.signals import by_name, canonical_factor, is_count, unit_of
 from groundstation.readers.icd.words_1553 import WORDS_OF
 from groundstation.readers.icd.yaml_text import Value, kind_of_value, read_yaml
 
@@ -370,4 +370,6 @@ class _Checker:
         factor = 1.0 if transform and wanted == "deg" else canonical_factor(element.unit, signal)
         if factor is None:
             self.fail(f"{place}: uom", repr(element.unit), f"a unit of {signal}")
+        if is_count(element) and (wanted or transform):
+            self.fail(f"{place}: msbval", "0, a count", f"the value of the most significant bit: {signal} has a unit")
         return replace(element, signal=signal, factor=sign * factor, transform=transform)

@@ -127,10 +127,21 @@ def by_name(element: AnyElement, holders: Iterable[str]) -> AnyElement:
     field = "track_deg" if is_gnss and named.field == TRUE_TRACK else named.field
     signal = f"{'gnss' if is_gnss else 'ins'}.{field}"
     factor = named.sign if named.transform else canonical_factor(element.unit, signal)
-    if factor is None or unit_of(signal) is None:
+    if factor is None or unit_of(signal) is None or is_count(element):
         return element
     sign = 1.0 if named.transform else named.sign
     return replace(element, signal=signal, factor=sign * factor, transform=named.transform, is_by_name=True)
+
+
+def is_count(element: Element) -> bool:
+    """Check for a plain count: bits without a value, of which the unit says nothing.
+
+    Examples
+    --------
+    >>> is_count(Element("Latitude", "SIGNED32", 0.0, "deg")), is_count(Element("Latitude", "FLOAT32_IEEE", 0.0, "deg"))
+    (True, False)
+    """
+    return element.msbval == 0.0 and element.schema != "BCD" and not element.schema.startswith(("FLOAT", "CAPS"))
 
 
 def signal_values(values: FloatArray, element: Element) -> FloatArray:

@@ -4,11 +4,12 @@ import re
 from collections.abc import Iterator
 
 from groundstation.base.records import Item
+from groundstation.readers.receiver import host_text
 from groundstation.readers.receiver.checksums import binary_frame_at, is_novatel_text, is_sentence
 from groundstation.readers.source import Claim, Source
 
 NAME = "receiver"
-_NAME = rb"(?<![ -~].)(?=[A-Z][A-Z0-9]{2,9},)"  # behind a $ or ! with no text before it
+_NAME = rb"(?<![ -~].)(?=[A-Z][A-Z0-9]{2,29},)"  # behind a $ or ! with no text before it
 _ASCII = rb"(?=[A-Z][A-Z0-9_]*A,)"  # NovAtel's messages as text
 # Every branch begins with one byte: then re skips what begins none, seven times as fast.
 _START = re.compile(
@@ -20,7 +21,7 @@ _LEADING = 2  # bytes in front of the first frame that are still a beginning: th
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim what begins with a frame, or holds several in its first 64 KiB."""
+    """Claim what begins with a frame, or holds several in its first 64 KiB, alone or in a computer's text."""
     head = source.head[:_LOOKED_AT]
     found = 0
     for tried, match in enumerate(_START.finditer(head)):
@@ -34,7 +35,7 @@ def sniff(source: Source) -> Claim | None:
         found += 1
         if found == _ENOUGH:
             return Claim(NAME, confidence=0.7)
-    return None
+    return Claim(NAME, confidence=0.6) if host_text.find(head) else None
 
 
 def _is_frame(head: bytes, at: int) -> bool:

@@ -3,7 +3,7 @@
 import re
 import zlib
 
-_SENTENCE = re.compile(rb"[$!]([A-Z][A-Z0-9]{2,9},[ -#%-)+-~]{0,500})(?:\*([0-9A-Fa-f]{2}))?(?=[\r\n]|$)")
+_SENTENCE = re.compile(rb"[$!]([A-Z][A-Z0-9]{2,29},[ -#%-)+-~]{0,500})(?:\*([0-9A-Fa-f]{2})|(?=[\r\n]|$))")
 
 _NOVATEL_TEXT = re.compile(rb"[#%]([A-Z][A-Z0-9_]*A,[ -)+-~]{0,8000};[ -)+-~]{0,8000})\*([0-9A-Fa-f]{8})")
 

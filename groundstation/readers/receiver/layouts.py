@@ -4,7 +4,7 @@
 little-endian type (u, i, r, and c for texts, with a number of bytes); ``/1e7`` divides; ``+lonHp`` adds a finer part
 that stands in a field of its own; ``x`` is a field of bits from the lowest on, one bit each unless a number says more;
 ``-`` is passed over; ``@12`` goes to a byte of the payload. Behind ``|`` stands the group that repeats: as often as the
-field named first says, ``*`` to the end of the message.
+field named first says, ``*`` to the end of the message. Behind another ``|`` stands how many bytes may follow.
 """
 
 import re
@@ -44,6 +44,11 @@ class Part:
     fields: tuple[Field, ...]
     ends: dict[str, int]
 
+    def values(self, records: NDArray[Any], name: str) -> NDArray[Any]:
+        """Values of one field, which has no finer part."""
+        field = next(field for field in self.fields if field.name == name)
+        return _values(records, field, {})
+
     def columns(self, records: NDArray[Any], size: int | None = None) -> dict[str, Column]:
         """Values by name; members that end behind byte ``size`` of the payload are left out."""
         fine = {field.fine for field in self.fields if field.fine}
@@ -57,16 +62,25 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """What a message holds; ``count`` names the field that tells how often the group repeats (``*``: as it fits)."""
+    """What a message holds; ``count`` names the field that tells how often the group repeats (``*``: as it fits).
+
+    ``tail`` bytes may stand behind the groups; they are not read.
+    """
 
     head: Part
     group: Part | None = None
     count: str = ""
+    tail: int = 0
 
     @property
     def size(self) -> int:
         """Bytes of the head."""
         return self.head.dtype.itemsize
+
+    @property
+    def needed(self) -> int:
+        """Bytes of the head without those behind its last field, which are passed over."""
+        return max(self.head.ends.values())
 
 
 @cache
@@ -82,9 +96,9 @@ def layout(text: str) -> Layout:
     >>> short.count, short.group.dtype.itemsize
     ('*', 2)
     """
-    head, _, group = text.partition("|")
+    head, group, tail = (*text.split("|"), "", "")[:3]
     count, _, repeated = group.strip().partition(" ")
-    return Layout(_part(head), _part(repeated) if group else None, count)
+    return Layout(_part(head), _part(repeated) if group else None, count, int(tail or 0))
 
 
 def _part(text: str) -> Part:

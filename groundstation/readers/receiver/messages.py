@@ -2,12 +2,20 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.records import MAX_BATCH_ROWS, MAX_TEXT_CHARACTERS, Column, Int64Array, RecordBatch
+from groundstation.base.records import (
+    MAX_BATCH_ROWS,
+    MAX_TEXT_CHARACTERS,
+    BoolArray,
+    Column,
+    Int64Array,
+    RecordBatch,
+)
 from groundstation.readers.receiver.layouts import Layout
 from groundstation.readers.receiver.stream import Frames
 
@@ -31,6 +39,9 @@ class Messages:
         Their payloads in ``frames.data``.
     layout : Layout or None
         None: not known here, the bytes are kept.
+    is_sound : bool
+        Whether payloads hold all fields of the layout, or of an older version of the message: what is shorter is
+        damage, of which the fields that are there are kept, and nothing else is made.
     """
 
     name: str
@@ -39,6 +50,7 @@ class Messages:
     payload_at: Int64Array
     payload_sizes: Int64Array
     layout: Layout | None
+    is_sound: bool = True
 
     def __len__(self) -> int:
         return len(self.places)
@@ -54,14 +66,42 @@ class Messages:
         is_usual = self.layout is None or self.size >= self.layout.size
         return f"raw.{self.name}" if is_usual else f"raw.{self.name}.{self.size}"
 
-    def head(self) -> NDArray[Any]:
-        """Heads as structures, shape (n,)."""
+    @cached_property
+    def _head(self) -> NDArray[Any]:
         assert self.layout is not None
         return self.frames.records(self.payload_at, self.layout.head.dtype)
+
+    def head(self) -> NDArray[Any]:
+        """Heads as structures, shape (n,)."""
+        return self._head
 
     def has(self, member: str) -> bool:
         """Whether the heads have a member."""
         return self.layout is not None and self.layout.head.ends.get(member, self.size + 1) <= self.size
+
+    @property
+    def is_short(self) -> bool:
+        """Whether payloads are shorter than the layout, and of no older version that is known."""
+        if self.layout is None or self.size >= self.layout.size:
+            return False  # also of a text that its layout does not fit: is_sound tells that
+        return not self.is_sound or self.size >= self.layout.needed
+
+    def misfits(self) -> BoolArray:
+        """Messages whose payload is longer than the layout, or does not hold the group as often as it says."""
+        if self.layout is None or self.size < self.layout.size:
+            return np.zeros(len(self), dtype=bool)
+        behind = self.payload_sizes - self.layout.size
+        if self.layout.group is None:
+            return np.asarray(behind != 0)
+        width = self.layout.group.dtype.itemsize
+        told = np.zeros(len(self), dtype=np.int64) if self.layout.count == "*" else self._told()
+        as_they_fit = (told == 0) & (behind % width == 0)  # as older versions that tell no count
+        return np.asarray((behind != width * told) & (behind != width * told + self.layout.tail) & ~as_they_fit)
+
+    def _told(self) -> Int64Array:
+        """Groups that each message says it has."""
+        assert self.layout is not None
+        return self.layout.head.values(self.head(), self.layout.count).astype(np.int64)
 
     def group(self) -> tuple[NDArray[Any], Int64Array, Int64Array]:
         """Members of the repeated groups: structures, which message each is of, and its place in the file."""
@@ -70,17 +110,13 @@ class Messages:
         fits = np.maximum(self.payload_sizes - self.layout.size, 0) // width
         counts = fits
         if self.layout.count != "*":
-            told = _column(self.layout, self.head(), self.layout.count).astype(np.int64)
+            told = self._told()
             counts = np.where(told > 0, np.minimum(told, fits), fits)
         owner, number = _repeated(counts)
         records = self.frames.records(
             self.payload_at[owner] + self.layout.size + number * width, self.layout.group.dtype
         )
         return records, owner, self.places[owner] + 1 + number
-
-
-def _column(layout: Layout, head: NDArray[Any], name: str) -> NDArray[Any]:
-    return layout.head.columns(head)[name].values
 
 
 def _repeated(counts: Int64Array) -> tuple[Int64Array, Int64Array]:
@@ -143,11 +179,11 @@ def bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
 
 
 class Block(dict[str, Messages]):
-    """Messages of a block by name; of a name that occurs with several lengths the most."""
+    """Sound messages of a block by name; of a name that occurs with several lengths the most."""
 
     def add(self, messages: Messages) -> None:
         """Take in messages."""
-        if len(messages) > len(self.get(messages.name, ())):
+        if messages.is_sound and len(messages) > len(self.get(messages.name, ())):
             self[messages.name] = messages
 
     def fields(self, name: str) -> "dict[str, NDArray[Any]] | None":

@@ -16,10 +16,12 @@ from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatc
 from groundstation.base.timescales import gps_week_to_utc_ns
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.receiver import novatel_text, scan
+from groundstation.readers.receiver.credible import credible_attitude, credible_dilution, credible_position
 from groundstation.readers.receiver.layouts import layout
 from groundstation.readers.receiver.messages import Block, Columns, Messages, occupied
 from groundstation.readers.receiver.novatel_messages import LAYOUTS, VELOCITY_OF, name_of
 from groundstation.readers.receiver.stream import Frames
+from groundstation.readers.receiver.tally import Tally
 from groundstation.readers.receiver.ubx import FIRST_WEEK, LAST_WEEK
 
 LONG = np.dtype(
@@ -44,14 +46,15 @@ _MS_PER_WEEK = 604_800_000
 _COMPUTED = 0
 _ALIGNING, _GOOD, _FREE = (1, 8, 9, 10, 11, 12), (2, 3, 7), 6
 _MODES = np.array(["", "align", "gnss_aided", "nav"])
+_HEIGHT_IS_GIVEN, _LAST_TYPE = 2, 255  # types of position: FIXEDHEIGHT, and the last that is looked up
 
 
 def _fixes() -> NDArray[np.str_]:
-    """Kind of solution by NovAtel's type of position."""
-    kinds = {"other": (1,), "2d": (2,), "3d": (8, 16), "dgnss": (17, 18), "dead_reckoning": (19,)}
+    """Kind of solution by NovAtel's type of position; ``other`` by a type that is not known."""
+    kinds = {"none": (0,), "2d": (2,), "3d": (8, 16), "dgnss": (17, 18, 20, 64, 65, 66), "dead_reckoning": (19,)}
     kinds |= {"ppp": (68, 69, 77, 78), "rtk_float": (32, 33, 34), "rtk_fixed": (48, 49, 50, 51)}
-    kinds |= {"gnss_ins": (52, 53, 54, 55, 56, 73, 74, 79, 80)}
-    fixes = np.full(256, "none", dtype="<U16")
+    kinds |= {"gnss_ins": (52, 53, 54, 55, 56, 57, 58, 59, 73, 74, 79, 80)}
+    fixes = np.full(_LAST_TYPE + 1, "other", dtype="<U16")
     for name, numbers in kinds.items():
         fixes[list(numbers)] = name
     return fixes
@@ -77,7 +80,8 @@ class Timed(Messages):
         week = np.where(is_long, longs["week"], shorts["week"]).astype(np.int64)
         week_ms = np.where(is_long, longs["week_ms"], shorts["week_ms"]).astype(np.int64)
         known = (week >= FIRST_WEEK) & (week < LAST_WEEK) & (week_ms < _MS_PER_WEEK)
-        return week, week_ms, known & (~is_long | (longs["status"] >= _LEAST_TIME_STATUS))
+        has_status = (longs["status"] >= _LEAST_TIME_STATUS) & (longs["header"] >= LONG.itemsize)
+        return week, week_ms, known & (~is_long | has_status)
 
     @property
     def frame_at(self) -> Int64Array:
@@ -115,10 +119,12 @@ def _by_size(name: str, frames: Frames, at: Int64Array, payload_at: Int64Array, 
     """Messages with a layout whose payloads are shorter than it apart from the others."""
     known = layout(LAYOUTS[name]) if name in LAYOUTS else None
     is_short = sizes < (known.size if known is not None else 0)
+    is_odd = name.removesuffix(novatel_text.KEPT) in LAYOUTS and known is None
     for size in (*np.unique(sizes[is_short]).tolist(), None):
         rows = np.flatnonzero(~is_short if size is None else is_short & (sizes == size))
         if len(rows):
-            yield Timed(name, frames, frames.first_byte + at[rows], payload_at[rows], sizes[rows], known)
+            is_sound = not is_odd if size is None else known is not None and size >= known.needed
+            yield Timed(name, frames, frames.first_byte + at[rows], payload_at[rows], sizes[rows], known, is_sound)
 
 
 def epoch_start(frames: Frames) -> int:
@@ -137,31 +143,36 @@ def epoch_start(frames: Frames) -> int:
     return int(which[0])
 
 
-def gnss_batch(block: Block, leader: str) -> RecordBatch | None:
+@np.errstate(all="ignore")  # doubles of a device may be anything
+def gnss_batch(block: Block, leader: str, tally: Tally) -> RecordBatch | None:
     """One row a position, with velocity and dilution of the same moment."""
     messages, fields = block.get(leader), block.fields(leader)
     if not isinstance(messages, Timed) or fields is None:
         return None
     computed = fields["solution_status"] == _COMPUTED
     height, undulation = fields["orthometric_height"], fields["undulation"].astype(np.float64)
-    kind = np.where(computed, np.minimum(fields["position_type"], len(_FIXES) - 1), 0)
+    kind = np.where(computed, np.minimum(fields["position_type"], _LAST_TYPE), 0)
+    flat = kind == _HEIGHT_IS_GIVEN
+    upright = computed & ~flat
     columns = {
         "latitude_deg": Column(fields["latitude"], computed),
         "longitude_deg": Column(fields["longitude"], computed),
-        "altitude_msl_m": Column(height, computed),
-        "altitude_ellipsoid_m": Column(height + undulation, computed),
+        "altitude_msl_m": Column(height, upright),
+        "altitude_ellipsoid_m": Column(height + undulation, upright),
         "horizontal_sigma_m": Column(_root(fields, "latitude_std_dev", "longitude_std_dev"), computed),
-        "vertical_sigma_m": Column(fields["height_std_dev"].astype(np.float64), computed),
+        "vertical_sigma_m": Column(fields["height_std_dev"].astype(np.float64), upright),
         "satellites_used": Column(fields["num_soln_svs"].astype(np.float64)),
-        "integrity_ok": Column(computed),
+        "integrity_ok": Column(computed, ~flat),
         "fix": Column(_FIXES[kind]),
     }
     columns |= _joined(block, messages, VELOCITY_OF[leader], _velocity)
     columns |= _joined(block, messages, "PSRDOP", _dilution)
+    columns = credible_position(credible_dilution(columns), "gnss", messages.places, tally)
     return occupied("gnss", messages.places, messages.time(), columns)
 
 
-def ins_batch(block: Block, source: str) -> RecordBatch | None:
+@np.errstate(all="ignore")
+def ins_batch(block: Block, source: str, tally: Tally) -> RecordBatch | None:
     """Position, velocity and attitude of the receiver's inertial filter, or the heading of its two antennas."""
     messages, fields = block.get(source), block.fields(source)
     if not isinstance(messages, Timed) or fields is None:
@@ -173,6 +184,7 @@ def ins_batch(block: Block, source: str) -> RecordBatch | None:
         for other, columns_of in (("INSCOV", _covariance), ("INSCOVS", _covariance), ("INSSTDEV", _spreads)):
             if "roll_std_dev" not in fields:
                 columns |= _joined(block, messages, other, columns_of)
+    columns = credible_attitude(credible_position(columns, "ins", messages.places, tally), messages.places, tally)
     return occupied("ins", messages.places, _solution_time(messages, fields), columns)
 
 
@@ -194,7 +206,7 @@ def _inertial(fields: Mapping[str, NDArray[Any]]) -> Columns:
     columns = {
         "roll_deg": Column(fields["roll"], known),
         "pitch_deg": Column(fields["pitch"], known),
-        "true_heading_deg": Column(wrap_360(fields["azimuth"]), known),
+        "true_heading_deg": Column(fields["azimuth"], known),
         "mode": Column(_MODES[mode], mode > 0),
         "valid": Column(known),
     }
@@ -219,7 +231,7 @@ def _inertial(fields: Mapping[str, NDArray[Any]]) -> Columns:
 def _two_antennas(fields: Mapping[str, NDArray[Any]]) -> Columns:
     known = fields["solution_status"] == _COMPUTED
     return {
-        "true_heading_deg": Column(wrap_360(fields["heading"].astype(np.float64)), known),
+        "true_heading_deg": Column(fields["heading"].astype(np.float64), known),
         "true_heading_sigma_deg": Column(fields["heading_std_dev"].astype(np.float64), known),
         "mode": Column(np.full(len(known), "gnss_aided"), known),
     }
@@ -258,8 +270,7 @@ def _covariance(fields: Mapping[str, NDArray[Any]]) -> Columns:
     """Roots of the diagonals: position and velocity x east, y north, z up; attitude about x (pitch), y (roll), z."""
 
     def root(kind: str, *axes: int) -> Column:
-        with np.errstate(invalid="ignore"):
-            return Column(np.sqrt(sum(fields[f"{kind}_cov_{axis}"] for axis in axes)))
+        return Column(np.sqrt(sum(fields[f"{kind}_cov_{axis}"] for axis in axes)))
 
     return {
         "pitch_sigma_deg": root("att", 1),

@@ -21,7 +21,9 @@ _BESTPOS = (
     f"solution_status:u4 position_type:u4 {_PLACE} datum_id:u4 {_PLACE_SPREAD} base_id:c4 diff_age:r4 solution_age:r4 "
     f"{_COUNTS}{_SIGNALS}"
 )
-_BESTVEL = "solution_status:u4 type:u4 latency:r4 diff_age:r4 horizontal_speed:r8 ground_track:r8 vertical_speed:r8"
+_BESTVEL = (
+    "solution_status:u4 type:u4 latency:r4 diff_age:r4 horizontal_speed:r8 ground_track:r8 vertical_speed:r8 -:r4"
+)
 _HEADING = (
     "solution_status:u4 position_type:u4 b_length:r4 heading:r4 pitch:r4 -:r4 heading_std_dev:r4 pitch_std_dev:r4 "
 )
@@ -48,6 +50,8 @@ LAYOUTS: Mapping[str, str] = MappingProxyType(
         "INSSTDEV": f"{_SPREADS} -:u2 enabled_updates:u4 -:u4",
         "CORRIMUDATA": _IMU,
         "CORRIMUDATAS": _IMU,
+        "TIME": "clock_status:u4 offset:r8 offset_std_dev:r8 utc_offset:r8 utc_year:u4 utc_month:u1 utc_day:u1 "
+        "utc_hour:u1 utc_min:u1 utc_ms:u4 utc_status:u4",
         "HEADING": f"{_HEADING}base_id:c4 {_COUNTS}{_SIGNALS}",
         "HEADING2": f"{_HEADING}rover_id:c4 base_id:c4 {_COUNTS}{_SIGNALS}",
         "DUALANTENNAHEADING": f"{_HEADING}base_id:c4 {_COUNTS}{_SIGNALS}",

@@ -66,12 +66,16 @@ _DATUM = _numbered(
     "VITI WAK60 WGS72 WGS84 ZANDE USER CSRS PE90=88",
     1,
 )
+_CLOCK = _numbered("VALID CONVERGING ITERATING INVALID")
+_UTC = _numbered("INVALID VALID WARNING")
 _ENUMERATIONS: Mapping[str, Mapping[str, int]] = {
     "solution_status": _SOLUTION,
     "position_type": _POSITION,
     "type": _POSITION,
     "ins_solution_status": _INS,
     "datum_id": _DATUM,
+    "clock_status": _CLOCK,
+    "utc_status": _UTC,
 }
 _HEXADECIMAL = frozenset(
     ("extended_solution_status2", "ext_sol_stat", "gal_and_bds_mask", "gps_and_glo_mask", "extended_sol_stat")
@@ -159,8 +163,10 @@ def _body(name: str, text: str) -> bytes | None:
         if len(cells) < len(head):
             return None
         found = b"".join(_packed(*field, cell) for field, cell in zip(head, cells, strict=False))
-        rest = cells[len(head) :] if group else []
-        for start in range(0, len(rest), max(len(group), 1)):
+        rest = cells[len(head) :]
+        if not group:
+            return found + bytes(len(rest))  # cells behind the layout make the body longer than it
+        for start in range(0, len(rest), len(group)):
             part = rest[start : start + len(group)]
             found += b"".join(_packed(*field, cell) for field, cell in zip(group, part, strict=True))
     except (ValueError, OverflowError, struct.error):

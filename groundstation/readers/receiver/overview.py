@@ -10,11 +10,22 @@ from groundstation.base.records import Damage, Int64Array, Remark
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver import nmea, novatel, novatel_messages, scan, ubx
+from groundstation.readers.receiver.dating import Told, dated
+from groundstation.readers.receiver.host_text import HostText
+from groundstation.readers.receiver.host_times import HostTimes
+from groundstation.readers.receiver.host_times import remarks as host_remarks
 from groundstation.readers.receiver.messages import Block, Messages
-from groundstation.readers.receiver.sentences import FORMATTERS, Sentences, by_address
+from groundstation.readers.receiver.nmea_canonical import HEADING_FORMATTERS, has_heading
+from groundstation.readers.receiver.sentence_layouts import FORMATTERS, MAKERS_POSITIONS, RECEIVERS, STANDARD_POSITIONS
+from groundstation.readers.receiver.sentences import Sentences, by_address, formatter_of
 from groundstation.readers.receiver.stream import Frames, Stream
-from groundstation.readers.receiver.times import DAY_NS, Anchors
-from groundstation.readers.receiver.ubx_canonical import ATTITUDE_SOURCES, POSITION_SOURCES, has_attitude
+from groundstation.readers.receiver.times import Anchors
+from groundstation.readers.receiver.ubx_canonical import (
+    ATTITUDE_SOURCES,
+    OTHER_SOLUTIONS,
+    POSITION_SOURCES,
+    has_attitude,
+)
 from groundstation.readers.source import Source
 
 NAME = "receiver"
@@ -33,9 +44,17 @@ class Overview:
     anchors : Anchors
         Full times.
     leader : str
-        UBX message that leads the rows of ``gnss``; empty: sentences give them.
+        Binary message that leads the rows of ``gnss``; empty: sentences give them.
+    choice : Choice
+        Which sentences do.
     attitude : str
         Message or formatter that gives ``ins``; empty where none does.
+    heading_address : str
+        Address of the sentences that do; empty where a binary message does.
+    arrivals : Anchors, optional
+        Times of arrival by the clock of the computer that recorded, where the stream tells no time.
+    is_absolute : bool
+        Whether times are UTC.
     blocks : list of Frames and their sentences
         Those of a stream that is one block: they need not be looked for again. Empty for a longer one.
     damages : tuple of Damage
@@ -45,7 +64,11 @@ class Overview:
     counts: Counter[str] = field(default_factory=Counter)
     anchors: Anchors = field(default_factory=lambda: ubx.FullTimes().anchors())
     leader: str = ""
+    choice: nmea.Choice = nmea.ALL
     attitude: str = ""
+    heading_address: str = ""
+    arrivals: Anchors | None = None
+    is_absolute: bool = False
     metadata: dict[str, str] = field(default_factory=dict)
     remarks: list[Remark] = field(default_factory=list)
     rtcm: Counter[int] = field(default_factory=Counter)
@@ -53,26 +76,34 @@ class Overview:
     damages: tuple[Damage, ...] = ()
 
 
-def overview(source: Source, bare: bool) -> Overview:
-    """Walk through a stream once."""
-    found, full_times, attitudes = Overview(), ubx.FullTimes(), Counter[str]()
+def overview(source: Source, bare: bool, host: HostText | None = None) -> Overview:
+    """Walk through a stream once; ``host`` is how a computer wrote around the sentences."""
+    found, full_times, attitudes, sound = Overview(), ubx.FullTimes(), Counter[str](), set[str]()
     places, utc_ns = [], []
-    stream = Stream(source, bare)
+    stream = Stream(source, bare, is_hosts=host.accepts if host else None)
+    host_clock = HostTimes(host) if host else None
     for frames in stream:
         block = Block()
         for messages in ubx.messages_of(frames):
             found.counts[messages.name] += len(messages)
-            full_times.take(messages)
+            if messages.is_sound:
+                full_times.take(messages)
+                sound.add(messages.name)
             block.add(messages)
         for timed in novatel.messages_of(frames):
             found.counts[timed.name] += len(timed)
+            sound |= {timed.name} if timed.is_sound else set()
             full_times.take_time(timed.places, timed.time())
+            full_times.note_utc_offset(timed)
         attitudes.update(name for name in ATTITUDE_SOURCES if has_attitude(block, name))
         if _VERSION in block and not found.metadata:
             found.metadata = _versions(block[_VERSION])
         sentences = by_address(frames)
         for one in sentences.values():
             found.counts[one.address] += len(one)
+            attitudes[one.address] += len(one) if attitudes[one.address] or has_heading(one) else 0
+        if host_clock is not None:
+            host_clock.take(frames, nmea.epochs_of(sentences))
         found.blocks.append((frames, sentences))
         del found.blocks[1 + MOST_BLOCKS_KEPT :]
         told = nmea.full_times(sentences)
@@ -83,51 +114,72 @@ def overview(source: Source, bare: bool) -> Overview:
         found.blocks.clear()
     else:
         found.damages = tuple(stream.damages())
-    _choose(found, attitudes)
-    _set_times(found, full_times, np.concatenate([*places, _NOTHING]), np.concatenate([*utc_ns, _NOTHING]))
+    _choose(found, attitudes, sound)
+    _set_times(found, full_times, np.concatenate([*places, _NOTHING]), np.concatenate([*utc_ns, _NOTHING]), source)
+    if host_clock is not None:
+        _take_hosts(found, host_clock)
     return found
 
 
 _NOTHING: Int64Array = np.zeros(0, dtype=np.int64)
 
 
-def _choose(found: Overview, attitudes: Counter[str]) -> None:
+def _choose(found: Overview, attitudes: Counter[str], sound: set[str]) -> None:
+    """Choose what gives ``gnss`` and ``ins``: of several the first in the order of the tables, for the whole stream."""
     leaders = (*POSITION_SOURCES, *novatel_messages.POSITION_SOURCES)
-    found.leader = next((name for name in leaders if found.counts[name]), "")
+    found.leader = next((name for name in leaders if name in sound), "")
+    found.choice = _choice_of(found.counts)
     found.attitude = next((name for name in ATTITUDE_SOURCES if attitudes[name]), "")
     if not found.attitude:
-        found.attitude = next((name for name in novatel_messages.INS_SOURCES if found.counts[name]), "")
-    formatters = {_formatter(name) for name in found.counts}
+        found.attitude = next((name for name in novatel_messages.INS_SOURCES if name in sound), "")
     if not found.attitude:
-        found.attitude = next((name for name in nmea.HEADING_FORMATTERS if name in formatters), "")
+        for formatter in HEADING_FORMATTERS:
+            told = sorted((-count, name) for name, count in attitudes.items() if formatter_of(name) == formatter)
+            if told and told[0][0]:
+                found.attitude, found.heading_address = formatter, told[0][1]
+                break
     if found.attitude:
         found.metadata["ins_kind"] = "gnss_aided"
 
 
-def _formatter(name: str) -> str:
-    return name if name in FORMATTERS else name[2:]
+def _choice_of(counts: Counter[str]) -> nmea.Choice:
+    """Sentences that give ``gnss``, by the addresses of a stream."""
+    positions = {name for name in counts if formatter_of(name) in STANDARD_POSITIONS}
+    if not positions:
+        return nmea.Choice(maker=next((name for name in MAKERS_POSITIONS if counts[name]), ""))
+    if not any(name.startswith(RECEIVERS) for name in positions):
+        return nmea.ALL
+    others = {name for name in counts if formatter_of(name) in FORMATTERS and not name.startswith(("P", *RECEIVERS))}
+    return nmea.Choice(passed_over=frozenset(others))
 
 
-def _set_times(found: Overview, full_times: ubx.FullTimes, places: Int64Array, utc_ns: Int64Array) -> None:
-    """Anchors of UBX where there are any, of sentences elsewhere; and what is odd about them."""
-    by_ubx = full_times.anchors()
+def _set_times(
+    found: Overview, full_times: ubx.FullTimes, places: Int64Array, utc_ns: Int64Array, source: Source
+) -> None:
+    """Note the full times of a stream, and what is odd about them."""
     order = np.argsort(places, kind="stable")
-    by_nmea = Anchors(places[order], utc_ns[order], np.full(len(places), -1, dtype=np.int64))
-    found.anchors = by_ubx if len(by_ubx) else by_nmea
-    for wrong_s, count in sorted(full_times.wrong_leaps.items()):
-        text = (
-            f"{count} fixes told UTC {abs(wrong_s)} s {'late' if wrong_s > 0 else 'early'}, as a receiver does before "
-            "its first almanac: their times are GPS time less the leap seconds of the day"
-        )
-        found.remarks.append(Remark("leap_seconds", text))
-    if len(by_ubx) and len(by_nmea):
-        apart_ns = int(by_nmea.utc_ns[-1] - by_ubx.utc_ns[-1])
-        if abs(apart_ns) > DAY_NS:
-            text = (
-                f"sentences tell {utc_ns_to_iso(int(by_nmea.utc_ns[-1]), 0)}, binary messages "
-                f"{utc_ns_to_iso(int(by_ubx.utc_ns[-1]), 0)}: the binary ones are believed"
-            )
-            found.remarks.append(Remark("date_disagrees", text))
+    told = Told(
+        of_week=full_times.anchors(),
+        of_day=Anchors(places[order], utc_ns[order], np.full(len(places), -1, dtype=np.int64)),
+        leaps=full_times.leaps,
+        wrong_leaps=full_times.wrong_leaps,
+        head=source.head,
+        hardware=found.metadata.get("receiver.hwVersion", ""),
+    )
+    times = dated(told)
+    found.anchors = times.anchors
+    found.is_absolute = bool(len(found.anchors))
+    found.remarks += times.remarks
+
+
+def _take_hosts(found: Overview, host_clock: HostTimes) -> None:
+    """Take the date, or times of arrival, from the computer's clock where the stream tells none."""
+    served = None if len(found.anchors) else host_clock.serve()
+    if served is not None:
+        found.arrivals, found.is_absolute = served.arrivals, served.is_absolute
+        if served.dates is not None:
+            found.anchors, found.is_absolute = served.dates, True
+    found.remarks += host_remarks(host_clock.host, host_clock.lines, served)
 
 
 def _versions(messages: Messages) -> dict[str, str]:
@@ -155,13 +207,7 @@ def _rtcm_numbers(frames: Frames) -> Iterator[int]:
 def remarks(found: Overview) -> Iterator[Remark]:
     """What serves as what, and what was passed over."""
     yield from found.remarks
-    if found.leader:
-        added = _ADDED.get(found.leader, ("NAV-DOP", "NAV-VELNED", "NAV-STATUS"))
-        others = ", ".join(name for name in added if found.counts[name])
-        text = f"gnss from {found.leader}" + (f" with {others} of the same epoch" if others else "")
-        sentences = sorted({_formatter(name) for name in found.counts} & {"GGA", "RMC", "GNS", "GLL"})
-        text += f"; the sentences of the same receiver ({', '.join(sentences)}) stay raw" if sentences else ""
-        yield Remark("mapped", text, "gnss")
+    yield from _gnss_remarks(found)
     if found.attitude:
         yield Remark("mapped", f"ins from {found.attitude}: {_ATTITUDE_SENSE[found.attitude]}", "ins", ("mode",))
     if found.rtcm:
@@ -176,8 +222,43 @@ def remarks(found: Overview) -> Iterator[Remark]:
             )
 
 
-_ADDED = dict.fromkeys(("NAV-PVT", "NAV-PVAT"), ("NAV-DOP", "NAV-HPPOSLLH")) | {
-    name: (velocity, "PSRDOP") for name, velocity in novatel_messages.VELOCITY_OF.items()
+def _gnss_remarks(found: Overview) -> Iterator[Remark]:
+    """What serves as ``gnss``, and the other solutions of the receiver, which would look like a second one."""
+    if found.leader:
+        others = ", ".join(name for name in _added_to(found.leader) if found.counts[name])
+        text = f"gnss from {found.leader}" + (f" with {others} of the same epoch" if others else "")
+        sentences = sorted({formatter_of(name) for name in found.counts} & {*STANDARD_POSITIONS})
+        text += f"; the sentences of the same receiver ({', '.join(sentences)}) stay raw" if sentences else ""
+        yield Remark("mapped", text, "gnss")
+    elif found.choice.maker:
+        yield Remark("mapped", f"gnss from {found.choice.maker}, as no standard sentence tells a position", "gnss")
+    for name in OTHER_SOLUTIONS:
+        if found.counts[name] and name != found.leader:
+            text = f"{name} ({found.counts[name]}) stays raw: {_OTHER_SENSE[name.partition('-')[0]]}"
+            yield Remark("skipped", text, f"raw.{name}")
+    if found.choice.passed_over and not found.leader:
+        names = ", ".join(sorted(found.choice.passed_over))
+        yield Remark("skipped", f"sentences of another device than the GNSS receiver stay raw: {names}")
+    told = {formatter_of(name) for name in found.counts}
+    if found.leader == "HNR-PVT" or found.choice.maker == "PUBX.00" or (not found.leader and told & {"RMC", "VTG"}):
+        text = "gnss: velocity_north_mps, velocity_east_mps derived from ground speed and track"
+        yield Remark("derived", text, "gnss", ("velocity_north_mps", "velocity_east_mps"))
+
+
+def _added_to(leader: str) -> tuple[str, ...]:
+    """Messages that add to the rows of the leading one."""
+    if leader in novatel_messages.VELOCITY_OF:
+        return novatel_messages.VELOCITY_OF[leader], "PSRDOP"
+    family = "NAV2" if leader.startswith("NAV2") else "NAV"
+    finer = ("NAV-HPPOSLLH",) if family == "NAV" and leader != "NAV-HPPOSLLH" else ()
+    if leader.endswith(("PVT", "PVAT")):
+        return f"{family}-DOP", *finer
+    return f"{family}-DOP", f"{family}-VELNED", f"{family}-SOL", f"{family}-STATUS", *finer
+
+
+_OTHER_SENSE = {
+    "HNR": "the receiver's solution between its epochs, predicted from the same measurements",
+    "NAV2": "the receiver's second solution, of the same antenna and without corrections or inertial sensors",
 }
 _FUSED = (
     "the receiver's own filter of GNSS and inertial sensors (gnss_aided); its position and velocity are those of gnss"
@@ -190,6 +271,8 @@ _ATTITUDE_SENSE = {
     "NAV-PVAT": _FUSED,
     "NAV-ATT": _FUSED,
     "NAV-PVT": _FUSED,
+    "HNR-ATT": _FUSED,
+    "HNR-PVT": _FUSED,
     "NAV-RELPOSNED": _TWO_ANTENNAS,
     "PASHR": _FUSED,
     **dict.fromkeys(

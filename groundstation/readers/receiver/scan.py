@@ -20,8 +20,9 @@ NOVATEL_SHORT_HEADER = 12
 TEXT_CRC_BYTES = 9  # of a NovAtel log as text: an asterisk and eight digits
 SHORTEST_TEXT = 28  # bytes of such a log, which are those of the binary header
 LONGEST = 66_000  # bytes of the longest frame that any protocol can write
-LONGEST_SENTENCE = 1_024
-DOLLAR, BANG, STAR, COMMA, CR, LF, HASH, PERCENT, SEMICOLON = 36, 33, 42, 44, 13, 10, 35, 37, 59
+LONGEST_SENTENCE, LONGEST_ADDRESS = 1_024, 31
+LONGEST_TEXT = 1_024  # bytes that a computer writes in front of a sentence or behind it
+DOLLAR, BANG, STAR, COMMA, CR, LF, TAB, HASH, PERCENT, SEMICOLON = 36, 33, 42, 44, 13, 10, 9, 35, 37, 59
 NO_FRAME, PENDING = 0, -1
 
 # Places in the state array.
@@ -103,7 +104,7 @@ def _bare_sentence(data: Any, at: int) -> int:
 @in_place
 def _is_address(data: Any, at: int) -> bool:
     """Whether two capital letters or more and a comma stand behind the first character of a sentence."""
-    for k in range(at + 1, min(at + 10, len(data))):
+    for k in range(at + 1, min(at + LONGEST_ADDRESS, len(data))):
         byte = data[k]
         if byte == COMMA:
             return k >= at + 3
@@ -213,16 +214,42 @@ def is_cut(data: Any, at: int) -> bool:
     return _declared(data, at) > len(data) - at
 
 
+@inlined
+def _is_text(byte: int) -> bool:
+    return 32 <= byte <= 126 or byte == TAB
+
+
+@in_place
+def _text_before(data: Any, start: int, at: int) -> int:
+    """Bytes of text between the beginning of a line and a place, from ``start`` on; 0 where other bytes are between."""
+    k = at
+    while k > start and at - k < LONGEST_TEXT and _is_text(data[k - 1]):
+        k -= 1
+    is_line = k == 0 or data[k - 1] == CR or data[k - 1] == LF
+    return at - k if is_line else 0
+
+
+@in_place
+def _text_behind(data: Any, at: int) -> int:
+    """Bytes of text from a place to the end of its line; 0 where another sentence or other bytes come before it."""
+    k = at
+    while k < len(data) and k - at < LONGEST_TEXT and _is_text(data[k]) and data[k] != DOLLAR:
+        k += 1
+    return k - at if k == len(data) or data[k] == CR or data[k] == LF else 0
+
+
 @in_place
 def scan(
     data: Any,
     is_last: bool,
     bare: bool,
+    hosted: bool,
     rtcm: Any,
     novatel: Any,
     offsets: Any,
     lengths: Any,
     kinds: Any,
+    texts: Any,
     spans: Any,
     state: Any,
 ) -> None:
@@ -235,10 +262,14 @@ def scan(
         Nothing follows ``data`` in the file; else the last LONGEST bytes are left for the next call.
     bare : bool
         Sentences without a checksum are taken.
+    hosted : bool
+        Text of the computer that recorded may stand in front of a sentence and behind it, in its line.
     rtcm, novatel : ndarrays of uint32, shape (256,)
         Tables of :func:`crc_tables`.
     offsets, lengths, kinds : ndarrays, out
         Where each frame begins, its bytes and protocol; appended at ``state[COUNT]``.
+    texts : ndarray of int64, shape (n, 2), out
+        Where ``hosted``: bytes of text in front of each frame and behind it, zeros before.
     spans : ndarray of int64, shape (k, 2), out
         Bytes that belong to no frame, from start to end; appended at ``state[SPANS]``.
     state : ndarray of int64
@@ -252,13 +283,18 @@ def scan(
             kind, length = _frame(data, at, bare, rtcm, novatel)
             doubted += 0 if length > 0 else _declared(data, at)
         if length > 0:
-            if skip != NOWHERE:
-                spans[state[SPANS], 0], spans[state[SPANS], 1] = skip, at
+            start, behind = at, 0
+            if hosted and kind in (NMEA, BARE_NMEA, NOVATEL_TEXT):
+                texts[count, 0] = _text_before(data, max(skip, 0), at) if skip != NOWHERE else 0
+                start, behind = at - texts[count, 0], _text_behind(data, at + length)
+                texts[count, 1] = behind
+            if skip != NOWHERE and skip < start:
+                spans[state[SPANS], 0], spans[state[SPANS], 1] = skip, start
                 state[SPANS] += 1
-                skip = NOWHERE
+            skip = NOWHERE
             offsets[count], lengths[count], kinds[count] = at, length, kind
             count += 1
-            at += length
+            at += length + behind
         else:
             if skip == NOWHERE and data[at] != CR and data[at] != LF:
                 skip = at

@@ -1,14 +1,13 @@
 """NMEA sentences of a block: fields found by one compiled loop, then whole columns at a time.
 
 A sentence is ``$`` + address + fields parted by commas. The address is a talker (GP, GN ...) and a formatter (GGA); P
-and letters of the maker where the sentence is a maker's own. Fields have the names of the table below, in the order of
-NMEA 0183 (4.11); a version that has fewer leaves the last ones out. An empty field is absent.
+and letters of the maker where the sentence is a maker's own, with the word behind it where that chooses the layout
+(``PUBX.00``). An empty field is absent.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
-from types import MappingProxyType
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -18,40 +17,21 @@ from groundstation.base.compile import in_place, inlined
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver import scan
+from groundstation.readers.receiver.sentence_layouts import FAMILIES, FORMATTERS
 from groundstation.readers.receiver.stream import Frames
 
-COMMA, STAR, POINT, MINUS, PLUS = 44, 42, 46, 45, 43
+COMMA, STAR, POINT, MINUS, PLUS, MAKERS = 44, 42, 46, 45, 43, 80  # P begins a maker's own address
 CHECKSUM_BYTES = 3
 MOST_DIGITS = 18  # of a number: more do not fit 64 bits
 MOST_BEHIND = 13  # digits behind the point of an angle
-ADDRESS_BYTES = 7
+ADDRESS_BYTES = 30  # of the longest address, PQTMCFGORIENTATIONERROR among them, and of the word behind it
+NAMELESS = "sentence"  # in place of an address that is none: such sentences are kept as text
+_EXACT_BYTES = 7  # of an address: they are its key; the bytes of a longer one are hashed
+_PRIME, _LONG = (1 << 55) - 55, 1 << 57  # hashes are below the first, so that the next byte fits 64 bits
 
-# Kinds of fields: n number, t time of day, d date, a latitude or longitude (its hemisphere is the next field), c text.
-_GROUP_OF_SATELLITE = " ".join(f"svid_0{k}:n elv_0{k}:n az_0{k}:n cno_0{k}:n" for k in range(1, 5))
-_PLACE = "lat:a NS:c lon:a EW:c"
-FORMATTERS: Mapping[str, str] = MappingProxyType(
-    {
-        "GGA": f"time:t {_PLACE} quality:n numSV:n HDOP:n alt:n altUnit:c sep:n sepUnit:c diffAge:n diffStation:n",
-        "GNS": f"time:t {_PLACE} posMode:c numSV:n HDOP:n alt:n sep:n diffAge:n diffStation:n navStatus:c",
-        "GLL": f"{_PLACE} time:t status:c posMode:c",
-        "RMC": f"time:t status:c {_PLACE} spd:n cog:n date:d mv:n mvEW:c posMode:c navStatus:c",
-        "VTG": "cogt:n cogtUnit:c cogm:n cogmUnit:c sogn:n sognUnit:c sogk:n sogkUnit:c posMode:c",
-        "GSA": "opMode:c navMode:n " + " ".join(f"svid_{k:02d}:n" for k in range(1, 13)) + " PDOP:n HDOP:n VDOP:n "
-        "systemId:c",
-        "GSV": f"numMsg:n msgNum:n numSV:n {_GROUP_OF_SATELLITE} signalID:c",
-        "GST": "time:t rangeRms:n stdMajor:n stdMinor:n orient:n stdLat:n stdLong:n stdAlt:n",
-        "ZDA": "time:t day:n month:n year:n ltzh:c ltzn:c",
-        "HDT": "headingT:n headingTu:c",
-        "HDM": "headingM:n headingMag:c",
-        "HDG": "headingM:n deviation:n deviationEW:c variation:n variationEW:c",
-        "THS": "headt:n mi:c",
-        "ROT": "rot:n valid:c",
-        "TXT": "numMsg:n msgNum:n msgType:n text:c",
-        "PASHR": "utctime:t trueHdg:n trueHdgInd:c roll:n pitch:n reserved:c rollAcc:n pitchAcc:n hdgAcc:n "
-        "gnssQual:n imuAlign:n",
-    }
-)
-TIMED = ("GGA", "GNS", "RMC", "GLL", "ZDA", "GST", "PASHR")
+_UPPER_CASE = 0xDF  # of a letter: the bit of lower case taken out
+_HEMISPHERES = {"lat": "NS", "lon": "EW"}
+_FIELDS_OF_OLD_VTG = 5  # with a mode
 _SATELLITE_FIELDS, _BEFORE_SATELLITES, _NO_FIELD = 4, 3, -1
 
 
@@ -122,14 +102,60 @@ def _times_of_day(value: Any, behind: Any, day_ns: Any, sound: Any) -> None:
             day_ns[row] = ((hour * 60 + minute) * 60 + second) * NS_PER_S + fraction_ns
 
 
+@inlined
+def _is_letter(byte: int) -> bool:
+    return 65 <= byte <= 90 or 97 <= byte <= 122
+
+
+@inlined
+def _is_word(byte: int) -> bool:
+    """Whether a byte may stand in an address or in the word behind it."""
+    return 48 <= byte <= 57 or 65 <= byte <= 90 or 97 <= byte <= 122 or byte == 95
+
+
+@inlined
+def _longer(key: int, byte: int, size: int) -> int:
+    """Key of ``size`` bytes and one more."""
+    return 256 * key + byte if size < _EXACT_BYTES else _LONG + (31 * (key % _PRIME) + byte) % _PRIME
+
+
+@inlined
+def _is_end(byte: int) -> bool:
+    """Whether an address or a field may end at a byte."""
+    return byte in (COMMA, STAR) or byte < 32
+
+
 @in_place
-def _addresses(data: Any, offsets: Any, keys: Any) -> None:
-    """Addresses as numbers: their letters are the bytes, the first the highest."""
+def _addresses(data: Any, offsets: Any, families: Any, keys: Any, sizes: Any) -> None:
+    """A number for each address, with the word behind it in a family, and their bytes; both 0 where there is none."""
     for row in range(len(offsets)):
-        for k in range(offsets[row] + 1, min(offsets[row] + 1 + ADDRESS_BYTES, len(data))):
-            if data[k] == COMMA or data[k] == STAR or data[k] <= 32:
+        start, key = offsets[row] + 1, 0
+        k, end = start, min(start + ADDRESS_BYTES, len(data))
+        while k < end and _is_word(data[k]):
+            key = _longer(key, data[k], k - start)
+            k += 1
+        if k == start or (k < len(data) and not _is_end(data[k])):
+            continue
+        keys[row], sizes[row] = key, k - start
+        for number in range(len(families) if data[start] == MAKERS else 0):
+            if families[number, 0] == key and k + 1 < end and (families[number, 1] or _is_letter(data[k + 1])):
+                key = _longer(key, COMMA, k - start)
+                k += 1
+                while k < end and _is_word(data[k]):
+                    key = _longer(key, data[k], k - start)
+                    k += 1
+                if data[k - 1] != COMMA and (k == len(data) or _is_end(data[k])):
+                    keys[row], sizes[row] = key, k - start
                 break
-            keys[row] = keys[row] * 256 + data[k]
+
+
+@cache
+def _families() -> Int64Array:
+    """Keys of the addresses of several layouts, and whether digits choose one too."""
+    keys = np.zeros((len(FAMILIES), 2), dtype=np.int64)
+    for row, (address, is_numbered) in enumerate(FAMILIES.items()):
+        keys[row] = int.from_bytes(address.encode(), "big"), is_numbered
+    return keys
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +165,7 @@ class Sentences:
     Parameters
     ----------
     address : str
-        ``GNGGA``, ``PASHR``.
+        ``GNGGA``, ``PASHR``, ``PUBX.00``.
     frames : Frames
     which : ndarray of int64, shape (n,)
         Which frames of the block they are.
@@ -158,7 +184,7 @@ class Sentences:
     @property
     def formatter(self) -> str:
         """``GGA`` of ``GNGGA``; a maker's own address as it is."""
-        return self.address if self.address.startswith("P") else self.address[2:]
+        return formatter_of(self.address)
 
     @property
     def places(self) -> Int64Array:
@@ -170,8 +196,14 @@ class Sentences:
         most = len(FORMATTERS.get(self.formatter, "").split()) + 1
         starts = np.zeros((most + 1, len(self)), dtype=np.int64)
         counts = np.zeros(len(self), dtype=np.int64)
-        _split(self.frames.data, self.frames.offsets[self.which], self._ends, starts, counts)
+        _split(self.frames.data, self._behind_address - 1, self._ends, starts, counts)
         return starts, counts
+
+    @property
+    def _behind_address(self) -> Int64Array:
+        """Where the fields of each sentence begin; a sentence without an address has all of its text there."""
+        bytes_before = 1 if self.address == NAMELESS else len(self.address) + 2
+        return self.frames.offsets[self.which] + bytes_before
 
     @property
     def _ends(self) -> Int64Array:
@@ -190,6 +222,8 @@ class Sentences:
         found: dict[str, Column] = {}
         for number, (name, kind) in enumerate(kinds):
             found[name] = self._column(number, name, kind)
+        if self.formatter == "VTG":
+            return self._with_old_form(found)
         return self._with_signal(found) if self.formatter == "GSV" else found
 
     def numbers(self, number: int) -> tuple[Int64Array, Int64Array, NDArray[np.int8]]:
@@ -216,7 +250,7 @@ class Sentences:
         return Column(texts, None if (size > 0).all() else size > 0)
 
     def _rest(self) -> Column:
-        begin = self.frames.offsets[self.which] + len(self.address) + 2
+        begin = self._behind_address
         return Column(self._text(begin, np.maximum(self._ends - begin, 0)).values)
 
     def _column(self, number: int, name: str, kind: str) -> Column:
@@ -229,7 +263,7 @@ class Sentences:
         if (state < 0).any():
             self.unreadable[name] = int((state < 0).sum())
         if kind == "a":
-            return Column(_degrees(value, behind) * self._sign(number + 1), present & (behind <= MOST_BEHIND))
+            return self._angle(number, name, Column(value, present & (behind <= MOST_BEHIND)), behind)
         if kind == "t":
             day_ns, sound = time_of_day_ns(value, behind)
             return Column(day_ns / NS_PER_S, present & sound)
@@ -237,16 +271,35 @@ class Sentences:
             return self._date(value, present)
         return Column(value / 10.0**behind, present)
 
-    def _sign(self, number: int) -> NDArray[np.float64]:
-        """-1 where the hemisphere in a field is south or west."""
+    def _angle(self, number: int, name: str, told: Column, behind: Int64Array) -> Column:
+        """Latitude or longitude by its hemisphere, in the next field; absent where that or the minutes cannot be."""
         starts, counts = self._fields
-        letters = self.frames.data[np.minimum(starts[number], len(self.frames.data) - 1)]
-        return np.where((counts > number) & np.isin(letters, (ord("S"), ord("W"))), -1.0, 1.0)
+        letters = self.frames.data[np.minimum(starts[number + 1], len(self.frames.data) - 1)] & _UPPER_CASE
+        letters = np.where(counts > number + 1, letters, 0)
+        positive, negative = (ord(letter) for letter in _HEMISPHERES[name])
+        degrees, has_minutes = _degrees(np.abs(told.values), behind)
+        is_angle = has_minutes & ((letters == positive) | (letters == negative))
+        if (told.mask & ~is_angle).any():
+            self.unreadable[name] = self.unreadable.get(name, 0) + int((told.mask & ~is_angle).sum())
+        return Column(np.where(letters == negative, -degrees, degrees), told.mask & is_angle)
 
     def _date(self, value: Int64Array, present: BoolArray) -> Column:
         texts = np.array([f"{date:06d}" for date in np.unique(value).tolist()] or [""])
         where = np.searchsorted(np.unique(value), value)
         return Column(texts[where], present)
+
+    def _with_old_form(self, found: dict[str, Column]) -> dict[str, Column]:
+        """VTG before NMEA 3: true and magnetic track, knots and km/h without a word of their units between them."""
+        old = (self._fields[1] <= _FIELDS_OF_OLD_VTG) & (self.numbers(1)[2] == 1)
+        if not old.any():
+            return found
+        for number, name in enumerate(("cogt", "cogm", "sogn", "sogk")):
+            value, behind, state = self.numbers(number)
+            column = found[name]
+            told = Column(np.where(old, value / 10.0**behind, column.values), np.where(old, state == 1, column.mask))
+            unit = found[f"{name}Unit"]
+            found |= {name: told, f"{name}Unit": Column(unit.values, unit.mask & ~old)}
+        return found
 
     @cached_property
     def _signal(self) -> Int64Array:
@@ -263,22 +316,37 @@ class Sentences:
         return found | {"signalID": Column(signals, signals != "")}
 
 
+def formatter_of(address: str) -> str:
+    """Formatter of an address.
+
+    Examples
+    --------
+    >>> formatter_of("GNGGA"), formatter_of("PASHR"), formatter_of("PUBX.00"), formatter_of(NAMELESS)
+    ('GGA', 'PASHR', 'PUBX.00', '')
+    """
+    if address == NAMELESS:
+        return ""
+    return address if address.startswith("P") else address[2:]
+
+
 def sentences_of(frames: Frames) -> Iterator[Sentences]:
     """Sentences of a block by address."""
     which = frames.of(scan.NMEA, scan.BARE_NMEA)
-    keys = np.zeros(len(which), dtype=np.int64)
-    _addresses(frames.data, frames.offsets[which], keys)
+    if not len(which):
+        return
+    keys, sizes = np.zeros(len(which), dtype=np.int64), np.zeros(len(which), dtype=np.int64)
+    _addresses(frames.data, frames.offsets[which], _families(), keys, sizes)
     order = np.argsort(keys, kind="stable")
-    distinct, starts = np.unique(keys[order], return_index=True)
-    for key, rows in zip(distinct.tolist(), np.split(order, starts[1:]), strict=True) if len(which) else ():
-        name = key.to_bytes(ADDRESS_BYTES, "big").lstrip(b"\0").decode("ascii", errors="replace")
-        if name.isalnum():
-            yield Sentences(name, frames, which[rows])
+    _distinct, starts = np.unique(keys[order], return_index=True)
+    for rows in np.split(order, starts[1:]):
+        at, size = int(frames.offsets[which[rows[0]]]) + 1, int(sizes[rows[0]])
+        name = frames.data[at : at + size].tobytes().decode("ascii").replace(",", ".")
+        yield Sentences(name or NAMELESS, frames, which[rows])
 
 
 def by_address(frames: Frames) -> dict[str, Sentences]:
-    """Sentences of a block by their address."""
-    return {one.address: one for one in sentences_of(frames)}
+    """Sentences of a block by their address, in alphabetical order."""
+    return {one.address: one for one in sorted(sentences_of(frames), key=lambda one: one.address)}
 
 
 def time_of_day_ns(value: Int64Array, behind: Int64Array) -> tuple[Int64Array, BoolArray]:
@@ -294,8 +362,8 @@ def time_of_day_ns(value: Int64Array, behind: Int64Array) -> tuple[Int64Array, B
     return day_ns, sound
 
 
-def _degrees(value: Int64Array, behind: Int64Array) -> NDArray[np.float64]:
-    """Degrees of ``dddmm.mmmm`` written as one integer."""
+def _degrees(value: Int64Array, behind: Int64Array) -> tuple[NDArray[np.float64], BoolArray]:
+    """Degrees of ``dddmm.mmmm`` written as one integer, and whether the minutes are at most 60, as some round them."""
     unit = 10**behind
     degrees, minutes = np.divmod(value, 100 * unit)
-    return np.asarray((degrees * (60 * unit) + minutes) / (60 * unit))
+    return np.asarray((degrees * (60 * unit) + minutes) / (60 * unit)), minutes <= 60 * unit

@@ -33,6 +33,8 @@ class Frames:
         Where each frame begins in ``data`` and how many bytes it has.
     kinds : ndarray of uint8, shape (n,)
         Protocol, as :mod:`scan` numbers them.
+    texts : ndarray of int64, shape (n, 2), optional
+        Bytes of a computer's text in front of each frame and behind it; None where there is none at all.
     """
 
     data: NDArray[np.uint8]
@@ -40,6 +42,7 @@ class Frames:
     offsets: Int64Array
     lengths: Int64Array
     kinds: NDArray[np.uint8]
+    texts: Int64Array | None = None
 
     def __len__(self) -> int:
         return len(self.offsets)
@@ -68,7 +71,8 @@ class Frames:
 
     def head(self, count: int) -> "Frames":
         """The first ``count`` frames."""
-        return Frames(self.data, self.first_byte, self.offsets[:count], self.lengths[:count], self.kinds[:count])
+        texts = None if self.texts is None else self.texts[:count]
+        return Frames(self.data, self.first_byte, self.offsets[:count], self.lengths[:count], self.kinds[:count], texts)
 
 
 class Stream:
@@ -82,10 +86,19 @@ class Stream:
     epoch_start : callable, optional
         Number of the first frame of the last epoch of a block: that frame and those behind it wait for the next block,
         so that what belongs together comes together.
+    is_hosts : callable, optional
+        Whether a text in front of a sentence (True) or behind it (False) is that of the computer that recorded; without
+        it there is no such text.
     """
 
-    def __init__(self, source: Source, bare: bool = False, epoch_start: Callable[[Frames], int] | None = None) -> None:
-        self._source, self._bare, self._epoch_start = source, bare, epoch_start
+    def __init__(
+        self,
+        source: Source,
+        bare: bool = False,
+        epoch_start: Callable[[Frames], int] | None = None,
+        is_hosts: Callable[[bytes, bool], bool] | None = None,
+    ) -> None:
+        self._source, self._bare, self._epoch_start, self._is_hosts = source, bare, epoch_start, is_hosts
         self._skipped = SkippedBytes("frame")
         self._cut: tuple[int, int] | None = None
         self._state = scan.new_state()
@@ -99,9 +112,10 @@ class Stream:
                 yield from self._blocks(data, base, is_last)
                 if is_last:
                     break
-                done = int(self._state[scan.POSITION])
+                position, skip = int(self._state[scan.POSITION]), int(self._state[scan.SKIP_START])
+                done = skip if self._is_hosts and 0 <= position - skip <= scan.LONGEST_TEXT else position
                 data, base = data[done:], base + done
-                self._state[scan.POSITION] = 0
+                self._state[scan.POSITION] = position - done
                 if self._state[scan.SKIP_START] != scan.NOWHERE:
                     self._state[scan.SKIP_START] -= done
         self._finish(data, base)
@@ -137,24 +151,44 @@ class Stream:
         """Blocks of the data at hand: one, and more where damage is frequent."""
         offsets = np.empty(len(data) // SMALLEST_FRAME + 1, dtype=np.int64)
         lengths, kinds = np.empty_like(offsets), np.empty(len(offsets), dtype=np.uint8)
+        hosted = self._is_hosts is not None
+        texts = np.zeros((len(offsets) if hosted else 0, 2), dtype=np.int64)
         tables, state = _crc_tables(), self._state
         limit = len(data) if is_last else len(data) - scan.LONGEST
         state[scan.DOUBTED] = 0
         while state[scan.POSITION] < limit:
             state[scan.COUNT] = state[scan.SPANS] = 0
-            scan.scan(data, is_last, self._bare, *tables, offsets, lengths, kinds, self._spans, state)
+            scan.scan(data, is_last, self._bare, hosted, *tables, offsets, lengths, kinds, texts, self._spans, state)
             count, spans = int(state[scan.COUNT]), self._spans[: state[scan.SPANS]]
-            found = Frames(data, base, offsets[:count].copy(), lengths[:count].copy(), kinds[:count].copy())
+            around = texts[:count].copy() if hosted else None
+            found = Frames(data, base, offsets[:count].copy(), lengths[:count].copy(), kinds[:count].copy(), around)
+            texts[:count] = 0
             is_whole = state[scan.POSITION] >= limit
             kept = self._held_back(found) if is_whole and not is_last else count
             if kept < count:  # those that wait are found again
-                state[scan.POSITION], state[scan.SKIP_START] = found.offsets[kept], scan.NOWHERE
-                spans = spans[spans[:, 1] <= found.offsets[kept]]
-            for start, end in spans.tolist():
+                first = int(found.offsets[kept]) - (0 if around is None else int(around[kept, 0]))
+                state[scan.POSITION], state[scan.SKIP_START] = first, scan.NOWHERE
+                spans = spans[spans[:, 1] <= first]
+            given = found.head(kept)
+            for start, end in sorted([*spans.tolist(), *self._strange_texts(given)]):
                 self._skipped.add(base + start, base + end, base + end)
-            yield found.head(kept)
+            yield given
             if kept < count:
                 return
+
+    def _strange_texts(self, frames: Frames) -> list[list[int]]:
+        """Texts around the frames that are none of the computer's, from start to end; the frames lose them."""
+        strange: list[list[int]] = []
+        if frames.texts is None or self._is_hosts is None:
+            return strange
+        for row in np.flatnonzero(frames.texts.any(axis=1)).tolist():
+            at, length = int(frames.offsets[row]), int(frames.lengths[row])
+            before, behind = frames.texts[row].tolist()
+            for column, (start, end) in enumerate(((at - before, at), (at + length, at + length + behind))):
+                if start < end and not self._is_hosts(frames.data[start:end].tobytes(), column == 0):
+                    strange.append([start, end])
+                    frames.texts[row, column] = 0
+        return strange
 
     def _finish(self, data: NDArray[np.uint8], base: int) -> None:
         """Count what is left behind the last frame: a frame that was cut, or bytes of none."""

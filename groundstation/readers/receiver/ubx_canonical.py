@@ -8,43 +8,58 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
+from groundstation.readers.layout import velocity_from_track
+from groundstation.readers.receiver.credible import credible_attitude, credible_dilution, credible_position
 from groundstation.readers.receiver.messages import Block, Columns, occupied
+from groundstation.readers.receiver.tally import MOVING_MPS, Tally
 from groundstation.readers.receiver.times import Anchors
 from groundstation.readers.receiver.ubx import time_of
 
 DEAD_RECKONING, FIX_2D, FIX_3D, WITH_SENSORS = 1, 2, 3, 4
 FLOAT, FIXED = 1, 2
 MM = 1e-3
-POSITION_SOURCES = ("NAV-PVT", "NAV-PVAT", "NAV-HPPOSLLH", "NAV-POSLLH")  # the first that a log has leads
-ATTITUDE_SOURCES = ("NAV-PVAT", "NAV-ATT", "NAV-RELPOSNED", "NAV-PVT")
-_FIXES = np.array(["none", "dead_reckoning", "2d", "3d", "gnss_ins", "none"])
-MOVING_MPS, SAME_DEG = 1.0, 2e-5
+FIRST_SOLUTION = ("NAV-PVT", "NAV-PVAT", "NAV-HPPOSLLH", "NAV-POSLLH")
+OTHER_SOLUTIONS = ("HNR-PVT", "NAV2-PVT", "NAV2-PVAT", "NAV2-POSLLH")
+POSITION_SOURCES = (*FIRST_SOLUTION, *OTHER_SOLUTIONS)  # the first that a log has leads
+ATTITUDE_SOURCES = ("NAV-PVAT", "NAV-ATT", "NAV-RELPOSNED", "NAV-PVT", "HNR-ATT", "HNR-PVT")
+_FIXES = np.array(["none", "dead_reckoning", "2d", "3d", "gnss_ins", "none", "other"])  # the last but one: time only
+_UPRIGHT = {"altitude_ellipsoid_m", "altitude_msl_m", "vertical_sigma_m", "velocity_down_mps"}
+_MOVING = {
+    *("latitude_deg", "longitude_deg", "horizontal_sigma_m", "velocity_north_mps", "velocity_east_mps"),
+    *("ground_speed_mps", "track_deg", "velocity_sigma_mps"),
+}
+SAME_DEG = 2e-5
 INS_MODE = "gnss_aided"
 
 
-def gnss_batch(block: Block, leader: str, anchors: Anchors) -> RecordBatch | None:
-    """One row an epoch: the leading message and what others of the same time of the week add."""
+def gnss_batch(block: Block, leader: str, anchors: Anchors, tally: Tally) -> RecordBatch | None:
+    """One row an epoch: the leading message and what others of the same solution and time of the week add."""
     messages, fields = block.get(leader), block.fields(leader)
-    if messages is None or fields is None or "iTOW" not in fields:
+    if messages is None or fields is None:
         return None
-    columns = _solution(fields) if leader in ("NAV-PVT", "NAV-PVAT") else _position(fields, _is_valid(fields))
-    if leader != "NAV-PVT" and leader != "NAV-PVAT":
-        columns |= _added(block, "NAV-VELNED", fields, _velocity_ned)
-        columns |= _added(block, "NAV-STATUS", fields, _status)
-    columns |= _precise(block, fields, columns)
-    columns = _added(block, "NAV-DOP", fields, _dilution) | columns
+    family = "NAV2" if leader.startswith("NAV2-") else "NAV"
+    columns = _SOLUTIONS[leader](fields) if leader in _SOLUTIONS else _position(fields, _is_valid(fields))
+    if leader not in _SOLUTIONS:
+        columns |= _added(block, f"{family}-VELNED", fields, _velocity_ned)
+        columns |= _added(block, f"{family}-SOL", fields, _old_solution)
+        columns |= _added(block, f"{family}-STATUS", fields, _status)
+        columns = _where_a_fix_is(columns)
+    if family == "NAV":
+        columns |= _precise(block, fields, columns)
+    columns = _added(block, f"{family}-DOP", fields, _dilution) | columns
+    columns = credible_position(credible_dilution(columns), "gnss", messages.places, tally)
     return occupied("gnss", messages.places, time_of(messages, anchors), columns)
 
 
-def ins_batch(block: Block, source: str, anchors: Anchors) -> RecordBatch | None:
+def ins_batch(block: Block, source: str, anchors: Anchors, tally: Tally) -> RecordBatch | None:
     """Attitude of the vehicle from the message that tells it; position and velocity stay those of ``gnss``."""
     messages, fields = block.get(source), block.fields(source)
-    if messages is None or fields is None or "iTOW" not in fields:
+    if messages is None or fields is None:
         return None
-    columns = _ATTITUDES[source](fields)
-    if source in ("NAV-PVAT", "NAV-ATT"):
-        columns |= _added(block, "ESF-INS", fields, _rates)
+    columns = credible_attitude(_ATTITUDES[source](fields), messages.places, tally)
     heading = columns.get("true_heading_deg")
+    if source in _RATES:
+        columns |= _added(block, _RATES[source], fields, _rates)
     if heading is not None:
         columns["mode"] = Column(np.full(len(messages), INS_MODE), heading.present)
     return occupied("ins", messages.places, time_of(messages, anchors), columns)
@@ -68,7 +83,7 @@ def heading_as_track(block: Block, source: str) -> tuple[int, int]:
 
 
 def _solution(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """NAV-PVT and NAV-PVAT."""
+    """NAV-PVT and NAV-PVAT, and those of the second solution."""
     kind = fields["fixType"]
     is_ok = fields["gnssFixOk"] if "gnssFixOk" in fields else fields["gnssFixOK"]
     has_fix = (kind >= DEAD_RECKONING) & (kind <= WITH_SENSORS)
@@ -84,12 +99,34 @@ def _solution(fields: Mapping[str, NDArray[Any]]) -> Columns:
         "track_deg": Column(wrap_360(track), has_fix),
         "velocity_sigma_mps": Column(fields["sAcc"] * MM, has_fix),
         "satellites_used": Column(fields["numSV"].astype(np.float64)),
-        "integrity_ok": Column(is_ok.copy()),
+        "integrity_ok": _integrity(is_ok, kind),
         "fix": Column(_fix(kind, fields["carrSoln"], fields["diffSoln"])),
     }
     if "pDOP" in fields:
         columns["pdop"] = Column(fields["pDOP"], has_fix)
     return columns
+
+
+def _integrity(is_ok: NDArray[Any], kind: NDArray[Any]) -> Column:
+    """The receiver's word on the fix; not that a fix in two dimensions is good, whose height was assumed."""
+    return Column(is_ok.copy(), ~(is_ok & (kind == FIX_2D)))
+
+
+def _high_rate(fields: Mapping[str, NDArray[Any]]) -> Columns:
+    """HNR-PVT: speed and track in place of velocities."""
+    kind = fields["gpsFix"]
+    has_fix = (kind >= DEAD_RECKONING) & (kind <= WITH_SENSORS)
+    speed, track = fields["gSpeed"] * MM, wrap_360(fields["headMot"])
+    north, east = velocity_from_track(track, speed)
+    return _position(fields, has_fix, has_fix & (kind != FIX_2D)) | {
+        "velocity_north_mps": Column(north, has_fix),
+        "velocity_east_mps": Column(east, has_fix),
+        "ground_speed_mps": Column(speed, has_fix),
+        "track_deg": Column(track, has_fix),
+        "velocity_sigma_mps": Column(fields["sAcc"] * MM, has_fix),
+        "integrity_ok": _integrity(fields["GPSfixOK"], kind),
+        "fix": Column(_fix(kind, np.zeros(len(kind), dtype=np.uint8), fields["DiffSoln"])),
+    }
 
 
 def _fix(kind: NDArray[Any], carrier: NDArray[Any], differential: BoolArray) -> NDArray[np.str_]:
@@ -102,9 +139,7 @@ def _fix(kind: NDArray[Any], carrier: NDArray[Any], differential: BoolArray) -> 
 
 
 def _is_valid(fields: Mapping[str, NDArray[Any]]) -> BoolArray:
-    if "invalidLlh" in fields:
-        return np.asarray(~fields["invalidLlh"])
-    return np.asarray((fields["lat"] != 0.0) | (fields["lon"] != 0.0))  # both zero: not known yet
+    return np.asarray(~fields["invalidLlh"] if "invalidLlh" in fields else np.ones(len(fields["lat"]), dtype=bool))
 
 
 def _position(fields: Mapping[str, NDArray[Any]], present: BoolArray, has_height: BoolArray | None = None) -> Columns:
@@ -142,7 +177,28 @@ def _velocity_ned(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 def _status(fields: Mapping[str, NDArray[Any]]) -> Columns:
     fix = Column(_fix(fields["gpsFix"], fields["carrSoln"], fields["diffSoln"]))
-    return {"integrity_ok": Column(fields["gpsFixOk"].copy()), "fix": fix}
+    return {"integrity_ok": _integrity(fields["gpsFixOk"], fields["gpsFix"]), "fix": fix}
+
+
+def _old_solution(fields: Mapping[str, NDArray[Any]]) -> Columns:
+    """NAV-SOL, which receivers had before NAV-PVT."""
+    no_carrier = np.zeros(len(fields["gpsFix"]), dtype=np.uint8)
+    return {
+        "integrity_ok": _integrity(fields["gpsfixOK"], fields["gpsFix"]),
+        "fix": Column(_fix(fields["gpsFix"], no_carrier, fields["diffSoln"])),
+        "satellites_used": Column(fields["numSV"].astype(np.float64)),
+        "pdop": Column(fields["pDOP"]),
+    }
+
+
+def _where_a_fix_is(columns: Columns) -> Columns:
+    """Columns of a message without a fix of its own, by that of its epoch: no height in two dimensions."""
+    if "fix" not in columns:
+        return columns
+    fix = columns["fix"]
+    none, flat = fix.mask & (fix.values == "none"), fix.mask & (fix.values == "2d")
+    refused = dict.fromkeys(columns.keys() & _MOVING, none) | dict.fromkeys(columns.keys() & _UPRIGHT, none | flat)
+    return columns | {name: Column(columns[name].values, columns[name].mask & ~rows) for name, rows in refused.items()}
 
 
 def _dilution(fields: Mapping[str, NDArray[Any]]) -> Columns:
@@ -160,7 +216,7 @@ def _of_pvat(fields: Mapping[str, NDArray[Any]]) -> Columns:
         present = fields[f"veh{part}Valid"]
         columns[f"{name}_deg"] = Column(fields[f"veh{part}"], present)
         columns[f"{name}_sigma_deg"] = Column(fields[f"acc{part}"], present)
-    return _on_the_circle(columns)
+    return columns
 
 
 def _of_att(fields: Mapping[str, NDArray[Any]]) -> Columns:
@@ -170,24 +226,23 @@ def _of_att(fields: Mapping[str, NDArray[Any]]) -> Columns:
         sigma = fields[f"acc{source.capitalize()}"]
         columns[f"{name}_deg"] = Column(fields[source], sigma > 0.0)
         columns[f"{name}_sigma_deg"] = Column(sigma, sigma > 0.0)
-    return _on_the_circle(columns)
+    return columns
 
 
 def _of_relative(fields: Mapping[str, NDArray[Any]]) -> Columns:
     """Heading of the line from one antenna to the other; a base that does not move is none of this vehicle's."""
     present = fields["relPosHeadingValid"] & fields["relPosValid"] & fields["isMoving"] & fields["gnssFixOK"]
-    columns = {
+    return {
         "true_heading_deg": Column(fields["relPosHeading"], present),
         "true_heading_sigma_deg": Column(fields["accHeading"], present),
     }
-    return _on_the_circle(columns)
 
 
 def _of_pvt(fields: Mapping[str, NDArray[Any]]) -> Columns:
     """Heading of the vehicle by sensor fusion; elsewhere the field repeats the track."""
     if "headVeh" not in fields:
         return {}
-    return _on_the_circle({"true_heading_deg": Column(fields["headVeh"], fields["headVehValid"])})
+    return {"true_heading_deg": Column(fields["headVeh"], fields["headVehValid"])}
 
 
 _ATTITUDES: Mapping[str, Callable[[Mapping[str, NDArray[Any]]], Columns]] = {
@@ -195,12 +250,17 @@ _ATTITUDES: Mapping[str, Callable[[Mapping[str, NDArray[Any]]], Columns]] = {
     "NAV-ATT": _of_att,
     "NAV-RELPOSNED": _of_relative,
     "NAV-PVT": _of_pvt,
+    "HNR-ATT": _of_att,
+    "HNR-PVT": _of_pvt,
 }
-
-
-def _on_the_circle(columns: Columns) -> Columns:
-    heading = columns["true_heading_deg"]
-    return columns | {"true_heading_deg": Column(wrap_360(heading.values), heading.present)}
+_RATES = {"NAV-PVAT": "ESF-INS", "NAV-ATT": "ESF-INS", "HNR-ATT": "HNR-INS"}
+_SOLUTIONS: Mapping[str, Callable[[Mapping[str, NDArray[Any]]], Columns]] = {
+    "NAV-PVT": _solution,
+    "NAV-PVAT": _solution,
+    "NAV2-PVT": _solution,
+    "NAV2-PVAT": _solution,
+    "HNR-PVT": _high_rate,
+}
 
 
 def _added(

@@ -66,13 +66,16 @@ LAYOUTS: Mapping[str, str] = MappingProxyType(
         "relPosD:i4+relPosDHp relPosNHp:i1/1e2 relPosEHp:i1/1e2 relPosDHp:i1/1e2 -:u1 accN:u4/1e1 accE:u4/1e1 "
         f"accD:u4/1e1 {_RELATIVE_FLAGS}",
         "NAV-EOE": "iTOW:u4",
+        "HNR-PVT": f"iTOW:u4 {_DATE} second:u1 valid:x1(validDate validTime fullyResolved) nano:i4 "
+        "gpsFix:u1 flags:x1(GPSfixOK DiffSoln WKNSET TOWSET headVehValid) -:u2 "
+        f"{_PLACE} gSpeed:i4 speed:i4 headMot:i4/1e5 headVeh:i4/1e5 hAcc:u4 vAcc:u4 sAcc:u4 headAcc:u4/1e5 -:u4",
         "RXM-SFRBX": "gnssId:u1 svId:u1 sigId:u1 freqId:u1 numWords:u1 chn:u1 version:u1 -:u1 | numWords dwrd:u4",
         "RXM-RAWX": "rcvTow:r8 week:u2 leapS:i1 numMeas:u1 recStat:x1(leapSec clkReset) -:u3 | numMeas prMes:r8 "
         "cpMes:r8 doMes:r4 gnssId:u1 svId:u1 sigId:u1 freqId:u1 locktime:u2 cno:u1 prStdev:x1(prStd:4) "
         "cpStdev:x1(cpStd:4) doStdev:x1(doStd:4) trkStat:x1(prValid cpValid halfCyc subHalfCyc) -:u1",
         "MON-VER": "swVersion:c30 hwVersion:c10 | * extension:c30",
         "ESF-MEAS": "timeTag:u4 flags:x2(timeMarkSent:2 timeMarkEdge calibTtagValid -:7 numMeas:5) id:u2 | numMeas "
-        "data:x4(dataField:24 dataType:6)",
+        "data:x4(dataField:24 dataType:6) | 4",
         "ESF-STATUS": "iTOW:u4 version:u1 initStatus1:x1(wtInitStatus:2 mntAlgStatus:3 insInitStatus:3) "
         "initStatus2:x1(imuInitStatus:2) -:u5 fusionMode:u1 -:u2 numSens:u1 | numSens "
         "sensStatus1:x1(type:6 used ready) sensStatus2:x1(calibStatus:2 timeStatus:2) freq:u1 "
@@ -82,6 +85,8 @@ LAYOUTS: Mapping[str, str] = MappingProxyType(
     }
 )
 SHORT_RELPOSNED = 40  # bytes of the payload of its version 0
+_LAID_OUT_AS = {"HNR-ATT": "NAV-ATT", "HNR-INS": "ESF-INS"}
+_OLDER = {"NAV-PVT": 84}  # bytes of the payload before headVeh and magDec were added (M8, protocol 14)
 
 # Class -> its name, and number and name of its messages.
 _CLASSES: Mapping[int, tuple[str, str]] = MappingProxyType(
@@ -91,7 +96,7 @@ _CLASSES: Mapping[int, tuple[str, str]] = MappingProxyType(
             "01-POSECEF 02-POSLLH 03-STATUS 04-DOP 05-ATT 06-SOL 07-PVT 09-ODO 10-RESETODO 11-VELECEF 12-VELNED "
             "13-HPPOSECEF 14-HPPOSLLH 17-PVAT 20-TIMEGPS 21-TIMEUTC 22-CLOCK 23-TIMEGLO 24-TIMEBDS 25-TIMEGAL "
             "26-TIMELS 27-TIMEQZSS 30-SVINFO 31-DGPS 32-SBAS 34-ORB 35-SAT 36-COV 39-GEOFENCE 3B-SVIN "
-            "3C-RELPOSNED 3D-EELL 42-SLAS 43-SIG 60-AOPSTATUS 61-EOE 62-PL",
+            "3C-RELPOSNED 3D-EELL 42-SLAS 43-SIG 60-AOPSTATUS 61-EOE 62-PL 63-TIMENAVIC",
         ),
         0x02: ("RXM", "13-SFRBX 14-MEASX 15-RAWX 20-SVSI 32-RTCM 34-COR 59-RLM"),
         0x04: ("INF", "00-ERROR 01-WARNING 02-NOTICE 03-TEST 04-DEBUG"),
@@ -107,6 +112,12 @@ _CLASSES: Mapping[int, tuple[str, str]] = MappingProxyType(
         0x21: ("LOG", ""),
         0x27: ("SEC", ""),
         0x28: ("HNR", "00-PVT 01-ATT 02-INS"),
+        0x29: (
+            "NAV2",
+            "01-POSECEF 02-POSLLH 03-STATUS 04-DOP 07-PVT 09-ODO 11-VELECEF 12-VELNED 17-PVAT 20-TIMEGPS 21-TIMEUTC "
+            "22-CLOCK 23-TIMEGLO 24-TIMEBDS 25-TIMEGAL 26-TIMELS 27-TIMEQZSS 32-SBAS 35-SAT 36-COV 3B-SVIN 3D-EELL "
+            "42-SLAS 43-SIG 61-EOE 63-TIMENAVIC",
+        ),
     }
 )
 _NAMES = MappingProxyType(
@@ -130,3 +141,28 @@ def name_of(code: int, size: int) -> str:
     family = _CLASSES[number][0] if number in _CLASSES else f"UBX-{number:02X}"
     name = _NAMES.get(code, f"{family}-{message:02X}")
     return f"{name}-V0" if name == "NAV-RELPOSNED" and size == SHORT_RELPOSNED else name
+
+
+def layout_of(name: str) -> str:
+    """Layout of a message by its name, as a line of text; empty for one that is not known here.
+
+    The messages of the second solution (NAV2) are laid out as those of the first.
+
+    Examples
+    --------
+    >>> layout_of("NAV2-EOE"), layout_of("MGA-02")
+    ('iTOW:u4', '')
+    """
+    first = _LAID_OUT_AS.get(name, name.replace("NAV2-", "NAV-"))
+    return LAYOUTS.get(first, "")
+
+
+def is_version(name: str, size: int) -> bool:
+    """Whether a message had a version with so many bytes, fewer than today's layout.
+
+    Examples
+    --------
+    >>> is_version("NAV-PVT", 84), is_version("NAV-PVT", 80)
+    (True, False)
+    """
+    return _OLDER.get(name) == size

@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Column
 from groundstation.base.units import DEG_PER_RAD, MPS2_PER_G, NT_PER_GAUSS
 from groundstation.readers.layout import velocity_from_track, wind_from_direction
@@ -34,11 +35,11 @@ def attitude(rows: Numbers) -> Columns:
 
 def global_position(rows: Numbers) -> Columns:
     """Position and velocity of the autopilot's filter; zeros before it has a position."""
-    known = (rows["lat"] != 0.0) | (rows["lon"] != 0.0)
+    known = has_position(rows["lat"] * 1e-7, rows["lon"] * 1e-7)
     return {
-        "latitude_deg": Column(rows["lat"] * 1e-7, known),
-        "longitude_deg": Column(rows["lon"] * 1e-7, known),
-        "altitude_msl_m": Column(rows["alt"] * 1e-3, known),
+        "latitude_deg": Column(rows["lat"] * 1e-7),
+        "longitude_deg": Column(rows["lon"] * 1e-7),
+        "altitude_msl_m": Column(rows["alt"] * 1e-3),
         "velocity_north_mps": Column(rows["vx"] * 0.01, known),
         "velocity_east_mps": Column(rows["vy"] * 0.01, known),
         "velocity_down_mps": Column(rows["vz"] * 0.01, known),

@@ -1,44 +1,58 @@
 """Items of a telemetry log: batches of every message, raw and canonical, then remarks and damages."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.records import Column, Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
+from groundstation.base.geodesy import NO_POSITION
+from groundstation.base.records import Column, Damage, Int64Array, Item, LogHeader, Remark
 from groundstation.base.signals import EVENT_SEPARATOR, RAW_PREFIX
 from groundstation.readers.mapping import Assignment, Offer, assigned, mapped
-from groundstation.readers.parts import Part, bounded, merged, occupied
+from groundstation.readers.parts import Part, bounded, merged, occupied, one_row_each
+from groundstation.readers.places import placed
 from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 from groundstation.readers.tlog.canonical import ARMED, INSTANCES, ROLES
-from groundstation.readers.tlog.dialect import MOST_IDS, Message, crc_extras, messages
+from groundstation.readers.tlog.clock import Clocks, ClockSurvey
+from groundstation.readers.tlog.dialect import Message, crc_extras, messages
+from groundstation.readers.tlog.frames import Block
+from groundstation.readers.tlog.timer import Timer
 
 BLOCK_BYTES = 4 << 20
+KEPT_BYTES = 32 << 20  # of a log whose frames are kept for the second pass
 AUTOPILOT = 1  # component
-_NS_PER_US = 1_000
-
-
-@dataclass(frozen=True, eq=False)
-class _Block:
-    """Frames of one stretch: columns as in :mod:`scan`, and the bytes they stand in."""
-
-    data: NDArray[np.uint8]
-    frames: NDArray[np.int64]
-    first_index: int
 
 
 @dataclass
 class _Frames:
-    """Iterates over the frames of a log in blocks."""
+    """Iterates over the frames of a log in blocks; again from memory where they are few."""
 
     source: Source
     skipped: SkippedBytes = field(default_factory=lambda: SkippedBytes("frame"))
     unknown: int = 0
     cut: tuple[int, int] | None = None
+    _kept: list[Block] | None = None
 
-    def __iter__(self) -> Iterator[_Block]:
+    def __iter__(self) -> Iterator[Block]:
+        if self._kept is not None:
+            yield from self._kept
+            return
+        self.skipped, self.unknown, self.cut = SkippedBytes("frame"), 0, None
+        kept: list[Block] | None = []
+        size = 0
+        for block in self._scanned():
+            size += len(block.data)
+            if kept is not None:
+                kept.append(block)
+            if size > KEPT_BYTES:
+                kept = None  # it is read again: memory does not grow with the log
+            yield block
+        self._kept = kept
+
+    def _scanned(self) -> Iterator[Block]:
         from groundstation.readers.tlog import scan
 
         data, base, count = np.zeros(0, dtype=np.uint8), 0, 0
@@ -56,7 +70,7 @@ class _Frames:
                     self.unknown += unknown
                     self._note(view, skipped[:spans], begun + at, count, is_last and at + done == len(data))
                     if frames:
-                        yield _Block(view, found[:frames].copy(), count)
+                        yield Block(view, found[:frames].copy(), count)
                         count += frames
                     at += done
                     if not done or (not is_last and at + scan.LONGEST > len(data)):
@@ -91,68 +105,71 @@ def _begins_frame(data: NDArray[np.uint8]) -> bool:
 
 def items(source: Source, reader_name: str) -> Iterator[Item]:
     """Items of a telemetry log."""
-    known = messages()
-    vehicle, met = _survey(source)
+    known, frames = messages(), _Frames(source)
+    vehicle, met, clocks = _survey(frames)
     metadata = {"vehicle": f"system {vehicle >> 8}, component {vehicle & 255}"}
-    yield LogHeader(reader_name, metadata, utc_of_zero_ns=0, has_counting_clock=True)
+    yield LogHeader(
+        reader_name, metadata, utc_of_zero_ns=0, has_counting_clock=True, clock_offsets=clocks.offsets.stated
+    )
     served = _served(met)
-    frames, armed = _Frames(source), _Arming()
-    for block in frames:
+    armed, timer = _Arming(), Timer(clocks)
+    nowhere: Counter[str] = Counter()
+    for block, following in _with_next(frames):
         canonical: dict[str, list[Part]] = {}
-        for system in np.unique(block.frames[:, 2]).tolist():
-            of_system = np.flatnonzero(block.frames[:, 2] == system)
-            for number, which in _by_number(block, of_system):
-                message = known[number]
-                part = _part(block, which, message)
-                suffix = "" if system == vehicle else f".{system >> 8}_{system & 255}"
-                yield from bounded(
-                    RecordBatch(f"{RAW_PREFIX}{message.name}{suffix}", part.index, part.time, part.columns)
-                )
-                if system == vehicle:
-                    _take(canonical, part, served.get(message.name, ()))
-                    armed.take(canonical, part, message.name)
+        validity_ns = timer.validity_ns(block, following)
+        for system, number, which in block.groups:
+            message = known[number]
+            part = _part(block, which, message, validity_ns)
+            suffix = "" if system == vehicle else f".{system >> 8}_{system & 255}"
+            yield from bounded(merged(f"{RAW_PREFIX}{message.name}{suffix}", [part]))
+            if system == vehicle:
+                _take(canonical, part, served.get(message.name, ()), nowhere)
+                armed.take(canonical, part, message.name)
         for topic, parts in sorted(canonical.items()):
             batch = merged(topic, parts)
-            yield from bounded(batch)
-    yield from _remarks(served)
+            yield from bounded(one_row_each(batch) if len(parts) > 1 else batch)
+    yield from _remarks(served, clocks.texts(vehicle, timer.most_late_ns))
+    for topic, count in sorted(nowhere.items()):
+        if count:
+            yield Remark("no_position", f"{topic}: {count} {NO_POSITION}", topic, ("latitude_deg", "longitude_deg"))
     yield from frames.damages()
 
 
-def _by_number(block: _Block, rows: Int64Array) -> Iterator[tuple[int, Int64Array]]:
-    """Each message that occurs among frames, by its number, and which of the block's frames are of it."""
-    order = rows[np.argsort(block.frames[rows, 1], kind="stable")]
-    numbers = block.frames[order, 1]
-    for which in np.split(order, np.flatnonzero(np.diff(numbers)) + 1):
-        yield int(block.frames[which[0], 1]), which
+def _with_next(blocks: Iterable[Block]) -> Iterator[tuple[Block, Block | None]]:
+    """Each block with the one that follows."""
+    before = None
+    for block in blocks:
+        if before is not None:
+            yield before, block
+        before = block
+    if before is not None:
+        yield before, None
 
 
-def _survey(source: Source) -> tuple[int, dict[str, frozenset[str]]]:
-    """The vehicle (system x 256 + component) that tells its attitude most often, and the columns of its messages."""
+def _survey(frames: Iterable[Block]) -> tuple[int, dict[str, frozenset[str]], Clocks]:
+    """The vehicle, the columns of its messages, and the clocks of all senders.
+
+    The vehicle (system x 256 + component) is the one that tells its attitude most often.
+    """
     known = messages()
     counts: dict[tuple[int, int], int] = {}
-    for block in _Frames(source):
-        pairs, times = np.unique(block.frames[:, 2] * MOST_IDS + block.frames[:, 1], return_counts=True)
-        for pair, count in zip(pairs.tolist(), times.tolist(), strict=True):
-            counts[divmod(pair, MOST_IDS)] = counts.get(divmod(pair, MOST_IDS), 0) + count
+    clocks = ClockSurvey()
+    for block in frames:
+        for system, number, which in block.groups:
+            counts[system, number] = counts.get((system, number), 0) + len(which)
+        clocks.take(block)
     own: dict[int, int] = {}
     for (system, number), count in counts.items():
         own[system] = own.get(system, 0) + count * (1_000 if known[number].name == "ATTITUDE" else 1)
     vehicle = max(own, key=lambda system: (own[system], -system), default=256 + AUTOPILOT)
     met = (known[number] for system, number in counts if system == vehicle)
-    return vehicle, {message.name: frozenset(message.dtype.names or ()) for message in met}
+    columns = {message.name: frozenset(message.dtype.names or ()) for message in met}
+    return vehicle, columns, clocks.clocks(vehicle)
 
 
-def _part(block: _Block, which: Int64Array, message: Message) -> Part:
-    """Columns of one message's frames; a payload of version 2 leaves out the zeros at its end."""
-    frames = block.frames[which]
-    size = message.dtype.itemsize
-    payloads = np.zeros((len(which), size), dtype=np.uint8)
-    lengths = np.minimum(frames[:, 4], size)
-    for length in np.unique(lengths[lengths > 0]).tolist():
-        rows = np.flatnonzero(lengths == length)
-        at_any_byte = np.ndarray((len(block.data) - length + 1,), f"V{length}", block.data.data, strides=(1,))
-        payloads[rows, :length] = at_any_byte[frames[rows, 3]].view(np.uint8).reshape(len(rows), length)
-    rows_of = payloads.view(message.dtype)[:, 0]
+def _part(block: Block, which: Int64Array, message: Message, validity_ns: Int64Array | None) -> Part:
+    """Columns of one message's frames."""
+    rows_of = block.rows(which, message)
     columns: dict[str, Column] = {}
     for name in message.dtype.names or ():
         values = rows_of[name]
@@ -164,10 +181,8 @@ def _part(block: _Block, which: Int64Array, message: Message) -> Part:
             columns |= {f"{name}[{k}]": Column(values[:, k].copy()) for k in range(message.arrays[name])}
         else:
             columns[name] = Column(values.copy())
-    time_us = frames[:, 0]
-    is_time = (time_us >= 0) & (time_us < (1 << 62) // _NS_PER_US)
-    time = Column(np.where(is_time, time_us, 0) * _NS_PER_US, None if is_time.all() else is_time)
-    return Part(block.first_index + which, time, columns)
+    validity = None if validity_ns is None else validity_ns[which]
+    return Part(block.first_index + which, block.received.take(which), columns, validity)
 
 
 def _served(met: Mapping[str, frozenset[str]]) -> dict[str, list[Assignment]]:
@@ -180,17 +195,21 @@ def _served(met: Mapping[str, frozenset[str]]) -> dict[str, list[Assignment]]:
     return served
 
 
-def _take(canonical: dict[str, list[Part]], part: Part, assignments: Sequence[Assignment]) -> None:
-    """Add what a message gives to canonical topics."""
+def _take(
+    canonical: dict[str, list[Part]], part: Part, assignments: Sequence[Assignment], nowhere: Counter[str]
+) -> None:
+    """Add what a message gives to canonical topics; ``nowhere`` counts positions that are none."""
     if not assignments:
         return
-    numbers = {
-        name: one.values.astype(np.float64) for name, one in part.columns.items() if one.values.dtype.kind != "U"
-    }
+    with np.errstate(invalid="ignore"):  # of a NaN that signals
+        numbers = {
+            name: one.values.astype(np.float64) for name, one in part.columns.items() if one.values.dtype.kind != "U"
+        }
     for one in assignments:
         with np.errstate(over="ignore", invalid="ignore"):
-            columns = one.rule.columns(numbers)
-        kept = occupied(Part(part.index, part.time, columns))
+            columns, zeros = placed(one.topic, one.rule.columns(numbers))
+        nowhere[one.topic] += len(zeros)
+        kept = occupied(Part(part.index, part.time, columns, part.validity_ns))
         if kept is not None:
             canonical.setdefault(one.topic, []).append(kept)
 
@@ -217,11 +236,12 @@ class _Arming:
 
     def _add(self, canonical: dict[str, list[Part]], part: Part, rows: Int64Array, names: NDArray[np.str_]) -> None:
         if len(rows):
-            event = Part(part.index[rows], part.time.take(rows), {"name": Column(names)})
+            validity_ns = None if part.validity_ns is None else part.validity_ns[rows]
+            event = Part(part.index[rows], part.time.take(rows), {"name": Column(names)}, validity_ns)
             canonical.setdefault("event", []).append(event)
 
 
-def _remarks(served: Mapping[str, Sequence[Assignment]]) -> Iterator[Remark]:
+def _remarks(served: Mapping[str, Sequence[Assignment]], clock_texts: Iterable[str]) -> Iterator[Remark]:
     """What serves as what, and by which clock."""
     sources: dict[str, list[str]] = {}
     for name, several in served.items():
@@ -229,5 +249,5 @@ def _remarks(served: Mapping[str, Sequence[Assignment]]) -> Iterator[Remark]:
             sources.setdefault(one.topic, []).append(name)
             yield from one.rule.told(one.topic)
     yield from mapped(sources)
-    text = "times are those of receipt on the ground, by the ground station's clock; the link's delay is in them"
-    yield Remark("clock_used", text)
+    for text in clock_texts:
+        yield Remark("clock_used", text)

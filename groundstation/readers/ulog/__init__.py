@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator
 
-from groundstation.base.errors import UnreadableLogError
+from groundstation.base.errors import UnclaimedLogError, UnreadableLogError
 from groundstation.base.records import Damage, Item
 from groundstation.readers.source import Claim, Source
 
@@ -11,14 +11,41 @@ NAME = "px4-ulog"
 _MAGIC = b"ULog\x01\x12\x35"
 _FORMAT = re.compile(rb"F[A-Za-z0-9_\-/]{2,80}:uint64_t timestamp;")
 _ENOUGH_FORMATS = 2
+_ENCRYPTED, _KEY = b"ULogEnc", b"ULogKey"  # PX4 from 1.16: key and data in one file (.ulge); before: .ulgk and .ulgc
+_ENCRYPTED_NAMES = (".ulge", ".ulgc")
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim what begins with the seven bytes of a ULog, or (where its start is damaged) holds several formats of it."""
+    """Claim what begins with the seven bytes of a ULog, or (where its start is damaged) holds several formats of it.
+
+    Raises
+    ------
+    UnreadableLogError
+        When the log is encrypted.
+    """
     if source.head.startswith(_MAGIC):
         return Claim(NAME)
     found = zip(range(_ENOUGH_FORMATS), _FORMAT.finditer(source.head), strict=False)
-    return Claim(NAME, confidence=0.8) if sum(1 for _ in found) == _ENOUGH_FORMATS else None
+    if sum(1 for _ in found) == _ENOUGH_FORMATS:
+        return Claim(NAME, confidence=0.8)
+    _refuse_encrypted(source)
+    return None
+
+
+def _refuse_encrypted(source: Source) -> None:
+    """Say how to decrypt what PX4 encrypted; before 1.16 data are told by their name."""
+    if source.head.startswith(_KEY):
+        found, next_step = "the key of an encrypted PX4 ULog, no log", "decrypt the .ulgc beside it"
+        raise UnclaimedLogError(source.name, found, "", f"{next_step} with PX4's Tools/decrypt_ulog.py")
+    by_name = [suffix for suffix in source.path.suffixes if suffix.lower() in _ENCRYPTED_NAMES]
+    if source.head.startswith(_ENCRYPTED) or by_name:
+        raise UnreadableLogError(
+            source.name,
+            "an encrypted PX4 ULog",
+            "",
+            "decrypt it with the private key of whoever built the firmware and PX4's Tools/decrypt_ulog.py "
+            "(from 1.16 on Tools/log_encryption/decrypt_logs.py), then read the .ulg that it writes",
+        )
 
 
 def read(source: Source) -> Iterator[Item]:

@@ -26,7 +26,8 @@ from groundstation.readers.mapping import (
 )
 
 _DOWNWARD = 25  # distance_sensor.orientation: ROTATION_DOWNWARD_FACING
-_2D_FIX, FIX_3D = 2, 3
+_2D_FIX, FIX_3D, _EXTRAPOLATED = 2, 3, 8
+_INVALID = 0x7FFFFFFF  # sensor_combined.<sensor>_timestamp_relative of a sensor that is not there
 _HPA_BELOW = 1_200.0  # sensor_baro.pressure is in hPa before PX4 1.13, in Pa from then on
 _UNKNOWN_CURRENT = -1.0
 
@@ -112,14 +113,25 @@ def gnss(rows: Numbers) -> Columns:
         name, factor = next(((name, factor) for name, factor in choices if name in rows), ("", 0.0))
         if name:
             is_velocity = field.startswith(("velocity", "ground", "track"))
-            columns[field] = Column(rows[name] * factor, velocity if is_velocity else fix)
+            known = velocity if is_velocity else fix
+            values = rows[name]
+            if field in _NEVER_ZERO:
+                known = known & ~(values <= 0.0)
+            columns[field] = Column(values * factor, known)
+    if {"altitude_msl_m", "altitude_ellipsoid_m"} <= columns.keys():
+        columns["altitude_ellipsoid_m"] = _filled(columns["altitude_ellipsoid_m"], columns["altitude_msl_m"])
     if "track_deg" in columns:
         with np.errstate(invalid="ignore"):
             columns["track_deg"] = direction(columns["track_deg"].values, velocity)
     if "satellites_used" in rows:
         columns["satellites_used"] = Column(rows["satellites_used"])
-    columns["integrity_ok"] = Column(rows["fix_type"] >= FIX_3D)
+    columns["integrity_ok"] = Column((rows["fix_type"] >= FIX_3D) & (rows["fix_type"] != _EXTRAPOLATED))
     return columns
+
+
+def _filled(ellipsoid: Column, msl: Column) -> Column:
+    """Height above the ellipsoid where a driver filled it in: else it leaves 0."""
+    return Column(ellipsoid.values, ellipsoid.mask & ((ellipsoid.values != 0.0) | (msl.values == 0.0)))
 
 
 _GNSS_FIELDS: Mapping[str, tuple[tuple[str, float], ...]] = {
@@ -135,6 +147,7 @@ _GNSS_FIELDS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "hdop": (("hdop", 1.0),),
     "velocity_sigma_mps": (("s_variance_m_s", 1.0),),
 }
+_NEVER_ZERO = ("hdop", "velocity_sigma_mps")  # a driver that does not know them leaves 0
 
 
 def _air_data(rows: Numbers) -> Columns:
@@ -146,6 +159,16 @@ def _barometer(rows: Numbers) -> Columns:
     with np.errstate(invalid="ignore"):
         pascals = np.where(pressure < _HPA_BELOW, pressure * 100.0, pressure)
     return pressure_altitude(pascals)
+
+
+def _wind(rows: Numbers) -> Columns:
+    """Wind of the filter; a variance of 0 is that of a filter that has not started."""
+    known = None
+    for north, east in (("variance_north", "variance_east"), ("covariance_north", "covariance_east")):
+        if north in rows and east in rows:
+            known = (rows[north] != 0.0) | (rows[east] != 0.0)
+    names = {"wind_north_mps": "windspeed_north", "wind_east_mps": "windspeed_east"}
+    return {field: Column(rows[name], known) for field, name in names.items()}
 
 
 def _current(rows: Numbers) -> Columns:
@@ -171,12 +194,26 @@ _FIELD = ("field_forward_nt", "field_right_nt", "field_down_nt")
 _HEADING = {"true_heading_deg": "attitude of the autopilot's filter (vehicle_attitude)"}
 _QUATERNION = tuple(f"q[{k}]" for k in range(4))
 _PRESSURE = {"pressure_altitude_m": "pressure in the standard atmosphere"}
-_WIND = {"wind_north_mps": ("windspeed_north", 1.0), "wind_east_mps": ("windspeed_east", 1.0)}
+_WIND_NEEDS = ("windspeed_north", "windspeed_east")
 _GNSS_NEEDS = ("fix_type",)
 
 
 def _vector_rule(source: str, name: str, fields: tuple[str, str, str], factor: float = 1.0, **derived: str) -> Rule:
     return Rule(source, tuple(f"{name}[{axis}]" for axis in range(3)), _vector(fields, name, factor), derived)
+
+
+def _while_there(sensor: str, rule: Rule) -> Rule:
+    """A rule of ``sensor_combined``, whose values are absent where it says that the sensor is."""
+    mark = f"{sensor}_timestamp_relative"
+
+    def columns(rows: Numbers) -> Columns:
+        found = rule.columns(rows)
+        if mark not in rows:
+            return found
+        is_there = rows[mark] != _INVALID
+        return {field: Column(column.values, column.mask & is_there) for field, column in found.items()}
+
+    return Rule(rule.source, rule.needs, columns, rule.derived)
 
 
 ROLES: tuple[Role, ...] = (
@@ -205,7 +242,7 @@ ROLES: tuple[Role, ...] = (
         "ins",
         (
             _vector_rule("vehicle_acceleration", "xyz", _ACCEL),
-            _vector_rule("sensor_combined", "accelerometer_m_s2", _ACCEL),
+            _while_there("accelerometer", _vector_rule("sensor_combined", "accelerometer_m_s2", _ACCEL)),
         ),
     ),
     Role(
@@ -228,7 +265,7 @@ ROLES: tuple[Role, ...] = (
         "magnetometer",
         (
             _vector_rule("vehicle_magnetometer", "magnetometer_ga", _FIELD, NT_PER_GAUSS),
-            _vector_rule("sensor_combined", "magnetometer_ga", _FIELD, NT_PER_GAUSS),
+            _while_there("magnetometer", _vector_rule("sensor_combined", "magnetometer_ga", _FIELD, NT_PER_GAUSS)),
             _rule(
                 "sensor_mag",
                 {field: (axis, NT_PER_GAUSS) for field, axis in zip(_FIELD, "xyz", strict=True)},
@@ -242,7 +279,7 @@ ROLES: tuple[Role, ...] = (
         "baro",
         (
             Rule("vehicle_air_data", ("baro_pressure_pa",), _air_data, _PRESSURE),
-            _rule("sensor_combined", {"pressure_altitude_m": ("baro_alt_meter", 1.0)}),
+            _while_there("baro", _rule("sensor_combined", {"pressure_altitude_m": ("baro_alt_meter", 1.0)})),
             Rule("sensor_baro", ("pressure",), _barometer, _PRESSURE),
         ),
     ),
@@ -253,7 +290,7 @@ ROLES: tuple[Role, ...] = (
             _rule("airspeed", {"true_airspeed_mps": ("true_airspeed_m_s", 1.0)}),
         ),
     ),
-    Role("air", (_rule("wind", _WIND), _rule("wind_estimate", _WIND), _rule("estimator_wind", _WIND))),
+    Role("air", tuple(Rule(name, _WIND_NEEDS, _wind) for name in ("wind", "wind_estimate", "estimator_wind"))),
     Role(
         "radio_altimeter",
         (Rule("distance_sensor", ("current_distance", "orientation"), _height),),
@@ -295,4 +332,3 @@ MODE_NAMES: Mapping[int, str] = MappingProxyType(
     }
 )
 ARMING: tuple[tuple[str, str, int], ...] = (("vehicle_status", "arming_state", 2), ("actuator_armed", "armed", 1))
-UTC_SOURCES = ("vehicle_gps_position", "sensor_gps", "vehicle_global_position")

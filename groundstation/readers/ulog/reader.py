@@ -1,7 +1,7 @@
 """The second pass over a ULog: batches of every topic, raw and canonical, then remarks and damages."""
 
 import re
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -23,6 +23,7 @@ from groundstation.base.records import (
 from groundstation.base.signals import EVENT_SEPARATOR
 from groundstation.readers.mapping import mapped
 from groundstation.readers.parts import Part, bounded, merged, occupied
+from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
 from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, Block, Topic, Walk
 from groundstation.readers.ulog.canonical import MODE_NAMES, MODES, Rows
@@ -33,15 +34,22 @@ from groundstation.readers.ulog.texts import MAX_TIME_US, TextTopics, device_tim
 MAX_NAME_CHARACTERS = 200
 _ODD = re.compile(r"[^A-Za-z0-9_\-/]")
 _WITH_MODE, _OF_PRESSURE = "true_heading_deg", "pressure_altitude_m"
+_ALTITUDES = ("sensor_combined",)  # topics that tell the altitude itself, not the pressure
 
 
 @dataclass
 class _Losses:
-    """Data messages without a usable definition, times that no clock shows, pressures that no air has."""
+    """Data without a usable definition, times that no clock shows, refused values."""
 
     unreadable: dict[str, int] = field(default_factory=dict)
     beyond: dict[str, int] = field(default_factory=dict)
-    pressures: dict[str, int] = field(default_factory=dict)
+    refused: dict[tuple[str, str], int] = field(default_factory=dict)
+    nowhere: Counter[str] = field(default_factory=Counter)
+
+    def refuse(self, topic: str, what: str, count: int) -> None:
+        """Count values that are not canonical; the log's own are kept."""
+        if count:
+            self.refused[topic, what] = self.refused.get((topic, what), 0) + count
 
     def damages(self) -> Iterator[Damage]:
         """One for each topic."""
@@ -50,8 +58,9 @@ class _Losses:
         for topic, count in self.beyond.items():
             what = "times more than 292 years after power-up"
             yield Damage("unreadable_cells", "the whole log", count, what, topic)
-        for topic, count in self.pressures.items():
-            yield Damage("unreadable_cells", "the whole log", count, REFUSED, topic, loses_data=False)
+        for (topic, what), count in self.refused.items():
+            yield Damage("unreadable_cells", "the whole log", count, what, topic, loses_data=False)
+        yield from (nowhere(topic, count) for topic, count in self.nowhere.items() if count)
 
 
 def items(source: Source, reader_name: str, start_us: int) -> Iterator[Item]:
@@ -157,7 +166,7 @@ class _CanonicalTopics:
         self._parts: dict[str, list[Part]] = {}
         self._armed: bool | None = None
         self._flight_mode: float | None = None
-        self._mode = "gnss_aided" if found.has_gnss else "attitude"
+        self._mode = "gnss_aided" if found.fixed else "attitude"
 
     def take(self, topic: Topic, index: Int64Array, time: Column, rows: NDArray[Any]) -> None:
         """Convert what a block has of a PX4 topic."""
@@ -169,8 +178,10 @@ class _CanonicalTopics:
         for name, columns in of_topic.items():
             if _WITH_MODE in columns:
                 columns["mode"] = Column(np.full(len(rows), self._mode), columns[_WITH_MODE].present)
-            if _OF_PRESSURE in columns:
+            if _OF_PRESSURE in columns and topic.name not in _ALTITUDES:
                 self._note_refused(name, columns[_OF_PRESSURE])
+            columns, zeros = placed(name, columns)
+            self._losses.nowhere[name] += len(zeros)
             part = occupied(Part(index, time, columns))
             if part is not None:
                 self._parts.setdefault(name, []).append(part)
@@ -181,8 +192,7 @@ class _CanonicalTopics:
 
     def _note_refused(self, topic: str, altitude: Column) -> None:
         refused = 0 if altitude.present is None else int((~altitude.present).sum())
-        if refused:
-            self._losses.pressures[topic] = self._losses.pressures.get(topic, 0) + refused
+        self._losses.refuse(topic, REFUSED, refused)
 
     def _note_mode(self, index: Int64Array, time: Column, modes: NDArray[Any]) -> None:
         """Changes of the flight mode as events, the first mode among them."""

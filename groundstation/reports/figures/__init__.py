@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from groundstation.base.failures import attempt
 from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.parts import Figure, Part, Section
 from groundstation.reports.drawing import Drawing
@@ -92,12 +93,14 @@ def with_drawings(section: Section, results: FlightResults) -> Section:
 
 
 def drawn_by(drawers: Mapping[str, Callable[..., Drawn]], section: Section, results: object) -> Section:
-    """The section with its figures drawn from results by those who know their names."""
+    """The section with its figures drawn from results by those who know their names; one that fails is left out."""
     parts: list[Part] = []
     for part in section.parts:
         if not isinstance(part, Figure):
             parts.append(part)
             continue
-        drawn = drawers[part.name](results, *([part.of] if part.of else []))
-        parts += () if drawn is None else [drawn] if isinstance(drawn, Drawing) else drawn
+        name = ".".join(filter(None, (part.name, part.of)))
+        drawn = attempt("figure", name, drawers[part.name], results, *([part.of] if part.of else []))
+        found = () if drawn is None else [drawn] if isinstance(drawn, Drawing) else drawn
+        parts += [replace(one, name=name) for one in found]
     return replace(section, parts=tuple(parts))

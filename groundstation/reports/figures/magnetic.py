@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.base.geodesy import north_east_m
+from groundstation.base.geodesy import on_earth, plan_north_east_m
 from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
@@ -101,11 +101,11 @@ def track(results: FlightResults) -> Drawing | None:
     near = (time >= min(turn.start_s for turn in turns) - MARGIN_S) & (
         time <= max(turn.end_s for turn in turns) + MARGIN_S
     )
-    latitude, longitude = numbers(data, "latitude_deg")[near], numbers(data, "longitude_deg")[near]
+    latitude, longitude = on_earth(numbers(data, "latitude_deg")[near], numbers(data, "longitude_deg")[near])
     known = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
     if not known.size:
         return None
-    north, east = north_east_m(latitude, longitude, float(latitude[known[0]]), float(longitude[known[0]]))
+    north, east = plan_north_east_m(latitude, longitude, float(latitude[known[0]]), float(longitude[known[0]]))
     time = time[near]
 
     def paint(figure: Any) -> None:

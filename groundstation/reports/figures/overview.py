@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.ellipse import ELLIPSE_95, outlines
-from groundstation.base.geodesy import north_east_m
+from groundstation.base.geodesy import on_earth, plan_north_east_m
 from groundstation.chapters.wording import number, words
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
@@ -32,12 +32,12 @@ def track_map(results: FlightResults) -> Drawing | None:
     data = results.figure_with_rows("overview")
     if data is None:
         return None
-    latitude, longitude = numbers(data, "latitude_deg"), numbers(data, "longitude_deg")
+    latitude, longitude = on_earth(numbers(data, "latitude_deg"), numbers(data, "longitude_deg"))
     known = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
     if not known.size:
         return None
     origin = float(latitude[known[0]]), float(longitude[known[0]])
-    north, east = north_east_m(latitude, longitude, *origin)
+    north, east = plan_north_east_m(latitude, longitude, *origin)
     answer = results.answer(HeadingResult)
     segments = () if answer is None else answer.segments
     time = numbers(data, "time_s")
@@ -98,7 +98,7 @@ def _scale(north: Any, east: Any) -> tuple[float, str]:
 def _ellipses(axes: Any, corrected: CorrectedPosition, origin: tuple[float, float], larger: int, scale: float) -> None:
     """95 % ellipses of the corrected position along the track."""
     rows = corrected.along()
-    north, east = north_east_m(corrected.latitude_deg[rows], corrected.longitude_deg[rows], *origin)
+    north, east = plan_north_east_m(corrected.latitude_deg[rows], corrected.longitude_deg[rows], *origin)
     sigmas = corrected.sigma_north_m[rows], corrected.sigma_east_m[rows]
     for middle, outline in zip(
         np.column_stack([north, east]), outlines(*sigmas, np.zeros(len(rows)), ELLIPSE_95), strict=True

@@ -4,7 +4,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.base.geodesy import north_east_m
+from groundstation.base.geodesy import on_earth, plan_north_east_m
 from groundstation.results.flight import FlightResults
 from groundstation.results.magnetic import MagneticResult, Turn
 from groundstation.viewer import colours
@@ -91,12 +91,14 @@ def eight(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     turns = [turn for turn in (answer.turns if answer else ()) if turn.state == "used"]
     if figure is None or not turns:
         return []
-    time_s, latitude, longitude = (numbers(figure, name) for name in ("time_s", "latitude_deg", "longitude_deg"))
+    time_s = numbers(figure, "time_s")
+    latitude, longitude = on_earth(numbers(figure, "latitude_deg"), numbers(figure, "longitude_deg"))
     start_s, end_s = min(turn.start_s for turn in turns) - MARGIN_S, max(turn.end_s for turn in turns) + MARGIN_S
     shown = np.flatnonzero((time_s >= start_s) & (time_s <= end_s) & np.isfinite(latitude) & np.isfinite(longitude))
     if len(shown) < 2:
         return []
-    north, east = north_east_m(latitude[shown], longitude[shown], float(latitude[shown[0]]), float(longitude[shown[0]]))
+    origin = float(latitude[shown[0]]), float(longitude[shown[0]])
+    north, east = plan_north_east_m(latitude[shown], longitude[shown], *origin)
     points = np.column_stack([east, -north])  # the axes of a Rerun picture run right and down
     low, high = bounds_of(points)
     recorder.static("magnetic/eight/grid", grid(low, high))

@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.base.ellipse import ELLIPSE_95
-from groundstation.base.geodesy import north_east_m, on_earth
+from groundstation.base.geodesy import continuous_longitude_deg, on_earth, plan_north_east_m
 from groundstation.base.records import BoolArray
 from groundstation.results.corrected_position import corrected_position
 from groundstation.results.figures import FigureData
@@ -23,6 +23,7 @@ from groundstation.viewer.views import figure_of, numbers
 
 LINE, MARK, GRID_LINE = 1.6, 5.0, 0.5  # widths and radii in points of the screen
 TILE_PIXELS, MAP_PIXELS, MAX_ZOOM = 256.0, 500.0, 18.0
+MAP_LATITUDE_DEG = 85.0  # beyond it the map, in Mercator's projection, has no tiles and soon no end
 GRID_LINES = 6  # about so many across the longer side
 MARGIN = 0.08  # of the longer side, around the track
 LARGEST_IN_M = 3000.0  # a plan no larger is labelled in metres, as in the report
@@ -39,7 +40,7 @@ def track(recorder: Recorder, results: FlightResults, figure: FigureData) -> rrb
         space = flight_space(recorder, figure, None, [], [])
         return None if space is None else rrb.Tabs(contents=[space])
     pieces, shades = _pieces(results, time_s, known)
-    north, east = north_east_m(positions[:, 0], positions[:, 1], *positions[known][0].tolist())
+    north, east = plan_north_east_m(positions[:, 0], positions[:, 1], *positions[known][0].tolist())
     space = flight_space(recorder, figure, np.column_stack([east, north]), pieces, shades)
     plan_m = np.column_stack([east, -north])
     ellipses = _ellipses(recorder, results, positions[known][0], plan_m[known])
@@ -97,7 +98,7 @@ def _ellipses(recorder: Recorder, results: FlightResults, origin_deg: FloatArray
     if corrected is None:
         return ""
     larger = corrected.larger(float(np.ptp(points, axis=0).max()))
-    north, east = north_east_m(corrected.latitude_deg, corrected.longitude_deg, *origin_deg.tolist())
+    north, east = plan_north_east_m(corrected.latitude_deg, corrected.longitude_deg, *origin_deg.tolist())
     middle = np.column_stack([east, -north]).astype(np.float32)
     half = larger * ELLIPSE_95 * np.column_stack([corrected.sigma_east_m, corrected.sigma_north_m]).astype(np.float32)
     thin, rows = rr.Radius.ui_points(GRID_LINE), corrected.along()
@@ -175,6 +176,9 @@ def _map(
     pieces: list[slice],
     shades: list[Colour],
 ) -> rrb.MapView:
+    """Log the track on the map, beyond 180 deg where it crosses the date line: Rerun's map draws it in one piece."""
+    latitude = np.clip(positions[:, 0], -MAP_LATITUDE_DEG, MAP_LATITUDE_DEG)
+    positions = np.column_stack([latitude, continuous_longitude_deg(positions[:, 1])])
     strips = rr.GeoLineStrings(
         lat_lon=[positions[piece] for piece in pieces], colors=shades, radii=rr.Radius.ui_points(LINE)
     )

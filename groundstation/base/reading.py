@@ -1,0 +1,37 @@
+"""Files opened so that an error of a later read names the file, as an error of opening it does."""
+
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer
+
+
+class _NamedFile(io.FileIO):
+    """A file whose errors have its name: a broken disk does not tell."""
+
+    def readinto(self, buffer: "WriteableBuffer", /) -> int:
+        try:
+            return super().readinto(buffer)
+        except OSError as error:
+            error.filename = self.name
+            raise
+
+    def readall(self) -> bytes:
+        try:
+            return super().readall()
+        except OSError as error:
+            error.filename = self.name
+            raise
+
+
+def open_to_read(path: Path) -> io.BufferedReader:
+    """Open a file for reading bytes.
+
+    Raises
+    ------
+    OSError
+        With the name of the file, as every later read does that fails.
+    """
+    return io.BufferedReader(_NamedFile(path))

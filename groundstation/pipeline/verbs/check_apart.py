@@ -1,0 +1,177 @@
+"""Checks and descriptions of logs, each in a process of its own: with a limit of time, or isolated."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from groundstation.base.clock import Clock
+from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.base.findings import Finding
+from groundstation.base.ledger import Ledger
+from groundstation.pipeline.many_flights.apart import each_apart
+from groundstation.pipeline.many_flights.confined import Bounds
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
+from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.pipeline.verbs.check import Checked, check_here, require_logs, unread
+from groundstation.pipeline.verbs.describe import Description, describe, suggest_icd
+
+DRAFT = "draft of an ICD"
+
+
+@dataclass(frozen=True)
+class Job:
+    """Logs to look at in one process: several of a session, else one."""
+
+    paths: tuple[Path, ...]
+    configuration: Configuration
+    purpose: str = ""
+    is_session: bool = False
+    fail_on: str = "none"
+
+    @property
+    def log(self) -> str:
+        """The first of them."""
+        return str(self.paths[0])
+
+    @property
+    def name(self) -> str:
+        """Name of the first of them."""
+        return self.paths[0].name
+
+
+@dataclass(frozen=True)
+class _Told:
+    """A check as it comes from another process."""
+
+    outcome: Outcome
+    facts: Mapping[str, str]
+    ledger: Ledger
+    clock: Clock
+    findings: tuple[Finding, ...]
+    usability: Mapping[str, Any] | None
+
+    @classmethod
+    def of(cls, checked: Checked) -> "_Told":
+        usability = None if checked.usability is None else checked.usability.to_dict()
+        return cls(checked.outcome, checked.facts, checked.ledger, checked.clock, checked.findings, usability)
+
+    def checked(self) -> Checked:
+        """The same as it was there."""
+        found = Checked(self.outcome, self.facts, self.ledger, self.clock, self.findings)
+        if self.usability is None:
+            return found
+        from groundstation.pipeline.verbs.usable import usability_from
+
+        return Checked(self.outcome, self.facts, self.ledger, self.clock, self.findings, usability_from(self.usability))
+
+
+@dataclass(frozen=True)
+class _Several:
+    checks: tuple[_Told, ...]
+
+
+def _check(job: Job, listen: Listener) -> _Several:
+    found = check_here(job.paths, job.configuration, job.purpose, job.is_session, job.fail_on, listen)
+    return _Several(tuple(map(_Told.of, found)))
+
+
+def check_apart(
+    paths: Sequence[Path],
+    configuration: Configuration,
+    bounds: Bounds,
+    *,
+    purpose: str = "",
+    fail_on: str = "none",
+    listen: Listener = silent,
+) -> tuple[Checked, ...]:
+    """Check logs as :func:`groundstation.pipeline.verbs.check.check_many` does, one process after the other.
+
+    Logs of a session, which are judged together, are checked in one process.
+
+    Raises
+    ------
+    UsageError
+        As there.
+    """
+    logs, is_session = require_logs(paths, purpose)
+    listen(Event("begin", total=len(logs)))
+    groups = [tuple(logs)] if is_session else [(log,) for log in logs]
+
+    def failed(job: Job, reason: str) -> _Several:
+        return _Several(tuple(_Told.of(unread(path, f"{path.name}: {reason}")) for path in job.paths))
+
+    jobs = enumerate(Job(group, configuration, purpose, is_session, fail_on) for group in groups)
+    found = each_apart(jobs, _check, _Several, failed, workers=1, listen=listen, bounds=bounds)
+    return tuple(told.checked() for _, several in sorted(found, key=lambda item: item[0]) for told in several.checks)
+
+
+@dataclass(frozen=True)
+class _Described:
+    """A description or the draft of an ICD, or why there is none."""
+
+    description: Description | None = None
+    draft: str | None = None
+    failure: str = ""
+    is_usage: bool = False
+
+
+def _describe(job: Job, _listen: Listener) -> _Described:
+    configuration = job.configuration
+    try:
+        if job.purpose == DRAFT:
+            return _Described(draft=suggest_icd(job.paths[0]))
+        return _Described(describe(job.paths[0], configuration.profile_path, configuration.icds))
+    except UsageError as error:
+        return _Described(failure=str(error), is_usage=True)
+    except Exception as error:
+        return _Described(failure=reason_of(job.name, error)[0])
+
+
+def describe_apart(path: Path, profile: Path | None, icds: tuple[str, ...], bounds: Bounds) -> Description:
+    """Describe a log in a process of its own.
+
+    Raises
+    ------
+    UsageError, GroundstationError
+        As :func:`groundstation.pipeline.verbs.describe.describe`; where the process went beyond its limits.
+    """
+    configuration = Configuration(profile=str(profile) if profile else None, icds=icds)
+    found = _described_apart(Job((path,), configuration), bounds)
+    assert found.description is not None
+    return found.description
+
+
+def suggest_icd_apart(path: Path, bounds: Bounds) -> str:
+    """The draft of an ICD that a process of its own makes of a log.
+
+    Raises
+    ------
+    UsageError, GroundstationError
+        As :func:`groundstation.pipeline.verbs.describe.suggest_icd`; where the process went beyond its limits.
+    """
+    found = _described_apart(Job((path,), Configuration(), DRAFT), bounds)
+    assert found.draft is not None
+    return found.draft
+
+
+def _described_apart(job: Job, bounds: Bounds) -> _Described:
+    ((_, found),) = each_apart(
+        [(0, job)],
+        _describe,
+        _Described,
+        lambda _job, reason: _Described(failure=f"{job.name}: {reason}"),
+        workers=1,
+        listen=silent,
+        bounds=bounds,
+    )
+    if found.failure:
+        raise (UsageError if found.is_usage else GroundstationError)(*_parts(found.failure))
+    return found
+
+
+def _parts(line: str) -> tuple[str, str]:
+    """Where and what, of an error that was told in one line."""
+    where, _, what = line.partition(": ")
+    return where, what

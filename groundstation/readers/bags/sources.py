@@ -1,0 +1,78 @@
+"""Who wrote a topic: connections of one topic that interlace are several sources, those one after the other are one.
+
+A node that is started again opens another connection, and a recording that was split goes on with one of the next file:
+the source stays. Two nodes that publish on one topic at the same time are two, whatever the name of the topic.
+"""
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from groundstation.base.records import Int64Array
+from groundstation.readers.bags.messages import Connection
+
+OVERLAP_SHARE, OVERLAP_MESSAGES = 0.05, 3  # of either of two connections within the time of the other: they interlace
+Key: TypeAlias = tuple[str, str, str, bytes]
+
+
+@dataclass(frozen=True)
+class Line:
+    """When a connection was written: log times in their order, each of which stands for ``stride`` messages."""
+
+    connection: Connection
+    time_ns: Int64Array
+    stride: int
+
+    def overlaps(self, other: "Line") -> bool:
+        """Whether messages of both interlace."""
+        pairs = ((self, other), (other, self))
+        counts = [one._within(two) for one, two in pairs]
+        shares = [count / len(one.time_ns) for count, (one, _two) in zip(counts, pairs, strict=True)]
+        messages = [count * one.stride for count, (one, _two) in zip(counts, pairs, strict=True)]
+        return min(messages) >= OVERLAP_MESSAGES and max(shares) >= OVERLAP_SHARE
+
+    def _within(self, other: "Line") -> int:
+        first, end = np.searchsorted(self.time_ns, (other.time_ns[0], other.time_ns[-1] + 1))
+        return int(end - first)
+
+
+def key_of(connection: Connection) -> Key:
+    """What connections of one source have in common."""
+    return connection.topic, connection.type, connection.encoding, connection.schema
+
+
+def in_order(connection: Connection) -> tuple[str, list[tuple[int, str]], int]:
+    """Key to sort connections by: topic, then publisher, numbers in it by their size."""
+    parts = re.findall(r"\d+|\D+", connection.publisher)
+    return (
+        connection.topic,
+        [(int(part), "") if part.isdigit() and part.isascii() else (-1, part) for part in parts],
+        connection.number,
+    )
+
+
+def sources_of(lines: Iterable[Line]) -> list[list[int]]:
+    """Numbers of the connections of each source, in the order in which they were first met."""
+    topics: dict[Key, list[Line]] = {}
+    for line in lines:
+        topics.setdefault(key_of(line.connection), []).append(line)
+    found = [source for several in topics.values() for source in _of_topic(several)]
+    found.sort(key=lambda source: source[0].connection.number)
+    return [[line.connection.number for line in source] for source in found]
+
+
+def _of_topic(lines: Sequence[Line]) -> list[list[Line]]:
+    """The connections of a topic, those together that one source wrote one after the other."""
+    sources: list[list[Line]] = []
+    for line in sorted(lines, key=lambda line: (int(line.time_ns[0]), line.connection.number)):
+        free = [source for source in sources if not any(line.overlaps(one) for one in source)]
+        if free:
+            publisher = line.connection.publisher
+            free.sort(key=lambda source: (source[-1].connection.publisher == publisher, int(source[-1].time_ns[-1])))
+            free[-1].append(line)
+        else:
+            sources.append([line])
+    return sources

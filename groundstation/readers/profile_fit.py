@@ -1,0 +1,202 @@
+"""A profile laid over a header of a table: its columns, and the lines that belong to it."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from groundstation.readers.dialect import DELIMITERS, Dialect, Line, normal_form, split_cells, trailing_cells
+from groundstation.readers.profile import Profile
+from groundstation.readers.sections import Place, lines_below
+from groundstation.readers.source import Source
+from groundstation.readers.told import Told, bare, told
+
+_MOST_ABOVE = 20  # lines above a header in the middle of a file that belong to it
+_TIMES: Mapping[str, re.Pattern[str]] = {
+    "local": re.compile(r"\d{1,2}:\d\d:\d\d(\.\d*)?"),
+    "iso": re.compile(r"\d{4}-?\d\d.*"),
+    "seconds": re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?"),
+    "nanoseconds": re.compile(r"[+-]?\d+"),
+}
+_FORMAT = re.compile(r"(?=.*(yy|hh))[ymdhs:./ -]+", re.IGNORECASE)  # the unit of a date or a time of day
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A profile over a header row.
+
+    Parameters
+    ----------
+    profile : Profile
+    encoding, delimiter : str
+    names : tuple of str
+        Cells of the header row.
+    header : Line
+    behind : tuple of Line
+        Rows of units or of other names below the header.
+    above : tuple of Line
+        Lines above the header that are no rows.
+    rows_above : tuple of Line
+        Rows above the header.
+    first_rows : tuple of str
+    """
+
+    profile: Profile
+    encoding: str
+    delimiter: str
+    names: tuple[str, ...]
+    header: Line
+    behind: tuple[Line, ...] = ()
+    above: tuple[Line, ...] = ()
+    rows_above: tuple[Line, ...] = ()
+    first_rows: tuple[str, ...] = ()
+
+    @property
+    def last(self) -> Line:
+        """The last line above the rows."""
+        return self.behind[-1] if self.behind else self.header
+
+    def dialect_to(self, end_byte: int | None, stands_again: bool = True) -> Dialect:
+        """Form, beginning and end of the rows; ``stands_again``: the header may stand among them."""
+        lines = (*self.above, *((self.header,) if stands_again else ()), *self.behind)
+        return Dialect(
+            self.encoding,
+            self.delimiter,
+            self._cell_count,
+            self.last.next_byte,
+            self.last.number + 1,
+            frozenset(normal_form(line.text, self.delimiter) for line in lines) - {""},
+            end_byte,
+        )
+
+    @cached_property
+    def _cell_count(self) -> int:
+        return len(self.names) + trailing_cells(self.first_rows, self.delimiter, len(self.names))
+
+    @cached_property
+    def position(self) -> Mapping[str, int]:
+        """Columns by name; also by the name without a unit if the header tells units."""
+        found = {name: at for at, name in reversed(list(enumerate(self.names))) if name}
+        if self.profile.header_tells:
+            found = {bare(name): at for at, name in reversed(list(enumerate(self.names))) if bare(name)} | found
+        return found
+
+    @cached_property
+    def _around(self) -> tuple[list[list[str]], list[list[str]]]:
+        """Cells of the rows of names, and of those of units, around the header and with it."""
+        if not self.profile.header_tells:
+            return [], []
+        names, units = [list(self.names)], list[list[str]]()
+        for line in (*self.above, *self.behind):
+            cells = self._cells(line.text)
+            is_of_units = line.text.startswith("#") or any(map(_FORMAT.fullmatch, cells))
+            (units if is_of_units else names).extend([cells] if cells else [])
+        return names, units
+
+    @property
+    def told_count(self) -> int:
+        """Number of columns whose name tells more in parentheses."""
+        return sum(bare(name) != name for name in self.names)
+
+    def told(self, at: int) -> Told:
+        """Read the names of a column, and its cells in the rows around the header."""
+        names, units = self._around
+        return told([cells[at] for cells in names], [cells[at] for cells in units])
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units by column: a comment above the header, or a row below it that is left out, that has as many cells."""
+        comments = [line.text for line in self.above if line.text.startswith("#")]
+        below = [line.text for line in self.behind[: self.profile.rows_after_header]]
+        for cells in map(self._cells, (*comments, *below)):
+            if cells:
+                return {name: cell for name, cell in zip(self.names, cells, strict=True) if name and cell != "-"}
+        return {}
+
+    def label(self, at: int) -> str:
+        """Name of a column under the raw topic."""
+        name = self.names[at]
+        return name if self.names.index(name) == at else f"{name}_{at + 1}"
+
+    def names_as(self, other: "Fit") -> bool:
+        """Tell whether another header names and tells the same."""
+        return (self.names, self.delimiter, self._around) == (other.names, other.delimiter, other._around)
+
+    def is_repeated(self, place: Place) -> bool:
+        """Tell whether the very lines stand again."""
+        above = place.above[len(place.above) - len(self.above) :] if self.above else ()
+        return place.line.text == self.header.text and [one.text for one in above] == [one.text for one in self.above]
+
+    def is_row(self, line: str) -> bool:
+        """Tell a row: it has a cell for each column, and a time, or no time and some number."""
+        times, others = self._times(line)
+        if any(times):
+            return bool(_TIMES[self.profile.time.kind].fullmatch(times[-1]))
+        return any(_TIMES["seconds"].fullmatch(cell) for cell in others)
+
+    def is_of_names(self, line: str) -> bool:
+        """Tell a row of names or units: a word for each column of time, and no number."""
+        times, others = self._times(line.lstrip("#"))
+        is_time = bool(times) and bool(_TIMES[self.profile.time.kind].fullmatch(times[-1]))
+        return bool(times) and all(times) and not is_time and not any(map(_TIMES["seconds"].fullmatch, others))
+
+    def _times(self, line: str) -> tuple[list[str], list[str]]:
+        """Cells of a line that tell the time, and the others; none if there are too few or many."""
+        cells = split_cells(line, self.delimiter)
+        if len(cells) not in (len(self.names), len(self.names) + 1) or line.startswith("#"):
+            return [], []
+        at = [self.position[name] for name in self.profile.time.columns[:2]]
+        return [cells[one] for one in at], [cell for one, cell in enumerate(cells) if one not in at]
+
+    def _cells(self, line: str) -> list[str]:
+        """Cells of a line beside the header, none where their number is not that of the columns."""
+        cells = [cell.strip() for cell in split_cells(line.lstrip("# "), self.delimiter)]
+        return cells if len(cells) == len(self.names) else []
+
+
+def delimiter_of(line: str, profile: Profile) -> str:
+    """Delimiter of a line that is a header row of a profile, else nothing."""
+    wanted = {*profile.required, *profile.time.columns[:2]}
+    if not all(name in line for name in wanted):
+        return ""
+    for delimiter in DELIMITERS:
+        names = _names(line, delimiter, profile)
+        if wanted.issubset(names) or (profile.header_tells and wanted.issubset(map(bare, names))):
+            return delimiter
+    return ""
+
+
+def fit_at(profile: Profile, encoding: str, delimiter: str, lines: Sequence[Line], at: int) -> Fit:
+    """A profile over the header row ``at`` of the lines on top of a file."""
+    fit = _with_names(profile, encoding, delimiter, lines, at)
+    return replace(
+        fit,
+        above=tuple(line for line in lines[:at] if not fit.is_row(line.text)),
+        rows_above=tuple(line for line in lines[:at] if fit.is_row(line.text)),
+    )
+
+
+def fit_below(source: Source, before: Fit, place: Place) -> tuple[Fit, int]:
+    """A profile over a header in the middle of a file, and the byte that ends the one before."""
+    lines = [place.line, *lines_below(source, place.line, before.encoding)]
+    fit = _with_names(before.profile, before.encoding, delimiter_of(place.line.text, before.profile), lines, 0)
+    count = 0
+    while count < min(len(place.above), _MOST_ABOVE) and not before.is_row(place.above[-count - 1].text):
+        count += 1
+    end_byte = place.above_from[-count] if count else place.first_byte
+    return replace(fit, above=place.above[len(place.above) - count :]), end_byte
+
+
+def _with_names(profile: Profile, encoding: str, delimiter: str, lines: Sequence[Line], at: int) -> Fit:
+    """Names and the lines below them; what stands above is left open."""
+    names = _names(lines[at].text, delimiter, profile)
+    first = at + 1 + profile.rows_after_header
+    fit = Fit(profile, encoding, delimiter, names, lines[at], tuple(lines[at + 1 : first]))
+    if profile.has_second_names and first < len(lines) and fit.is_of_names(lines[first].text):
+        first += 1
+    below = tuple(line.text for line in lines[first:])
+    return replace(fit, behind=tuple(lines[at + 1 : first]), first_rows=below)
+
+
+def _names(line: str, delimiter: str, profile: Profile) -> tuple[str, ...]:
+    return tuple(split_cells(line.lstrip("#") if profile.header_tells else line, delimiter))

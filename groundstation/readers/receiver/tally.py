@@ -1,0 +1,131 @@
+"""Counts of what a stream tells that cannot be, or cannot be read, and what is told of it once the stream was read."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from groundstation.base.geodesy import NO_POSITION
+from groundstation.base.records import HEADING_IS_TRACK, Damage, Int64Array, Item, RecordBatch, Remark
+from groundstation.readers.receiver.messages import Messages
+from groundstation.readers.receiver.sentences import Sentences
+
+MOST_SEPARATION_M = 120.0  # of geoid and ellipsoid; on Earth they are within 107 m
+MOST_ROLL_DEG, MOST_PITCH_DEG, MOST_HEADING_DEG = 180.0, 90.0, 360.0
+MOVING_MPS = 1.0
+ZERO_POSITION, IMPOSSIBLE_ATTITUDE, ASTRAY, NOT_MEASURED = "no_position", "impossible", "odd_height", "not_measured"
+_NEARLY_ALL = 0.99
+_NAMES_TOLD = 5
+_REFUSED = {
+    ZERO_POSITION: NO_POSITION,
+    IMPOSSIBLE_ATTITUDE: f"records with a roll beyond {MOST_ROLL_DEG:g}, a pitch beyond {MOST_PITCH_DEG:g} or a "
+    f"heading beyond {MOST_HEADING_DEG:g} deg: no attitude, kept as raw values alone",
+}
+_ODD = {
+    ASTRAY: f"geoid and ellipsoid are said to be over {MOST_SEPARATION_M:.0f} m apart in {{count}} rows, which they "
+    "never are: altitude_msl_m left out, their sum kept as altitude_ellipsoid_m",
+    NOT_MEASURED: "{count} fixes are simulated or entered by hand, as the receiver says: integrity_ok is false",
+}
+_FIELDS = {ASTRAY: ("altitude_ellipsoid_m",), NOT_MEASURED: ("fix",)}
+SHORTER, OTHER_LENGTH, ODD_TEXT = "shorter", "of another length", "odd text"
+_LENGTHS = {
+    SHORTER: "messages shorter than their layout: only the fields that they have are kept",
+    OTHER_LENGTH: "messages of another length than their layout: what does not fit it is not read",
+    ODD_TEXT: "messages in text that do not fit their layout: only their text is kept",
+}
+
+
+@dataclass
+class Tally:
+    """Rows, messages and cells by what is odd about them, and the byte of the file at which the first stands.
+
+    Parameters
+    ----------
+    bare : int
+        Sentences without a checksum.
+    """
+
+    bare: int = 0
+    _rows: Counter[tuple[str, str]] = field(default_factory=Counter)
+    _lengths: Counter[tuple[str, str]] = field(default_factory=Counter)
+    _cells: Counter[tuple[str, str]] = field(default_factory=Counter)
+    _first: dict[tuple[str, str], int] = field(default_factory=dict)
+    _as_track: int = 0
+    _moving: int = 0
+    _fixes: int = 0
+    _positions: int = 0
+    _most_satellites: float = 0.0
+
+    def add(self, what: str, topic: str, places: Int64Array) -> None:
+        """Count rows, which begin at ``places``."""
+        self._count(self._rows, (what, topic), places)
+
+    def add_lengths(self, messages: Messages, is_poll: bool) -> None:
+        """Count the messages whose payload their layout does not fit; one that asks for an answer has none."""
+        if messages.is_short and not is_poll:
+            self._count(self._lengths, (SHORTER, messages.name), messages.places)
+        if messages.layout is None and not messages.is_sound:
+            self._count(self._lengths, (ODD_TEXT, messages.name), messages.places)
+        self._count(self._lengths, (OTHER_LENGTH, messages.name), messages.places[messages.misfits()])
+
+    def add_cells(self, sentences: Sentences) -> None:
+        """Count the fields of sentences that are no number."""
+        for name, count in sentences.unreadable.items():
+            self._cells[sentences.address, name] += count
+
+    def add_headings(self, as_track: int, moving: int) -> None:
+        """Count fixes of a moving vehicle, and those of them whose heading is their track."""
+        self._as_track, self._moving = self._as_track + as_track, self._moving + moving
+
+    def add_fixes(self, gnss: RecordBatch) -> None:
+        """Count rows of ``gnss``, and those with a position."""
+        self._fixes += len(gnss)
+        if "latitude_deg" in gnss.columns:
+            self._positions += int(np.count_nonzero(gnss.columns["latitude_deg"].mask))
+        used = gnss.columns.get("satellites_used")
+        if used is not None and used.mask.any():
+            self._most_satellites = max(self._most_satellites, float(used.values[used.mask].max()))
+
+    def _count(self, counter: Counter[tuple[str, str]], key: tuple[str, str], places: Int64Array) -> None:
+        if len(places):
+            counter[key] += len(places)
+            self._first.setdefault(key, int(np.min(places)))
+
+    def items(self, counts: Counter[str]) -> Iterator[Item]:
+        """Remarks and damages. Of what was refused nothing is lost: the raw topics keep it.
+
+        ``counts`` are those of all messages and sentences by name.
+        """
+        if not self._positions:
+            most = f"{'at most ' if self._most_satellites else ''}{self._most_satellites:g} satellites"
+            why = f"GNSS never had a fix: {self._fixes} rows, {most}; "
+            yield Remark("no_position", f"no position in this file: {why if self._fixes else ''}{_named(counts)}")
+        if self.bare:
+            yield Remark("no_checksum", "sentences without a checksum: a damaged number is not seen")
+        if self._moving and self._as_track >= _NEARLY_ALL * self._moving:
+            text = (
+                f"heading and track are the same in {self._as_track} of {self._moving} fixes above {MOVING_MPS:g} m/s: "
+                "the receiver lets the nose point along the motion, so its heading is no second measurement"
+            )
+            yield Remark(HEADING_IS_TRACK, text, "ins", ("true_heading_deg",))
+        for (what, topic), count in sorted(self._rows.items()):
+            if what in _ODD:
+                yield Remark(what, _ODD[what].format(count=count), topic, _FIELDS[what])
+            else:
+                place = f"{topic}, the first at byte {self._first[what, topic]}"
+                yield Damage(what, place, count, _REFUSED[what], topic, loses_data=False)
+        for (how, name), count in sorted(self._lengths.items()):
+            place = f"{name}, the first at byte {self._first[how, name]}"
+            if how == ODD_TEXT:
+                yield Remark("odd_text", f"{_LENGTHS[how]}: {count} ({place})", f"raw.{name}")
+            else:
+                yield Damage("corrupt", place, count, _LENGTHS[how])
+        for (address, name), count in sorted(self._cells.items()):
+            topic = f"raw.{address}"
+            yield Damage("unreadable_cells", f"{topic}.{name}", count, "cells that are no number", topic)
+
+
+def _named(counts: Counter[str]) -> str:
+    names = ", ".join(f"{name} ({count})" for name, count in counts.most_common(_NAMES_TOLD))
+    return names + (" and others" if len(counts) > _NAMES_TOLD else "")

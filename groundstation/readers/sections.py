@@ -1,0 +1,174 @@
+"""Sections of a table: a header line in the middle of a file governs the rows below it.
+
+Logs that were appended to each other, or recorders that begin anew in the same file, write a second header: with other
+columns, other units, another time zero.
+"""
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import BinaryIO
+
+from groundstation.base.records import Damage, Remark
+from groundstation.readers.dialect import Dialect, Line
+from groundstation.readers.layout import Layout
+from groundstation.readers.source import Source
+
+MOST = 500  # more headers that change something are no log: what follows is left out
+_PIECE_BYTES, _LONGEST_LINE = 1 << 17, 8 << 20
+_ABOVE_BYTES, _BELOW_BYTES = 1 << 16, 1 << 14  # how far from a header line its preamble and its rows are looked at
+_MARK_OF_UTF8 = "\ufeff"  # a file that was appended to another brings its own
+_SHORT = 2  # characters: such a name stands in many a row
+_WORD = re.compile(rb"[\n\r][ \"#]*[A-Za-z_]")
+
+
+@dataclass(frozen=True)
+class Section:
+    """Rows below one header.
+
+    Parameters
+    ----------
+    dialect : Dialect
+        With the bytes where the rows begin and end.
+    layout : Layout
+    shift_ns : int, optional
+        From the time of these rows to that of the log's header; None where nothing tells it: the rows have no time.
+    """
+
+    dialect: Dialect
+    layout: Layout
+    shift_ns: int | None = 0
+
+
+@dataclass(frozen=True)
+class Place:
+    """A header line, and the lines above it up to the header before, each with its first byte."""
+
+    line: Line
+    first_byte: int
+    above: tuple[Line, ...]
+    above_from: tuple[int, ...]
+
+
+def header_places(
+    source: Source, first: Line, encoding: str, mark: re.Pattern[bytes], is_header: Callable[[str], bool]
+) -> Iterator[Place]:
+    """Lines below the first header that are headers too.
+
+    Parameters
+    ----------
+    source : Source
+    first : Line
+        The last line of the first header; looked for is behind it.
+    encoding : str
+    mark : pattern
+        Stands in every header line, and in hardly any row.
+    is_header : callable
+        Tells of a line with the mark whether it is a header.
+    """
+    after = first
+    with source.open() as again:
+        for line, start in lines_with(source, first, encoding, mark):
+            if is_header(line.text):
+                yield Place(line, start, *_above(again, after, line.number, start, encoding, _separator(source)))
+                after = line
+
+
+def mark_of(name: str) -> re.Pattern[bytes]:
+    """A mark of header lines: a name in them, or a letter at their beginning if it is short."""
+    return _WORD if len(name) <= _SHORT else re.compile(re.escape(name.encode()))
+
+
+def lines_with(source: Source, first: Line, encoding: str, mark: re.Pattern[bytes]) -> Iterator[tuple[Line, int]]:
+    """Whole lines behind a line that have a mark, and their first bytes."""
+    separator = _separator(source)
+    base, rest = first.next_byte - len(separator), b""  # every piece begins with the end of the line before
+    number, counted = first.number + 1, first.next_byte
+    with source.open() as stream, source.open() as again:
+        stream.seek(base)
+        while data := stream.read(_PIECE_BYTES):
+            piece = rest + data if rest else data
+            end = piece.rfind(separator)
+            if end <= 0 and len(piece) > _LONGEST_LINE:
+                base, rest = base + len(piece) - 1, piece[-1:]
+                continue
+            at = 0
+            while end > 0 and (hit := mark.search(piece, at, end)) is not None:
+                start, at = piece.rfind(separator, 0, hit.end()) + 1, piece.find(separator, hit.end())
+                if counted < base:
+                    number, counted = number + _count(again, counted, base, separator), base
+                number, counted = number + piece.count(separator, counted - base, start), base + start
+                text = piece[start:at].decode(encoding, errors="replace").rstrip("\r").removeprefix(_MARK_OF_UTF8)
+                yield Line(number, base + at + 1, text, True), counted
+            base, rest = base + max(end, 0), piece[max(end, 0) :]
+
+
+def _count(stream: BinaryIO, start: int, end: int, separator: bytes) -> int:
+    """Line ends between two bytes of a file."""
+    stream.seek(start)
+    count = 0
+    while start < end and (data := stream.read(min(_PIECE_BYTES, end - start))):
+        count, start = count + data.count(separator), start + len(data)
+    return count
+
+
+def lines_below(source: Source, line: Line, encoding: str) -> tuple[Line, ...]:
+    """The first lines below a header."""
+    separator = _separator(source)
+    with source.open() as stream:
+        stream.seek(line.next_byte)
+        content = stream.read(_BELOW_BYTES).split(separator)[:-1]
+    found, next_byte = [], line.next_byte
+    for offset, text in enumerate(content, start=1):
+        next_byte += len(text) + len(separator)
+        found.append(Line(line.number + offset, next_byte, text.decode(encoding, errors="replace").rstrip("\r"), True))
+    return tuple(found)
+
+
+def _separator(source: Source) -> bytes:
+    return b"\n" if b"\n" in source.head or b"\r" not in source.head else b"\r"
+
+
+def ended(section: Section, end_byte: int) -> Section:
+    """A section whose rows end where the next header, or what belongs to it, begins."""
+    return replace(section, dialect=replace(section.dialect, end_byte=end_byte))
+
+
+def left_out(source: Source, line: int, first_byte: int) -> Damage:
+    """Damage that tells of the lines from a header on that is one too many."""
+    with source.open() as stream:
+        count = _count(stream, first_byte, source.size, _separator(source))
+    what = f"lines behind the first {MOST} headers, each unlike the one before: left out"
+    return Damage("dropped_rows", f"rows {line} to {line + max(count, 1) - 1}", max(count, 1), what)
+
+
+def without_headers(section: Section) -> Section:
+    """A section in which no header line stands again: nothing to look for."""
+    return replace(section, dialect=replace(section.dialect, header_lines=frozenset()))
+
+
+def told(place: Place, is_same: bool, shift_ns: int | None = 0) -> Remark:
+    """A remark on a header of other columns, or of another time, that governs the rows below."""
+    what = "is that of a log with another zero of time" if is_same else "names other columns"
+    text = f"the header in row {place.line.number} {what}: it governs the rows below it"
+    if shift_ns is None:
+        text += ", whose times nothing ties to those above: they are left out"
+    return Remark("second_header", text)
+
+
+def _above(
+    stream: BinaryIO, after: Line, number: int, start: int, encoding: str, separator: bytes
+) -> tuple[tuple[Line, ...], tuple[int, ...]]:
+    """Lines between the header before and a line, and their first bytes."""
+    begin = max(after.next_byte, start - _ABOVE_BYTES)
+    stream.seek(begin)
+    lines = stream.read(start - begin).split(separator)[:-1]
+    if begin > after.next_byte:
+        lines = lines[1:]  # the first may be half of one
+    found, starts, next_byte = [], [], start
+    for offset, content in enumerate(reversed(lines), start=1):
+        text = content.decode(encoding, errors="replace").rstrip("\r")
+        found.append(Line(number - offset, next_byte, text, True))
+        next_byte -= len(content) + len(separator)
+        starts.append(next_byte)
+    return tuple(reversed(found)), tuple(reversed(starts))

@@ -1,0 +1,304 @@
+"""A clock against the times at which its readings were received: what arrived late, and which of the two was set.
+
+Receipt less clock is never below the offset between the two: a reading that waited in a buffer or on a link arrives
+late, none early. The lower envelope of the differences is that offset; where the envelope steps and stays, one of the
+clocks was set, or started again.
+
+Source: S. B. Moon, P. Skelly, D. Towsley, Estimation and removal of clock skew from network delay measurements, IEEE
+INFOCOM 1999.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from groundstation.base.records import BoolArray, Int64Array
+from groundstation.base.units import NS_PER_S
+
+LARGEST_NS = 1 << 62  # of a time: differences of differences fit 64 bits
+STEP_S = 1.0  # a smaller step cannot be told from a reading that arrived late
+DRIFT_PPM = 200.0  # of two clocks; crystals are within 100
+MOST_SKEW_PPM = 1_000.0  # a clock that runs worse counts no seconds: a simulation, or one that was stopped
+JUMP_AHEAD_S = 60.0  # a clock that goes ahead by less and stays: older readings were dropped on the way
+FEWEST_READINGS = 4  # of a stretch; fewer are astray
+MOST_ROUNDS = 5  # of leaving out readings astray
+CAUGHT_UP_SHARE = 0.1  # of a step, by which readings behind it may come earlier
+MOST_KEPT, RUN = 100_000, 64  # readings that are kept beside the lowest of each run
+MOST_STEPS = 64  # of a log; a clock with more is none
+Stepped: TypeAlias = Literal["", "receipt", "clock"]
+
+
+@dataclass
+class Readings:
+    """Readings of a clock, thinned: those around each jump, and of each run the one that arrived least late.
+
+    Attributes
+    ----------
+    count : int
+        How many there were.
+    """
+
+    count: int = 0
+    _parts: list[Int64Array] = field(default_factory=list)
+    _kept: int = 0
+    _last: Int64Array = field(default_factory=lambda: np.zeros((4, 0), dtype=np.int64))
+
+    def take(self, record_index: Int64Array, receipt_ns: Int64Array, clock_ns: Int64Array) -> None:
+        """Add readings in the order of the log, shape (n,) each; a time that is negative or above 62 bits is none."""
+        is_time = (receipt_ns >= 0) & (receipt_ns < LARGEST_NS) & (clock_ns >= 0) & (clock_ns < LARGEST_NS)
+        if not is_time.all():
+            record_index, receipt_ns, clock_ns = record_index[is_time], receipt_ns[is_time], clock_ns[is_time]
+        if not len(record_index):
+            return
+        number = np.arange(self.count, self.count + len(record_index))
+        new = np.stack((record_index, receipt_ns, clock_ns, number))
+        self.count += len(record_index)
+        rows = np.concatenate((self._last, new), axis=1)
+        late_ns = rows[1] - rows[2]
+        is_kept = np.zeros(rows.shape[1], dtype=bool)
+        is_kept[[0, -1]] = True
+        jumps = np.flatnonzero(np.abs(np.diff(late_ns)) > STEP_S * NS_PER_S)
+        jumps = jumps[: max(MOST_KEPT - self._kept, 0) // 2]
+        is_kept[jumps] = is_kept[jumps + 1] = True
+        whole = len(late_ns) // RUN * RUN
+        is_kept[np.arange(0, whole, RUN) + late_ns[:whole].reshape(-1, RUN).argmin(axis=1)] = True
+        is_kept[whole + int(late_ns[whole:].argmin()) if whole < len(late_ns) else -1] = True
+        is_kept[: self._last.shape[1]] = False  # it was kept before
+        self._kept += 2 * len(jumps)
+        self._parts.append(rows[:, is_kept])
+        self._last = rows[:, -1:]
+
+    def all(self) -> "Track":
+        """Those that were kept."""
+        rows = np.concatenate(self._parts, axis=1) if self._parts else np.zeros((4, 0), dtype=np.int64)
+        return Track(*rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Readings in the order of the log, shape (n,) each: record, receipt, clock, and the place among all readings."""
+
+    record_index: Int64Array
+    receipt_ns: Int64Array
+    clock_ns: Int64Array
+    number: Int64Array
+
+    def __len__(self) -> int:
+        return len(self.record_index)
+
+    def take(self, rows: BoolArray | slice) -> "Track":
+        """The readings that ``rows`` selects."""
+        return Track(self.record_index[rows], self.receipt_ns[rows], self.clock_ns[rows], self.number[rows])
+
+    @property
+    def late_ns(self) -> Int64Array:
+        """Receipt less clock."""
+        return np.asarray(self.receipt_ns - self.clock_ns)
+
+    @property
+    def readings(self) -> int:
+        """How many readings there are from the first to the last."""
+        return int(self.number[-1] - self.number[0]) + 1 if len(self) else 0
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Readings over which neither clock was set.
+
+    Parameters
+    ----------
+    track : Track
+    stepped : {'', 'receipt', 'clock'}
+        Which clock was set, or started again, where it begins.
+    after : int
+        Record of the reading before; -1 for the first stretch.
+    """
+
+    track: Track
+    stepped: Stepped = ""
+    after: int = -1
+
+    @property
+    def level_ns(self) -> int:
+        """Least difference of receipt and clock."""
+        return int(self.track.late_ns.min())
+
+
+def stretches_of(track: Track, *, receipt_step_s: float = STEP_S) -> list[Stretch]:
+    """Stretches between steps; readings astray are left out. One of all where the steps are no steps of a clock.
+
+    Parameters
+    ----------
+    track : Track
+    receipt_step_s : float
+        Least step ahead of the receiver's clock that is taken for one: readings may go on being late.
+
+    Examples
+    --------
+    >>> seconds = np.arange(100)
+    >>> late = np.where(seconds < 40, 0, 3_600)  # the receiver's clock is set
+    >>> track = Track(seconds, (seconds + late) * NS_PER_S, seconds * NS_PER_S, seconds)
+    >>> [(len(one.track), one.stepped, one.level_ns // NS_PER_S) for one in stretches_of(track)]
+    [(40, '', 0), (60, 'receipt', 3600)]
+    """
+    left, found = track.take(~_slips(track)), list[Stretch]()
+    for _ in range(MOST_ROUNDS):
+        found = _stretches(left, receipt_step_s)
+        sound = [one for one in found if one.track.readings >= min(FEWEST_READINGS, track.readings)]
+        if len(sound) == len(found):
+            return found
+        kept = np.concatenate([left.number[:0], *(one.track.number for one in sound)])
+        left, found = left.take(np.isin(left.number, kept)), sound
+    return found
+
+
+def _slips(track: Track) -> BoolArray:
+    """Single readings that are far from those before and behind, which are near each other."""
+    late_ns, step_ns = track.late_ns, STEP_S * NS_PER_S
+    found = np.zeros(len(track), dtype=bool)
+    changes = np.abs(np.diff(late_ns)) > step_ns
+    in_turn = track.number[2:] - track.number[:-2] == 2
+    found[1:-1] = in_turn & changes[:-1] & changes[1:] & (np.abs(late_ns[2:] - late_ns[:-2]) <= step_ns)
+    return found
+
+
+def _stretches(track: Track, receipt_step_s: float) -> list[Stretch]:
+    if not len(track):
+        return []
+    late_ns = track.late_ns
+    span_ns = min(int(np.ptp(track.receipt_ns)), int(np.ptp(track.clock_ns)))
+    tolerance_ns = STEP_S * NS_PER_S + min(span_ns, 86_400 * NS_PER_S) * DRIFT_PPM * 1e-6
+    places: list[int] = []
+    kinds: dict[int, Stepped] = {}
+    open_ends = [(0, len(track))]
+    while open_ends and len(places) <= MOST_STEPS:
+        start, end = open_ends.pop()
+        place, kind = _step_in(track, late_ns, start, end, tolerance_ns, receipt_step_s * NS_PER_S)
+        if kind:
+            places.append(place)
+            kinds[place] = kind
+            open_ends += [(start, place), (place, end)]
+    if len(places) > MOST_STEPS:
+        return [Stretch(track)]
+    edges = [0, *sorted(places), len(track)]
+    return [
+        Stretch(
+            track.take(slice(start, end)), kinds.get(start, ""), int(track.record_index[start - 1]) if start else -1
+        )
+        for start, end in pairwise(edges)
+    ]
+
+
+def _step_in(
+    track: Track, late_ns: Int64Array, start: int, end: int, tolerance_ns: float, ahead_ns: float
+) -> tuple[int, Stepped]:
+    """The largest step of the lower envelope within some readings: its place, and which clock stepped.
+
+    The readings step there too. Those that come late after a pause catch up, those of a clock that was set do not.
+    """
+    changes = np.diff(late_ns[start:end])
+    places = np.flatnonzero(np.abs(changes) > STEP_S * NS_PER_S) + 1
+    if not len(places):
+        return 0, ""
+    before = np.minimum.accumulate(late_ns[start:end])[places - 1]
+    behind = np.minimum.accumulate(late_ns[start:end][::-1])[::-1][places]
+    rises, jumps = behind - before, changes[places - 1]
+    sizes = np.where(np.sign(rises) == np.sign(jumps), np.minimum(np.abs(rises), np.abs(jumps)), 0)
+    for at in np.argsort(-sizes, kind="stable")[:8].tolist():
+        if sizes[at] <= tolerance_ns:
+            break
+        place = start + int(places[at])
+        receipt_ns = int(track.receipt_ns[place] - track.receipt_ns[place - 1])
+        clock_ns = int(track.clock_ns[place] - track.clock_ns[place - 1])
+        kind: Stepped = "receipt" if _oddness(receipt_ns) > _oddness(clock_ns) else "clock"
+        rise_ns, caught_up_ns = int(rises[at]), int(late_ns[place]) - int(behind[at])
+        is_lasting = rise_ns > ahead_ns and caught_up_ns <= max(STEP_S * NS_PER_S, CAUGHT_UP_SHARE * rise_ns)
+        if kind == "receipt" and (receipt_ns < 0 or is_lasting):
+            return place, kind
+        if kind == "clock" and (rise_ns > 0 or -rise_ns > JUMP_AHEAD_S * NS_PER_S):
+            return place, kind
+    return 0, ""
+
+
+def _oddness(change_ns: int) -> float:
+    """How odd a change of a clock from one reading to the next is: one that falls is odder than any that rises."""
+    return change_ns if change_ns >= -STEP_S * NS_PER_S else -change_ns * 1e6
+
+
+@dataclass(frozen=True)
+class Line:
+    """Receipt less clock of readings that were not late: ``offset_ns`` at ``zero_ns`` of the clock, and its drift."""
+
+    zero_ns: int
+    offset_ns: int
+    drift: float = 0.0
+
+    def at(self, clock_ns: Int64Array) -> Int64Array:
+        """What is to be added to times of the clock."""
+        if not self.drift:
+            return np.full(len(clock_ns), self.offset_ns, dtype=np.int64)
+        return np.asarray(self.offset_ns + np.rint((clock_ns - self.zero_ns) * self.drift).astype(np.int64))
+
+    def shifted(self, by_ns: int) -> "Line":
+        """The line with another offset."""
+        return replace(self, offset_ns=self.offset_ns + by_ns)
+
+
+def lower_line(track: Track) -> Line:
+    """The line below all differences of receipt and clock that is nearest to them.
+
+    It goes through the edge of their lower hull above which the middle of the clock's times lies. A clock that runs off
+    by more than :data:`MOST_SKEW_PPM` counts no seconds: then the least difference holds throughout.
+
+    Examples
+    --------
+    >>> clock = np.arange(0, 3_600, 10) * NS_PER_S
+    >>> late = np.where(np.arange(360) % 7, 400_000_000, 0) + (clock * 50e-6).astype(np.int64)
+    >>> line = lower_line(Track(np.arange(360), clock + 5 * NS_PER_S + late, clock, np.arange(360)))
+    >>> round(line.drift * 1e6), [round(at / NS_PER_S, 3) for at in line.at(clock[[0, -1]]).tolist()]
+    (50, [5.0, 5.179])
+    """
+    order = np.argsort(track.clock_ns, kind="stable")
+    clock_ns, late_ns = track.clock_ns[order], track.late_ns[order]
+    least = Line(int(clock_ns[0]), int(late_ns.min()))
+    corners = _lower_hull(clock_ns, late_ns)
+    middle = float(np.mean((clock_ns - clock_ns[0]).astype(np.float64)))
+    after = next((at for at in range(1, len(corners)) if clock_ns[corners[at]] - clock_ns[0] >= middle), 0)
+    if not after:
+        return least
+    one, other = corners[after - 1], corners[after]
+    drift = int(late_ns[other] - late_ns[one]) / int(clock_ns[other] - clock_ns[one])
+    if abs(drift) > MOST_SKEW_PPM * 1e-6:
+        return least
+    return Line(int(clock_ns[one]), int(late_ns[one]), drift)
+
+
+def _lower_hull(x: Int64Array, y: Int64Array) -> list[int]:
+    """Places of the corners of the lower hull of points in order of ``x``; of equal ``x`` the lowest."""
+    keep = _lowest(x, y)
+    corners: list[int] = []
+    for at in keep:
+        while len(corners) > 1 and _is_above(x, y, corners[-2], corners[-1], at):
+            corners.pop()
+        corners.append(at)
+    return corners
+
+
+def _lowest(x: Int64Array, y: Int64Array) -> Sequence[int]:
+    """The lowest point of each of at most some thousand stretches of ``x``."""
+    width = max(int(x[-1] - x[0]) // 4_096, 1)
+    cell = (x - x[0]) // width
+    order = np.lexsort((y, cell))
+    first = np.concatenate(([True], np.diff(cell[order]) > 0))
+    places = order[first]
+    keep: list[int] = sorted(places.tolist(), key=lambda at: int(x[at]))
+    return [at for number, at in enumerate(keep) if not number or x[at] > x[keep[number - 1]]]
+
+
+def _is_above(x: Int64Array, y: Int64Array, one: int, middle: int, other: int) -> bool:
+    """Whether the point in the middle is not below the line between two."""
+    left = int(y[middle] - y[one]) * int(x[other] - x[one])
+    return left >= int(y[other] - y[one]) * int(x[middle] - x[one])

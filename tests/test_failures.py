@@ -1,0 +1,499 @@
+"""One part of a flight that fails by a defect: the rest is there, and finding, report and exit code tell."""
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NoReturn
+
+import pytest
+import rerun.blueprint as rrb
+
+from groundstation.base.failures import Failure, attempt, failures, gathered_failures, reason_of
+from groundstation.base.ledger import Ledger
+from groundstation.chapters import by_answer
+from groundstation.chapters.fleet import CHAPTERS as FLEET_CHAPTERS
+from groundstation.chapters.parts import Document, Figure, Front, Note, Section
+from groundstation.cli.main import main
+from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
+from groundstation.estimators.analysis import Analysis
+from groundstation.pipeline.many_flights import publishing
+from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.one_flight import analyse as analysing
+from groundstation.pipeline.one_flight import flight as running
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.reports import acceptance, comparison, fleet_report, painting, sections
+from groundstation.reports import fleet as fleet_figures
+from groundstation.reports.drawing import Drawing, draw, sketching
+from groundstation.reports.figures import DRAWERS, drawn_by
+from groundstation.results.answer import Answer
+from groundstation.results.files import load_document, put_failures, save
+from groundstation.tables.table import Flight
+from groundstation.viewer import comparison as viewer_comparison
+from groundstation.viewer import fleet as viewer_fleet
+from groundstation.viewer import plan as viewer_plan
+from groundstation.viewer import recording
+from tests.recording_contents import Contents
+from tests.report_example import MANIFEST, example, heading_result
+from tests.saved import load, write_flight_report
+from tests.viewer_example import make_flight, make_results
+
+SAMPLE = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv"
+ANSWERED = example(heading_result())
+SHORT = make_flight(240.0, 5.0)
+REASON = "internal error (ZeroDivisionError: of this test); please report it"
+
+
+def fails(*_: Any, **__: Any) -> NoReturn:
+    raise ZeroDivisionError("of this test")
+
+
+def codes() -> list[str]:
+    return [failure.code for failure in failures()]
+
+
+# ------------------------------------------------------------------------------------------------ gathering
+
+
+def test_where_nobody_gathers_an_error_is_raised_as_it_is() -> None:
+    with pytest.raises(ZeroDivisionError, match="of this test"):
+        attempt("figure", "a", fails)
+
+
+@pytest.mark.parametrize(
+    "error", [MemoryError(), OSError(28, "No space left on device"), KeyError("a"), ValueError("a\n\x1b[2Jb" * 200)]
+)
+def test_any_error_is_one_short_line_that_shows(error: Exception) -> None:
+    def raises() -> NoReturn:
+        raise error
+
+    with gathered_failures():
+        assert attempt("tab", "a", raises) is None
+        (failure,) = failures()
+    assert failure.text.isprintable() and len(failure.text) < 500
+    assert failure.text.startswith("the tab a is left out: ") and type(error).__name__ in failure.trace
+
+
+def test_a_panic_of_a_library_is_a_failure_and_an_interrupt_is_none() -> None:
+    panic = type("PanicException", (BaseException,), {})
+
+    def panics() -> NoReturn:
+        raise panic("of this test")
+
+    def interrupted() -> NoReturn:
+        raise KeyboardInterrupt
+
+    with gathered_failures():
+        assert attempt("tab", "a", panics) is None and codes() == ["internal.tab.a"]
+        with pytest.raises(KeyboardInterrupt):
+            attempt("tab", "b", interrupted)
+        with pytest.raises(OSError, match="full"):
+            attempt("tab", "c", lambda: (_ for _ in ()).throw(OSError("full")), unless=(OSError,))
+    assert failures() == ()
+
+
+def test_each_failure_is_told_once() -> None:
+    with gathered_failures():
+        attempt("chapter", "a", fails)
+        with gathered_failures():
+            attempt("chapter", "a", fails)
+        assert codes() == ["internal.chapter.a"]
+
+
+# ------------------------------------------------------------------------------------------------ analyses
+
+
+def bare() -> Flight:
+    """A flight on which no analysis finds what it needs: they are through at once."""
+    return replace(SHORT, tables={"discrete": SHORT["discrete"]})
+
+
+def changed(listed: tuple[Analysis, ...], name: str, **parts: Callable[..., Any]) -> tuple[Analysis, ...]:
+    return tuple(replace(one, **parts) if one.name == name else one for one in listed)
+
+
+@pytest.mark.parametrize("part", ["run", "applies"])
+@pytest.mark.parametrize("name", [one.name for one in FLIGHT_ANALYSES])
+def test_an_analysis_that_fails_leaves_the_others(name: str, part: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    flight = bare()
+    before = analysing.answers_of(flight, Configuration())[0]
+    requires = {one.name: {*one.requires} for one in FLIGHT_ANALYSES}
+    always: dict[str, Any] = {"requires": (), "applies": lambda *_: True}
+    with_it = changed(FLIGHT_ANALYSES, name, **(always if part == "run" else {}), **{part: fails})
+    monkeypatch.setattr(analysing, "FLIGHT_ANALYSES", with_it)
+    with pytest.raises(ZeroDivisionError):
+        analysing.answers_of(flight, Configuration())
+    with gathered_failures():
+        found = analysing.answers_of(flight, Configuration())[0]
+        assert codes() == [f"internal.analysis.{name}"]
+    (finding,) = found.findings[name]
+    assert (finding.severity, finding.code) == ("warn", f"internal.analysis.{name}")
+    assert finding.text == f"the analysis {name} is left out: {REASON}"
+    assert found.reasons[name] == REASON
+    kept = [one for one in before.reasons if one != name and name not in requires[one]]
+    assert {one: found.reasons[one] for one in kept} == {one: before.reasons[one] for one in kept}
+
+
+@pytest.mark.parametrize("name", [one.name for one in SESSION_ANALYSES])
+def test_an_analysis_of_a_session_that_fails_leaves_the_others(name: str) -> None:
+    from groundstation.estimators.cooperative.analysis import SessionKnown
+
+    known = SessionKnown(settings=Configuration().settings.analyses)
+    with gathered_failures():
+        found = analysing.run_analyses(changed(SESSION_ANALYSES, name, run=fails), None, known)
+    assert [one.analysis for one in found.not_assessable] == [name] and found.reasons[name] == REASON
+
+
+@pytest.mark.parametrize("name", [one.name for one in FLIGHT_ANALYSES])
+def test_damage_checks_lines_and_columns_that_fail_leave_the_rest(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    results = replace(ANSWERED, answers={})
+    monkeypatch.setattr(running, "FLIGHT_ANALYSES", changed(FLIGHT_ANALYSES, name, sentence=fails))
+    with gathered_failures():
+        assert running.sentence(results).startswith("not assessable")
+        assert codes() == [f"internal.line.{name}"]
+    monkeypatch.setattr(analysing, "FLIGHT_ANALYSES", FLIGHT_ANALYSES)
+    monkeypatch.setattr(analysing, "_on_damage", fails)
+    flight = bare()
+    given = analysing.Given("NOTIME_01234567", results.source, Ledger(), results.clock, (), False)
+    with gathered_failures():
+        done = analysing.analyse(flight, given, Configuration())
+        assert f"internal.damage_check.{name}" in codes() and len(codes()) == len(FLIGHT_ANALYSES)
+    assert done.figure("phases") is not None
+
+
+# ------------------------------------------------------------------------------------------------ figures
+
+
+@pytest.mark.parametrize(
+    ("drawers", "name"),
+    [(one, name) for one in (DRAWERS, fleet_figures.DRAWERS, acceptance.DRAWN) for name in one],
+    ids=lambda one: one if isinstance(one, str) else "",
+)
+def test_a_figure_that_cannot_be_drawn_leaves_the_rest_of_its_chapter(
+    drawers: dict[str, Any], name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(drawers, name, fails)
+    section = Section("a", "A", "", (Note("before"), Figure(name), Figure(name, "one"), Note("behind")))
+    with gathered_failures():
+        assert drawn_by(drawers, section, None).parts == (Note("before"), Note("behind"))
+        assert codes() == [f"internal.figure.{name}", f"internal.figure.{name}.one"]
+
+
+def pages_of(number: int, failing: set[int]) -> Callable[[], Document]:
+    def paint(at: int) -> Callable[[Any], None]:
+        return lambda figure: fails() if at in failing else figure.subplots().plot([0.0, 1.0], [at, 1.0])
+
+    def tell() -> Document:
+        parts = [
+            Drawing("", "", "", draw(f"key-{at}", 20.0, paint(at), 40.0), (), f"name.{at}") for at in range(number)
+        ]
+        return Document("", "", Front(""), (Section("", "", "", (Note("text"), *parts)),))
+
+    return tell
+
+
+@pytest.mark.parametrize("processes", [1, 2, 3])
+def test_a_figure_that_cannot_be_painted_leaves_the_others_however_many_paint(processes: int) -> None:
+    whole = painting.with_painted_figures(pages_of(6, set()))
+    with gathered_failures():
+        found = painting.with_painted_figures(pages_of(6, {5, 1}), processes)
+        assert codes() == ["internal.figure.name.1", "internal.figure.name.5"], "in their order"
+    kept = [part for at, part in enumerate(whole.sections[0].parts) if at not in (2, 6)]
+    assert list(found.sections[0].parts) == kept
+    with pytest.raises(ZeroDivisionError):
+        painting.with_painted_figures(pages_of(6, {5, 1}), processes)
+
+
+# ------------------------------------------------------------------------------------------------ chapters
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place: Path = tmp_path_factory.mktemp("flight")
+    save(place, ANSWERED, MANIFEST)
+    return place
+
+
+@pytest.fixture
+def untold() -> Iterator[None]:
+    with sketching():
+        yield
+
+
+OF_A_FLIGHT = [
+    *(("BEFORE_THE_ANSWERS", name) for name in sections.BEFORE_THE_ANSWERS),
+    *(("ON_THE_DATA", name) for name in sections.ON_THE_DATA),
+    *(("APPENDICES", name) for name in sections.APPENDICES),
+]
+
+
+@pytest.mark.parametrize(("where", "name"), OF_A_FLIGHT)
+def test_a_chapter_on_a_flight_that_fails_leaves_the_others(
+    where: str, name: str, folder: Path, untold: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(getattr(sections, where), name, fails)
+    with gathered_failures():
+        found = sections.flight_sections(load(folder))
+        assert codes() == [f"internal.chapter.{name}"]
+    assert len(found) > 5 and "heading" in {one.key for one in found}
+
+
+@pytest.mark.parametrize("listed", ["FLIGHT_CHAPTERS", "SESSION_CHAPTERS", "PLAN_CHAPTERS"])
+def test_a_chapter_on_an_answer_that_fails_leaves_the_others(listed: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    every = getattr(by_answer, listed)
+    kind = {"SESSION_CHAPTERS": "is_session", "PLAN_CHAPTERS": "is_plan"}.get(listed)
+    for failing in every:
+        with monkeypatch.context() as patch:
+            patch.setattr(by_answer, listed, tuple(one._replace(build=_named(one)) for one in every))
+            if kind is not None:
+                patch.setattr(by_answer, kind, lambda _: True)
+            shown = [one.key for one in by_answer.chapters_of(ANSWERED)]
+            broken = tuple(one._replace(build=fails if one is failing else _named(one)) for one in every)
+            patch.setattr(by_answer, listed, broken)
+            with gathered_failures():
+                found = by_answer.chapters_of(ANSWERED)
+                assert codes() == [f"internal.chapter.{failing.name}"]
+            assert [one.key for one in found] == [key for key in shown if key != failing.name]
+
+
+def _named(chapter: Any) -> Callable[[Any], Section]:
+    return lambda _: Section(chapter.name, chapter.name, "")
+
+
+def test_a_generic_chapter_a_front_and_a_page_that_fail_leave_the_rest(
+    folder: Path, tmp_path: Path, untold: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from groundstation.reports import flight_report
+
+    monkeypatch.setattr(by_answer, "generic", fails)
+    other = type("Other", (Answer,), {"analysis": "other", "figures": ()})
+    results = replace(ANSWERED, answers={"other": other()})
+    with gathered_failures():
+        assert by_answer.answer_chapters(results) == () and codes() == ["internal.chapter.other"]
+    monkeypatch.setattr(flight_report, "front", fails)
+    with gathered_failures():
+        document = flight_report.sketched_document(load(folder))
+        assert document.front.title == ANSWERED.flight_id and len(document.sections) > 5
+        page = tmp_path / "report.html"
+        page.write_text("of an earlier run", encoding="utf-8")
+        flight_report.write_pages(page, fails, document, document, with_pdf=False)
+        assert codes() == ["internal.chapter.front", "internal.report.report.html"] and not page.exists()
+
+
+@pytest.mark.parametrize("name", FLEET_CHAPTERS)
+def test_a_chapter_on_a_fleet_that_fails_leaves_the_others(
+    name: str, fleet: Any, untold: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = fleet_report.fleet_document(fleet)
+    monkeypatch.setitem(FLEET_CHAPTERS, name, fails)
+    with gathered_failures():
+        found = fleet_report.fleet_document(fleet)
+        assert codes() == [f"internal.chapter.{name}"]
+    assert len(whole.sections) - len(found.sections) in (0, 1) and len(found.sections) > 2
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    from groundstation.pipeline.many_flights.fleet import gather
+    from tests.fleet_example import save_flight
+
+    out: Path = tmp_path_factory.mktemp("fleet")
+    for number in range(2):
+        save_flight(out, number)
+    return gather(out)
+
+
+# ------------------------------------------------------------------------------------------------ recordings
+
+
+def empty(name: str) -> Callable[..., rrb.Container]:
+    return lambda *_: rrb.Vertical(name=name)
+
+
+NAMES = [name for name, _ in recording.tabs_of(*[None] * 2, make_results(SHORT))]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("failing", [*NAMES, "log"])
+def test_a_tab_of_a_flight_that_fails_leaves_the_others(
+    failing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[str] = []
+    layout = recording.send_layout
+    monkeypatch.setattr(recording, "send_layout", lambda stream, tabs: shown.extend(one.name for one in tabs))
+    named = recording.tabs_of
+
+    def tabs(*given: Any) -> Iterator[Any]:
+        for name, _tab in named(*given):
+            yield name, fails if name == failing else empty(name)
+
+    monkeypatch.setattr(recording, "tabs_of", tabs)
+    monkeypatch.setattr(recording, "log", fails if failing == "log" else empty("log"))
+    flight = SHORT
+    with gathered_failures():
+        recording.write_recording(tmp_path / "a.rrd", flight, make_results(flight))
+        assert codes() == [f"internal.tab.{failing}"]
+    assert shown == [name for name in (*NAMES, "log") if name != failing] and layout is not None
+
+
+@pytest.mark.parametrize(
+    ("tabs", "name"),
+    [(one, name) for one in (viewer_fleet.TABS, viewer_comparison.TABS, viewer_plan.PLAN_TABS) for name in one],
+    ids=lambda one: one if isinstance(one, str) else "",
+)
+def test_a_tab_of_another_recording_that_fails_leaves_the_others(
+    tabs: dict[str, Any], name: str, fleet: Any, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for one in tabs:
+        monkeypatch.setitem(tabs, one, fails if one == name else empty(one))
+    path = tmp_path / "a.rrd"
+    with gathered_failures():
+        if tabs is viewer_fleet.TABS:
+            viewer_fleet.write_fleet_recording(path, fleet)
+        elif tabs is viewer_plan.PLAN_TABS:
+            viewer_plan.write_plan_recording(path, replace(ANSWERED, answers={}, figures=()))
+        else:
+            saved = load(folder)
+            compared = _compared(folder)
+            viewer_comparison.write_comparison(path, compared, saved, saved)
+        assert codes() == [f"internal.tab.{name}"]
+    assert path.is_file()
+
+
+def _compared(folder: Path) -> Any:
+    from groundstation.pipeline.verbs.compare import compare
+
+    return compare(folder, folder, None)[0]
+
+
+def test_a_figure_of_a_comparison_that_fails_leaves_the_others(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    saved, compared = load(folder), _compared(folder)
+    for name, code in (("_tracks", "tracks"), ("_growth", "growth")):
+        with monkeypatch.context() as patch, sketching():
+            patch.setattr(comparison, name, fails)
+            with gathered_failures():
+                assert "Altitude" in comparison.comparison_html(compared, saved, saved)
+                assert codes() == [f"internal.figure.{code}"]
+
+
+# ------------------------------------------------------------------------------------------------ a whole run
+
+
+def break_five(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
+    """Make an analysis, a figure as drawn, one as painted, a chapter and a tab fail; the codes in their order."""
+    monkeypatch.setattr(analysing, "FLIGHT_ANALYSES", changed(FLIGHT_ANALYSES, "latency", run=fails, requires=()))
+    monkeypatch.setitem(DRAWERS, "overview.profile", fails)
+    paint = painting._paint
+    monkeypatch.setattr(painting, "_paint", lambda key, sketch: fails() if key == "map" else paint(key, sketch))
+    monkeypatch.setitem(sections.BEFORE_THE_ANSWERS, "next_steps", fails)
+    monkeypatch.setattr(recording, "raw", fails)
+    return (
+        "internal.analysis.latency",
+        "internal.chapter.next_steps",
+        "internal.figure.overview.profile",
+        "internal.tab.raw",
+        "internal.figure.overview.track",
+    )
+
+
+def test_a_run_with_failures_has_all_else_tells_and_is_mended_by_the_next(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, whole = tmp_path / "out", tmp_path / "whole"
+    monkeypatch.setattr("groundstation.pipeline.many_flights.batch.painters_of", lambda *_: 2)
+    with monkeypatch.context() as patch:
+        expected = break_five(patch)
+        with pytest.raises(SystemExit) as ended:
+            main(["run", str(SAMPLE), "-o", str(out), "-j", "1", "--no-pdf"])
+    printed = capsys.readouterr()
+    assert ended.value.code == 1
+    assert "taxi-short.csv  incomplete  " in printed.out
+    lines = [line for line in printed.err.splitlines() if line.startswith("error: ")]
+    assert [line.partition(" is left out: ")[2] for line in lines] == [REASON] * 5
+    assert "Traceback" not in printed.err
+    (place,) = (path.parent for path in out.glob("*/summary.json"))
+    findings = load_document(place).findings
+    told = {finding.code: finding for finding in findings if finding.code.startswith("internal.")}
+    assert set(told) == set(expected) and {one.severity for one in told.values()} == {"warn"}
+    assert list(told) == list(expected), "in one order, however many paint"
+    page = (place / "report.html").read_text(encoding="utf-8")
+    for finding in told.values():
+        assert finding.text in page
+    assert 'id="quality' in page and 'id="heading' in page and 'id="next' not in page
+    contents = Contents(place / f"{place.name}.rrd")
+    assert "the tab raw is left out" in contents.text("/log/by_gravity") and not any(
+        entity.startswith("/raw/") for entity in contents.batches
+    )
+
+    (outcome,) = run_many([SAMPLE], out, Configuration(), jobs=1, with_pdf=False)
+    assert (outcome.state, outcome.failures, outcome.was_finished) == ("done", (), False)
+    run_many([SAMPLE], whole, Configuration(), jobs=1, with_pdf=False)
+    for name in ("summary.json", "report.html", "tables/overview.csv"):
+        assert (place / name).read_bytes() == (whole / place.name / name).read_bytes(), name
+
+
+def test_a_report_made_again_tells_what_fails_now_and_no_longer_what_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unpainted: None
+) -> None:
+    save(tmp_path, ANSWERED, MANIFEST)
+    put_failures(tmp_path, [Failure("tab", "raw", "old"), Failure("figure", "heading.taxi", "old")])
+    before = (tmp_path / "summary.json").read_bytes()
+    with monkeypatch.context() as patch:
+        patch.setitem(DRAWERS, "heading.taxi", fails)
+        assert [one.code for one in write_flight_report(tmp_path, with_pdf=False).failures] == [
+            "internal.figure.heading.taxi"
+        ]
+    codes_now = [one.code for one in load_document(tmp_path).findings if one.code.startswith("internal.")]
+    assert codes_now == ["internal.tab.raw", "internal.figure.heading.taxi"]
+    assert write_flight_report(tmp_path, with_pdf=False).failures == ()
+    codes_now = [one.code for one in load_document(tmp_path).findings if one.code.startswith("internal.")]
+    assert codes_now == ["internal.tab.raw"], "reports make no recording"
+    assert (tmp_path / "summary.json").read_bytes() != before
+
+
+def test_a_summary_without_failures_is_left_as_it_is(tmp_path: Path) -> None:
+    save(tmp_path, ANSWERED, MANIFEST)
+    before = (tmp_path / "summary.json").stat().st_mtime_ns
+    assert not put_failures(tmp_path, (), ("figure",))
+    assert (tmp_path / "summary.json").stat().st_mtime_ns == before
+    one = Failure("figure", "a", reason_of(ValueError("at 0x7f0000000000")))
+    assert put_failures(tmp_path, [one]) and not put_failures(tmp_path, [one])
+    assert re.search(r"ValueError: at 0x\.\.\.\)", (tmp_path / "summary.json").read_text(encoding="utf-8"))
+
+
+# ------------------------------------------------------------------------------------------------ beside the flights
+
+
+def test_publishing_that_fails_is_no_log_and_leaves_the_rest(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, unpainted: None
+) -> None:
+    logs = [tmp_path / f"{name}.csv" for name in "ab"]
+    for number, log in enumerate(logs):
+        log.write_text(f"time_s,baro.pressure_altitude_m\n0,{number}\n1,{number}\n2,3\n", encoding="utf-8")
+    monkeypatch.setitem(FLEET_CHAPTERS, "method", fails)
+    monkeypatch.setitem(viewer_fleet.TABS, "flights", fails)
+    with pytest.raises(SystemExit) as ended:
+        main(["run", *map(str, logs), "-o", str(tmp_path / "out"), "-j", "1", "--no-pdf"])
+    printed = capsys.readouterr().err
+    assert ended.value.code == 1
+    assert "2 logs: 2 done, 0 with data lost, 0 at the limit, 0 failed, 0 skipped" in printed
+    assert f"out: the chapter method is left out: {REASON}" in printed
+    assert f"out: the tab flights is left out: {REASON}" in printed
+    assert {"index.json", "index.csv", "fleet.parquet", "summary.html", "fleet.rrd"} <= {
+        path.name for path in (tmp_path / "out").iterdir()
+    }
+
+    monkeypatch.setattr(publishing, "write_fleet", fails)
+    with pytest.raises(SystemExit) as ended:
+        main(["run", *map(str, logs), "-o", str(tmp_path / "out"), "-j", "1", "--no-pdf", "--json"])
+    told = json.loads(capsys.readouterr().out)
+    assert ended.value.code == 1
+    assert [one.get("kind") for one in told] == [None, None, "output"] and REASON in told[2]["text"]
+
+
+def test_an_incomplete_log_is_worse_than_lost_data() -> None:
+    from groundstation.pipeline.one_flight.outcome import worst_code
+
+    lost, lacking = Outcome("a", "data_lost", ""), Outcome("b", "incomplete", "")
+    assert worst_code((lost, lacking)) == 1
