@@ -154,6 +154,12 @@ Isolate = Annotated[
     ),
 ]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]
+PowerUp = Annotated[
+    int | None,
+    typer.Option(
+        "--power-up", help="Of a log with several power-ups: which, from 1. Default: the only one.", metavar="N", min=1
+    ),
+]
 Profile = Annotated[
     Path | None,
     typer.Option(

@@ -33,6 +33,7 @@ from groundstation.cli.application import (
     Json,
     NoPdf,
     Only,
+    PowerUp,
     Profile,
     Progress,
     Quiet,
@@ -376,13 +377,14 @@ def view(
         int | None,
         typer.Option("--port", help="Port. Default: 9090 for --web, else any free one.", min=1, max=65535),
     ] = None,
+    power_up: PowerUp = None,
     profile: Profile = None,
     verbose: Verbose = False,
 ) -> int | None:
     """Look at a flight in the Rerun viewer, native or in the browser."""
     from groundstation.pipeline.verbs.view import look_at
 
-    look_at(flight, web=web, host=host, port=port, profile=profile, say=say)
+    look_at(flight, web=web, host=host, port=port, power_up=power_up or 1, profile=profile, say=say)
     return DONE
 
 

@@ -171,9 +171,11 @@ def _runs_together(before: Source, behind: Source) -> bool:
         return False
     if first.startswith((b"#", b"$", b"!")):
         return True
-    return all(first.count(mark) == lines[-1].count(mark) == lines[-2].count(mark) for mark in _marks(lines[-2]))
+    cells = _cells(lines[-2], lines[-2])
+    return cells > 1 and cells == _cells(lines[-1], lines[-2]) == _cells(first, lines[-2])
 
 
-def _marks(line: bytes) -> list[bytes]:
-    """The delimiter that a row has most of."""
-    return [max((mark.encode() for mark in DELIMITERS), key=line.count)]
+def _cells(line: bytes, like: bytes) -> int:
+    """Cells of a row, parted as those of another one: by the delimiter that it has most of, else by blanks."""
+    mark = max((delimiter.encode() for delimiter in DELIMITERS), key=like.count)
+    return line.count(mark) + 1 if mark in like else len(line.split())

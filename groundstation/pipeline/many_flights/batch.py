@@ -54,6 +54,7 @@ def run_many(
     timeout_s: float = math.inf,
     is_isolated: bool = False,
     store: str = "",
+    unclaimed: Sequence[Path] = (),
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Run logs and folders of logs into ``out``, then the sessions among the flights; the index lists all of them.
@@ -79,6 +80,8 @@ def run_many(
         Each log, and each session, in a process of its own that may take what ``[isolation]`` of the settings allows.
     store : str
         ``delta:`` and a path or URL: a Delta table that takes the rows of these flights, too.
+    unclaimed : sequence of Path
+        Files that no reader claims: they are skipped, unless one goes on from a log.
 
     Returns
     -------
@@ -94,7 +97,7 @@ def run_many(
     ground = None if stations is None else load_stations(stations)
     if store:
         delta_place(store)
-    inputs = inputs_of(paths, out, configuration)
+    inputs = inputs_of(paths, out, configuration, unclaimed)
     is_near = not any(is_remote(str(place)) for place in (out, *paths))
     listen(Event("begin", total=len(inputs)))
     strangers = Strangers(Path(out) if is_near else None)

@@ -3,6 +3,7 @@
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError
@@ -11,7 +12,7 @@ from groundstation.pipeline.many_flights.known_flights import KnownFlights
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.log import Log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
-from groundstation.pipeline.one_flight.parts import LATE_S, LONGEST_GAP_S, behind_it, family, goes_on, order_of
+from groundstation.pipeline.one_flight.parts import LATE_S, LONGEST_GAP_S, behind_it, family, gap_ns, goes_on, order_of
 from groundstation.results.manifest import PartOfRun
 
 _NOT_JOINED = "groundstation-mcap"  # how readers of MCAPs that we wrote begin: a recorder's files are joined
@@ -61,8 +62,8 @@ def flights_of_parts(
         How logs are read.
     """
     own = [Stretch(one.parts, (number,)) for number, one in outcomes.items() if one.flight_id and _may_join(one.parts)]
-    stretches = [*own, *_others(own, known)]
     strangers = {Path(one.source).absolute(): number for number, one in outcomes.items() if not one.flight_id}
+    stretches = [*own, *_others(own, strangers, known)]
     folders = _Folders()
     grown = [_with_strangers(one, strangers, folders, configuration) for one in stretches]
     known_ones = {_digests(one) for one in stretches}
@@ -97,12 +98,14 @@ def _may_join(parts: Sequence[PartOfRun]) -> bool:
     return bool(parts) and not parts[0].reader.startswith(_NOT_JOINED)
 
 
-def _others(own: Sequence[Stretch], known: KnownFlights) -> Iterator[Stretch]:
+def _others(own: Sequence[Stretch], strangers: Iterable[Path], known: KnownFlights) -> Iterator[Stretch]:
     """Flights of OUT that are near those of the run; what the run has anew of their parts is left out of them."""
+    of_logs = (found for one in own for part in one.parts for found in known.about(part))
+    of_files = (found for path in strangers for found in known.beside(path))
     mine = {part.sha256 for one in own for part in one.parts}
     paths = {part.path for one in own for part in one.parts}
     seen: set[str] = set()
-    for name, manifest in (found for one in own for part in one.parts for found in known.about(part)):
+    for name, manifest in chain(of_logs, of_files):
         if name in seen or not _may_join(manifest.parts):
             continue
         seen.add(name)
@@ -140,17 +143,34 @@ def _chained(stretches: Sequence[Stretch], folders: _Folders) -> list[Stretch]:
         before.setdefault(other, []).append(one)
     links: dict[int, int] = {}
     for one, others in behind.items():
-        chosen = _only(stretches, one, others)
-        if chosen is not None and _only(stretches, chosen, before[chosen]) == one:
+        chosen = _only(stretches, one, _nearest(stretches, others, is_behind=True))
+        if chosen is None:
+            continue
+        if _only(stretches, chosen, _nearest(stretches, before[chosen], is_behind=False)) == one:
             links[one] = chosen
     starts = [number for number in range(len(stretches)) if number not in links.values()]
     chains = []
     for number in starts:
-        chain = stretches[number]
+        whole = stretches[number]
         while (number := links.get(number, -1)) >= 0:
-            chain = chain.with_next(stretches[number])
-        chains.append(chain)
+            whole = whole.with_next(stretches[number])
+        chains.append(whole)
     return chains
+
+
+def _nearest(stretches: Sequence[Stretch], others: Sequence[int], *, is_behind: bool) -> list[int]:
+    """Those of some stretches behind (or before) another one that are not behind (or before) one of themselves."""
+
+    def comes_first(one: int, other: int) -> bool:
+        first, second = (stretches[one], stretches[other]) if is_behind else (stretches[other], stretches[one])
+        is_earlier = _first_ns(first) < _first_ns(second)
+        return is_earlier and gap_ns(first.last, second.first) >= -round(LATE_S * NS_PER_S)
+
+    return [other for other in others if not any(comes_first(one, other) for one in others if one != other)]
+
+
+def _first_ns(stretch: Stretch) -> int:
+    return stretch.first.utc_ns[0] if stretch.first.utc_ns else stretch.first.device_ns[0]
 
 
 def _only(stretches: Sequence[Stretch], one: int, others: Sequence[int]) -> int | None:

@@ -1,7 +1,7 @@
 """Flights that an OUT has already, by the log they came from; a folder is read when its log is asked for."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
@@ -68,30 +68,33 @@ class KnownFlights:
 
     def about(self, part: PartOfRun) -> Iterator[tuple[str, Manifest]]:
         """Flights that another one may go on from, or that may go on from it: by their times, or names of files."""
-        if self._out is None:
-            return
-        names = {*self._near(part), *self._beside(part)}
+        is_sure = part.utc_ns is not None and part.aircraft
+        yield from self._manifests_of({*self._near(part), *([] if is_sure else self._beside(Path(part.path)))})
+
+    def beside(self, path: Path) -> Iterator[tuple[str, Manifest]]:
+        """Flights of files in the folder of another one whose names differ from its in a number alone."""
+        yield from self._manifests_of(self._beside(path))
+
+    def _manifests_of(self, names: Iterable[str]) -> Iterator[tuple[str, Manifest]]:
         for name in sorted(names):
             with suppress(GroundstationError):  # it is gone, or not whole
-                yield name, self._manifests.get(name) or load_manifest(self._out / name)
+                yield name, self._manifests.get(name) or load_manifest((self._out or Path()) / name)
 
     def _near(self, part: PartOfRun) -> list[str]:
         """Flights that overlap with a log, or nearly."""
-        if part.utc_ns is None:
+        if part.utc_ns is None or self._out is None:
             return []
         gap_ns = round(LONGEST_GAP_S * NS_PER_S)
         start_ns, end_ns = self._spans
         rows = np.flatnonzero((start_ns <= part.utc_ns[1] + gap_ns) & (end_ns >= part.utc_ns[0] - gap_ns))
         return [self._names[row] for row in rows.tolist()]
 
-    def _beside(self, part: PartOfRun) -> list[str]:
-        """Flights of files in the folder of a log whose names differ from its in a number alone."""
-        if part.utc_ns is not None and part.aircraft:
+    def _beside(self, path: Path) -> list[str]:
+        if self._out is None:
             return []
-        folder, like = Path(part.path).parent, family(part.name)
         paths = (*self._keys.column("path"), *(one.source.path for one in self._manifests.values()))
-        pairs = zip(self._names, map(Path, paths), strict=True)
-        return [name for name, path in pairs if path.parent == folder and family(path.name) == like]
+        pairs, like = zip(self._names, map(Path, paths), strict=True), family(path.name)
+        return [name for name, one in pairs if one.parent == path.parent and family(one.name) == like]
 
     @cached_property
     def _spans(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -18,10 +18,13 @@ from groundstation.pipeline.one_flight.resume import Finished, Keys
 from groundstation.results.manifest import PartOfRun
 
 
-def inputs_of(paths: Sequence[Path | str], out: Path | str, configuration: Configuration) -> tuple[FarLog, ...]:
-    """Logs by path or URL, in a stable order."""
+def inputs_of(
+    paths: Sequence[Path | str], out: Path | str, configuration: Configuration, unclaimed: Sequence[Path] = ()
+) -> tuple[FarLog, ...]:
+    """Logs by path or URL, in a stable order, with the files ``unclaimed``, which no reader claims."""
     near = [Path(path) for path in paths if not is_remote(str(path))]
     found = {log.url: log for path in paths if is_remote(str(path)) for log in far_logs(str(path))}
+    found.update({str(path): FarLog(str(path), is_named=False, size=path.stat().st_size) for path in unclaimed})
     judges = {path.resolve() for path in configuration.references.paths}  # in a folder they are no logs to run
     for one in collect(near, None if is_remote(str(out)) else Path(out)):
         if one.is_named or not judges or one.path.resolve() not in judges:

@@ -127,11 +127,12 @@ def _outcomes(batch: Batch, listen: Listener) -> tuple[Outcome, ...]:
     claimed = sorted({*map(str, batch.paths)} - {one.source for one in strangers})
     before = [] if batch.is_first else rows_without_flight(batch.out)
     outcomes: tuple[Outcome, ...] = ()
-    if claimed:
+    if claimed or (strangers and _has_flights(batch.out)):  # a file that cannot be read alone may be part of a flight
         outcomes = run_many(
             claimed,
             batch.out,
             batch.configuration,
+            unclaimed=[Path(one.source) for one in strangers],
             jobs=batch.jobs,
             only_results=batch.only_results,
             timeout_s=batch.timeout_s,
@@ -142,8 +143,17 @@ def _outcomes(batch: Batch, listen: Listener) -> tuple[Outcome, ...]:
             stations=batch.stations,
             listen=listen,
         )
+    joined = {one.source for one in outcomes}
+    strangers = [one for one in strangers if one.source not in joined]
     _list_too(batch, before, strangers)
     return (*strangers, *outcomes)
+
+
+def _has_flights(out: Path) -> bool:
+    """Whether any flight is in a folder of results."""
+    from groundstation.pipeline.many_flights.inputs import flight_folders
+
+    return out.is_dir() and bool(flight_folders(out))
 
 
 def _unclaimed(path: Path, configuration: Configuration) -> Outcome | None:

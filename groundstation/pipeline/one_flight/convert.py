@@ -1,7 +1,7 @@
 """A log becomes an MCAP: its clock is repaired, its ledger is kept beside the data."""
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from itertools import chain, pairwise
 from pathlib import Path
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 OWN_TRUTH = ("a truth of its own", "a log without one", "leave --reference out")
 OF_JOINTS = ("log.power_ups", "data.repeated_header", "data.comment_line")  # findings on files that stand behind others
-PARTS_TOLD = 5
+PARTS_TOLD, PARTS = 5, "parts"  # names in a finding; the key of metadata
 COUNTED_CAUSES = ("dropout", "stuck", "out_of_range", "sequence")  # of spans: counted again with the topics
 
 
@@ -200,7 +200,16 @@ def _facts_of_parts(log: Log) -> dict[str, str]:
     if not log.parts:
         return {}
     parts = [{"name": path.name, "sha256": sha256} for path, sha256 in zip(log.parts, log.digests, strict=True)]
-    return {"parts": json.dumps(parts)}
+    return {PARTS: json.dumps(parts)}
+
+
+def parts_told(metadata: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """Name and digest of each of the consecutive files of a flight, by its metadata."""
+    try:
+        told = json.loads(metadata.get(PARTS, "[]"))
+        yield from ((str(one["name"]), str(one["sha256"])) for one in told)
+    except (ValueError, KeyError, TypeError):  # the MCAP is damaged there
+        return
 
 
 def _with_truth(ledger: Ledger, laid: Laid, limits: Thresholds) -> Ledger:

@@ -20,7 +20,7 @@ from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES
 from groundstation.pipeline.one_flight.analyse import Given, analyse
 from groundstation.pipeline.one_flight.apply_deviation import apply_deviation, corrected_name, write_corrected
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.convert import Converted, convert_flight
+from groundstation.pipeline.one_flight.convert import Converted, convert_flight, parts_told
 from groundstation.pipeline.one_flight.identity import flight_id, sha256_of
 from groundstation.pipeline.one_flight.log import Log, as_log, digest_of, open_log, open_parts
 from groundstation.pipeline.one_flight.manifest import manifest_of
@@ -298,7 +298,12 @@ def _parts(log: Log, job: Job, path: str, converted: Converted, flight: Flight) 
         return ()
     if job.step == "analysis" and job.finished is not None:
         return job.finished.parts
-    whole = part_of(log, path, log.source.reader, flight)  # an MCAP that we wrote says so: it is no recorder's file
+    if log.is_store:  # a recorder does not go on in it
+        return tuple(
+            PartOfRun(name=name, sha256=sha256, reader=log.source.reader)
+            for name, sha256 in parts_told(converted.info.metadata)
+        )
+    whole = part_of(log, path, converted.info.reader, flight)
     if not log.parts:
         return (whole,)
     missing = sum(part.rows for part in job.parts) - whole.rows

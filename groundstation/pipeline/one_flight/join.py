@@ -19,12 +19,13 @@ from groundstation.base.source_units import PREFIX as UNITS
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.two_clocks.gnss_time import gnss_time_of
 from groundstation.estimators.two_clocks.relate import relate
-from groundstation.estimators.two_clocks.relation import LogRelation, TimedLog
+from groundstation.estimators.two_clocks.relation import LogRelation, NotOneFlightError, TimedLog
 from groundstation.estimators.two_clocks.settings import TwoClocksSettings
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.ledger import damage_entry
 from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.continued import in_recordings, with_strangers
 from groundstation.pipeline.one_flight.convert import Converted, census_of, convert_log, recounted
 from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.log import Log, as_log, open_log
@@ -80,7 +81,7 @@ def join_files(
         When a path is missing or a folder, and as :func:`join_logs`, as is all else.
     """
     logs: list[Log] = []
-    unclaimed: list[tuple[str, GroundstationError]] = []
+    unclaimed: list[tuple[Path, GroundstationError]] = []
     for path in paths:
         if not path.exists():
             raise UsageError(str(path), "no such file")
@@ -89,13 +90,14 @@ def join_files(
         try:
             logs.append(open_log(path, configuration.profile_path, configuration.icds))
         except UnreadableLogError as error:
-            unclaimed.append((path.name, error))
+            unclaimed.append((path, error))
     if not logs and unclaimed:
         raise unclaimed[0][1]
+    logs, used = with_strangers(logs, [path for path, _error in unclaimed])
     listen(Event("stage", joined_name(logs), "joining"))
     target.parent.mkdir(parents=True, exist_ok=True)
     settings = configuration.settings.of(TwoClocksSettings)
-    left_out = [_left_out(name, error) for name, error in unclaimed]
+    left_out = [_left_out(path.name, error) for path, error in unclaimed if path not in used]
     return join_logs(logs, target, configuration.thresholds, settings=settings, left_out=left_out)
 
 
@@ -112,7 +114,8 @@ def join_logs(
     The flight has the clock of the first log that GNSS tells the time, else of the first with UTC, else of the first.
     Topics of the first log keep their names; those of the second end in ``.b``, of the third in ``.c``. A log that
     cannot be read is left out with a finding, as are those of ``left_out``, and the others close up; where one is left
-    the flight is that of this log.
+    the flight is that of this log. Logs that nothing puts on one clock are one recording where one goes on from the
+    other, however long after: they are read as one.
 
     Raises
     ------
@@ -129,10 +132,17 @@ def join_logs(
         parts, unread = _converted(logs, Path(folder), limits, settings)
         left_out = (*left_out, *unread)
         if len(parts) == 1:
-            return Converted(info := _alone(parts[0], target, left_out), info.findings, has_lost_data=True)
+            info = _alone(parts[0], target, left_out)
+            return Converted(info, info.findings, bool(left_out) or parts[0].converted.has_lost_data)
         clock_of = next((one for one in parts if one.timed.gnss_time), None)
         clock_of = clock_of or next((one for one in parts if one.timed.flight.has_utc), parts[0])
-        parts = [_related(one, clock_of, settings) for one in parts]
+        try:
+            parts = [_related(one, clock_of, settings) for one in parts]
+        except NotOneFlightError:
+            whole = in_recordings([(one.log, one.converted, one.timed.flight) for one in parts])
+            if len(whole) == len(parts):
+                raise
+            return join_logs(whole, target, thresholds, settings=settings, left_out=left_out)
         info = _written(parts, clock_of, target, limits, left_out)
     has_lost = bool(left_out) or any(one.converted.has_lost_data for one in parts)
     return Converted(info, info.findings, has_lost)
@@ -145,9 +155,11 @@ def _related(part: _Part, clock_of: _Part, settings: TwoClocksSettings | None) -
 
 
 def _require_different(logs: Sequence[Log], left_out: int) -> None:
-    count = len(logs) + left_out
+    count = sum(max(1, len(log.parts)) for log in logs) + left_out
     if not 2 <= count <= len(LABELS) + 1:
-        raise UsageError("--together", f"{count} log" + "s" * (count != 1), f"2 to {len(LABELS) + 1} logs")
+        raise UsageError(
+            "--together", f"{count} log" + "s" * (count != 1), f"2 to {len(LABELS) + 1} logs"
+        )  # files of one recording count each
     first: dict[str, str] = {}
     for log in logs:
         if log.source.sha256 in first:

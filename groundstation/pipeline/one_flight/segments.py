@@ -86,6 +86,11 @@ class Segment:
             yield replace(part, time_ns=part.time_ns - self.shift_ns, validity_time_ns=moved)
 
     @property
+    def has_utc(self) -> bool:
+        """Whether its times are UTC."""
+        return self.info.has_utc if self.info is not None else self.utc_of_zero_ns is not None
+
+    @property
     def finding(self) -> Finding:
         """That a flight is one of several in its source."""
         text = f"power-up {self.number} of {self.count} in the file"
@@ -133,6 +138,26 @@ def segments_of(several: Sequence[PowerUpClock]) -> tuple[Segment, ...]:
             one.metadata,
         )
         for number, one in enumerate(several, start=1)
+    )
+
+
+@dataclass(frozen=True)
+class PowerUpTold:
+    """One of several power-ups in a log, for people and scripts: times are text by the clock of the log."""
+
+    number: int
+    first_record: int
+    start: str
+    end: str
+    is_utc: bool
+
+
+def told_of(segments: Sequence[Segment], is_absolute: bool) -> tuple[PowerUpTold, ...]:
+    """The power-ups of a log as they are told; ``is_absolute``: its times are UTC."""
+    clock = ClockModel(is_absolute=is_absolute)
+    return tuple(
+        PowerUpTold(one.number, one.first, clock.text(one.start_ns), clock.text(one.end_ns), one.has_utc)
+        for one in segments
     )
 
 

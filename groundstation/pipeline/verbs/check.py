@@ -24,6 +24,7 @@ from groundstation.pipeline.one_flight.convert import (
 from groundstation.pipeline.one_flight.log import Log, as_log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.pipeline.one_flight.segments import PowerUpTold, segments_in, segments_of, told_of
 from groundstation.pipeline.verbs.describe import facts_of
 
 if TYPE_CHECKING:
@@ -46,6 +47,8 @@ class Checked:
     findings : tuple of Finding
     usability : Usability, optional
         Whether it serves the purpose that was asked for.
+    power_ups : tuple of PowerUpTold
+        Where the log holds several.
     """
 
     outcome: Outcome
@@ -54,6 +57,7 @@ class Checked:
     clock: Clock
     findings: tuple[Finding, ...]
     usability: "Usability | None" = None
+    power_ups: tuple[PowerUpTold, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-able."""
@@ -67,6 +71,7 @@ class Checked:
             "clock": to_json_exactly(self.clock),
             "ledger": to_json_exactly(self.ledger),
             "findings": [asdict(finding) for finding in self.findings],
+            **({"power_ups": [asdict(one) for one in self.power_ups]} if self.power_ups else {}),
             **({"usability": self.usability.to_dict()} if self.usability else {}),
         }
 
@@ -228,7 +233,9 @@ def _recorded(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) 
     facts = facts_of(log, found.header.metadata, ledger)
     findings = ledger_findings(found.ledger)
     has_lost = found.ledger.loses_data
-    return _checked(log, facts, ledger, found.clock.document(), findings, has_lost, fail_on), flight
+    checked = _checked(log, facts, ledger, found.clock.document(), findings, has_lost, fail_on)
+    power_ups = told_of(segments_of(found.power_ups), found.clock.is_absolute)
+    return replace(checked, power_ups=power_ups), flight
 
 
 def _stored(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) -> tuple[Checked, "Flight | None"]:
@@ -262,7 +269,8 @@ def _stored(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) ->
         info = anew
     facts = facts_of(log, info.metadata, anew.ledger)
     has_lost = any(entry.get("loses_data") for entry in info.damages)
-    return _checked(log, facts, anew.ledger, info.clock, info.findings, has_lost, fail_on), flight
+    checked = _checked(log, facts, anew.ledger, info.clock, info.findings, has_lost, fail_on)
+    return replace(checked, power_ups=told_of(segments_in(info), info.has_utc)), flight
 
 
 def _checked(

@@ -1,7 +1,7 @@
 """``clip``: a part of a flight as an MCAP of its own and, beside it, its recording."""
 
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -12,19 +12,20 @@ from groundstation.base.errors import SettingsError, UnreadableLogError, UsageEr
 from groundstation.base.failures import Failure, attempt, failures, gathered_failures
 from groundstation.base.ledger import DamagedSpan, Ledger
 from groundstation.base.records import Damage, RecordBatch
-from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.base.timescales import iso_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.many_flights.inputs import file_in
 from groundstation.pipeline.one_flight.analyse import analyse
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.convert import Converted, census_of, convert_log, recounted
+from groundstation.pipeline.one_flight.convert import Converted, census_of, convert_flight, convert_log, recounted
 from groundstation.pipeline.one_flight.flight import OF_THE_WORLD, given_of, read_flight
 from groundstation.pipeline.one_flight.identity import flight_id
 from groundstation.pipeline.one_flight.intervals import flight_seconds
 from groundstation.pipeline.one_flight.log import Log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, State
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.pipeline.one_flight.segments import Segment, segments_in
 from groundstation.pipeline.verbs.anonymous import ANONYMOUS, Disguise, disguise_of
 from groundstation.pipeline.verbs.describe import facts_of
 from groundstation.results.flight import Source
@@ -51,6 +52,8 @@ class Wanted:
         Without what names the flight (:mod:`groundstation.pipeline.verbs.anonymous`).
     seed : int, optional
         Of the disguise; None: one that nobody knows.
+    power_up : int
+        Which of several power-ups in a log, from 1; 0: the only one, or that in which the range in UTC lies.
     """
 
     start: str | None = None
@@ -58,6 +61,7 @@ class Wanted:
     topics: tuple[str, ...] = ()
     anonymous: bool = False
     seed: int | None = None
+    power_up: int = 0
 
     @property
     def span(self) -> str:
@@ -111,7 +115,7 @@ def clip(
     listen(Event("stage", path.name, "cutting"))
     with told_in_a_line(str(target)):
         target.parent.mkdir(parents=True, exist_ok=True)
-        with _as_mcap(log, target.parent, limits) as mcap:
+        with _as_mcap(log, target.parent, limits, wanted) as (log, mcap):
             done = _cut(log, mcap, target, wanted, limits)
     found: tuple[Failure, ...] = ()
     if with_recording:
@@ -137,15 +141,39 @@ def _expect_free(source: Path, target: Path, with_recording: bool, force: bool) 
 
 
 @contextmanager
-def _as_mcap(log: Log, folder: Path, limits: Thresholds) -> Iterator[Path]:
-    """The log's MCAP: itself, or one that is gone afterwards."""
-    if log.is_store:
-        yield log.path
+def _as_mcap(log: Log, folder: Path, limits: Thresholds, wanted: Wanted) -> Iterator[tuple[Log, Path]]:
+    """The log and its MCAP: itself, or one that is gone afterwards; of several power-ups that of the one wanted."""
+    if log.is_store and not segments_in(log.info()):
+        yield log, log.path
         return
     with tempfile.TemporaryDirectory(prefix=".partial-", dir=folder) as temporary:
         whole = Path(temporary) / "whole.mcap"
-        convert_log(log, whole, limits)
-        yield whole
+        found = convert_flight(log, whole, limits)
+        if isinstance(found, tuple):
+            log = _wanted_of(found, wanted)
+            convert_log(log, whole, limits)
+        yield log, whole
+
+
+def _wanted_of(logs: Sequence[Log], wanted: Wanted) -> Log:
+    """The power-up that is asked for by its number, or by a range in UTC."""
+    segments = [log.segment for log in logs if log.segment is not None]
+    numbers = [one.number for one in segments if wanted.power_up in (0, one.number) and _may_hold(one, wanted)]
+    if len(numbers) == 1:
+        return logs[numbers[0] - 1]
+    found = f"{len(logs)} power-ups" if not wanted.power_up else f"no power-up {wanted.power_up} of {len(logs)}"
+    raise UsageError(logs[0].path.name, found, "one of them", f"--power-up 1 to {len(logs)}")
+
+
+def _may_hold(segment: Segment, wanted: Wanted) -> bool:
+    """Whether a range that is given in UTC lies in a power-up; a range in seconds may lie in any."""
+    texts = [text for text in (wanted.start, wanted.end) if text is not None]
+    if segment.shift_ns or not texts or not all("T" in text for text in texts):
+        return True
+    ends_ns = [iso_to_utc_ns(text)[0] for text in texts]
+    start_ns = ends_ns[0] if wanted.start is not None else segment.start_ns
+    end_ns = ends_ns[-1] if wanted.end is not None else segment.end_ns
+    return start_ns <= segment.end_ns and end_ns > segment.start_ns
 
 
 def _cut(log: Log, mcap: Path, target: Path, wanted: Wanted, limits: Thresholds) -> Converted:

@@ -12,6 +12,7 @@ from groundstation.base.records import Damage, RecordBatch
 from groundstation.base.signals import BUS_PREFIX
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.log import Log, as_log, open_log
+from groundstation.pipeline.one_flight.segments import PowerUpTold, segments_in, segments_of, told_of
 from groundstation.store.info import StoreInfo
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ class BusWord:
 class Description:
     """A log described: facts for people (name to text), topics, findings, and what is on its buses.
 
-    ``has_records``: at least one record of the log could be read.
+    ``has_records``: at least one record of the log could be read; ``power_ups``: where it holds several.
     """
 
     facts: dict[str, str]
@@ -57,11 +58,14 @@ class Description:
     has_lost_data: bool
     buses: tuple[BusWord, ...] = ()
     has_records: bool = True
+    power_ups: tuple[PowerUpTold, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         plain = asdict(self)
         del plain["has_records"]  # the exit code tells it
+        if not self.power_ups:
+            del plain["power_ups"]
         return plain
 
 
@@ -101,7 +105,8 @@ def _recorded(log: Log) -> Description:
     facts = facts_of(log, dict(found.header.metadata), ledger)
     lost = any(damage.loses_data for damage in found.damages)
     topics, findings = _topics(ledger, fields), ledger_findings(found.ledger)
-    return Description(facts, topics, findings, lost, _buses(buses, log), has_records=bool(topics))
+    power_ups = told_of(segments_of(found.power_ups), found.clock.is_absolute)
+    return Description(facts, topics, findings, lost, _buses(buses, log), bool(topics), power_ups)
 
 
 def _bus_contents(ledger: Ledger) -> "BusContents | None":
@@ -171,7 +176,8 @@ def _stored(log: Log) -> Description:
     facts["log"] = f"{info.source_name}, read as {info.reader}"
     findings = (*info.findings, *(damage_finding(damage) for damage in damages))
     lost, topics = _has_lost(info, damages), _topics(info.ledger, fields)
-    return Description(facts, topics, findings, lost, _buses(buses, log), has_records=bool(fields))
+    power_ups = told_of(segments_in(info), info.has_utc)
+    return Description(facts, topics, findings, lost, _buses(buses, log), bool(fields), power_ups)
 
 
 def _has_lost(info: StoreInfo, damages: list[Damage]) -> bool:

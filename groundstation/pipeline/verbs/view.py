@@ -10,6 +10,7 @@ from groundstation.pipeline.many_flights.inputs import COMPARISON_RECORDING, fil
 from groundstation.pipeline.many_flights.publishing import FLEET_RECORDING
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job, run_flight
+from groundstation.results.files import load_manifest
 
 ADDRESSES = ("rerun://", "rerun+http://", "rerun+https://")
 MOST_VERIFIED_BYTES = 200_000_000  # 25 MB take 0.65 s of one core
@@ -22,6 +23,7 @@ def look_at(
     web: bool,
     host: str,
     port: int | None,
+    power_up: int = 1,
     profile: Path | None,
     say: Callable[[str], None],
 ) -> None:
@@ -36,6 +38,8 @@ def look_at(
         In the browser.
     host, port
         Where the viewer listens; see :func:`groundstation.viewer.launch.open_viewer`.
+    power_up : int
+        Which of several power-ups in an MCAP or log, from 1.
 
     Raises
     ------
@@ -60,10 +64,12 @@ def look_at(
         with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
             say(f"computing {path.name} ...")
             configuration = Configuration(profile=str(profile) if profile else None)
-            outcome = run_flight(Job(path, Path(folder), configuration, with_pdf=False))
+            outcome = run_flight(Job(path, Path(folder), configuration, with_pdf=False, power_up=power_up))
             if outcome.state == "failed":
                 where, _, found = outcome.text.partition(": ")
                 raise GroundstationError(where, found)
+            if outcome.power_up and (told := load_manifest(Path(outcome.folder)).power_up) is not None:
+                say(f"power-up {told.number} of {told.count} in {path.name}; --power-up shows another one")
             for failure in outcome.failures:
                 say(f"error: {path.name}: {failure.text}")
             code = open_viewer(_recording(Path(outcome.folder)), web=web, host=host, port=port, say=say)
