@@ -106,6 +106,15 @@ def test_an_ins_with_a_velocity_error_from_the_first_second_keeps_its_rate() -> 
     assert found.radial_error_rate_50_nmiph == pytest.approx(0.8 * S_PER_H / NMI_M, rel=0.02)
 
 
+def test_gnss_may_come_a_minute_after_the_ins() -> None:
+    """By then the velocity error has made a position error; the start is that of the INS record all the same."""
+    flight = flight_from_stand(rate_nmiph=0.0, velocity_mps=0.8)
+    flight = without_rows(flight, "gnss", flight.time_s("gnss") >= 60.0)
+    found = result(flight)
+    assert start_of(found) == (0.0, "standstill")
+    assert found.radial_error_rate_50_nmiph == pytest.approx(0.8 * S_PER_H / NMI_M, rel=0.02)
+
+
 def test_a_logged_change_from_alignment_is_a_start_wherever_it_is() -> None:
     flight = begun_at(flight_from_stand(), 600.0)
     time_s = flight.time_s("ins")
@@ -177,7 +186,12 @@ def test_flights_without_a_start_stand_outside_the_acceptance(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    ("case", "rate"), [("cases/x0_whole_flight.csv.gz", 1.65), ("cases/x1_started_in_flight.csv.gz", None)]
+    ("case", "rate"),
+    [
+        ("cases/x0_whole_flight.csv.gz", 1.65),
+        ("cases/f_zero_fix_first_60s.csv.gz", 1.65),
+        ("cases/x1_started_in_flight.csv.gz", None),
+    ],
 )
 def test_one_ins_as_a_whole_and_from_the_middle(case: str, rate: float | None, tmp_path: Path) -> None:
     ended = CliRunner().invoke(app, ["run", str(real_log(case)), "-o", str(tmp_path / "out"), "--only", "results"])

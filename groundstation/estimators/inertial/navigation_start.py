@@ -24,6 +24,7 @@ STAND_MPS = 0.5  # mean velocity of GNSS below which the aircraft stands
 INS_STAND_MPS = 3.0  # the INS's own: its error may be in it
 STAND_M = 20.0  # what the INS's position may jump while it stands
 MEAN_EPOCHS = 5
+LONGEST_WAIT_S = 300.0  # for GNSS, over which a velocity error is taken for constant
 CALM_MPS = 0.3  # an INS that was just aligned has hardly a velocity error
 SIGMAS = 3.0
 LONGEST_H = 48.0  # before the log; an older start is a mistyped one
@@ -130,15 +131,21 @@ def _by_standstill(compared: Differences, gnss: GnssNoise) -> NavigationStart:
     if still_s - seen_s < LEAST_STAND_S:
         return _unproven("the aircraft moves where INS and GNSS are first logged together")
     stand = (epochs.time_s >= seen_s) & (epochs.time_s < min(still_s, seen_s + COMPARED_S))
-    apart_m = float(np.hypot(*np.nanmean(epochs.position_m[stand], axis=0)))
+    apart_m = np.nanmean(epochs.position_m[stand], axis=0)
+    known = stand & np.isfinite(epochs.velocity_mps).all(axis=1)
+    error_mps = np.mean(epochs.velocity_mps[known], axis=0) if known.any() else np.zeros(2)
+    # GNSS may come some minutes after the INS: what the velocity error made of the position by then is taken off.
+    waited_s = float(np.mean(epochs.time_s[stand])) - float(epochs.time_s[0])
+    at_first_m = apart_m - error_mps * waited_s if waited_s <= LONGEST_WAIT_S else apart_m
+    nearest_m = min(float(np.hypot(*apart_m)), float(np.hypot(*at_first_m)))
     limit_m = SIGMAS * float(np.hypot(gnss.position_white_m, gnss.position_correlated_m))
-    if apart_m > limit_m:
-        return _unproven(f"at the standstill where the log begins the INS is {apart_m:.0f} m off GNSS already")
-    text = f"the log begins at a standstill, with the INS {apart_m:.0f} m from GNSS"
-    known = np.isfinite(epochs.velocity_mps[stand]).all(axis=1)
-    error_mps = float(np.hypot(*np.mean(epochs.velocity_mps[stand][known], axis=0))) if known.any() else 0.0
-    if error_mps > CALM_MPS:  # an error of velocity that had lasted would show in the position
-        text += f"; its velocity is off by {error_mps:.2f} m/s, for {limit_m / error_mps:.0f} s at most"
+    if nearest_m > limit_m:
+        seen_m = float(np.hypot(*apart_m))
+        return _unproven(f"at the standstill where the log begins the INS is {seen_m:.0f} m off GNSS already")
+    text = f"the log begins at a standstill, with the INS {nearest_m:.0f} m from GNSS"
+    speed_mps = float(np.hypot(*error_mps))
+    if speed_mps > CALM_MPS:  # an error of velocity that had lasted would show in the position
+        text += f"; its velocity is off by {speed_mps:.2f} m/s, for {limit_m / speed_mps:.0f} s at most before"
     return NavigationStart(float(epochs.time_s[0]), "standstill", text)
 
 
