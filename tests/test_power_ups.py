@@ -181,7 +181,7 @@ def spans(found: Survey) -> list[tuple[float, float, bool]]:
 def test_each_has_a_utc_of_its_own(is_counting: bool) -> None:
     zeros = np.repeat([DAY_IN_2026_NS, DAY_IN_2026_NS + 700 * NS_PER_S], 3)
     readings = UtcReadings(np.array([10, 20, 30, 70, 80, 90]), zeros)
-    header = LogHeader("test", {}, DAY_IN_2026_NS, is_counting, readings)
+    header = LogHeader("test", {}, DAY_IN_2026_NS, is_counting, utc_readings=readings)
     found = survey(log(seconds(0, 60), seconds(0, 60), header=header))
     expected = [(0.0, 59.0, True), (700.0, 759.0, True)] if is_counting else spans(found)
     assert spans(found) == expected and len(expected) == 2 and found.clock.is_absolute
