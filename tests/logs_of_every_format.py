@@ -114,7 +114,13 @@ def write_tlog(path: Path) -> int:
         fix = (3, *place, 120 + at, 65_535, 500 + at, 1_400 * at, 8 + at % 9, 190_000 + at, 0, 0, 300 + at)
         log.add("gps_raw_int", at, *fix, time_us=time_us + 1_000)
         log.add(
-            "global_position_int", 100 * at, *place, 0, *rng.integers(-900, 900, 3).tolist(), 0, time_us=time_us + 2_000
+            "global_position_int",
+            100 * at + 20,
+            *place,
+            0,
+            *rng.integers(-900, 900, 3).tolist(),
+            0,
+            time_us=time_us + 2_000,
         )
         log.add("raw_imu", at, *rng.integers(-900, 900, 9).tolist(), time_us=time_us + 3_000)
         log.add("sys_status", 0, 0, 0, 0, 12_000, 100 + at, 80, *[0] * 6, time_us=time_us + 4_000)

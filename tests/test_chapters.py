@@ -19,6 +19,7 @@ from groundstation.chapters.overview import overview
 from groundstation.chapters.parts import Facts, Figure, Grid, Mark, Note, Part, Section
 from groundstation.chapters.provenance import provenance
 from groundstation.chapters.quality import quality
+from groundstation.chapters.verdict import claim
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures import DRAWERS, with_drawings
 from groundstation.results.chosen import ChosenInterval
@@ -71,6 +72,18 @@ def test_front_tells_flight_verdict_and_number_to_type() -> None:
     assert values["Heading error"] == ("+1.038°", "95 % interval +0.977° … +1.099°")
     assert values["Parking heading, corrected"][0] == "301.98°"
     assert values["Against the reference"][0] == "−3.6′"
+
+
+def test_advisory_says_how_good_the_number_is_and_gives_none_to_type() -> None:
+    answer = heading_result(verdict="advisory", confidence95_deg=(0.6, 1.4))
+    found = claim(answer)
+    assert found.mark == Mark("warn", "Advisory")
+    assert found.headline == "Good to ± 24′ only: taxi the other way, or state the wind" and not found.to_sign
+
+
+def test_taxi_after_the_flight_is_never_the_hero() -> None:
+    late = Gate("before_take_off", "", 0.5, 1.0, "", "failed", sense="at_least")
+    assert claim(heading_result(verdict="reject", gates=(late,))).rank > claim(heading_result()).rank
 
 
 @pytest.mark.parametrize(

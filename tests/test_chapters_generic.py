@@ -145,7 +145,8 @@ def test_a_long_table_is_cut_and_says_so() -> None:
 
 
 @pytest.mark.parametrize(
-    ("verdict", "tone"), [("accept", "good"), ("reject", "bad"), ("extend", "warn"), ("undecided", "unknown")]
+    ("verdict", "tone"),
+    [("accept", "good"), ("advisory", "warn"), ("reject", "bad"), ("extend", "warn"), ("undecided", "unknown")],
 )
 def test_the_verdict_stands_first_and_in_the_headline(verdict: str, tone: str) -> None:
     section = chapter(wind(verdict=verdict, remarks=("few turns",)))

@@ -100,7 +100,7 @@ def test_a_front_tells_flight_verdict_and_why() -> None:
     assert "## Not assessable" in text
 
 
-@pytest.mark.parametrize("verdict", ["accept", "reject", "extend", "undecided"])
+@pytest.mark.parametrize("verdict", ["accept", "advisory", "reject", "extend", "undecided"])
 def test_the_heading_panel_begins_with_the_line_of_the_front(verdict: str) -> None:
     results = example(heading_result(verdict=verdict))
     assert markdown(heading(results)).splitlines()[0] == front_markdown(front(results)).split("\n\n")[1][1:]

@@ -79,3 +79,17 @@ def test_thresholds_are_a_section_and_a_file(tmp_path: Path) -> None:
     assert found.to_dict() == {"thresholds": {"version": 1, "gaps": {"periods": 4}}}
     with pytest.raises(SettingsError, match=r"c.toml, key thresholds.version"):
         load_configuration(written(tmp_path, "c.toml", "[thresholds]\ngaps.min_s = 0.5\n"))
+
+
+def test_metar_lines_of_a_file_and_of_the_settings(tmp_path: Path) -> None:
+    file = tmp_path / "metar.txt"
+    file.write_text("# the day\nMETAR UUEE 040600Z 27010MPS CAVOK=\nMETAR UUEE 040630Z NIL=\n", encoding="utf-8")
+    found = load_configuration(weather=file)
+    assert found.weather == ("METAR UUEE 040600Z 27010MPS CAVOK=",)
+    again = load_configuration(found.to_dict())
+    assert again.weather == found.weather
+    file.write_text("sunny\n", encoding="utf-8")
+    with pytest.raises(SettingsError, match=r"metar\.txt: found no METAR line with a wind, expected lines such as"):
+        load_configuration(weather=file)
+    with pytest.raises(SettingsError, match="expected a list of METAR lines"):
+        load_configuration({"weather": [1]})

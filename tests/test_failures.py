@@ -462,6 +462,46 @@ def test_a_summary_without_failures_is_left_as_it_is(tmp_path: Path) -> None:
     assert re.search(r"ValueError: at 0x\.\.\.\)", (tmp_path / "summary.json").read_text(encoding="utf-8"))
 
 
+def test_a_plan_with_failures_has_all_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unpainted: None) -> None:
+    from groundstation.pipeline.verbs.plan import run_plan
+    from tests.test_plan import scenario
+
+    monkeypatch.setitem(viewer_plan.PLAN_TABS, "placement", fails)
+    monkeypatch.setitem(DRAWERS, "control.paths", fails)
+    monkeypatch.setitem(sections.ON_THE_SESSION, "provenance", fails)
+    done = run_plan("session", scenario(tmp_path), tmp_path / "out", with_pdf=False)
+    assert (done.state, done.code) == ("incomplete", 1)
+    told = [one.code for one in load_document(Path(done.folder)).findings if one.code.startswith("internal.")]
+    assert told == ["internal.tab.placement", "internal.chapter.provenance", "internal.figure.control.paths"]
+    assert {"summary.json", "manifest.json", "report.html", "mine.rrd"} <= {
+        one.name for one in Path(done.folder).iterdir()
+    }
+
+
+def test_a_session_with_failures_has_all_else_and_is_run_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unpainted: None
+) -> None:
+    from groundstation.pipeline.one_flight.configuration import load_configuration
+    from groundstation.pipeline.verbs.cooperative import run_session
+    from groundstation.simulation.session_log import write_session
+    from groundstation.viewer import session as viewer_session
+    from tests.session_example import SEED
+    from tests.session_example import SHORT as SCENARIO
+
+    write_session(SCENARIO, tmp_path, "example", SEED)
+    logs, settings = sorted(tmp_path.glob("*.csv")), load_configuration(tmp_path / "settings.toml")
+    with monkeypatch.context() as patch:
+        patch.setattr(viewer_session, "cooperative", fails)
+        patch.setitem(DRAWERS, "cooperative.map", fails)
+        (done,) = run_session(logs, tmp_path / "out", settings, with_pdf=False)
+        assert (done.state, done.code) == ("incomplete", 1)
+    told = [one.code for one in load_document(Path(done.folder)).findings if one.code.startswith("internal.")]
+    assert set(told) == {"internal.tab.cooperative", "internal.figure.cooperative.map"}
+    (again,) = run_session(logs, tmp_path / "out", settings, with_pdf=False)
+    assert (again.state, again.was_finished) == ("done", False)
+    assert not [one for one in load_document(Path(done.folder)).findings if one.code.startswith("internal.")]
+
+
 # ------------------------------------------------------------------------------------------------ beside the flights
 
 

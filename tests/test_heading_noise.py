@@ -216,3 +216,15 @@ def test_what_is_told_apart_widens_the_whole_interval_alone() -> None:
     assert found.apart_sigma_deg == pytest.approx(0.3, abs=0.003)
     assert found.standard_error_deg == pytest.approx(np.hypot(0.3, plain.standard_error_deg), rel=0.05)
     assert found.interval_deg(is_measured=True) == pytest.approx(plain.interval_deg(), abs=0.02)
+
+
+def test_the_interval_does_not_hang_on_the_seed() -> None:
+    taxi, still = simulated(np.random.default_rng(12), 25.0, 0.02)
+    data = replace(taxi, segment=np.ones(len(taxi.time_s), dtype=np.int64))
+
+    def half_width(seed: int, **more: int) -> float:
+        low, high = error_posterior(data, still, seed=seed, **more).interval_deg()
+        return 0.5 * (high - low)
+
+    widths = [half_width(seed) for seed in range(3)]
+    assert widths == pytest.approx([half_width(77, draws=16_000)] * 3, rel=0.05)

@@ -35,6 +35,7 @@ from groundstation.estimators.heading.samples import (
 )
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.heading.standstill import effective_samples, find_standstill, speed_bound_mps
+from groundstation.estimators.heading.steps import heading_steps
 from groundstation.estimators.heading.verdict import decide, explain
 from groundstation.estimators.known import AircraftData, Interval, Runway, SiteData, Stand
 from groundstation.results.heading import Gate
@@ -529,6 +530,42 @@ def test_the_ends_of_the_ranges_can_be_used() -> None:
 # Verdict
 
 
+def back_taxi(seed: int, rate_dps: float = 8.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time, INS heading at 10 Hz and where it turns: two half turns whose rate is there within one sample, and sway."""
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(0.0, 120.0, 0.1) + rng.uniform(0.0, 0.1)
+    heading_deg = 350.0 + 0.7 * np.sin(2.0 * np.pi * rng.uniform(0.2, 0.6) * time_s + rng.uniform(0.0, 6.0))
+    is_turning = np.zeros(len(time_s), dtype=bool)
+    for start_s, hand in ((rng.uniform(30.0, 35.0), 1.0), (rng.uniform(70.0, 75.0), -1.0)):
+        turned_s = np.clip(time_s - start_s, 0.0, 180.0 / rate_dps)
+        heading_deg += hand * rate_dps * turned_s
+        is_turning |= (turned_s > 2.0) & (turned_s < 180.0 / rate_dps - 2.0)
+    return time_s, np.round((heading_deg + rng.normal(0.0, 0.02, len(time_s))) / 0.01) * 0.01 % 360.0, is_turning
+
+
+def test_an_abrupt_turn_is_no_step() -> None:
+    assert [seed for seed in range(40) if heading_steps(*back_taxi(seed)[:2], SETTINGS)] == []
+
+
+@pytest.mark.parametrize("is_in_turn", [False, True])
+def test_a_step_is_found_on_the_straight_and_in_a_turn(is_in_turn: bool) -> None:
+    found = 0
+    for seed in range(40):
+        time_s, heading_deg, is_turning = back_taxi(seed)
+        rng = np.random.default_rng(1000 + seed)
+        place = int(rng.choice(np.flatnonzero(is_turning) if is_in_turn else np.arange(60, 280)))
+        stepped = (heading_deg + 0.3 * (np.arange(len(time_s)) >= place)) % 360.0
+        steps = heading_steps(time_s, stepped, SETTINGS)
+        found += len(steps) == 1 and abs(steps[0].time_s - time_s[place]) < 0.05
+    assert found >= 39
+
+
+def test_a_spike_of_the_heading_is_no_step() -> None:
+    time_s, heading_deg, _is_turning = back_taxi(1)
+    spiked = (heading_deg + 0.5 * (np.arange(len(time_s)) == 150)) % 360.0
+    assert heading_steps(time_s, spiked, SETTINGS) == ()
+
+
 def gate(name: str, state: str, required: bool = True) -> Gate:
     return Gate(name, name, 1.0, 2.0, "", state, required)  # type: ignore[arg-type]
 
@@ -541,6 +578,10 @@ def gate(name: str, state: str, required: bool = True) -> Gate:
         ((("quality", "failed"), ("precision", "failed")), "reject"),
         ((("geometry", "not_measured"), ("precision", "passed")), "undecided"),
         ((("geometry", "not_measured"), ("precision", "failed")), "extend"),
+        ((("whole_half_width", "failed"), ("precision", "passed")), "advisory"),
+        ((("whole_half_width", "failed"), ("half_width", "failed")), "extend"),
+        ((("whole_half_width", "failed"), ("steps", "failed")), "reject"),
+        ((("whole_half_width", "failed"), ("geometry", "not_measured")), "undecided"),
         ((("standstill_speed_of_mean", "failed"), ("precision", "passed")), "reject"),
     ],
 )

@@ -93,6 +93,12 @@ def test_a_position_that_stands_still_is_told_by_the_speed_of_its_own_topic() ->
     assert stuck_fields(ledger_of(gnss=one_alone)) == set()
 
 
+def test_a_speed_that_no_motion_has_tells_of_no_stuck_position() -> None:
+    nonsense = frozen_in(flight(turn_dps=0.1), "latitude_deg", "longitude_deg")
+    nonsense |= {"velocity_north_mps": np.full(len(TIME_S), 1e308), "velocity_east_mps": np.ones(len(TIME_S))}
+    assert stuck_fields(ledger_of(gnss=nonsense)) == set()
+
+
 def test_a_parked_aircraft_has_nothing_stuck() -> None:
     parked = flight(0.0, 0.0)
     rng = np.random.default_rng(5)

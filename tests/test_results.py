@@ -185,5 +185,5 @@ def test_tables_are_readable_and_safe() -> None:
     rows = list(csv.reader(io.StringIO(csv_text(data))))
     assert rows[0] == ["time_s", "rows", "used", "state", "mixed", "gain"]
     assert rows[1] == ["0.000", "-1", "1", "'=1+1", "'@x", "1.2"]
-    assert rows[2] == ["2.500", "2", "0", 'a,"b"', "b\nc", "-2.0"]
+    assert rows[2] == ["2.500", "2", "0", 'a,"b"', "b c", "-2.0"]
     assert rows[3] == ["", "3", "1", "'-x", "d", ""]

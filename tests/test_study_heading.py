@@ -127,3 +127,22 @@ def test_both_intervals_hold_the_truth_and_are_not_wider_than_they_were(family: 
     accepted = [run for run in outcomes if run.verdict == "accept"]
     assert len(accepted) >= 3
     assert max(abs(run.error_deg) for run in accepted) <= 20.0 / 60.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["held velocity", "skidding", "spoofed"])
+def test_what_is_no_straight_taxi_is_refused(kind: str) -> None:
+    from groundstation.studies.heading_crew import KINDS, run_crew
+
+    place = next(number for number, name in enumerate(KINDS) if name == kind)
+    outcomes = [run_crew(4001, place + 10 * number) for number in range(2)]
+    assert [one.verdict for one in outcomes if one.verdict == "accept" and not one.is_inside] == []
+
+
+def test_crew_runs_are_the_same_again_and_make_a_table() -> None:
+    from groundstation.studies.heading_crew import crew_table, run_crew
+
+    found = run_crew(4001, 0)
+    assert found == run_crew(4001, 0)
+    table = crew_table([found])
+    assert (list(table["kind"]), list(table["runs"])) == (["one way, METAR"], [1])

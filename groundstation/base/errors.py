@@ -119,7 +119,7 @@ class SettingsError(UsageError):
 
 
 def lack_of_memory(error: BaseException) -> str:
-    """What could not be had for want of memory or of processes, in a few words; empty for another error.
+    """Name what was lacking, memory or processes, in a few words; empty for another error.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Parts of a result that failed by a defect of ours: they are left out and told, the rest is made without them."""
+"""Parts of a result that failed by a defect of ours: left out and told, the rest is made."""
 
 import re
 import traceback
@@ -70,7 +70,7 @@ _gathered: ContextVar[list[Failure] | None] = ContextVar("failures", default=Non
 
 @contextmanager
 def gathered_failures() -> Iterator[None]:
-    """Gather failures, which :func:`failures` tells, in place of raising them; an inner such context is none."""
+    """Gather failures in place of raising them; :func:`failures` tells those so far."""
     if _gathered.get() is not None:
         yield
         return
@@ -82,7 +82,7 @@ def gathered_failures() -> Iterator[None]:
 
 
 def failures() -> tuple[Failure, ...]:
-    """What was gathered so far; nothing where nobody gathers."""
+    """Failures gathered so far; none where nobody gathers."""
     return tuple(_gathered.get() or ())
 
 
@@ -93,7 +93,7 @@ def attempt(
     *arguments: *Arguments,
     unless: tuple[type[Exception], ...] = (),
 ) -> Made | None:
-    """Make a part of a result; None where it fails and somebody gathers failures, else its error is raised.
+    """Make a part of a result; None where it fails and failures are gathered, else it raises.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def left_out(part: str, name: str, error: BaseException) -> Failure:
 
 
 def reason_of(error: BaseException) -> str:
-    """Why a part failed, in one line that is the same at every run.
+    """Reason of a failure, in one line that is the same at every run.
 
     Examples
     --------
@@ -154,7 +154,7 @@ def reason_of(error: BaseException) -> str:
 
 
 def is_incomplete(findings: "Iterable[Finding]") -> bool:
-    """Whether a flight with these findings lacks a part that failed."""
+    """Tell whether a flight with these findings lacks a part that failed."""
     return any(finding.code.startswith(f"{CODE}.") for finding in findings)
 
 

@@ -73,7 +73,7 @@ def has_position(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> BoolArray
 
 
 def continuous_longitude_deg(longitude_deg: ArrayLike) -> FloatArray:
-    """Longitudes of a path, shape (n,), without the step of a turn at the date line; NaN stays NaN.
+    """Longitudes of a path, shape (n,), without a step at the date line; NaN stays NaN.
 
     Each is within half a turn of the known one before it, so that some lie beyond 180 deg; the middle of the path does
     not. A path that does not cross the date line is returned as it is.
@@ -123,7 +123,7 @@ def north_east_m(
 def plan_north_east_m(
     latitude_deg: ArrayLike, longitude_deg: ArrayLike, origin_latitude_deg: float, origin_longitude_deg: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Places on a plan, metres north and east of an origin: as :func:`north_east_m`, and true in shape near a pole.
+    """Places on a plan, metres north and east of an origin; true in shape near a pole too.
 
     Where one place lies beyond 85 deg of latitude, all are drawn at their distance and direction from the origin
     (azimuthal equidistant), so that a straight flight over a pole is a straight line.

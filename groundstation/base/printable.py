@@ -1,4 +1,4 @@
-"""Text of a log fit for a terminal, a spreadsheet and JSON that is printed: it shows, and drives nothing.
+"""Text of a log made fit for terminals, spreadsheets and pages: it drives nothing.
 
 Control characters move the cursor, set titles and colours of a terminal; marks of direction rearrange the line around
 them; a cell that begins like a formula is one to a spreadsheet. Data stay as they are: this is for what is shown.
@@ -15,7 +15,7 @@ _OTHERS = re.compile("[^\x20-\x7e]")  # than what shows in any program
 
 @cache
 def is_hidden(mark: str) -> bool:
-    """Whether a character does something in place of being seen: controls, marks of direction, ends of lines, halves.
+    """Tell whether a character acts instead of being seen: a control, a mark of direction.
 
     Examples
     --------
@@ -26,7 +26,7 @@ def is_hidden(mark: str) -> bool:
 
 
 def printable(text: str, instead: str = "?") -> str:
-    """Text in one line with ``instead`` for every hidden character; tabs and ends of lines become spaces.
+    """Text in one line, ``instead`` for each hidden character, a space for tabs and line ends.
 
     Examples
     --------
@@ -56,7 +56,7 @@ def in_a_line(text: str) -> str:
 
 
 def spreadsheet_text(text: str) -> str:
-    """Text of a cell that shows in a spreadsheet and is not run: an apostrophe before what would be a formula.
+    """Text of a cell that shows and is not run: an apostrophe stands before a formula.
 
     Examples
     --------
@@ -68,7 +68,7 @@ def spreadsheet_text(text: str) -> str:
 
 
 def csv_cell(text: str) -> str:
-    """Write text as a CSV cell that no spreadsheet runs: quoted where needed, an apostrophe before a formula.
+    """Write text as a CSV cell that no spreadsheet runs, quoted where needed.
 
     Examples
     --------

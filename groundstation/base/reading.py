@@ -1,4 +1,4 @@
-"""Files opened so that an error of a later read names the file, as an error of opening it does."""
+"""Files opened so that an error of a later read names the file."""
 
 import io
 from pathlib import Path

@@ -8,7 +8,7 @@ GAP = "  "
 
 
 def columns(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
-    """Lay rows out in aligned columns, each cell in one printable line; those in ``right`` are aligned to the right.
+    """Lay rows out in aligned columns of printable cells; those in ``right`` stand right.
 
     Examples
     --------

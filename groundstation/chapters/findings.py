@@ -10,7 +10,7 @@ from groundstation.results.grouped_findings import NAMED, grouped
 from groundstation.results.reasons import explained
 
 MOST_FINDINGS = 200
-TOLD_ABOVE = (".not_assessable", "heading.accept", "heading.reject", "heading.extend", "heading.undecided")
+TOLD_ABOVE = (".not_assessable", *(f"heading.{one}" for one in ("accept", "advisory", "reject", "extend", "undecided")))
 TITLE, LEAD = "Findings", "The most severe first; all of them in summary.json."
 MARKS = {"fail": Mark("bad", "fail"), "warn": Mark("warn", "warn"), "info": Mark("plain", "info")}
 GRAVITY = {"fail": 0, "warn": 1, "info": 2}

@@ -35,7 +35,13 @@ from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 
 TOLD_ALIKE = ("verdict", "verdict_reason", "gates", "remarks", "settings", "figures")
-VERDICTS: dict[str, Tone] = {"accept": "good", "reject": "bad", "extend": "warn", "undecided": "unknown"}
+VERDICTS: dict[str, Tone] = {
+    "accept": "good",
+    "advisory": "warn",
+    "reject": "bad",
+    "extend": "warn",
+    "undecided": "unknown",
+}
 ACRONYMS = {"ins": "INS", "gnss": "GNSS", "rms": "RMS", "utc": "UTC", "gdop": "GDOP", "pdop": "PDOP", "hdop": "HDOP"}
 MORE_UNITS = {"mps2": "m/s²", "nt": "nT", "m2": "m²", "a": "A"}
 SERIES = "generic.series"  # the figure of any arrays over time

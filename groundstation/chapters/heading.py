@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from groundstation.chapters.assessed import reason_of
 from groundstation.chapters.gates import gate_grid, setting_facts
 from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Part, Section, kept
-from groundstation.chapters.verdict import NOT_ASSESSABLE, claim
+from groundstation.chapters.verdict import NOT_ASSESSABLE, PARTS, claim
 from groundstation.chapters.wording import ABSENT, clock, interval, is_number, number, step_places
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults
@@ -82,7 +82,7 @@ def _estimates(answer: HeadingResult) -> Grid:
             "Heading error, robust and weighted by speed",
             value["error"],
             interval(answer.confidence95_deg, 3, "°"),
-            "used for the correction; interval allows for correlation, steady sideslip, mounting",
+            "the airframe's, used for the correction; interval allows for correlation and steady sideslip",
         ),
         (
             "Heading error, running mean of Markelov 2015",
@@ -91,6 +91,12 @@ def _estimates(answer: HeadingResult) -> Grid:
             "e holds for white errors only",
         ),
         ("Heading error without lever arm", value["uncorrected_error"], ABSENT, ""),
+        (
+            "Azimuth error of the platform",
+            number(answer.platform_error_deg, 4, "°", signed=True),
+            interval(answer.platform_confidence95_deg, 3, "°") if answer.platform_confidence95_deg else ABSENT,
+            "navigation's: mounting taken off, its sigma in the interval",
+        ),
         ("Standard deviation of the differences", number(answer.estimate_sd_deg, 3, "°"), ABSENT, ""),
         ("Quality: scatter of the running mean", number(answer.quality_deg, 3, "°"), ABSENT, ""),
     )
@@ -207,13 +213,26 @@ def _spread(answer: HeadingResult) -> Facts | None:
     pairs = (
         ("Own error of a segment, σ", number(answer.segment_spread_deg, 3, "°"), "from the spread of the segments"),
         ("Wander of INS heading minus path, σ", number(answer.wander_spread_deg, 3, "°"), wander),
-        ("Remaining steady sideslip and mounting, σ", number(answer.steady_sigma_deg, 3, "°"), answer.steady_origin),
+        *_of_the_wind(answer),
+        ("Remaining steady sideslip, σ", number(answer.steady_sigma_deg, 3, "°"), answer.steady_origin),
         *(
             ("Step of the INS heading", number(step.size_deg, 2, "°", signed=True), f"at {clock(step.time_s)}")
             for step in answer.steps
         ),
     )
     return Facts("Segments, minutes and steady terms", pairs)
+
+
+def _of_the_wind(answer: HeadingResult) -> list[tuple[str, str, str]]:
+    """The parts of the interval, each alone, and the sideslip that a known wind has made."""
+    rows = [
+        (f"95 % half width, {PARTS.get(one.name, one.name)} alone", number(one.half_width_deg, 3, "°"), "")
+        for one in answer.interval_parts
+    ]
+    if answer.wind is not None:
+        origin = f"{answer.wind.origin}, {answer.aircraft_class or 'class not stated'}"
+        rows.append(("Sideslip by the wind, taken off", number(answer.sideslip_deg, 3, "°", signed=True), origin))
+    return rows
 
 
 def _with_sigma(value: float | None, sigma: float | None, places: int, unit: str) -> str:

@@ -22,13 +22,17 @@ BY_GATE = {
     "before_take_off": ("Fly", "taxi straight before take-off: taxi after landing does not count"),
     "half_width": ("Fly", "taxi straight for longer"),
     "precision": ("Fly", "taxi straight for longer"),
-    "whole_half_width": ("Fly", "taxi the other way too, or state the sigmas of sideslip and mounting"),
+    "whole_half_width": (
+        "Fly",
+        "taxi the other way too, state the wind (--weather) and aircraft_class, or let the tool learn the installation",
+    ),
     "standstill_duration": ("Fly", "stand still for 30 s before taxi"),
     "standstill_speed_of_mean": ("Fly", "stand still for 30 s before taxi, with an open sky"),
     "geometry": ("Record", "GDOP, PDOP or HDOP"),
     "integrity": ("Record", "the integrity flag of GNSS"),
     "ground": ("Record", "weight on wheels"),
     "gnss_rate": ("Record", "GNSS velocity at 10 Hz (now {value})"),
+    "held_velocity": ("Check", "the receiver: it holds its velocity in turns (static hold, dynamic model)"),
     "drift": ("Check", "the alignment of the INS: let it settle before taxi"),
     "steps": ("Check", "the alignment of the INS: its heading stepped"),
     "ins_mode": ("Check", "the alignment of the INS: it changed its mode"),
@@ -38,6 +42,7 @@ REFLECTIONS = ("Check", "the taxiway for reflections and gusts")
 # By a part of the reason for which an analysis could not be carried out.
 BY_REASON = (
     ("ground speed never above", ("Fly", TAXI)),
+    ("needed for an estimate", ("Fly", TAXI)),
     ("no straight taxi", ("Fly", TAXI)),
     ("ground contact proven", ("Record", "weight on wheels")),
     ("no turn of steady bank", ("Fly", "a full circle to either side at equal bank")),

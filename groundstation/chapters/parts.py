@@ -110,13 +110,13 @@ def kept(parts: Iterable[Part | None]) -> tuple[Part, ...]:
 class Rank(IntEnum):
     """Which claim a report opens with: the lowest that the flight has."""
 
-    HEADING = 0  # decided: accept, reject, extend
+    HEADING = 0  # decided: accept, advisory, reject, extend
     MAGNETIC = 1  # decided
     INERTIAL = 2
     FORECAST = 3
     LANDING = 4
     REFERENCE = 5
-    HEADING_OPEN = 6  # undecided
+    HEADING_OPEN = 6  # undecided, or partly from taxi after the flight
     GROUND_RUNS = 7
     MAGNETIC_OPEN = 8
     INERTIAL_OPEN = 9  # aided by GNSS, or not known whether

@@ -3,14 +3,20 @@
 import re
 from collections.abc import Mapping
 
+from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.chapters.gates import failed_to_inform
 from groundstation.chapters.parts import Claim, Mark, Rank
 from groundstation.chapters.wording import ABSENT, interval, is_number, number, step_places, typeset
 from groundstation.results.heading import HeadingResult
 
 PUBLISHED_LIMIT_ARCMIN = 20.0
+PARTS: Mapping[str, str] = {"taxi": "this taxi", "wind": "wind", "installation": "installation"}
+SAME_EVERYWHERE = (
+    "Sideslip that is the same in every direction (one engine, a dragging brake) cannot be seen, there and back."
+)
 VERDICTS: Mapping[str, Mark] = {
     "accept": Mark("good", "Accept"),
+    "advisory": Mark("warn", "Advisory"),
     "reject": Mark("bad", "Reject"),
     "extend": Mark("warn", "Extend"),
     "undecided": Mark("unknown", "Undecided"),
@@ -25,8 +31,9 @@ NOT_ASSESSABLE = Mark("unknown", "Not assessable")
 
 def claim(heading: HeadingResult) -> Claim:
     """The verdict with the number to type, or why there is none."""
+    is_late = any(gate.name == "before_take_off" and gate.state == "failed" for gate in heading.gates)
     return Claim(
-        Rank.HEADING_OPEN if heading.verdict == "undecided" else Rank.HEADING,
+        Rank.HEADING_OPEN if heading.verdict == "undecided" or is_late else Rank.HEADING,
         VERDICTS[heading.verdict],
         what_to_enter(heading),
         value=number(heading.error_deg, 2, "°", signed=True),
@@ -39,6 +46,8 @@ def claim(heading: HeadingResult) -> Claim:
 
 def what_to_enter(heading: HeadingResult) -> str:
     """The number to type with its sign and the digits of the entry step; never one where there is nothing to type."""
+    if heading.verdict == "advisory":
+        return f"Good to {half_width(heading.confidence95_deg)} only: taxi the other way, or state the wind"
     if heading.verdict != "accept":
         return ADVICE[heading.verdict]
     step, correction = heading.entry_step_deg, heading.correction_deg
@@ -49,22 +58,58 @@ def what_to_enter(heading: HeadingResult) -> str:
 
 def reasons(heading: HeadingResult) -> tuple[str, ...]:
     """Why the verdict is what it is, what failed beside it, and the error in words."""
-    why = typeset(re.split(r": enter |\. Not to be entered", heading.verdict_reason)[0])  # told by the headline
+    why = typeset(
+        re.split(r": enter |\. Not to be entered|\. To be entered", heading.verdict_reason)[0]
+    )  # told by the headline
     each = (sentence(part) for part in why.split("; "))
     found = failed_to_inform(heading.gates), _in_words(heading), steady_terms(heading)
     return tuple(filter(None, (*each, *found)))
 
 
+def half_width(ends: tuple[float, float]) -> str:
+    """Half width of an interval in arcminutes, as ± figure."""
+    return f"± {number(0.5 * (ends[1] - ends[0]) * ARCMIN_PER_DEG, 0, '′')}"
+
+
 def steady_terms(heading: HeadingResult) -> str:
-    """What of the interval this taxi shows, and what steady sideslip and mounting add; empty where not known."""
+    """What of the interval this taxi, the wind and the installation make; empty where not known."""
     measured, sigma = heading.confidence95_measured_deg, heading.steady_sigma_deg
     if measured is None or not all(map(is_number, measured)) or not is_number(sigma):
         return ""
     driven = "the directions driven do not remove" if heading.directions else "this taxi cannot show"
     origin = "as the aircraft file states" if heading.steady_origin == "aircraft file" else "shipped figures"
-    return (
-        f"95 % interval {interval(heading.confidence95_deg, 3, '°')}, including steady sideslip and mounting that "
+    text = (
+        f"95 % interval {interval(heading.confidence95_deg, 3, '°')}, including steady sideslip that "
         f"{driven} (σ {number(sigma, 2, '°')}, {origin}); {interval(measured, 3, '°')} from this taxi alone."
+    )
+    return " ".join(filter(None, (text, _parts(heading), _typed(heading), SAME_EVERYWHERE)))
+
+
+def _parts(heading: HeadingResult) -> str:
+    """The parts that the interval is made of, each as the half width it would have alone."""
+    parts = (
+        f"{PARTS.get(one.name, one.name)} ± {number(one.half_width_deg * ARCMIN_PER_DEG, 1, '′')}"
+        for one in heading.interval_parts
+    )
+    told = ", ".join(parts)
+    wind = heading.wind
+    known = (
+        f" Sideslip of {number(heading.sideslip_deg, 2, '°', signed=True)} by the wind ({wind.origin}) is taken off."
+        if wind
+        else ""
+    )
+    return f"Its parts: {told}.{known}" if told else ""
+
+
+def _typed(heading: HeadingResult) -> str:
+    """Which of the two numbers is typed, and the other one with its own half width."""
+    ends = heading.platform_confidence95_deg
+    if ends is None or not all(map(is_number, ends)):
+        return ""
+    azimuth = number(heading.platform_error_deg, 3, "°", signed=True)
+    return (
+        "The airframe's error is the one that is typed, because it is the airframe that is pointed and checked; the "
+        f"platform's azimuth error, the mounting taken off, is {azimuth} {half_width(ends)}."
     )
 
 

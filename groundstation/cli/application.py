@@ -180,6 +180,15 @@ AircraftFile = Annotated[
     Path | None,
     typer.Option("--aircraft", help="Aircraft file (TOML): antenna arm, entry step.", metavar="FILE", readable=False),
 ]
+WeatherFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--weather",
+        help="METAR lines (text): each flight takes the wind nearest to its taxi, within 60 min.",
+        metavar="FILE",
+        readable=False,
+    ),
+]
 SiteFile = Annotated[
     Path | None,
     typer.Option(

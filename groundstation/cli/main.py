@@ -44,6 +44,7 @@ from groundstation.cli.application import (
     Timeout,
     Together,
     Verbose,
+    WeatherFile,
     answers_with_exit_code,
     app,
     examples,
@@ -215,6 +216,7 @@ def run(
     aircraft: AircraftFile = None,
     site: SiteFile = None,
     intervals: IntervalsFile = None,
+    weather: WeatherFile = None,
     thresholds: ThresholdsFile = None,
     profile: Profile = None,
     icd: IcdFiles = None,
@@ -269,7 +271,7 @@ def run(
     from groundstation.pipeline.many_flights.references import judged_by
     from groundstation.pipeline.one_flight.configuration import applying, load_configuration
 
-    settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd)
+    settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd, weather)
     is_one_log = together or (len(paths) == 1 and not Path(paths[0]).is_dir())
     configuration = judged_by(applying(settings, apply), reference or (), is_one_log=is_one_log)
     if together and (dry_run or scheduler or stations is not None or timeout is not None or store or isolate):

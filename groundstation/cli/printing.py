@@ -143,7 +143,7 @@ def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:
 
 
 def totals(done: Sequence[Outcome]) -> str:
-    """Totals line: how many logs, and sessions of several, ended in which state; what stands beside them is none.
+    """Totals line: how many logs, and sessions of several, ended in which state.
 
     Examples
     --------

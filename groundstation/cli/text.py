@@ -1,4 +1,4 @@
-"""What all verbs print with: text that shows and drives no terminal, JSON for programs."""
+"""Printing for all verbs: text that shows and drives no terminal, JSON for programs."""
 
 import json
 from typing import Any
@@ -31,5 +31,5 @@ def printable_lines(text: str) -> str:
 
 
 def as_json(document: Any) -> str:
-    """Render a document as JSON text: hidden characters, and names of files that are not UTF-8, as escapes."""
+    """Render a document as JSON text, hidden characters as escapes."""
     return printable_json(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))

@@ -159,7 +159,7 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
         return self.table or self.name
 
     def values(self, answers: Answers) -> dict[str, Any]:
-        """What its answer gives to the tables of flights, by the names of its columns; nothing without an answer."""
+        """Values of its columns in the tables of flights, by name; none without an answer."""
         answer = answers.get(self.answer.analysis)
         return {} if answer is None else {column.name: column.value(cast(Any, answer)) for column in self.columns}
 

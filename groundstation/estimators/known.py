@@ -14,6 +14,7 @@ from groundstation.results.answer import A, Answers, answer_of
 from groundstation.tables.phases import Phases
 
 S = TypeVar("S")
+AircraftClass = Literal["", "light", "jet trainer", "business jet", "airliner", "car", "uav"]
 LEAST_ENTRY_STEP_DEG = 1e-6  # the places an answer is shown with
 
 
@@ -31,9 +32,15 @@ class AircraftData:
     mounting_deg : float
         Heading of the INS case minus heading of the airframe, known.
     mounting_sigma_deg : float or None
-        What remains uncertain of it, and of sideslip that is the same in every direction; None: the settings' figure.
+        What remains uncertain of it; None: the settings' figure. It widens the interval of the platform's number alone.
     sideslip_sigma_deg : float or None
-        Sigma of the steady sideslip that a crosswind makes on taxi; None: the settings' figure.
+        Sigma of the steady sideslip that a crosswind makes on taxi, at 10 m/s where the wind is known; None: that of
+        the class in the wind.
+    steady_sideslip_sigma_deg : float or None
+        Sigma of sideslip that is the same in every direction; None: the settings' figure.
+    aircraft_class : str
+        How far a crosswind pushes its nose off the path on taxi: ``light``, ``jet trainer``, ``business jet``,
+        ``airliner``, ``car`` or ``uav``; empty: not known, with a sigma that holds them all.
     gnss_latency_s, gnss_latency_sigma_s : float or None
         How much later GNSS velocities are logged than the INS shows the same motion, known; None: estimated.
     ins_class : str
@@ -55,6 +62,8 @@ class AircraftData:
     mounting_deg: float = number(0.0, -10.0, 10.0)
     mounting_sigma_deg: float | None = number(None, 0.0)
     sideslip_sigma_deg: float | None = number(None, 0.0)
+    steady_sideslip_sigma_deg: float | None = number(None, 0.0)
+    aircraft_class: AircraftClass = ""
     gnss_latency_s: float | None = number(None, -10.0, 10.0)
     gnss_latency_sigma_s: float = number(0.01, 0.0, 10.0)
     ins_class: str = ""
@@ -149,12 +158,16 @@ class Beacon:
 
 @dataclass(frozen=True)
 class SiteData:
-    """What is known of the airfield. ``stand`` names the stand the aircraft was parked on."""
+    """What is known of the airfield. ``stand`` names the stand the aircraft was parked on.
+
+    ``station`` is the field's four letters in METAR lines: the wind is then that of no other.
+    """
 
     stands: tuple[Stand, ...] = ()
     runways: tuple[Runway, ...] = ()
     stand: str = ""
     beacons: tuple[Beacon, ...] = ()
+    station: str = ""
 
     def __post_init__(self) -> None:
         for key, listed in (("stands", self.stands), ("runways", self.runways), ("beacons", self.beacons)):
@@ -202,6 +215,8 @@ class Known:
     site : SiteData
     intervals : tuple of Interval
         Parts of the flight that the user excludes or forces.
+    weather : tuple of str
+        METAR lines of the day, of one field or several.
     intervals_problem : SettingsError, optional
         Why the user's intervals have no place on this flight, which then has none.
     settings : mapping
@@ -216,6 +231,7 @@ class Known:
     aircraft: AircraftData = AircraftData()
     site: SiteData = SiteData()
     intervals: tuple[Interval, ...] = ()
+    weather: tuple[str, ...] = ()
     intervals_problem: SettingsError | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
     answers: Answers = field(default_factory=dict)

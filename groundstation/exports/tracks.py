@@ -73,7 +73,7 @@ class Track:
         return self.columns.get(name, np.full(len(self), np.nan))
 
     def pieces(self) -> tuple[slice, ...]:
-        """Rows of the track between its crossings of the date line; all rows where it crosses none."""
+        """Rows between crossings of the date line; all rows where it crosses none."""
         crossings = (np.flatnonzero(np.abs(np.diff(self.longitude_deg)) > 180.0) + 1).tolist()
         return tuple(slice(first, last) for first, last in pairwise((0, *crossings, len(self))))
 

@@ -194,8 +194,10 @@ class Judge:
         for seen in self._sources:
             if seen.name == "ground_speed_mps" and topic in ("", seen.topic):
                 values = seen.within(stretch)
-                if len(values) > 1:
-                    return seen.topic, float(values.min()), float(values.mean())
+                with np.errstate(over="ignore"):  # values that no motion has tell of none
+                    mean = float(values.mean()) if len(values) > 1 else np.inf
+                if np.isfinite(mean):
+                    return seen.topic, float(values.min()), mean
         return None
 
     def _why_position(

@@ -39,6 +39,7 @@ def open_flight(
     profile: AnyPath | None = None,
     icd: AnyPath | Sequence[AnyPath] = (),
     thresholds: Settings | None = None,
+    weather: Settings | None = None,
 ) -> "OpenFlight":
     """Open a flight: a recorded log, an MCAP that groundstation wrote, or a flight folder that ``run`` made.
 
@@ -47,6 +48,8 @@ def open_flight(
     path : str or Path
     config, aircraft, site, intervals, thresholds : str, Path or mapping, optional
         Settings as of the verb ``run``: a TOML file, or its content as a mapping. Not for a flight folder.
+    weather : str, Path or mapping, optional
+        METAR lines: a text file, or a mapping with a list of them under ``weather``.
     profile : str or Path, optional
         Layout of a log that no reader knows.
     icd : str, Path or several of them, optional
@@ -65,6 +68,7 @@ def open_flight(
     where, layout = Path(path), None if profile is None else Path(profile)
     icds = tuple(str(one) for one in ([icd] if isinstance(icd, str | PathLike) else icd))
     given = {"config": config, "aircraft": aircraft, "site": site, "intervals": intervals, "thresholds": thresholds}
+    given["weather"] = weather
     files = {name: _file_or_content(value) for name, value in given.items()}
     with told_in_a_line(where.name):
         if not where.exists():

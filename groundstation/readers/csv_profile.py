@@ -119,8 +119,10 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
 
 def _rows_of_another(fit: Fit) -> Dialect | None:
     """Form of the rows above the header, where they are those of another log with the same columns."""
-    is_begun = any(line.text.lstrip().startswith(fit.profile.first_lines) for line in fit.above)
-    if not fit.profile.first_lines or not is_begun or len(fit.rows_above) < FEWEST_ROWS:
+    if not fit.profile.first_lines or len(fit.rows_above) < FEWEST_ROWS:
+        return None
+    below = [line for line in fit.above if line.number > fit.rows_above[-1].number]
+    if not any(line.text.lstrip().startswith(fit.profile.first_lines) for line in below):
         return None
     return replace(fit.dialect_to(None), first_byte=0, first_line=1, end_byte=fit.rows_above[-1].next_byte)
 

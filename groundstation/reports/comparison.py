@@ -37,7 +37,7 @@ LINES = (  # figure, column, column of the half width and what it is multiplied 
 
 
 def comparison_html(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> str:
-    """Render the page of a comparison as a complete HTML document; a chapter or figure that fails is left out."""
+    """Render the page of a comparison as a complete HTML document, without parts that fail."""
     sections = (
         attempt("chapter", "answers", answers, comparison),
         attempt("chapter", "figures", _figures, comparison, a, b),

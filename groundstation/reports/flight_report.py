@@ -19,6 +19,7 @@ from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.reports.sections import flight_sections
 from groundstation.reports.steer_card import write_exports
 from groundstation.results.answer import Answer
+from groundstation.results.file_names import SUMMARY
 from groundstation.results.files import SavedFlight, load, put_failures, write_text
 
 PARTS = "chapter", "figure", "report"  # of a report, by their kinds as failures tell them
@@ -31,9 +32,10 @@ _NOT_IN_AN_ID = re.compile(r"[^A-Za-z0-9_-]+")
 
 @dataclass(frozen=True)
 class Written:
-    """The files of a report; ``problem`` says why there is no PDF where one was asked for.
+    """The files of a report, summary.json among them where its findings changed.
 
-    ``failures`` are the parts that failed by a defect, where they are gathered.
+    ``problem`` says why there is no PDF where one was asked for; ``failures`` are the parts that failed by a defect,
+    where they are gathered.
     """
 
     paths: tuple[Path, ...]
@@ -87,13 +89,15 @@ def flight_report_begun(
 
             def finished() -> Written:
                 document = painting.finished()
-                if put_failures(folder, failures(), PARTS):
+                is_changed = put_failures(folder, failures(), PARTS)
+                if is_changed:
                     again = load(folder, answer_types)
                     document = painting.told_again(lambda: sketched_document(again))
                 pages = write_pages(folder / REPORT, flight_report_html, document, document, with_pdf=with_pdf)
-                put_failures(folder, failures())
+                is_changed |= put_failures(folder, failures())
                 problems = "; ".join(filter(None, (pages.problem, problem)))
-                return Written((*pages.paths, *written), problems, failures())
+                summary = (folder / SUMMARY,) if is_changed else ()
+                return Written((*pages.paths, *written, *summary), problems, failures())
 
             yield finished
 
@@ -101,7 +105,7 @@ def flight_report_begun(
 def write_pages(
     page: Path, render: Callable[[Document], str], shown: Document, on_paper: Document, *, with_pdf: bool
 ) -> Written:
-    """Write a page and, beside it, a document as PDF; what is not made is not there from an earlier run either."""
+    """Write a page and, beside it, a document as PDF; none of an earlier run stays."""
     pdf, problem = page.with_suffix(".pdf"), ""
     html = attempt("report", page.name, render, shown)
     if html is None:

@@ -32,14 +32,14 @@ NUMBER_BYTES = 2
 
 
 class Painting:
-    """A document that is told, whose figures are being painted, or are those of somebody who gathers sketches."""
+    """Document that is told and whose figures are being painted (or gathered as sketches)."""
 
     def __init__(self, document: Document, finish: Callable[[], dict[str, Svg]] | None) -> None:
         self._document, self._finish = document, finish
         self._pictures: dict[str, Svg] = {}
 
     def finished(self) -> Document:
-        """The document with its figures, this process painting with the others; without those that fail."""
+        """Finish the document, painting with the others; figures that fail are left out."""
         if self._finish is None:
             return self._document
         self._pictures = self._finish()
@@ -72,7 +72,7 @@ def with_painted_figures(tell: Callable[[], Document], processes: int = 1) -> Do
 
 @contextmanager
 def document_begun(tell: Callable[[], Document], processes: int = 1) -> Iterator[Painting]:
-    """Tell a document, and let other processes paint its figures while this one does something else."""
+    """Tell a document; other processes paint its figures while this one does something else."""
     if is_sketching():
         yield Painting(tell(), None)
         return
@@ -118,7 +118,7 @@ def painting_begun(
     others = min(processes, len(keys) // 2) - 1 if CAN_FORK and len(keys) >= FEWEST else 0
 
     def with_rest(pictures: Mapping[str, Svg]) -> dict[str, Svg]:
-        """All pictures: those that are not there are painted here, and fail where it can be told."""
+        """Pictures of all: those that lack are painted here, and fail where it can be told."""
         found = (
             (key, pictures.get(key) or attempt("figure", names.get(key) or key, _paint, key, sketches[key]))
             for key in keys

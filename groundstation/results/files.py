@@ -106,7 +106,7 @@ def write_bytes(path: Path, content: bytes, *, is_synced: bool = True) -> None:
 
 
 def json_text(document: Any) -> str:
-    """Render JSON as it is written everywhere: two spaces, order kept, NaN refused, hidden characters as escapes."""
+    """Render JSON as it is written everywhere: NaN refused, hidden characters escaped."""
     return printable_json(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
 
 

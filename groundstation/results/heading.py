@@ -11,7 +11,7 @@ from groundstation.results.figures import FigureData
 
 GateState = Literal["passed", "failed", "not_measured"]
 Sense = Literal["at_most", "at_least", "between"]
-Verdict = Literal["accept", "reject", "extend", "undecided"]
+Verdict = Literal["accept", "advisory", "reject", "extend", "undecided"]
 Bound = tuple[float | None, float | None]  # lowest and highest value with which a gate passes
 STORED_STEP = 1e-6  # limits in summary.json are rounded to it
 
@@ -121,6 +121,28 @@ class HeadingStep:
 
 
 @dataclass(frozen=True)
+class TaxiWind:
+    """Wind on taxi: velocity of the air, sigma of either component, and whence: ``log`` or the METAR line."""
+
+    north_mps: float
+    east_mps: float
+    sigma_mps: float
+    origin: str
+
+
+@dataclass(frozen=True)
+class IntervalPart:
+    """One part of the interval of the error: ``taxi``, ``wind`` or ``installation``. The squares of the sigmas add up.
+
+    ``half_width_deg`` is what the 95 % interval would be with this part alone.
+    """
+
+    name: str
+    sigma_deg: float
+    half_width_deg: float
+
+
+@dataclass(frozen=True)
 class RunwayCheck:
     """Second reference: runway true bearing on line-up or take-off run against the INS heading there."""
 
@@ -161,11 +183,19 @@ class HeadingResult(Answer):
         The plain running mean of the paper over the same samples.
     standard_error_deg, confidence95_deg
         Honest ones: they allow for errors correlated over seconds, for what segments and minutes say against each
-        other, and for steady sideslip and mounting.
+        other, and for steady sideslip. The error is the airframe's, as a theodolite on it judges: the mounting of the
+        INS is a part of it and needs no sigma.
+    interval_parts : tuple of IntervalPart
+        What the interval is made of: this taxi, the wind, the installation.
+    platform_error_deg, platform_standard_error_deg, platform_confidence95_deg
+        Azimuth error of the INS itself, as navigation has it: the mounting is taken off, its sigma is in the interval.
+    wind, aircraft_class, sideslip_deg
+        The wind used, the class whose factor turned it to sideslip, and the mean sideslip (heading minus track) taken
+        off with them; None where no wind is known.
     confidence95_measured_deg : (low, high), optional
-        The interval without steady sideslip and mounting: what this taxi shows by itself.
+        The interval without steady sideslip: what this taxi shows by itself.
     steady_sigma_deg, steady_origin
-        Sigma of what steady sideslip and mounting leave in the error, and whence their prior sigmas come:
+        Sigma of what steady sideslip leaves in the error, and whence the prior sigmas come:
         ``"aircraft file"`` or ``"shipped figures"``.
     segment_spread_deg, wander_spread_deg, wander_s
         Error that each segment has of its own, and wander of INS heading minus path: sigmas and correlation time, as
@@ -236,6 +266,13 @@ class HeadingResult(Answer):
     confidence95_measured_deg: tuple[float, float] | None = None
     steady_sigma_deg: float | None = None
     steady_origin: str = field(default="", metadata={"one_of": ("", "aircraft file", "shipped figures")})
+    interval_parts: tuple[IntervalPart, ...] = ()
+    platform_error_deg: float | None = None
+    platform_standard_error_deg: float | None = None
+    platform_confidence95_deg: tuple[float, float] | None = None
+    wind: TaxiWind | None = None
+    aircraft_class: str = ""
+    sideslip_deg: float | None = None
     segment_spread_deg: float | None = None
     wander_spread_deg: float | None = None
     wander_s: float | None = None
@@ -246,5 +283,12 @@ class HeadingResult(Answer):
 
     @property
     def measured_sigma_deg(self) -> float:
-        """Standard error without steady sideslip and mounting."""
+        """Standard error without steady sideslip."""
         return math.sqrt(max(self.standard_error_deg**2 - (self.steady_sigma_deg or 0.0) ** 2, 0.0))
+
+    @property
+    def azimuth(self) -> tuple[float, float]:
+        """Error of the platform's azimuth and its standard error; the airframe's in an answer of an older version."""
+        if self.platform_error_deg is None or self.platform_standard_error_deg is None:
+            return self.error_deg, self.standard_error_deg
+        return self.platform_error_deg, self.platform_standard_error_deg

@@ -288,7 +288,7 @@ class Scenario:
     airport: Airport
     legs: tuple[Leg, ...]
     title: str = ""
-    expected_verdict: Literal["", "accept", "reject", "extend", "undecided"] = ""
+    expected_verdict: Literal["", "accept", "advisory", "reject", "extend", "undecided"] = ""
     aircraft: str = "SIM-1"
     flight: str = ""
     start_utc: str = ""

@@ -38,7 +38,7 @@ PLACES_BYTES = 64 << 20  # bound of the working arrays for one piece of a chunk
 
 
 def read_info(path: str | os.PathLike[str]) -> StoreInfo:
-    """Facts about a store file; blank where the file lost them. A log of its own that holds no name has the file's.
+    """Facts about a store file, blank where it lost them; without a name that of the file.
 
     Raises
     ------

@@ -121,7 +121,7 @@ def _page(tables: list[FigureData], families: tuple[tuple[Family, int], ...], ru
             "Study: heading correction before take-off",
             f"{runs} runs of each family of docs/heading-family.md ({seeds}), each through tables and estimator. "
             "Coverage is the share of runs whose 95 % interval holds the truth; its sampling error stands beside it. "
-            "Measured are coverage and half width without steady sideslip and mounting, which only family wide has. "
+            "Measured are coverage and half width without steady sideslip, which only family wide has. "
             "It has cells for what one flight cannot show: there only the whole interval can hold the truth.",
         )
     ]

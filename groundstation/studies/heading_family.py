@@ -53,7 +53,7 @@ class RunOutcome:
 
     @property
     def is_inside_measured(self) -> bool:
-        """Whether the interval without steady sideslip and mounting holds the truth."""
+        """Whether the interval without steady sideslip holds the truth."""
         return self.low_measured_deg <= 0.0 <= self.high_measured_deg
 
     @property
@@ -214,7 +214,7 @@ def _cells(outcomes: Sequence[RunOutcome]) -> Iterable[Cell]:
     known = np.array([case.is_arm_known for case in cases])
     yield from (("arm known", known), ("arm not known", ~known))
     verdicts = np.array([outcome.verdict for outcome in outcomes])
-    yield from ((f"verdict {verdict}", verdicts == verdict) for verdict in ("accept", "extend", "reject"))
+    yield from ((f"verdict {verdict}", verdicts == verdict) for verdict in ("accept", "advisory", "extend", "reject"))
 
 
 def coverage_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
@@ -280,7 +280,7 @@ def gates_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
     """Share of runs that pass each required gate, and each verdict's share."""
     names = list(outcomes[0].gates)
     shares = [float(np.mean([outcome.gates.get(gate) == "passed" for outcome in outcomes])) for gate in names]
-    for verdict in ("accept", "extend", "reject", "undecided"):
+    for verdict in ("accept", "advisory", "extend", "reject", "undecided"):
         names.append(f"verdict {verdict}")
         shares.append(float(np.mean([outcome.verdict == verdict for outcome in outcomes])))
     return FigureData(name, {"gate": np.array(names), "share": np.array(shares)}, {"share": 3})

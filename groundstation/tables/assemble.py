@@ -126,7 +126,7 @@ def _column(pieces: list[Column | None], lengths: list[int]) -> Column:
 
 
 def _with_places_on_earth(columns: dict[str, Column]) -> dict[str, Column]:
-    """The columns, latitude and longitude absent where one of them is beyond what there is on Earth."""
+    """Columns whose latitude and longitude are absent where one of them is not on Earth."""
     named = {name: columns[name] for name in MOST_ON_EARTH_DEG if name in columns}
     places = {name: column for name, column in named.items() if column.values.dtype.kind in "fiu"}
     beyond = [column.mask & (np.abs(column.values) > MOST_ON_EARTH_DEG[name]) for name, column in places.items()]

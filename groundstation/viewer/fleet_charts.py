@@ -21,6 +21,7 @@ from groundstation.viewer.views import lanes, numbers, plot
 UNNAMED = "aircraft not named"
 VERDICTS: Final[dict[str, Colour]] = {
     "accept": colours.GREEN,
+    "advisory": colours.YELLOW_GREEN,
     "reject": colours.VERMILION,
     "extend": colours.ORANGE,
     "undecided": colours.GREY,

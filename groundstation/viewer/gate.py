@@ -120,7 +120,7 @@ class _Visitor(socketserver.BaseRequestHandler):
                 back.join()
 
     def _head(self) -> tuple[bytes, bytes]:
-        """What tells whether the visitor may enter, to the end of the first head, and the bytes behind it."""
+        """First head of the connection, to its end, and the bytes behind it."""
         head = b""
         while len(head) < MOST_HEAD_BYTES and HEAD_END not in head:
             block = self.request.recv(BLOCK_BYTES)
@@ -132,14 +132,14 @@ class _Visitor(socketserver.BaseRequestHandler):
 
 
 class Request(NamedTuple):
-    """A request as it is passed on: its head, which closes the connection behind it, and the length of its body."""
+    """Request as it is passed on: a head that ends the connection, the length of its body."""
 
     head: bytes
     body_bytes: int
 
 
 def request_of(head: bytes) -> Request | None:
-    """The request that a connection of HTTP/1.1 begins with, if it may enter: one Host, a name of this machine.
+    """Request that begins a connection of HTTP/1.1, if its one Host is of this machine.
 
     None else, and where two readers of it might see two requests: ends of lines that are none, a body without a
     length, or with two.

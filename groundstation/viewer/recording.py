@@ -142,7 +142,7 @@ def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResul
 
 
 def tabs_of(recorder: Recorder, flight: Flight, results: FlightResults) -> Iterator[Tab]:
-    """The tabs of a flight but for the log, in their order: the name of each and what logs it."""
+    """Tabs of a flight but for the log, in their order: the name of each and what logs it."""
     yield "overview", partial(overview, recorder, results)
     yield "quality", partial(quality, recorder, flight, results)
     for tab, analyses in ANSWER_TABS:

@@ -78,7 +78,7 @@ def bases(kind: str) -> tuple[str, ...]:
         "site": lambda: (_documented("## `--site"),),
         "intervals": lambda: (INTERVALS,),
         "thresholds": lambda: _shipped("integrity/thresholds"),
-        "profile": lambda: _shipped("readers/profiles", "garmin*.toml"),
+        "profile": lambda: _shipped("readers/profiles", "garmin_g1000.toml"),
         "icd": lambda: _shipped("readers/icd/shipped", "*.yaml"),
         "stations": lambda: (STATIONS,),
         "scenario": lambda: _shipped("simulation/scenarios"),

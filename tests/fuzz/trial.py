@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.errors import GroundstationError
-from groundstation.base.records import Damage, LogHeader, RecordBatch, Remark
+from groundstation.base.records import Damage, LogHeader, NewLog, RecordBatch, Remark
 from tests.fuzz.bases import FORMATS, Base, bases
 from tests.fuzz.mutation import Edit, Mutant, random_edits
 
@@ -92,7 +92,7 @@ def check_items(items: Sequence[Any]) -> None:
     """What holds of every reader's items whatever the file was."""
     assert isinstance(items[0], LogHeader), "no header first"
     for item in items[1:]:
-        assert isinstance(item, RecordBatch | Damage | Remark), f"{type(item).__name__} among the items"
+        assert isinstance(item, RecordBatch | Damage | Remark | NewLog), f"{type(item).__name__} among the items"
         if isinstance(item, Damage):
             assert item.count >= 0 and "\n" not in item.place, f"damage {item}"
         elif isinstance(item, RecordBatch):

@@ -38,6 +38,7 @@ def _run(flight: "Flight", known: Known, settings: HeadingSettings) -> Found[Hea
         request=HeadingRequest(intervals=known.intervals),
         latencies=known.answer(Latencies),
         phases=known.phases,
+        weather=known.weather,
     )
     return Found(found, (_verdict(found), *_steps(found), *_findings_of_what_was_set(flight, found, known)))
 
@@ -70,6 +71,11 @@ def _findings_of_what_was_set(flight: "Flight", heading: HeadingResult, known: K
 
     lines = reference_findings(heading, flight.metadata, known.site)
     findings = [Finding("warn", "heading.reference", line) for line in lines]
+    if known.weather and heading.wind is None:
+        text = "no METAR line of the field within the time allowed of the taxi: the ordinary wind is taken"
+        if not flight.has_utc:
+            text = "the log has no UTC: no METAR line can be placed, the ordinary wind is taken"
+        findings.append(Finding("warn", "heading.weather", text))
     for part in intervals_without_epoch(flight.time_s(heading.gnss_topic), known.intervals):
         text = f"interval to {part.use}, {part.start_s:g} to {part.end_s:g} s: no GNSS epoch in it"
         findings.append(Finding("warn", "heading.interval", text))
@@ -89,7 +95,7 @@ def _sentence(answers: Answers) -> str:
     text = f"{heading.verdict}: heading error {heading.error_deg:+.3f} deg, 95 % {low:+.3f} to {high:+.3f}"
     if heading.confidence95_measured_deg is not None:
         low, high = heading.confidence95_measured_deg
-        text += f" ({low:+.3f} to {high:+.3f} without steady sideslip and mounting)"
+        text += f" ({low:+.3f} to {high:+.3f} without steady sideslip)"
     if heading.correction_deg is not None:
         return f"{text}, enter {heading.correction_deg:+g} deg"
     return f"{text} ({heading.verdict_reason})"

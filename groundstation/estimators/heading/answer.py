@@ -5,8 +5,9 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from groundstation.base.angles import wrap_180
+from groundstation.base.normal import NORMAL_95
 from groundstation.estimators.heading import figures as drawn
-from groundstation.estimators.heading.checks import disagreement, variance_ratio
+from groundstation.estimators.heading.checks import disagreement, held_seconds, variance_ratio
 from groundstation.estimators.heading.interval import ErrorPosterior
 from groundstation.estimators.heading.normality import normality
 from groundstation.estimators.heading.references import (
@@ -23,17 +24,17 @@ from groundstation.estimators.heading.steady import SteadyPrior
 from groundstation.estimators.heading.verdict import Figures, build_gates, decide, explain, round_to_step
 from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.results.figures import FigureData
-from groundstation.results.heading import HeadingResult, Standstill
+from groundstation.results.heading import HeadingResult, IntervalPart, Standstill
 from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight
 
 
 @dataclass(frozen=True)
 class _Error:
-    """The error with the sigma of what all samples share (declination, mounting) in it, wrapped.
+    """The error with the sigma of what all samples share (declination, sideslip in every direction), wrapped.
 
-    ``whole_deg`` and ``measured_deg`` are the intervals with and without steady sideslip and mounting;
-    ``common_sigma_deg`` is what declination and mounting add to the former.
+    ``whole_deg`` and ``measured_deg`` are the intervals with and without steady sideslip; ``platform_deg`` is the
+    former less the mounting, with its sigma. ``common_sigma_deg``: what declination and installation add to it.
     """
 
     error_deg: float
@@ -42,6 +43,9 @@ class _Error:
     measured_deg: tuple[float, float]
     steady_sigma_deg: float
     common_sigma_deg: float
+    platform_sigma_deg: float
+    platform_deg: tuple[float, float]
+    parts: tuple[IntervalPart, ...]
 
 
 def build_answer(
@@ -66,7 +70,7 @@ def build_answer(
         gnss_topic=topics[1],
         heading_source=solution.samples.heading_source,
         verdict=verdict,
-        verdict_reason=explain(verdict, deciding, error.error_deg, step_deg),
+        verdict_reason=explain(verdict, deciding, error.error_deg, step_deg, figures.whole_half_width_deg),
         error_deg=error.error_deg,
         standard_error_deg=error.sigma_deg,
         confidence95_deg=error.whole_deg,
@@ -89,6 +93,13 @@ def build_answer(
         confidence95_measured_deg=error.measured_deg,
         steady_sigma_deg=error.steady_sigma_deg,
         steady_origin="aircraft file" if steady.is_stated else "shipped figures",
+        interval_parts=error.parts,
+        platform_error_deg=float(wrap_180(error.error_deg - steady.mounting_deg)),
+        platform_standard_error_deg=error.platform_sigma_deg,
+        platform_confidence95_deg=error.platform_deg,
+        wind=steady.wind,
+        aircraft_class=steady.aircraft_class,
+        sideslip_deg=solution.sideslip_deg,
         segment_spread_deg=solution.posterior.parameter("segment_deg"),
         wander_spread_deg=solution.posterior.parameter("wander_deg"),
         wander_s=solution.posterior.parameter("wander_s"),
@@ -103,18 +114,30 @@ def build_answer(
 
 def _error_of(solution: Solution, steady: SteadyPrior) -> _Error:
     posterior, declination_deg = solution.posterior, solution.samples.heading_sigma_deg
-    common_deg = float(np.hypot(declination_deg, steady.mounting_sigma_deg))
+    common_deg = float(np.hypot(declination_deg, steady.same_sigma_deg))
     wrapped = float(wrap_180(posterior.error_deg))
     shift = wrapped - posterior.error_deg  # differences near +-180 deg were kept together
     low, high = posterior.interval_deg(extra_sigma_deg=common_deg)
     least, most = posterior.interval_deg(extra_sigma_deg=declination_deg, is_measured=True)
+    platform_sigma_deg = float(np.hypot(common_deg, steady.mounting_sigma_deg))
+    ends_deg = posterior.interval_deg(extra_sigma_deg=platform_sigma_deg)
+    off = float(wrap_180(wrapped - steady.mounting_deg)) - posterior.error_deg
+    measured_sigma_deg = float(np.sqrt(max(posterior.standard_error_deg**2 - posterior.apart_sigma_deg**2, 0.0)))
+    sigmas_deg = {
+        "taxi": (float(np.hypot(measured_sigma_deg, declination_deg)), 0.5 * (most - least)),
+        "wind": (posterior.apart_sigma_deg, NORMAL_95 * posterior.apart_sigma_deg),
+        "installation": (steady.same_sigma_deg, NORMAL_95 * steady.same_sigma_deg),
+    }
     return _Error(
         wrapped,
         float(np.hypot(posterior.standard_error_deg, common_deg)),
         (low + shift, high + shift),
         (least + shift, most + shift),
-        float(np.hypot(posterior.apart_sigma_deg, steady.mounting_sigma_deg)),
+        float(np.hypot(posterior.apart_sigma_deg, steady.same_sigma_deg)),
         common_deg,
+        float(np.hypot(posterior.standard_error_deg, platform_sigma_deg)),
+        (ends_deg[0] + off, ends_deg[1] + off),
+        tuple(IntervalPart(name, sigma, half_width) for name, (sigma, half_width) in sigmas_deg.items()),
     )
 
 
@@ -154,6 +177,7 @@ def _judged_figures(
         mode_changes=mode_changes(flight, ins_topic, begin_s, float(used.time_s[-1])),
         disagreement=disagreement(solution.parts, settings.disagreement_probability),
         steps=solution.steps,
+        held_s=held_seconds(solution.samples),
     )
 
 

@@ -16,6 +16,8 @@ from groundstation.results.heading import Standstill, TaxiSegment
 
 FloatArray = NDArray[np.float64]
 LEAST_SAMPLES = 20
+SWING_MPS = 0.25  # of an antenna 6 m above the roll axis: 0.6 deg of roll, rms, at 0.6 Hz
+TURNED_DEG, TURN_S, FOLLOWED, TURNING_MPS = 20.0, 5.0, 0.3, 3.0  # a turn that a receiver which holds does not show
 LEAST_IN_LINE = 4
 LEAST_SPREAD_DEG = 1e-6  # below it there is nothing to compare
 
@@ -75,6 +77,12 @@ def variance_ratio(used: Samples, standstill: Standstill | None, line_s: float) 
     -------
     VarianceRatio or None
         The interval takes both variances as independent, which they are not quite (both contain the sway): it is wide.
+
+    Notes
+    -----
+    An antenna high above the roll axis swings with the airframe: its velocity scatters within seconds and leaves no
+    error in a mean. So what the differences have in common with their neighbours, about their running line and beyond
+    the sway, is expected too, up to the swing of an antenna 6 m up. White noise has nothing in common.
     """
     if standstill is None or len(used) < LEAST_SAMPLES:
         return None
@@ -86,7 +94,10 @@ def variance_ratio(used: Samples, standstill: Standstill | None, line_s: float) 
     track2 = velocity2 * float(np.mean(1.0 / used.speed_mps**2)) * DEG_PER_RAD**2
     sway2 = float(np.mean(residual**2))
     difference = unwrap(used.difference_deg)
-    expected = track2 + sway2
+    about = about_running_line(used.time_s, used.heading_deg - used.track_deg, used.segment, line_s)
+    swing2 = max(float(np.nanmean(about[1:] * about[:-1])) - sway2, 0.0)
+    most2 = SWING_MPS**2 * float(np.mean(1.0 / used.speed_mps**2)) * DEG_PER_RAD**2
+    expected = track2 + sway2 + min(swing2, most2)
     if expected <= LEAST_SPREAD_DEG**2:
         return None
     ratio = float(np.var(difference)) / expected
@@ -119,3 +130,23 @@ def disagreement(parts: tuple[TaxiSegment, ...], probability: float) -> Disagree
     told = f"farthest off: {parts[worst].start_s:.0f} to {parts[worst].end_s:.0f} s, by {off[worst]:+.2f} deg"
     limit = float(chi_square_quantile(1.0 - probability, freedom)) / freedom
     return Disagreement(float(np.sum(weights * off**2)) / freedom, limit, told)
+
+
+def held_seconds(samples: Samples) -> float | None:
+    """Seconds in which the INS turns and the receiver's track does not; None where the taxi has no turn.
+
+    A receiver that holds its velocity goes on straight: what follows the turn is off by all of it.
+    """
+    moving = np.flatnonzero((samples.speed_mps > TURNING_MPS) & np.isfinite(samples.heading_deg))
+    if len(moving) < LEAST_SAMPLES or samples.interval_s <= 0.0:
+        return None
+    time_s = samples.time_s[moving]
+    heading_deg, track_deg = unwrap(samples.heading_deg[moving]), unwrap(samples.track_deg[moving])
+    before = np.searchsorted(time_s, time_s - TURN_S)
+    is_near = time_s - time_s[before] > 0.5 * TURN_S
+    is_near &= moving - moving[before] <= 1.5 * TURN_S / samples.interval_s
+    turned, followed = heading_deg - heading_deg[before], track_deg - track_deg[before]
+    turns = is_near & (np.abs(turned) > TURNED_DEG)
+    if not turns.any():
+        return None
+    return float(np.sum(turns & (followed * np.sign(turned) < FOLLOWED * np.abs(turned)))) * samples.interval_s

@@ -19,7 +19,7 @@ def _of_the_samples(_heading: HeadingResult) -> None:
 
 
 COLUMNS: tuple[AnswerColumn[HeadingResult], ...] = (
-    AnswerColumn("verdict", "category", "of the heading correction: accept, reject, extend, undecided"),
+    AnswerColumn("verdict", "category", "of the heading correction: accept, advisory, reject, extend, undecided"),
     AnswerColumn("verdict_reason", "text", "why, in words"),
     AnswerColumn("error_deg", "number", "heading error, INS - true, used for the correction"),
     AnswerColumn("standard_error_deg", "number", "of error_deg, with errors correlated over seconds"),
@@ -30,9 +30,10 @@ COLUMNS: tuple[AnswerColumn[HeadingResult], ...] = (
         lambda heading: heading.confidence95_deg[0],
     ),
     AnswerColumn("confidence95_high_deg", "number", "its upper end", lambda heading: heading.confidence95_deg[1]),
-    AnswerColumn(
-        "steady_sigma_deg", "number", "steady sideslip and mounting left in error_deg, sigma", is_indexed=False
-    ),
+    AnswerColumn("steady_sigma_deg", "number", "steady sideslip left in error_deg, sigma", is_indexed=False),
+    AnswerColumn("platform_error_deg", "number", "heading error less the mounting of the INS", is_indexed=False),
+    AnswerColumn("platform_standard_error_deg", "number", "its sigma, that of the mounting included", is_indexed=False),
+    AnswerColumn("sideslip_deg", "number", "mean sideslip taken off, by the wind known", is_indexed=False),
     AnswerColumn("correction_deg", "number", "the number to enter; missing unless accepted"),
     AnswerColumn("paper_error_deg", "number", "plain running mean of the paper", is_indexed=False),
     AnswerColumn("precision_deg", "number", "the paper's e"),

@@ -1,5 +1,6 @@
 """The heading estimator: from the tables of a flight to a verdict and a number to type."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -36,6 +37,7 @@ def estimate_heading_error(
     request: HeadingRequest | None = None,
     latencies: Latencies | None = None,
     phases: Phases | None = None,
+    weather: Iterable[str] = (),
 ) -> HeadingResult:
     """Estimate the INS heading error from straight taxi before take-off.
 
@@ -55,6 +57,8 @@ def estimate_heading_error(
         Where that of GNSS behind the INS is observed, GNSS times are put back by it; the aircraft file's comes first.
     phases : Phases, optional
         Phases of the flight: take-off run and landing roll are not taxi and not used.
+    weather : iterable of str
+        METAR lines: the wind of the one nearest in time is used where the log has none.
 
     Returns
     -------
@@ -64,14 +68,14 @@ def estimate_heading_error(
     Raises
     ------
     NotAssessableError
-        With the reason: no heading, no velocity, never fast enough, never straight.
+        With the reason: no heading, no velocity, never fast enough, never straight, too little before take-off.
 
     Notes
     -----
     On straight taxi the track equals the true heading, so the mean of d = INS heading - track is the error. The
     running mean, its precision e and the quality are the paper's; the estimate and its interval come from a noise model
-    (``interval.py``) in which errors are correlated over seconds. What neither sees: steady sideslip and mounting,
-    which an aircraft file may state.
+    (``interval.py``) in which errors are correlated over seconds. Steady sideslip is not seen from one direction: what
+    a known wind makes of it is taken off, the rest is in the interval. The mounting of the INS is part of the error.
 
     Source: Markelov, Kostishin, Shukalov, Heading correction of an INS before take-off by satellite navigation,
     Information and Control Systems 2015 No 6.
@@ -83,7 +87,6 @@ def estimate_heading_error(
     antenna = straight_taxi(
         *(flight, ins_topic, gnss_topic),
         settings=settings,
-        aircraft=aircraft,
         request=request,
         on_ground=on_ground,
         heading=heading,
@@ -92,7 +95,7 @@ def estimate_heading_error(
     )
     standstill = find_standstill(antenna, settings)
     span_s = tuple(float(time_s) for time_s in antenna.time_s[antenna.is_used][[0, -1]])
-    steady = steady_prior(flight, span_s, aircraft, settings)
+    steady = steady_prior(flight, span_s, aircraft, settings, site, weather)
     steps = _steps(flight, ins_topic, heading, (standstill.start_s(antenna), span_s[1]), settings)
     offset_s = max(settings.offset_prior_sigma_s, settings.offset_prior_intervals * antenna.interval_s)
     at_rate = replace(settings, offset_prior_sigma_s=offset_s)  # a slow receiver is later, and differs more

@@ -39,7 +39,6 @@ def examine_heading(flight: Flight, known: Known, settings: HeadingSettings) -> 
     samples = straight_taxi(
         *(flight, *topics),
         settings=settings,
-        aircraft=known.aircraft,
         request=request,
         on_ground=lambda time_ns: ground_mask(flight, time_ns),
         heading=lambda topic: true_heading(flight, topic),

@@ -38,6 +38,8 @@ PRIOR: dict[str, tuple[float, float]] = {
 PRIOR_MEAN = np.log([PRIOR[name][0] for name in noise.PARAMETER_NAMES])
 PRIOR_SIGMA = np.array([PRIOR[name][1] for name in noise.PARAMETER_NAMES])
 SPREAD = (noise.SEGMENT, noise.WANDER)  # what parts of a run have of their own
+LEAST_WEIGHT, LEAST_VARIANCE_DEG2 = 1e-5, 1e-18  # of a draw, times the mean; below it there is nothing to add
+DRAWS_OF_GROWTH = 200
 NO_SPREAD = np.log(1e-3 / ARCMIN_PER_DEG)
 
 
@@ -109,8 +111,8 @@ class ErrorPosterior:
         Sigma without what the regressors leave in the error that are told apart.
     coefficients, coefficient_sigma : ndarray, shape (k, c)
         Regression coefficients of each draw, the heading error first.
-    growth_sigma_deg : ndarray, shape (k, m)
-        Measured sigma after the samples counted in ``growth_samples``.
+    growth_sigma_deg : ndarray, shape (g, m)
+        Measured sigma of draws of equal weight after the samples counted in ``growth_samples``.
     parameters : ndarray, shape (k, 11)
         Draws, natural logarithms, in the order of ``noise.PARAMETER_NAMES``.
     effective_draws : float
@@ -180,21 +182,25 @@ class ErrorPosterior:
         """Half width of the interval after ``growth_samples``, shape (m,), noise and terms told apart as at the end."""
         extra_deg = np.hypot(self.apart_sigma_deg, extra_sigma_deg)
         upper = 0.5 * (1.0 + probability)
-        zeros = np.zeros(len(self.weight))
         columns = np.hypot(self.growth_sigma_deg, extra_deg).T
-        return np.array([mixture_quantile(upper, zeros, sigma, self.weight) for sigma in columns])
+        zeros, even = np.zeros(columns.shape[1]), np.full(columns.shape[1], 1.0 / columns.shape[1])
+        return np.array([mixture_quantile(upper, zeros, sigma, even) for sigma in columns])
 
     def even_draws(self, count: int = 40) -> FloatArray:
         """Draws of the parameters with equal weights, shape (count, 11): systematic resampling."""
-        places = (np.arange(count) + 0.5) / count
-        index = np.minimum(np.searchsorted(np.cumsum(self.weight), places), len(self.weight) - 1)
-        return np.asarray(self.parameters[index])
+        return even_draws(self.parameters, self.weight, count)
 
     def draws_of_ordinary_parts(self, count: int = 40) -> FloatArray:
         """The same, parts of a run taken to have no more of their own than usual: what they say beyond that shows."""
         draws = self.even_draws(count)
         draws[:, SPREAD] = PRIOR_MEAN[np.array(SPREAD)]
         return draws
+
+
+def even_draws(points: FloatArray, weight: FloatArray, count: int) -> FloatArray:
+    """Draws with equal weights, shape (count, p), from weighted ones: systematic resampling."""
+    places = (np.arange(count) + 0.5) / count
+    return np.asarray(points[np.minimum(np.searchsorted(np.cumsum(weight), places), len(weight) - 1)])
 
 
 def mixture_quantile(probability: float, mean: FloatArray, sigma: FloatArray, weight: FloatArray) -> float:
@@ -294,7 +300,7 @@ def error_posterior(
     differences: Differences,
     standstill: StandstillVelocities = NO_STANDSTILL,
     *,
-    draws: int = 400,
+    draws: int = 4000,
     seed: int = 2015,
     growth: int = 30,
 ) -> ErrorPosterior:
@@ -317,22 +323,30 @@ def error_posterior(
     target = _Target(standstill, without_apart(differences))
     scale = PRIOR_SIGMA[target.free]
     mode, has_converged = find_mode(target.log_density, _start(differences, standstill)[target.free], scale)
-    points, weight = sample(target.log_density, mode, scale, draws, np.random.default_rng(seed))
-    kept = weight > 1e-5 / len(weight)
+    found: list[tuple[FloatArray, FloatArray]] = []
+
+    def evaluate(thetas: FloatArray) -> FloatArray:
+        density, estimate, variance = target.evaluate(target.whole(thetas), target.last)
+        found.append((estimate, variance[:, -1]))
+        return density
+
+    points, weight = sample(target.log_density, mode, scale, draws, np.random.default_rng(seed), evaluate)
+    coefficients, variance = (np.vstack(arrays) for arrays in zip(*found, strict=True))
+    kept = weight > LEAST_WEIGHT / len(weight)
     points, weight = target.whole(points[kept]), weight[kept] / weight[kept].sum()
-    _log_density, coefficients, variance = target.evaluate(points, checkpoints)
+    coefficients, measured = coefficients[kept], np.sqrt(np.maximum(variance[kept], LEAST_VARIANCE_DEG2))
     coefficients[:, 0] += target.reference_deg
-    measured = np.sqrt(np.maximum(variance, 1e-18))
     apart_deg = _left_in_error(differences, np.asarray(weight @ points))
+    _density, _estimate, growing = target.evaluate(even_draws(points, weight, DRAWS_OF_GROWTH), checkpoints)
     return ErrorPosterior(
         mean_deg=coefficients[:, 0],
-        sigma_deg=np.hypot(measured[:, -1, 0], apart_deg),
-        measured_sigma_deg=measured[:, -1, 0],
+        sigma_deg=np.hypot(measured[:, 0], apart_deg),
+        measured_sigma_deg=measured[:, 0],
         weight=weight,
         coefficients=coefficients,
-        coefficient_sigma=measured[:, -1, :],
+        coefficient_sigma=measured,
         growth_samples=checkpoints,
-        growth_sigma_deg=measured[:, :, 0],
+        growth_sigma_deg=np.sqrt(np.maximum(growing[:, :, 0], LEAST_VARIANCE_DEG2)),
         parameters=points,
         effective_draws=float(1.0 / np.sum(weight**2)),
         has_converged=has_converged,

@@ -18,7 +18,11 @@ FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]
 
 T_DEGREES = 6.0  # of the multivariate t that draws: heavier tails than any posterior met
-MOST_ROUNDS, LEAST_EFFECTIVE_DRAWS = 6, 60.0
+ROUNDS, LEAST_IN_ROUND = 20, 50  # of draws: each proposal learns from all rounds before it
+MOST_TIMES, LEAST_EFFECTIVE_DRAWS = 3, 60.0  # so many times the draws asked for, until so many carry the weight
+FIRST_SHARE = 0.1  # of the first proposal's covariance in all that follow
+HEAVIEST_IN_FIT, HEAVIEST = 100.0, 0.5  # weight of one draw: times the mean; times the mean and the root of all draws
+TINIEST = 1e-12  # distance of a point of the sequence from 0 and 1
 
 
 def _gradient(log_density: LogDensity, theta: FloatArray, scale: FloatArray) -> tuple[float, FloatArray]:
@@ -104,9 +108,16 @@ class _Proposal:
     center: FloatArray
     factor: FloatArray
 
-    def draw(self, rng: np.random.Generator, count: int) -> FloatArray:
-        normal = rng.standard_normal((count, len(self.center)))
-        spread = np.sqrt(T_DEGREES / rng.chisquare(T_DEGREES, count))
+    def at(self, places: FloatArray) -> FloatArray:
+        """The draws, shape (k, p), that belong to places in the unit cube, shape (k, p + 1).
+
+        The first place gives the last parameter, which depends on no other: what is asked first is spread most evenly.
+        """
+        from scipy.special import gammaincinv, ndtri
+
+        places = np.clip(places, TINIEST, 1.0 - TINIEST)
+        normal = ndtri(places[:, -2::-1])
+        spread = np.sqrt(0.5 * T_DEGREES / gammaincinv(0.5 * T_DEGREES, places[:, -1]))
         return np.asarray(self.center + spread[:, None] * (normal @ self.factor.T))
 
     def log_density(self, points: FloatArray) -> FloatArray:
@@ -118,39 +129,70 @@ class _Proposal:
 
 
 def _root(covariance: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+    """Upper triangular factor: the last parameter depends on one normal number alone."""
+    return np.asarray(np.linalg.cholesky(covariance[::-1, ::-1])[::-1, ::-1], dtype=np.float64)
 
 
-def _normalised(log_weight: FloatArray) -> FloatArray:
+def _even_places(first: int, count: int, shift: FloatArray) -> FloatArray:
+    """Points ``first`` to ``first + count`` of an additive recurrence in the unit cube, shape (count, d).
+
+    Source: M. Roberts, The unreasonable effectiveness of quasirandom sequences, 2018 (the generalised golden ratio).
+    """
+    ratio = 1.5
+    for _ in range(60):
+        ratio = (1.0 + ratio) ** (1.0 / (len(shift) + 1.0))
+    steps = ratio ** -np.arange(1.0, len(shift) + 1.0)
+    return np.asarray((shift + np.arange(first + 1, first + count + 1)[:, None] * steps) % 1.0)
+
+
+def _weights(log_weight: FloatArray) -> FloatArray:
+    """Weights of sum 1, none so large that one draw makes the answer.
+
+    Source: E. Ionides, Truncated importance sampling, Journal of Computational and Graphical Statistics 17 (2008).
+    """
     weight = np.exp(log_weight - log_weight.max())
+    weight = np.minimum(weight / weight.sum(), HEAVIEST / np.sqrt(len(weight)))
     return np.asarray(weight / weight.sum())
 
 
+def _next_proposal(first: _Proposal, points: FloatArray, weight: FloatArray) -> _Proposal:
+    """A proposal fitted to weighted draws, with a share of the first one, which is never too narrow."""
+    fitted = np.minimum(weight, HEAVIEST_IN_FIT / len(weight))
+    fitted = fitted / fitted.sum()
+    center = fitted @ points
+    spread = (points - center) * np.sqrt(fitted)[:, None]
+    covariance = (1.0 - FIRST_SHARE) * spread.T @ spread + FIRST_SHARE * first.factor @ first.factor.T
+    return _Proposal(center, _root(covariance))
+
+
 def sample(
-    log_density: LogDensity, mode: FloatArray, scale: FloatArray, draws: int, rng: np.random.Generator
+    log_density: LogDensity,
+    mode: FloatArray,
+    scale: FloatArray,
+    draws: int,
+    rng: np.random.Generator,
+    evaluate: LogDensity | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Draws of the posterior, shape (k, p), and their weights, shape (k,).
 
-    Rounds of draws; each proposal is fitted to the weighted draws so far. At least two rounds, more while few draws
-    carry the weight.
+    Rounds of draws; each proposal is fitted to the weighted draws so far. More rounds than asked for while few draws
+    carry the weight. ``evaluate``, where given, takes the place of ``log_density`` for the draws, each once and in
+    order: it may keep what else it finds.
     """
+    evaluate = evaluate or log_density
     proposals = [_Proposal(mode, _root(_covariance(_curvature(log_density, mode), scale) * 1.3))]
-    size = draws // 2
-    points, log_target = np.zeros((0, len(mode))), np.zeros(0)
+    size = max(draws // ROUNDS, LEAST_IN_ROUND)
+    rounds, shift = max(-(-draws // size), 2), rng.random(len(mode) + 1)
+    points, log_target, mixture = np.zeros((0, len(mode))), np.zeros(0), np.zeros(0)
     weight = np.zeros(0)
-    for number in range(MOST_ROUNDS):
-        fresh = proposals[-1].draw(rng, size)
-        points = np.vstack([points, fresh])
-        log_target = np.concatenate([log_target, log_density(fresh)])
-        mixture = np.logaddexp.reduce([proposal.log_density(points) for proposal in proposals], axis=0)
-        weight = _normalised(log_target - mixture)
-        effective = 1.0 / float(np.sum(weight**2))
-        if number > 0 and effective > LEAST_EFFECTIVE_DRAWS:
+    for number in range(MOST_TIMES * rounds):
+        fresh = proposals[-1].at(_even_places(len(points), size, shift))
+        mixture = np.logaddexp(mixture, proposals[-1].log_density(points)) if number else mixture
+        of_fresh = np.logaddexp.reduce([proposal.log_density(fresh) for proposal in proposals], axis=0)
+        points, mixture = np.vstack([points, fresh]), np.concatenate([mixture, of_fresh])
+        log_target = np.concatenate([log_target, evaluate(fresh)])
+        weight = _weights(log_target - mixture)
+        if number >= rounds - 1 and 1.0 / float(np.sum(weight**2)) > LEAST_EFFECTIVE_DRAWS:
             break
-        tempered = np.minimum(weight, 10.0 / len(weight))  # so that one draw does not make the fit
-        tempered = tempered / tempered.sum()
-        center = tempered @ points
-        spread = (points - center) * np.sqrt(tempered)[:, None]
-        covariance = 0.8 * spread.T @ spread + 0.2 * proposals[0].factor @ proposals[0].factor.T
-        proposals.append(_Proposal(center, _root(covariance)))
+        proposals.append(_next_proposal(proposals[0], points, weight))
     return points, weight

@@ -64,10 +64,11 @@ class HeadingSettings:
 
     # Acceptance
     taxi_min_s: float = number(20.0, 0.0)  # paper
+    taxi_least_s: float = number(5.0, 0.0)  # less before take-off is not assessable: no verdict at all
     precision_max_deg: float = number(0.05, 0.0)  # paper: e
     quality_max_deg: float = number(0.3, 0.0)  # paper
     half_width_max_deg: float = number(0.2, 0.0)  # of what this taxi shows: 20 arcmin is then more than three sigma
-    whole_half_width_max_deg: float = number(1.0 / 3.0, 0.0)  # steady sideslip and mounting in it: 20 arcmin
+    whole_half_width_max_deg: float = number(1.0 / 3.0, 0.0)  # steady sideslip in it: 20 arcmin
     whole_decides: bool = True  # whether the latter is required: nothing is accepted that steady terms may spoil
     skewness_max: float = number(0.5, 0.0)
     excess_kurtosis_range: tuple[float, float] = (-1.2, 2.0)
@@ -92,11 +93,15 @@ class HeadingSettings:
     offset_observable_sigma_s: float = number(0.05, 0.0)
 
     # Steady sideslip and mounting, where the aircraft file does not state them
-    sideslip_sigma_deg: float = number(0.25, 0.0)  # of a crosswind; at 10 m/s where the wind is logged
-    mounting_sigma_deg: float = number(0.1, 0.0)
+    sideslip_sigma_deg: float | None = number(None, 0.0)  # of a crosswind; None: by class of aircraft and wind
+    ordinary_wind_mps: float = number(3.6, 0.0)  # rms of either component, where no wind is known
+    wind_sigma_mps: float = number(1.5, 0.0)  # of either component, where it is known
+    weather_max_min: float = number(60.0, 0.0)  # a METAR line is no nearer to the taxi than that: not used
+    steady_sideslip_sigma_deg: float = number(0.05, 0.0)  # the same in every direction
+    mounting_sigma_deg: float = number(0.1, 0.0)  # of the platform's number alone
 
     # Honest interval
-    posterior_draws: int = number(400, LEAST_DRAWS)
+    posterior_draws: int = number(4000, LEAST_DRAWS)  # the half width then agrees within 5 % whatever the seed
     posterior_seed: int = number(2015, 0)
     growth_steps: int = number(120, 2)
 

@@ -45,12 +45,12 @@ class Solution:
     samples, used : Samples
         All and the used ones, the applied arm taken out.
     differences : Differences
-        Of the used samples, without a jump at +-180 deg.
+        Of the used samples, without a jump at +-180 deg, the mean sideslip of a known wind taken off.
     posterior : ErrorPosterior
     growth_samples : ndarray of int64
         Numbers of used samples at which the posterior's growth was taken.
     running : Running
-        The paper's recursion over the same differences.
+        The paper's recursion over the differences as measured.
     knowledge : ArmKnowledge
     uncorrected_deg : float
         Plain mean of the differences with the velocity of the antenna.
@@ -63,6 +63,8 @@ class Solution:
     parts : tuple of TaxiSegment
         The segments, long ones cut: what their errors say against each other is judged.
     steps : tuple of HeadingStep
+    sideslip_deg : float or None
+        Mean sideslip taken off, by the weights of the samples; None where no wind is known.
     """
 
     samples: Samples
@@ -81,6 +83,7 @@ class Solution:
     directions: tuple[TaxiSegment, ...]
     parts: tuple[TaxiSegment, ...]
     steps: tuple[HeadingStep, ...]
+    sideslip_deg: float | None
 
     @property
     def difference_deg(self) -> FloatArray:
@@ -106,6 +109,7 @@ def _differences(
 ) -> Differences:
     difference = _centred(used.difference_deg)
     direction = wrap_360(used.heading_deg - np.median(difference))
+    difference = difference - steady.sideslip_deg(direction)
     return Differences(
         time_s=used.time_s,
         difference_deg=difference,
@@ -155,7 +159,8 @@ def solve(
         differences=differences,
         posterior=posterior,
         growth_samples=posterior.growth_samples * thinning,
-        running=run_recursion(differences.difference_deg),
+        running=run_recursion(_centred(used.difference_deg)),
+        sideslip_deg=None if steady.wind is None else float(weight @ steady.sideslip_deg(differences.direction_deg)),
         knowledge=knowledge,
         uncorrected_deg=float(wrap_180(np.mean(uncorrected))),
         weight=full_weight,

@@ -1,61 +1,136 @@
 """Steady sideslip and mounting: what one direction of taxi cannot show, and what is known of it beforehand.
 
-Sideslip that a crosswind makes turns with the aircraft: as cos and sin of the track it takes the other sign on the way
-back, so directions driven both ways show it. Mounting, and sideslip that is the same in every direction, never show.
+Sideslip of an aircraft on its wheels comes from the side force of the wind across its path. Wind from the left pushes
+the aircraft to the right; the tyres hold against it with the nose to the left of the path, into the wind:
+
+    heading - track = -factor x (wind across the path, from the left)
+
+Worked example: an L-39 (0.027 deg per m/s) with 10 m/s from the left has -0.27 deg. On the way back the sideslip
+takes the other sign. Mounting, and sideslip that is the same in every direction, never show.
 """
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.metar import metar_winds, nearest_wind
 from groundstation.base.signals import topics_of_kind
+from groundstation.base.units import NS_PER_S
 from groundstation.estimators.heading.interval import Regressor
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.known import AircraftData
+from groundstation.estimators.known import AircraftClass, AircraftData, SiteData
+from groundstation.results.heading import TaxiWind
 from groundstation.tables.table import Flight
 
 FloatArray = NDArray[np.float64]
-WIND_MPS = 10.0  # crosswind at which the sideslip has the stated sigma
+STATED_AT_MPS = 10.0  # crosswind at which the sideslip has a stated sigma
 WIND_FIELDS = ("wind_north_mps", "wind_east_mps")
+# Sideslip by crosswind, deg per m/s: mean and sigma, half of the mean. Side area, weight and tyres of an L-39, Citation
+# II, A320 and C172; a car and a small unmanned aircraft on wheels by the same sum. Not stated: wide enough for most.
+FACTORS: Mapping[AircraftClass, tuple[float, float]] = {
+    "light": (0.051, 0.0255),
+    "jet trainer": (0.027, 0.0135),
+    "business jet": (0.038, 0.019),
+    "airliner": (0.031, 0.0155),
+    "car": (0.011, 0.0055),
+    "uav": (0.15, 0.075),
+    "": (0.035, 0.05),
+}
 
 
 @dataclass(frozen=True)
 class SteadyPrior:
-    """Sigmas of steady sideslip and of mounting, degrees; ``wind_mps`` north and east where the log has it.
+    """What is known beforehand of the steady terms, degrees.
 
-    ``is_stated``: the aircraft file says how large one of them or both are.
+    Parameters
+    ----------
+    factor, factor_sigma : float
+        Sideslip by crosswind, deg per m/s.
+    along_sigma_deg : float
+        Sigma of the sideslip that the unknown part of the wind makes, along either axis.
+    same_sigma_deg : float
+        Of sideslip that is the same in every direction.
+    mounting_deg, mounting_sigma_deg : float
+        Heading of the INS case minus that of the airframe.
+    is_stated : bool
+        The aircraft file says how large one of the sigmas is.
+    wind : TaxiWind, optional
+        Wind of log or METAR line.
     """
 
-    sideslip_sigma_deg: float
+    factor: float
+    factor_sigma: float
+    along_sigma_deg: float
+    same_sigma_deg: float
+    mounting_deg: float
     mounting_sigma_deg: float
     is_stated: bool
-    wind_mps: tuple[float, float] | None = None
+    aircraft_class: str = ""
+    wind: TaxiWind | None = None
+
+    def from_left_mps(self, direction_deg: FloatArray) -> FloatArray:
+        """Known wind across a path in these directions, from the left positive, m/s, shape (n,)."""
+        if self.wind is None:
+            return np.zeros(len(direction_deg))
+        north, east = np.cos(np.deg2rad(direction_deg)), np.sin(np.deg2rad(direction_deg))
+        return np.asarray(self.wind.east_mps * north - self.wind.north_mps * east)
+
+    def sideslip_deg(self, direction_deg: FloatArray) -> FloatArray:
+        """Heading minus track as the known wind makes it by the mean factor, shape (n,)."""
+        return -self.factor * self.from_left_mps(direction_deg)
 
     def regressors(self, direction_deg: FloatArray) -> tuple[Regressor, ...]:
-        """What the sideslip of a crosswind does to differences taken in these directions of motion, shape (n,)."""
+        """What remains of the sideslip of a crosswind in these directions of motion, shape (n,)."""
         north, east = np.cos(np.deg2rad(direction_deg)), np.sin(np.deg2rad(direction_deg))
-        if self.wind_mps is None:
-            return tuple(Regressor(part, 0.0, self.sideslip_sigma_deg, is_apart=True) for part in (north, east))
-        across = (self.wind_mps[1] * north - self.wind_mps[0] * east) / WIND_MPS
-        return (Regressor(across, 0.0, self.sideslip_sigma_deg, is_apart=True),)
+        unknown = tuple(Regressor(part, 0.0, self.along_sigma_deg, is_apart=True) for part in (north, east))
+        if self.wind is None:
+            return unknown
+        return (Regressor(self.from_left_mps(direction_deg), 0.0, self.factor_sigma, is_apart=True), *unknown)
 
 
 def steady_prior(
-    flight: Flight, span_s: tuple[float, ...], aircraft: AircraftData, settings: HeadingSettings
+    flight: Flight,
+    span_s: tuple[float, ...],
+    aircraft: AircraftData,
+    settings: HeadingSettings,
+    site: SiteData | None = None,
+    weather: Iterable[str] = (),
 ) -> SteadyPrior:
-    """What is known beforehand: the aircraft file's sigmas, else those of the settings; the wind logged over a span."""
-    sideslip, mounting = aircraft.sideslip_sigma_deg, aircraft.mounting_sigma_deg
+    """What is known beforehand: stated sigmas, else those of the class; the wind of the log, else of a METAR line."""
+    kind = aircraft_class_of(flight, aircraft)
+    factor, factor_sigma = FACTORS[kind]
+    stated = settings.sideslip_sigma_deg if aircraft.sideslip_sigma_deg is None else aircraft.sideslip_sigma_deg
+    wind = _logged_wind(flight, span_s, settings) or _reported_wind(flight, span_s, settings, site, tuple(weather))
+    if stated is not None:
+        factor_sigma = stated / STATED_AT_MPS
+    usual = float(np.hypot(factor, factor_sigma))
+    along = usual * (settings.ordinary_wind_mps if wind is None else wind.sigma_mps)
+    same, mounting = aircraft.steady_sideslip_sigma_deg, aircraft.mounting_sigma_deg
     return SteadyPrior(
-        settings.sideslip_sigma_deg if sideslip is None else sideslip,
-        settings.mounting_sigma_deg if mounting is None else mounting,
-        sideslip is not None or mounting is not None,
-        _wind(flight, span_s),
+        factor=factor,
+        factor_sigma=factor_sigma,
+        along_sigma_deg=stated if stated is not None and wind is None else along,
+        same_sigma_deg=settings.steady_sideslip_sigma_deg if same is None else same,
+        mounting_deg=aircraft.mounting_deg,
+        mounting_sigma_deg=settings.mounting_sigma_deg if mounting is None else mounting,
+        is_stated=any(one is not None for one in (aircraft.sideslip_sigma_deg, same, mounting)),
+        aircraft_class=kind,
+        wind=wind,
     )
 
 
-def _wind(flight: Flight, span_s: tuple[float, ...]) -> tuple[float, float] | None:
-    """Median wind over a span of flight time, m/s north and east; None where the log has none."""
+def aircraft_class_of(flight: Flight, aircraft: AircraftData) -> AircraftClass:
+    """The class stated; that of a car where the log or the aircraft file says that it only rolls."""
+    if aircraft.aircraft_class:
+        return aircraft.aircraft_class
+    rolls = flight.metadata.get("vehicle") == "rolls" or flight.metadata.get("always_on_ground") == "true"
+    return "car" if rolls or aircraft.always_on_ground else ""
+
+
+def _logged_wind(flight: Flight, span_s: tuple[float, ...], settings: HeadingSettings) -> TaxiWind | None:
+    """Median wind over a span of flight time; None where the log has none."""
     for topic in topics_of_kind("air", flight.topics()):
         table, time_s = flight[topic], flight.time_s(topic)
         if not table.has(*WIND_FIELDS):
@@ -64,5 +139,24 @@ def _wind(flight: Flight, span_s: tuple[float, ...]) -> tuple[float, float] | No
         north, east = (table.values(name)[inside] for name in WIND_FIELDS)
         known = np.isfinite(north) & np.isfinite(east)
         if known.any():
-            return float(np.median(north[known])), float(np.median(east[known]))
+            middle = float(np.median(north[known])), float(np.median(east[known]))
+            return TaxiWind(*middle, settings.wind_sigma_mps, "log")
     return None
+
+
+def _reported_wind(
+    flight: Flight,
+    span_s: tuple[float, ...],
+    settings: HeadingSettings,
+    site: SiteData | None,
+    weather: tuple[str, ...],
+) -> TaxiWind | None:
+    """Wind of the METAR line nearest to the middle of a span; None where there is none, or the log has no UTC."""
+    if not weather or not flight.has_utc:
+        return None
+    at_ns = flight.start_ns + round(0.5 * (span_s[0] + span_s[1]) * NS_PER_S)
+    longest_ns = round(settings.weather_max_min * 60.0) * NS_PER_S
+    wind, _away_ns = nearest_wind(metar_winds(weather), at_ns, longest_ns, site.station if site else "")
+    if wind is None:
+        return None
+    return TaxiWind(wind.north_mps, wind.east_mps, max(wind.sigma_mps, settings.wind_sigma_mps), f"METAR {wind.name}")

@@ -1,15 +1,11 @@
 """The epochs of straight taxi that the heading is estimated from."""
 
-from dataclasses import replace
-
 import numpy as np
 
-from groundstation.base.angles import wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.heading.gating import gate_samples
 from groundstation.estimators.heading.samples import HeadingOf, OnGround, Samples, pair_samples
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.estimators.known import AircraftData
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight
 
@@ -20,7 +16,6 @@ def straight_taxi(
     gnss_topic: str,
     *,
     settings: HeadingSettings,
-    aircraft: AircraftData,
     request: HeadingRequest,
     on_ground: OnGround | None = None,
     heading: HeadingOf | None = None,
@@ -44,8 +39,6 @@ def straight_taxi(
             with_later_runs=with_later_runs,
             gnss_latency_s=gnss_latency_s,
         )
-        if aircraft.mounting_deg:
-            paired = replace(paired, heading_deg=wrap_360(paired.heading_deg - aircraft.mounting_deg))
         return gate_samples(paired, settings, request, phases)
 
     antenna = gated(with_later_runs=settings.runs == "all_ground")
@@ -55,7 +48,20 @@ def straight_taxi(
         antenna = whole if whole.is_used.sum() > antenna.is_used.sum() else antenna
     if antenna.is_used.sum() < 2:
         raise NotAssessableError("heading", _why_nothing_is_used(antenna, settings))
+    _refuse_too_little(antenna, settings)
     return antenna
+
+
+def _refuse_too_little(samples: Samples, settings: HeadingSettings) -> None:
+    """Refuse an estimate where what was taxied straight before take-off is next to nothing, or nothing."""
+    is_wanted = samples.is_used if settings.runs == "all_ground" else samples.is_used & ~samples.is_after_lift_off
+    seconds, later = (float(np.sum(mask)) * samples.interval_s for mask in (is_wanted, samples.is_used & ~is_wanted))
+    if seconds >= settings.taxi_least_s - 0.5 * samples.interval_s:
+        return
+    found = f"{seconds:.1f} s of straight taxi" if seconds else "no straight taxi"
+    where = "" if settings.runs == "all_ground" else " before take-off"
+    text = f"{found}{where}, {settings.taxi_least_s:g} s needed for an estimate"
+    raise NotAssessableError("heading", f"{text} ({later:.0f} s after the flight do not count)" if later else text)
 
 
 def _why_nothing_is_used(samples: Samples, settings: HeadingSettings) -> str:

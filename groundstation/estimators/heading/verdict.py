@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.normal import NORMAL_95
+from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.checks import Disagreement, VarianceRatio
 from groundstation.estimators.heading.gating import NOT_TAXI, is_straight_and_fast
 from groundstation.estimators.heading.normality import Normality, normality_limits
@@ -17,6 +18,10 @@ from groundstation.results.rules import Rejudged
 
 # Required gates whose failure more data may cure; the failure of any other required gate rejects.
 CURED_BY_MORE_DATA = frozenset({"standstill_duration", "taxi_seconds", "precision", "half_width", "whole_half_width"})
+STEADY_GATE = "whole_half_width"  # alone: no length of the same taxi cures it
+PAPER_RATE_HZ, LEAST_RATE_HZ = 10.0, 0.2
+HELD_MAX_S = 1.0  # a receiver is late by less
+CURES = "taxi the other way, state the wind, or let the tool learn the installation"
 STANDSTILL_GATE = "standstill_speed_of_mean"
 Bounds = Mapping[str, Bound]
 
@@ -38,10 +43,15 @@ class Figures:
     mode_changes: int | None
     disagreement: Disagreement | None
     steps: tuple[HeadingStep, ...]
+    held_s: float | None = None
 
 
-def gate_bounds(settings: HeadingSettings, samples: int) -> dict[str, Bound]:
-    """Lowest and highest value with which each gate passes, of those whose limits are settings."""
+def gate_bounds(settings: HeadingSettings, samples: int, rate_hz: float = PAPER_RATE_HZ) -> dict[str, Bound]:
+    """Lowest and highest value with which each gate passes, of those whose limits are settings.
+
+    The limit of e is for the paper's 10 Hz: fewer epochs of the same taxi give a larger e and no larger error.
+    """
+    slower = float(np.sqrt(max(PAPER_RATE_HZ / max(rate_hz, LEAST_RATE_HZ), 1.0)))
     skewness, kurtosis, distance = normality_limits(settings, max(samples, 1))
     return {
         "geometry": (settings.geometry_share_min, None),
@@ -51,7 +61,7 @@ def gate_bounds(settings: HeadingSettings, samples: int) -> dict[str, Bound]:
         "standstill_bound97": (None, settings.speed_of_mean_max_mps),
         "taxi_seconds": (settings.taxi_min_s, None),
         "outliers": (None, settings.outlier_share_max),
-        "precision": (None, settings.precision_max_deg),
+        "precision": (None, settings.precision_max_deg * slower),
         "quality": (None, settings.quality_max_deg),
         "half_width": (None, settings.half_width_max_deg),
         "whole_half_width": (None, settings.whole_half_width_max_deg),
@@ -65,7 +75,8 @@ def gate_bounds(settings: HeadingSettings, samples: int) -> dict[str, Bound]:
 
 def rejudge(answer: HeadingResult, settings: HeadingSettings) -> tuple[Rejudged, ...]:
     """The gates and the verdict of an answer under other limits, from the values that it was judged by."""
-    bounds = gate_bounds(settings, answer.samples)
+    rate_hz = next((gate.value for gate in answer.gates if gate.name == "gnss_rate"), None) or PAPER_RATE_HZ
+    bounds = gate_bounds(settings, answer.samples, rate_hz)
     after = tuple(gate.under(bounds[gate.name]) if gate.name in bounds else gate for gate in answer.gates)
     after = tuple(
         replace(gate, required=settings.whole_decides) if gate.name == "whole_half_width" else gate for gate in after
@@ -78,7 +89,8 @@ def build_gates(
     samples: Samples, standstill: Standstill | None, figures: Figures, settings: HeadingSettings
 ) -> tuple[Gate, ...]:
     """Every gate of the method in the order of the paper: throughout, standstill, taxi, acceptance."""
-    bounds = gate_bounds(settings, int(samples.is_used.sum()))
+    rate_hz = 1.0 / samples.interval_s if samples.interval_s > 0.0 else PAPER_RATE_HZ
+    bounds = gate_bounds(settings, int(samples.is_used.sum()), rate_hz)
     return (
         *_throughout_gates(samples, figures, settings, bounds),
         *_standstill_gates(standstill, bounds),
@@ -111,7 +123,8 @@ def _throughout_gates(
             "integrity",
             "share of straight taxi with integrity good",
             float(np.mean(integrity > 0.5)) if len(integrity) else None,
-            reason="" if len(integrity) else "integrity flag not in the log",
+            reason="" if len(integrity) else "no integrity flag, fix type or RAIM in the log",
+            required=bool(len(integrity)),
         ),
         judged_gate(
             (1.0, None),
@@ -195,6 +208,15 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings, b
             reason=f"{outliers} of {outliers + used}",
         ),
         judged_gate(
+            (None, HELD_MAX_S),
+            "held_velocity",
+            "turns of the INS that the GNSS velocity does not show",
+            figures.held_s,
+            unit="s",
+            reason="no turn in motion" if figures.held_s is None else "",
+            required=figures.held_s is not None,
+        ),
+        judged_gate(
             (9.0, None),
             "gnss_rate",
             "GNSS rate (10 Hz in Markelov 2015)",
@@ -220,11 +242,10 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings, b
         judged_gate(
             bounds["whole_half_width"],
             "whole_half_width",
-            "half width of the 95 % interval with steady sideslip and mounting",
+            "half width of the 95 % interval: this taxi, wind and installation together",
             figures.whole_half_width_deg,
             unit="deg",
-            reason=f"{NORMAL_95 * figures.steady_sigma_deg:.2f} deg of it steady: taxi the other way too, log the "
-            "wind, or state the sigmas in the aircraft file",
+            reason=f"{NORMAL_95 * figures.steady_sigma_deg:.2f} deg of it wind and installation",
             required=settings.whole_decides,
         ),
     )
@@ -312,16 +333,19 @@ def decide(
 ) -> tuple[Verdict, tuple[Gate, ...]]:
     """The verdict and every gate that stands against a correction.
 
-    reject: a required gate failed that more data cannot cure; extend: only such failed as more data may cure;
-    undecided: nothing failed, but a required gate could not be measured; accept: every required gate passed.
+    reject: a required gate failed that more data cannot cure; extend: only such failed as more of the same may cure;
+    undecided: nothing failed but for steady terms, but a required gate could not be measured; advisory: only the steady
+    terms leave the interval too wide, which no length of the same taxi cures; accept: every required gate passed.
     """
     failed = tuple(gate for gate in gates if gate.required and gate.state == "failed")
     if any(not _is_curable(gate, standstill, settings) for gate in failed):
         return "reject", failed
-    if failed:
+    if failed and {gate.name for gate in failed} != {STEADY_GATE}:
         return "extend", failed
     missing = tuple(gate for gate in gates if gate.required and gate.state == "not_measured")
-    return ("undecided", missing) if missing else ("accept", ())
+    if missing:
+        return "undecided", (*failed, *missing)
+    return ("advisory", failed) if failed else ("accept", ())
 
 
 def round_to_step(value: float, step: float) -> float:
@@ -338,8 +362,15 @@ def round_to_step(value: float, step: float) -> float:
     return float(round(steps * step, 9)) + 0.0
 
 
-def explain(verdict: Verdict, gates: tuple[Gate, ...], error_deg: float, step_deg: float) -> str:
+def explain(
+    verdict: Verdict, gates: tuple[Gate, ...], error_deg: float, step_deg: float, half_width_deg: float = float("nan")
+) -> str:
     """One line for people: every gate the verdict rests on, the plainest first; a number not to be entered says so."""
     if verdict == "accept":
         return f"every required gate passed: enter {round_to_step(-error_deg, step_deg):+g} deg"
+    if verdict == "advisory":
+        return (
+            f"good to +-{half_width_deg * ARCMIN_PER_DEG:.0f} arcmin; {CURES}. "
+            f"To be entered only where that is enough: {round_to_step(-error_deg, step_deg):+g} deg"
+        )
     return f"{told(gates)}. Not to be entered: {round_to_step(-error_deg, step_deg):+g} deg"

@@ -13,10 +13,11 @@ FAILED = {
     "ground": "ground contact proven for {value} of the samples, {limit} needed",
     "ins_mode": "{value} changes of the INS mode during the taxi",
     "outliers": "{value} of the samples are outliers, at most {limit}",
+    "held_velocity": "GNSS velocity held for {value} while the INS turned, at most {limit}",
     "steps": "{value} steps of the INS heading during the taxi ({reason})",
     "segments": "parts of the taxi disagree: chi-square {value} per part, at most {limit} ({reason})",
     "half_width": "heading error known to +- {value} only, +- {limit} needed",
-    "whole_half_width": "heading error with steady sideslip and mounting known to +- {value} only, "
+    "whole_half_width": "heading error with wind and installation known to +- {value} only, "
     "+- {limit} needed ({reason})",
     "precision": "precision e {value}, at most {limit}",
     "quality": "running mean not settled: spread {value}, at most {limit}",

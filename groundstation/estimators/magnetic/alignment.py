@@ -59,9 +59,9 @@ def align(
         origin += f"; no faster run: {runs.why_not or why_not}"
     return Alignment(
         origin,
-        used.error_deg + drift * hours,
+        used.azimuth[0] + drift * hours,
         math.hypot(sigma, drift_sigma * hours),
-        used.error_deg,
+        used.azimuth[0],
         sigma,
         drift,
         drift_sigma,
@@ -91,7 +91,7 @@ def _sigma(heading: HeadingResult) -> float:
     Where it states none, A holds them.
     """
     is_stated = heading.steady_origin == "aircraft file"
-    return heading.standard_error_deg if is_stated else heading.measured_sigma_deg
+    return heading.azimuth[1] if is_stated else heading.measured_sigma_deg
 
 
 def _is_carried_by_sigma(heading: HeadingResult) -> bool:

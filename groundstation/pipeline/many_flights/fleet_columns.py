@@ -38,7 +38,7 @@ INDEXED = tuple(column.name for analysis in FLIGHT_ANALYSES for column in analys
 
 
 def answer_values(results: FlightResults) -> dict[str, Any]:
-    """What the answers of a flight say in the columns of their analyses, by name; nothing where there is none.
+    """Values of the columns of all analyses, by name; none of one without an answer.
 
     Columns that fail are empty: the run of the flight has told it.
     """

@@ -169,7 +169,7 @@ def _heading_checks(saved: SavedFlight, heading: HeadingResult) -> list[Check | 
     found = [_reference_check(heading, saved.results.metadata)]
     found += [_check("runway", runway.difference_deg, runway.sigma_deg, verdict) for runway in heading.runway]
     if heading.onboard is not None:
-        # Steady sideslip and mounting are the same in both.
+        # Steady sideslip is the same in both.
         difference = heading.onboard.difference_error_deg
         found.append(_check("onboard", difference, heading.measured_sigma_deg, verdict))
     return found

@@ -83,7 +83,7 @@ def write_beside(
 
 
 def _beside(place: Path, state: State, text: str, trace: str = "") -> Outcome:
-    """The outcome of something that stands beside the flights, or of a flight folder that was there before."""
+    """Outcome of something beside the flights, or of a flight folder that was there before."""
     return Outcome(str(place), state, text, trace=trace, is_beside=True)
 
 

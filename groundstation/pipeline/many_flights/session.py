@@ -213,7 +213,7 @@ def _kept(job: SessionJob) -> _Kept | None:
 
 
 def _is_incomplete(folder: Path) -> bool:
-    """Whether a part of a session failed: it is then run again."""
+    """Tell whether a part of a session failed: it is then run again."""
     try:
         return is_incomplete(load_document(folder).findings)
     except GroundstationError:

@@ -147,6 +147,7 @@ def known_of(flight: Flight, configuration: Configuration) -> Known:
         aircraft=settings.aircraft,
         site=settings.site,
         settings=settings.analyses,
+        weather=configuration.weather,
     )
     try:
         return replace(known, intervals=_intervals(flight, configuration))
@@ -195,7 +196,7 @@ def run_analyses(analyses: tuple[Analysis, ...], data: Any, known: Any) -> Answe
 
 
 class _Unanswered(NamedTuple):
-    """Why an analysis gave no answer, and what is found of that."""
+    """Reason why an analysis gave no answer, and findings on that."""
 
     reason: NotAssessable
     findings: tuple[Finding, ...]
@@ -204,7 +205,7 @@ class _Unanswered(NamedTuple):
 def _run_one(
     analysis: Analysis, data: Any, known: Any, reasons: Mapping[str, NotAssessable]
 ) -> Found[Any] | _Unanswered | None:
-    """Run an analysis behind others, of which some gave ``reasons``; None where it does not apply to the data."""
+    """Run an analysis behind others that gave ``reasons``; None where it does not apply."""
     if not analysis.applies(data, known):
         return None
     missing = next((name for name in analysis.requires if name not in known.answers), None)

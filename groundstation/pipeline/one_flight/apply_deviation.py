@@ -162,7 +162,8 @@ def _ins_error_deg(results: FlightResults, ins_topic: str) -> float:
         return magnetic.alignment.error_deg
     if heading is None or heading.ins_topic != ins_topic or heading.verdict == "reject":
         return 0.0
-    return heading.error_deg if np.isfinite(heading.error_deg) else 0.0
+    error_deg, _sigma_deg = heading.azimuth
+    return error_deg if np.isfinite(error_deg) else 0.0
 
 
 def _figure(flight: Flight, corrected: "CorrectedHeading") -> FigureData:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 ISOLATION = "isolation"  # the table that changes no result: it is not kept
 S = TypeVar("S")
+LISTS = ("exclude", "force", "weather")  # what a settings file may hold besides tables
 Settings = Path | Mapping[str, Any]  # a TOML file, or its content
 
 
@@ -46,7 +47,7 @@ def tables() -> tuple[str, ...]:
 @cache
 def sections() -> tuple[str, ...]:
     """Names of all that a settings file may hold."""
-    return (*tables(), ISOLATION, "exclude", "force")
+    return (*tables(), ISOLATION, *LISTS)
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,8 @@ class Configuration:
         The deviation to add to the magnetic heading.
     references : References
         Files of which the one of the log's time judges the answers.
+    weather : tuple of str
+        METAR lines; each flight takes the wind of the one nearest to its taxi.
 
     Raises
     ------
@@ -134,6 +137,7 @@ class Configuration:
     files: Mapping[str, str] = field(default_factory=dict)
     apply: "Apply | None" = None
     references: References = NO_REFERENCES
+    weather: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         self.thresholds  # noqa: B018 -- a slip is told now
@@ -200,6 +204,8 @@ class Configuration:
             document["icds"] = [Path(one).name for one in self.icds]
         if self.apply:
             document["apply"] = self.apply.to_dict()
+        if self.weather:
+            document["weather"] = list(self.weather)
         if self.references.paths:
             document["references"] = [path.name for path in self.references.paths]
         return document
@@ -225,6 +231,7 @@ def load_configuration(
     profile: Path | None = None,
     thresholds: Settings | None = None,
     icds: Iterable[str] | None = None,
+    weather: Settings | None = None,
 ) -> Configuration:
     """Put the user's settings, files or what would stand in them, into one configuration.
 
@@ -249,7 +256,7 @@ def load_configuration(
         listed = _content(intervals)
         _refuse_unknown(listed, ("exclude", "force"), _name(intervals))
         document.update(listed)
-    given = {name: content for name, content in document.items() if name not in ("exclude", "force")}
+    given = {name: content for name, content in document.items() if name not in LISTS}
     for name, content in given.items():
         if not isinstance(content, Mapping):
             raise SettingsError(f"{_name(config)}, {name}", repr(content), f"a table [{name}]")
@@ -260,6 +267,7 @@ def load_configuration(
         profile=str(profile) if profile else None,
         icds=tuple(icds or ()),
         files={name: str(path) for name, path in files.items() if isinstance(path, Path)},
+        weather=_weather(document.get("weather", []), weather, _name(config)),
     )
 
 
@@ -312,6 +320,23 @@ def _intervals(listed: Any, where: str) -> tuple[Interval, ...]:
     return tuple(
         Interval(_time(part["from"], where), _time(part["to"], where), str(part.get("reason", ""))) for part in listed
     )
+
+
+def _weather(listed: Any, given: Settings | None, where: str) -> tuple[str, ...]:
+    """METAR lines that have a wind: of a text file or mapping given, else of the settings."""
+    from groundstation.base.metar import metar_wind
+
+    file = given if isinstance(given, Path) else None
+    if file is not None:
+        listed, where = toml_text(file, str(file), "a text file", "METAR lines").splitlines(), str(file)
+    elif isinstance(given, Mapping):
+        listed = given.get("weather", [])
+    if not isinstance(listed, list) or not all(isinstance(line, str) for line in listed):
+        raise SettingsError(f"{where}, weather", repr(listed), "a list of METAR lines")
+    lines = tuple(line.strip() for line in listed if metar_wind(line) is not None)
+    if file is not None and not lines:
+        raise SettingsError(where, "no METAR line with a wind", "lines such as UUEE 040600Z 27010MPS CAVOK 12/05 Q1013")
+    return lines
 
 
 def _time(value: Any, where: str) -> str:

@@ -207,7 +207,7 @@ def _failed(job: Job, error: Exception, watch: Stopwatch, log: Log | None = None
 
 
 def partial_folder(out: Path) -> Path:
-    """A new folder in ``out`` for what is not finished; as every other it is open to whom the user's mask leaves it."""
+    """Make a folder in ``out`` for unfinished work, open to whom the user's mask leaves it."""
     partial = out / f"{PARTIAL_PREFIX}{secrets.token_hex(8)}"
     partial.mkdir()
     return partial

@@ -93,7 +93,7 @@ def with_drawings(section: Section, results: FlightResults) -> Section:
 
 
 def drawn_by(drawers: Mapping[str, Callable[..., Drawn]], section: Section, results: object) -> Section:
-    """The section with its figures drawn from results by those who know their names; one that fails is left out."""
+    """Section with its figures drawn by those who know their names, without those that fail."""
     parts: list[Part] = []
     for part in section.parts:
         if not isinstance(part, Figure):

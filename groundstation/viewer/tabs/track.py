@@ -176,7 +176,7 @@ def _map(
     pieces: list[slice],
     shades: list[Colour],
 ) -> rrb.MapView:
-    """Log the track on the map, beyond 180 deg where it crosses the date line: Rerun's map draws it in one piece."""
+    """Log the track on the map, in one piece: beyond 180 deg where it crosses the date line."""
     latitude = np.clip(positions[:, 0], -MAP_LATITUDE_DEG, MAP_LATITUDE_DEG)
     positions = np.column_stack([latitude, continuous_longitude_deg(positions[:, 1])])
     strips = rr.GeoLineStrings(

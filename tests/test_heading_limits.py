@@ -1,0 +1,43 @@
+"""Shipped limits of the heading correction, each held to its source: changing one is a decision with a reason."""
+
+import pytest
+
+from groundstation.base.units import ARCMIN_PER_DEG
+from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.estimators.heading.verdict import gate_bounds
+
+PAPER = "Markelov, Kostishin, Shukalov, Heading correction of an INS before take-off by satellite navigation, 2015"
+ENOUGH = 1000  # samples
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "source"),
+    [
+        ("precision_max_deg", 0.05, f"{PAPER}: precision e"),
+        ("quality_max_deg", 0.3, f"{PAPER}: spread of the running mean"),
+        ("speed_of_mean_max_mps", 0.01, f"{PAPER}: mean velocity at standstill"),
+        ("taxi_min_s", 20.0, f"{PAPER}: shortest of 11 taxi runs"),
+        ("taxi_speed_min_mps", 6.0, f"{PAPER}: ground speed of a sample"),
+        ("turn_rate_max_dps", 1.0, f"{PAPER}: rate of the INS heading of a sample"),
+        ("geometry_max", 2.0, f"{PAPER}: geometric factor"),
+        ("standstill_speed_max_mps", 0.2, f"{PAPER}: speed of the 1-s mean at standstill"),
+        ("standstill_min_s", 10.0, f"{PAPER}: standstill of 10 to 30 s"),
+        ("standstill_max_s", 30.0, f"{PAPER}: standstill of 10 to 30 s"),
+        ("half_width_max_deg", 0.2, "20 arcmin is then more than three sigma"),
+    ],
+)
+def test_a_shipped_limit_is_that_of_its_source(name: str, value: float, source: str) -> None:
+    assert getattr(HeadingSettings(), name) == value, source
+
+
+def test_the_whole_interval_may_be_as_wide_as_the_published_errors() -> None:
+    assert HeadingSettings().whole_half_width_max_deg * ARCMIN_PER_DEG == pytest.approx(20.0), PAPER
+
+
+def test_the_gates_use_the_shipped_limits() -> None:
+    bounds = gate_bounds(HeadingSettings(), ENOUGH)
+    assert bounds["precision"] == (None, 0.05)
+    assert bounds["quality"] == (None, 0.3)
+    assert bounds["standstill_speed_of_mean"] == (None, 0.01)
+    assert bounds["taxi_seconds"] == (20.0, None)
+    assert bounds["whole_half_width"] == (None, pytest.approx(20.0 / 60.0))
