@@ -20,7 +20,13 @@ from groundstation.pipeline.many_flights.fleet_store import Scan, refresh
 from groundstation.pipeline.many_flights.found_sessions import Asked, find_sessions, run_sessions
 from groundstation.pipeline.many_flights.inputs import session_folders
 from groundstation.pipeline.many_flights.known_flights import KnownFlights
-from groundstation.pipeline.many_flights.listed_logs import inputs_of, run_known, skipped_files, with_steps
+from groundstation.pipeline.many_flights.listed_logs import (
+    inputs_of,
+    run_known,
+    skipped_files,
+    with_steps,
+    without_parts,
+)
 from groundstation.pipeline.many_flights.out_folder import alone_in, clear_unfinished, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.output import LocalOutput, RemoteOutput
 from groundstation.pipeline.many_flights.placement import Placement
@@ -203,8 +209,10 @@ def _run_here(
     refuse_foreign(out, force)
     with alone_in(out):
         prepare(out)
-        known = KnownFlights(None if asked.redo or is_isolated else out)  # isolated, no log is read in this process
+        in_out = KnownFlights(None if asked.redo else out)
+        known = KnownFlights() if is_isolated else in_out  # isolated, no log is read in this process
         run = partial(run_known, redo=asked.redo) if is_isolated else run_flight
+        skipped = without_parts(skipped, known)
         placement = Placement(LocalOutput(out), [job.log for job in work])
         for number, outcome in skipped.items():
             placement.put(number, outcome)
@@ -227,7 +235,7 @@ def _run_here(
             return replace(work[number % len(work)], add_suffix=True, power_up=placement.power_up(number))
 
         _run_into(placement, out, left(), run, suffixed, crew, listen, len(work))
-        apart = _run_joined(placement, work, known, crew, listen)
+        apart = _run_joined(placement, work, in_out, crew, listen, is_isolated=is_isolated)
         clear_unfinished(out)  # of processes that died or took too long
         found, unwritten = _swept(placement, out, refresher)
         sessions = _run_sessions(placement, asked, found, crew, listen)
@@ -240,10 +248,20 @@ def _run_here(
 
 
 def _run_joined(
-    placement: Placement, work: Sequence[Job], known: KnownFlights, crew: Crew, listen: Listener
+    placement: Placement,
+    work: Sequence[Job],
+    known: KnownFlights,
+    crew: Crew,
+    listen: Listener,
+    *,
+    is_isolated: bool = False,
 ) -> tuple[Outcome, ...]:
-    """Run as one flight the consecutive logs among those in place; returns what could not be joined, and why."""
-    found = flights_of_parts(placement.flights(), known, work[0].configuration)
+    """Run as one flight the consecutive logs among those in place; returns what could not be joined, and why.
+
+    Isolated, files that cannot be read alone are not looked at: that would read them in this process.
+    """
+    outcomes = {number: one for number, one in placement.flights().items() if one.flight_id or not is_isolated}
+    found = flights_of_parts(outcomes, known, work[0].configuration)
     if not found:
         return ()
     tasks: list[tuple[int, Job]] = []

@@ -8,7 +8,7 @@ from groundstation.base.errors import UnclaimedLogError, UsageError
 from groundstation.pipeline.many_flights.fleet_store import Scan, scan
 from groundstation.pipeline.many_flights.found_sessions import STATIONS_TOML, Asked, FoundSessions, find_sessions
 from groundstation.pipeline.many_flights.known_flights import KnownFlights
-from groundstation.pipeline.many_flights.listed_logs import inputs_of, skipped_files, with_steps
+from groundstation.pipeline.many_flights.listed_logs import inputs_of, skipped_files, with_steps, without_parts
 from groundstation.pipeline.many_flights.out_folder import refuse_foreign
 from groundstation.pipeline.many_flights.remote import is_remote
 from groundstation.pipeline.many_flights.session import load_stations, planned_session
@@ -51,7 +51,7 @@ def plan_many(
     known = KnownFlights(None if redo else out)
     make = partial(Job, out=out, configuration=configuration, with_pdf=with_pdf, only_results=only_results)
     work = [make(Path(one.url), is_named=one.is_named) for one in inputs]
-    found = {} if configuration.profile is not None else skipped_files(inputs, Strangers(out))
+    found = {} if configuration.profile is not None else without_parts(skipped_files(inputs, Strangers(out)), known)
     for number, job, twin in with_steps(work, known, found):
         if twin is not None and job.finished is not None and len(job.finished.parts) > 1:
             text = f"part of {job.finished.flight_id}, with {work[twin].name}"

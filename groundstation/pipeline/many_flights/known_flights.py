@@ -45,6 +45,7 @@ class KnownFlights:
                     self._digests.append(manifest.source.sha256)
                     self._names.append(name)
                     later.append([part.sha256 for part in manifest.parts[1:]])
+        self._of_several = [name for name, parts in zip(self._names, later, strict=True) if parts]
         self._one_of = {sha256: name for name, parts in zip(self._names, later, strict=True) for sha256 in parts}
         self._one_of |= dict(zip(self._digests, self._names, strict=True))
 
@@ -65,6 +66,12 @@ class KnownFlights:
             return tuple(whole[:1])
         wanted = range(1, whole[0].power_up.count + 1)
         return tuple(by_number[number] for number in wanted) if by_number.keys() >= set(wanted) else ()
+
+    @cached_property
+    def paths_of_parts(self) -> frozenset[str]:
+        """Where the logs behind the first one are of flights that came from several."""
+        several = self._manifests_of(self._of_several)
+        return frozenset(part.path for _name, manifest in several for part in manifest.parts[1:])
 
     def about(self, part: PartOfRun) -> Iterator[tuple[str, Manifest]]:
         """Flights that another one may go on from, or that may go on from it: by their times, or names of files."""

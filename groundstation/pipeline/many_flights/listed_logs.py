@@ -1,6 +1,6 @@
 """The logs of a run: which there are, which are none, and what an earlier run has left to do of each."""
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -12,6 +12,7 @@ from groundstation.pipeline.many_flights.remote import FarLog, far_logs, is_remo
 from groundstation.pipeline.many_flights.strangers import Strangers
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job, run_flight
+from groundstation.pipeline.one_flight.log import as_log, digest_of
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Listener
 from groundstation.pipeline.one_flight.resume import Finished, Keys
@@ -101,14 +102,28 @@ def skipped_files(inputs: Sequence[FarLog], strangers: Strangers) -> dict[int, O
     return found
 
 
+def without_parts(skipped: Mapping[int, Outcome], known: KnownFlights) -> dict[int, Outcome]:
+    """Those of the skipped files that are no parts of known flights."""
+    return {
+        number: one for number, one in skipped.items() if str(Path(one.source).absolute()) not in known.paths_of_parts
+    }
+
+
 def run_known(job: Job, listen: Listener, *, redo: bool) -> Outcome:
     """Run a log that this process has not looked at yet: what an earlier run finished of it is not done again.
 
-    With ``add_suffix`` it is one of several of the same id, and run anew.
+    With ``add_suffix`` it is one of several of the same id, and run anew; with parts it is several logs.
     """
-    known = KnownFlights(None if redo or job.add_suffix else job.out)
+    known = KnownFlights(None if redo or job.add_suffix or job.parts else job.out)
     asked = job.asked() if len(known) else None
-    found = known.of(asked[0]) if asked else ()
-    if asked and len(found) == 1 and len(found[0].parts) < 2:
-        job = job.going_on(found[0], asked[1])
-    return run_flight(job, listen)
+    if asked is None:
+        return run_flight(job, listen)
+    planned = _with_step(job, asked, known.of(asked[0]), _is_as_it_was)
+    first, *others = [run_flight(one, listen) for one in planned]
+    return replace(first, more=(*first.more, *others))
+
+
+def _is_as_it_was(part: PartOfRun) -> bool:
+    """Whether a part of a flight has not changed; one that is gone cannot tell."""
+    path = Path(part.path)
+    return not path.exists() or digest_of(as_log(path)) == part.sha256

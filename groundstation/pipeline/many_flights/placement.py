@@ -79,6 +79,9 @@ class Placement:
         """Take over a log whose content is that of the log with the number ``kept``."""
         if outcome.folder and not self._output.has_in_place(outcome):
             self._output.discard(outcome.folder)
+        if len(outcome.parts) > 1:
+            self.put_part(number, kept, outcome.flight_id, "", was_finished=outcome.was_finished)
+            return
         text = f"{Path(outcome.source).name}: same content as {self._names[kept % len(self._names)]}, listed once"
         self._outcomes[number] = Outcome(outcome.source, "skipped", text, sha256=outcome.sha256)
 
