@@ -34,7 +34,8 @@ _NOT_IN_AN_ID = re.compile(r"[^A-Za-z0-9_-]+")
 class Written:
     """The files of a report, summary.json among them where its findings changed.
 
-    ``problem`` says why there is no PDF where one was asked for; ``failures`` are the parts that failed by a defect, where they are gathered.
+    ``problem`` says why there is no PDF where one was asked for; ``failures`` are the parts that failed by a defect,
+    where they are gathered.
     """
 
     paths: tuple[Path, ...]
