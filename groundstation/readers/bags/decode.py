@@ -63,6 +63,7 @@ class Decoder:
     kinds: dict[str, str] = field(default_factory=dict)
     work: Work = field(default_factory=lambda: Work.of(0))
     given_up: int = 0
+    left_out: int = 0
 
     def __post_init__(self) -> None:
         connection = self.connection
@@ -191,7 +192,7 @@ class Decoder:
         columns: dict[str, Column] = {}
         for name in dict.fromkeys(name for one in found for name in one):
             if name not in self.kinds and len(self.kinds) >= MOST_COLUMNS:
-                self.shortened.setdefault(name)
+                self.left_out += sum(name in one for one in found)
                 continue
             values = [one.get(name) for one in found]
             kind = self.kinds.setdefault(name, _kind(next(value for value in values if value is not None)))

@@ -24,6 +24,7 @@ from groundstation.readers.bags.clocks import LARGEST_LAG_S
 from groundstation.readers.bags.decode import Decoded, Decoder
 from groundstation.readers.bags.messages import Block, Connection, joined
 from groundstation.readers.bags.profile import MessageProfile
+from groundstation.readers.bags.shapes import MOST_COLUMNS
 from groundstation.readers.bags.sources import Key, key_of
 from groundstation.readers.bags.survey import Survey, survey
 from groundstation.readers.bags.work import Work
@@ -214,6 +215,9 @@ class _Topics:
             if decoder.given_up:
                 what = "messages that take more work than a file of this size is given: time and length are kept"
                 yield Damage("corrupt", "the whole log", decoder.given_up, what, self._names[number])
+            if decoder.left_out:
+                what = f"values of fields beyond the first {MOST_COLUMNS} different ones"
+                yield Damage("unreadable_cells", "the whole log", decoder.left_out, what, self._names[number])
             if decoder.unreadable > decoder.given_up:
                 why = f"of {decoder.reason}" if decoder.reason else "that their definition does not describe"
                 what = f"messages {why}: time and length are kept"
