@@ -299,3 +299,122 @@ def test_a_database_gives_no_more_than_its_file_holds(tmp_path: Path, monkeypatc
     monkeypatch.setattr(sqlite, "_bounded", poor)
     rows, damages = read(path)
     assert 0 < rows < 144 and "more than its file can hold" in damages[0].what
+
+
+def record(fields: dict[bytes, bytes], data: bytes) -> bytes:
+    """A record of a bag of ROS 1."""
+    header = b"".join(
+        (len(name) + 1 + len(value)).to_bytes(4, "little") + name + b"=" + value for name, value in fields.items()
+    )
+    return len(header).to_bytes(4, "little") + header + len(data).to_bytes(4, "little") + data
+
+
+def packed(content: bytes) -> bytes:
+    """A chunk of a bag of ROS 1, in lz4."""
+    import lz4.frame
+
+    fields = {b"op": b"\x05", b"compression": b"lz4", b"size": len(content).to_bytes(4, "little")}
+    return record(fields, lz4.frame.compress(content))
+
+
+def message(at: int, data: bytes) -> bytes:
+    """A message of connection 0."""
+    time = (1_777_874_400 + at // 1_000).to_bytes(4, "little") + (at % 1_000).to_bytes(4, "little")
+    return record({b"op": b"\x02", b"conn": bytes(4), b"time": time}, data)
+
+
+def connection(definition: bytes) -> bytes:
+    """Connection 0."""
+    fields = {b"type": b"own/Type", b"md5sum": b"*", b"message_definition": definition}
+    data = b"".join(
+        (len(name) + 1 + len(value)).to_bytes(4, "little") + name + b"=" + value for name, value in fields.items()
+    )
+    return record({b"op": b"\x07", b"conn": bytes(4), b"topic": b"/own"}, data)
+
+
+LOOKS_LIKE_ONE = b"\x10\0\0\0\x04\0\0\0op=\x05"  # the beginning of a header that is none, again and again
+FEW_STEPS = 2_000
+
+
+@pytest.mark.parametrize("is_packed", [False, True])
+def test_what_looks_like_a_record_is_looked_at_so_often(
+    bag: Path, is_packed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from groundstation.readers.bags import ros1_records
+
+    looked_at: list[int] = []
+    known = ros1_records.head_at
+
+    def counted(data: bytes, at: int) -> ros1_records.Head | None:
+        looked_at.append(at)
+        return known(data, at)
+
+    monkeypatch.setattr(ros1_records, "head_at", counted)
+    data = bag.read_bytes()
+    junk = LOOKS_LIKE_ONE * 50_000
+    at = chunks(data)[1][0]
+    bag.write_bytes(data[:at] + (packed(junk) if is_packed else junk) + data[at:])
+    rows, damages = read(bag)
+    assert rows > 0 and damages and len(looked_at) < 10 * 3 * ros1_records.MOST_TRIES
+
+
+def test_layouts_that_are_ever_new_are_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each message has a text more than the one before."""
+    from groundstation.readers.bags import work
+
+    texts = [message(at, at.to_bytes(4, "little") + bytes(4 * at)) for at in range(300)]
+    path = tmp_path / "a.bag"
+    path.write_bytes(MAGIC + packed(connection(b"string[] texts") + b"".join(texts)))
+    rows, damages = read(path)
+    assert rows == 300 and not [one for one in damages if "work" in one.what]
+    monkeypatch.setattr(work, "FREE_STEPS", FEW_STEPS)
+    monkeypatch.setattr(work, "STEPS_PER_BYTE", 0)
+    rows, damages = read(path)
+    (given_up,) = [one for one in damages if "work" in one.what]
+    assert rows == 300 and 0 < given_up.count < 300 and given_up.loses_data
+
+
+def test_more_messages_than_a_file_can_hold_are_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from groundstation.readers.bags import work
+
+    monkeypatch.setattr(work, "FREE_MESSAGES", 100)
+    path = tmp_path / "a.bag"
+    one = message(0, bytes(8))
+    path.write_bytes(MAGIC + packed(connection(b"float64 value") + one * 20_000))
+    rows, damages = read(path)
+    assert 100 < rows < 20_000 and any("no file of its size holds" in damage.what for damage in damages)
+
+
+def test_chunks_expand_to_so_many_times_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from groundstation.readers.bags import ros1
+
+    monkeypatch.setattr(ros1, "FREE_BYTES", 50_000)
+    path = tmp_path / "a.bag"
+    one = packed(message(0, bytes(1_000_000)))
+    path.write_bytes(MAGIC + packed(connection(b"uint8[1000000] image") + message(0, bytes(1_000_000))) + one * 300)
+    rows, damages = read(path)
+    assert 0 < rows < 301 and any("cannot" in damage.what or "size" in damage.what for damage in damages)
+
+
+def test_objects_of_ever_new_names_fill_so_many_columns(tmp_path: Path) -> None:
+    import json
+
+    from mcap.writer import Writer as McapWriter
+
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start()
+        channel = writer.register_channel("/own", "json", writer.register_schema("own", "jsonschema", b"{}"))
+        for row in range(60):
+            deep = '{"a":' * 300 + "1" + "}" * 300
+            names = {f"name{row}_{number}": number for number in range(100)}
+            data = (json.dumps(names)[:-1] + f', "deep": {deep}}}').encode()
+            writer.add_message(channel, 1_777_874_400 * 10**9 + row, data, 0)
+        writer.finish()
+    found = list(registry.read(path))
+    check(found)
+    columns = {name for item in found if isinstance(item, RecordBatch) for name in item.columns}
+    assert len(columns) <= 2_002 and all(len(name) < 100 for name in columns), "with bytes and publish time"
+    (damage,) = [item for item in found if isinstance(item, Damage)]
+    assert damage.count == 60 * 100 - 2_000 and damage.loses_data

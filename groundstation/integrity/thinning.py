@@ -47,6 +47,8 @@ class Thinner:
     @property
     def period_ns(self) -> int:
         """Median of the steps ahead between usable records of the windows that were thinned, 0 of none."""
+        if not self._steps:
+            return 0
         steps, counts = (np.concatenate(parts) for parts in zip(*self._steps, strict=True))
         order = np.argsort(steps, kind="stable")
         reached = np.cumsum(counts[order])

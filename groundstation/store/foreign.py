@@ -34,6 +34,7 @@ from groundstation.store.sequences import Sequences
 from groundstation.store.walk import find_messages
 
 PEEK_BYTES = 64
+MOST_EXPANDED, FREE_BYTES = 200, 64 << 20  # chunks expand to so many times the file's size, or to so much
 _CHUNK = re.compile(rb"\x06(?=[\0-\xff]{5}\0{3})")  # opcode and a length below 2**40
 _MESSAGE = re.compile(rb"\x05(?=[\0-\xff]{3}\0{5})")
 _KNOWN_OPCODES = frozenset(range(Opcode.HEADER, Opcode.DATA_END + 1))
@@ -103,6 +104,7 @@ class ForeignMcap:
         self._known = Summary()
         self._count = self._unknown = 0
         self._met: dict[int, Sequences] = {}
+        self._room = max(FREE_BYTES, MOST_EXPANDED * size)  # what chunks may still expand to
 
     def __iter__(self) -> Iterator[Found]:
         summary = read_summary(self._file, self._size)
@@ -185,6 +187,9 @@ class ForeignMcap:
             yield ForeignLost(at, self._size, what, self._size - at, self._count, True)
             return
         try:
+            self._room -= head.uncompressed_size
+            if self._room < 0:
+                raise ChunkError(f"the file expands to more than {MOST_EXPANDED} times its size")
             raw = decompress(head.compression, data, head.uncompressed_size, head.crc or None)
         except ChunkError as error:
             yield ForeignLost(at, end, f"bytes of a chunk that is lost: {error}", end - at, self._count)

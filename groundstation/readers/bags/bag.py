@@ -19,6 +19,7 @@ from groundstation.readers.bags.rosbag2_metadata import BagMetadata
 from groundstation.readers.bags.sources import Key, key_of
 from groundstation.readers.bags.sqlite import MAGIC as SQLITE_MAGIC
 from groundstation.readers.bags.sqlite import Ros2Sqlite
+from groundstation.readers.bags.work import most_messages
 from groundstation.readers.joined import JoinedSource
 from groundstation.readers.source import Source
 
@@ -116,6 +117,17 @@ class Bag:
     def _is_folder(self) -> bool:
         return self.source.head.lstrip().startswith(MARK)
 
+    @property
+    def size(self) -> int:
+        """Bytes of all its files that are there."""
+        size = 0
+        for file in self.files():
+            try:
+                size += file.size
+            except GroundstationError:  # told when it is read
+                continue
+        return size
+
     def __iter__(self) -> Iterator[Item]:
         if self._kept is not None:
             yield from self._kept
@@ -137,10 +149,16 @@ class Bag:
         """Messages and damages, then what the metadata of the bag counts beyond what its files tell."""
         account = _account_of(self.source.path).messages if self._is_folder else {}
         told: Counter[str] = Counter()
+        count, most = 0, most_messages(self.size)
         for part in self._of_files():
             if isinstance(part, Block):
                 told[part.connection.topic] += len(part)
+                count += len(part)
                 yield part
+                if count > most:
+                    what = f"log of more than {most} messages, which no file of its size holds: the rest is not read"
+                    yield Damage("corrupt", "the whole log", 1, what)
+                    return
             elif isinstance(part, Missing):
                 told[part.topic] += part.count
                 yield part.damage()

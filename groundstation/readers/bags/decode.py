@@ -24,7 +24,9 @@ from groundstation.readers.bags.shapes import (
     values_of,
     walk,
 )
+from groundstation.readers.bags.work import BYTES_PER_STEP, STEPS_PER_VALUE, Work
 
+DEEPEST = 32  # objects within objects
 BYTES = "bytes"  # column of messages that cannot be read: how long they are
 MOST_SHAPES = 64  # of a connection that are kept: messages of ever new lengths are walked one by one
 
@@ -59,6 +61,9 @@ class Decoder:
     _definition: Definition | None = None
     _object: Callable[[bytes], Any] | None = None
     kinds: dict[str, str] = field(default_factory=dict)
+    work: Work = field(default_factory=lambda: Work.of(0))
+    given_up: int = 0
+    left_out: int = 0
 
     def __post_init__(self) -> None:
         connection = self.connection
@@ -131,6 +136,10 @@ class Decoder:
                     yield _read(block, known_shape, left[fits])
                     left = left[~fits]
             while len(left):
+                if self.work.steps < 0:
+                    bad.append(left)
+                    self.given_up += len(left)
+                    break
                 shape = self._walked(block.payload(int(left[0])))
                 if shape is None:
                     bad.append(left[:1])
@@ -147,8 +156,10 @@ class Decoder:
             return None
         try:
             shape = walk(self._definition, message, how)
-        except ShapeError:
+        except ShapeError as error:
+            self.work.spend(STEPS_PER_VALUE * error.steps)
             return None
+        self.work.spend(STEPS_PER_VALUE * (shape.steps + len(shape.leaves)))
         self.shortened.update(dict.fromkeys(shape.shortened))
         if len(self._shapes) < MOST_SHAPES:
             self._shapes[shape.size, shape.guards] = shape
@@ -159,12 +170,17 @@ class Decoder:
         found: list[dict[str, Any]] = []
         rows: list[int] = []
         for row in range(len(block)):
+            if not self.work.spend(int(block.sizes[row]) // BYTES_PER_STEP):
+                bad.append(np.arange(row, len(block), dtype=np.int64))
+                self.given_up += len(block) - row
+                break
             try:
                 flat: dict[str, Any] = {}
                 _flatten(read(block.payload(row)), "", flat, self.shortened)
             except (ValueError, RecursionError, TypeError):
                 bad.append(np.array([row], dtype=np.int64))
                 continue
+            self.work.spend(STEPS_PER_VALUE * len(flat))
             found.append(flat)
             rows.append(row)
         if not rows:
@@ -175,6 +191,9 @@ class Decoder:
         """Columns of flat objects; those without a value have their length."""
         columns: dict[str, Column] = {}
         for name in dict.fromkeys(name for one in found for name in one):
+            if name not in self.kinds and len(self.kinds) >= MOST_COLUMNS:
+                self.left_out += sum(name in one for one in found)
+                continue
             values = [one.get(name) for one in found]
             kind = self.kinds.setdefault(name, _kind(next(value for value in values if value is not None)))
             if kind == "i" and self.connection.encoding == "json" and not name.endswith("_ns"):
@@ -211,15 +230,17 @@ def _definition(connection: Connection) -> tuple[Definition | None, str]:
     return found, "" if found else f"type {connection.type} {what}"
 
 
-def _flatten(value: Any, path: str, found: dict[str, Any], shortened: dict[str, None]) -> None:
+def _flatten(value: Any, path: str, found: dict[str, Any], shortened: dict[str, None], depth: int = 0) -> None:
     """Numbers and texts of nested objects by their paths; a time of two numbers becomes one."""
-    if isinstance(value, dict):
+    if depth > DEEPEST:
+        shortened[path[:MAX_TEXT_CHARACTERS]] = None
+    elif isinstance(value, dict):
         seconds, rest = value.get("sec"), value.get("nsec", value.get("nanos"))
         if len(value) == 2 and isinstance(seconds, int) and isinstance(rest, int):
             found[f"{path}_ns"] = seconds * NS_PER_S + rest
             return
         for name, part in value.items():
-            _flatten(part, f"{path}.{name}" if path else str(name), found, shortened)
+            _flatten(part, f"{path}.{name}" if path else str(name), found, shortened, depth + 1)
     elif isinstance(value, list):
         is_plain = not value or not isinstance(value[0], dict | list)
         if len(value) > (MOST_NUMBERS if is_plain else MOST_PARTS):
@@ -227,7 +248,7 @@ def _flatten(value: Any, path: str, found: dict[str, Any], shortened: dict[str, 
             found[path + COUNT] = len(value)
             return
         for number, part in enumerate(value):
-            _flatten(part, f"{path}[{number}]", found, shortened)
+            _flatten(part, f"{path}[{number}]", found, shortened, depth + 1)
     elif value is not None and len(found) < MOST_COLUMNS:
         found[path or "value"] = value
 

@@ -23,8 +23,10 @@ from groundstation.readers.bags.clocks import LARGEST_LAG_S
 from groundstation.readers.bags.decode import Decoded, Decoder
 from groundstation.readers.bags.messages import Block, Connection, joined
 from groundstation.readers.bags.profile import MessageProfile
+from groundstation.readers.bags.shapes import MOST_COLUMNS
 from groundstation.readers.bags.sources import Key, key_of
 from groundstation.readers.bags.survey import Survey, survey
+from groundstation.readers.bags.work import Work
 from groundstation.readers.parts import Part, bounded, merged, occupied, one_row_each
 from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
@@ -49,7 +51,7 @@ def items(source: Source, reader_name: str, profile: MessageProfile | None = Non
         has_counting_clock=not found.is_set,
         clock_offsets=found.offsets.stated,
     )
-    topics = _Topics(found, names)
+    topics = _Topics(found, names, Work.of(bag.size))
     gathered: dict[int, list[Block]] = {}
     size, newest = 0, -1
     for part in bag:
@@ -117,7 +119,8 @@ def _fits_in(time_ns: Int64Array, record_index: Int64Array, is_far: BoolArray) -
 class _Topics:
     """Decodes blocks and lays them on topics."""
 
-    def __init__(self, found: Survey, names: dict[int, str]) -> None:
+    def __init__(self, found: Survey, names: dict[int, str], work: Work) -> None:
+        self._work = work
         self._found, self._names, self._publishers = found, names, _publishers(found, names)
         self._decoders: dict[int, Decoder] = {}
         self._kinds: dict[str, dict[str, str]] = {}
@@ -161,7 +164,7 @@ class _Topics:
 
     def _decoder(self, connection: Connection) -> Decoder:
         kinds = self._kinds.setdefault(self._names[connection.number], {})
-        return self._decoders.setdefault(connection.number, Decoder(connection, kinds=kinds))
+        return self._decoders.setdefault(connection.number, Decoder(connection, kinds=kinds, work=self._work))
 
     def _validity(
         self, number: int, decoded: Decoded, record_index: Int64Array, log_ns: Int64Array
@@ -208,8 +211,14 @@ class _Topics:
             if count:
                 yield nowhere(topic, count)
         for number, decoder in sorted(self._decoders.items()):
-            if decoder.unreadable:
+            if decoder.given_up:
+                what = "messages that take more work than a file of this size is given: time and length are kept"
+                yield Damage("corrupt", "the whole log", decoder.given_up, what, self._names[number])
+            if decoder.left_out:
+                what = f"values of fields beyond the first {MOST_COLUMNS} different ones"
+                yield Damage("unreadable_cells", "the whole log", decoder.left_out, what, self._names[number])
+            if decoder.unreadable > decoder.given_up:
                 why = f"of {decoder.reason}" if decoder.reason else "that their definition does not describe"
                 what = f"messages {why}: time and length are kept"
                 kind = "dropped_channel" if decoder.reason else "corrupt"
-                yield Damage(kind, "the whole log", decoder.unreadable, what, self._names[number])
+                yield Damage(kind, "the whole log", decoder.unreadable - decoder.given_up, what, self._names[number])

@@ -28,16 +28,19 @@ from groundstation.readers.bags.ros1_records import (
     Index,
     Record,
     Records,
+    Tries,
     head_at,
     heads_in,
     number_of,
     parse_header,
 )
-from groundstation.readers.compressed import MAX_RATIO, MIN_LIMIT_BYTES
+from groundstation.readers.bags.work import most_messages
+from groundstation.readers.compressed import MAX_RATIO
 from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 
 MAX_CHUNK_BYTES = 256 << 20  # decompressed; recorders close a chunk at 768 kB
+FREE_BYTES = 32 << 20  # that chunks may expand to, whatever the size of the file
 MOST_SEARCHED = 20_000  # times that a record is searched for in the contents of chunks
 _TIME = struct.Struct("<II")
 
@@ -66,6 +69,7 @@ class Ros1Bag:
         self._met: dict[int, int] = {}
         self._count = self._chunks = 0
         self._unknown = self._searched = self._expanded = 0
+        self._tries = Tries()
         self._skipped = SkippedBytes("record")
         # Headers of messages differ in their time alone: where it stands by their length, the connection by the rest.
         self._time_places: dict[int, int] = {}
@@ -121,7 +125,7 @@ class Ros1Bag:
     def _chunk(self, head: Head, data: bytes, at: int, is_cut: bool) -> Iterator[Part]:
         compression = head.fields.get(b"compression", b"")
         size = number_of(head.fields, b"size") or 0
-        left = max(MIN_LIMIT_BYTES, MAX_RATIO * self._source.size) - self._expanded
+        left = max(FREE_BYTES, MAX_RATIO * self._source.size) - self._expanded
         content, reason = _decompress(compression, data, min(size, MAX_CHUNK_BYTES, left))
         self._expanded += len(content)
         place = bytes_place(at, head.data_at + len(data))
@@ -137,7 +141,8 @@ class Ros1Bag:
         """Messages that stand one after the other; definitions among them are taken in."""
         found: dict[int, _Gathered] = {}
         at = lost = 0
-        while at < len(content):
+        most = most_messages(self._source.size) + 1  # that many are told to be too many
+        while at < len(content) and self._count <= most:
             end = self._known_message(content, at, found)
             if end:
                 at = end
@@ -177,7 +182,7 @@ class Ros1Bag:
         self._searched += 1
         if self._searched > MOST_SEARCHED:
             return len(content)
-        heads = heads_in(content, OP, at + 1)
+        heads = heads_in(content, OP, self._tries, at + 1)
         return next((begin for begin, head in heads if head.end <= len(content)), len(content))
 
     def _message(self, content: bytes, at: int, head: Head, found: dict[int, _Gathered]) -> None:

@@ -15,6 +15,7 @@ MAX_HEADER_BYTES, MOST_FIELDS = 4096, 32  # of a header, and of the description 
 SEARCH_BYTES = 1 << 20
 BEYOND_BYTES = 4096  # room for a header that begins within a record and ends behind it
 BACK_BYTES, MOST_BEGINNINGS = 512, 8  # before an operation: how far its header begins, and places that are tried
+MOST_TRIES = 5_000  # of a file: what looks like an operation stands in damaged bytes once in many gigabytes
 LOOKED_AT, MOST_TRIED = 1 << 16, 200  # bytes of a file without the first ones of a bag, and headers in them
 INDEX_BYTES = 64 << 20  # of an index at most
 # Every record's header has the field "op" of one byte: 4 bytes of length, "op=", the number.
@@ -74,22 +75,33 @@ def head_at(data: bytes, at: int) -> Head | None:
     return Head(op, fields, data_at, data_at + int.from_bytes(data[data_at - 4 : data_at], "little"))
 
 
-def heads_in(block: bytes, ops: re.Pattern[bytes], start: int = 0) -> Iterator[tuple[int, Head]]:
+@dataclass
+class Tries:
+    """How often a header may still be looked for before what looks like an operation and is none."""
+
+    left: int = MOST_TRIES
+
+
+def heads_in(block: bytes, ops: re.Pattern[bytes], tries: Tries, start: int = 0) -> Iterator[tuple[int, Head]]:
     """Headers of records in some bytes, told by their operation, with where each begins."""
     for match in ops.finditer(block, start):
+        tries.left -= 1
+        if tries.left < 0:
+            return
         first = max(start, match.start() - BACK_BYTES)
         # The fields of a header have no order: it begins at one of the lengths before, most likely a near one.
         begins = [one.start() for one in _BEGINNING.finditer(block, first, match.start() + 8)]
         for begin in reversed(begins[-MOST_BEGINNINGS:]):
             head = head_at(block, begin)
             if head is not None and begin < match.start() and match.end() <= head.data_at - 4:
+                tries.left += 1
                 yield begin, head
                 break
 
 
 def has_chunk(head: bytes) -> bool:
     """Whether a chunk of a bag begins in the first bytes of a file, whatever stands before it."""
-    heads = islice(heads_in(head[:LOOKED_AT], OP_OUTSIDE), MOST_TRIED)
+    heads = islice(heads_in(head[:LOOKED_AT], OP_OUTSIDE, Tries()), MOST_TRIED)
     return any(one.op == CHUNK and {b"compression", b"size"} <= one.fields.keys() for _, one in heads)
 
 
@@ -115,10 +127,12 @@ class Records:
     stream : binary file
     size : int
         Bytes of the file.
+    tries : Tries
     """
 
     stream: BinaryIO
     size: int
+    tries: Tries = field(default_factory=Tries)
 
     def __iter__(self) -> Iterator[Record]:
         at = len(MAGIC) if self.read(0, len(MAGIC)) == MAGIC else 0
@@ -159,10 +173,10 @@ class Records:
         at = start
         while at < end:
             block = self.read(at, min(SEARCH_BYTES, end - at) + 64)
-            for begin, head in heads_in(block, ops):
+            for begin, head in heads_in(block, ops, self.tries):
                 if at + head.data_at <= end:
                     return at + begin
-            if len(block) <= SEARCH_BYTES:
+            if len(block) <= SEARCH_BYTES or self.tries.left < 0:
                 return end
             at += SEARCH_BYTES
         return end

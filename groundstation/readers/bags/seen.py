@@ -13,7 +13,7 @@ from groundstation.readers.bags.messages import Block, Connection
 from groundstation.readers.bags.profile import MessageRule
 
 SAMPLE = 4_000  # messages of a connection that are looked at
-LOOKED_AT = 500  # of those whose values stand at places that are found once
+LOOKED_AT = 200  # of those whose values stand at places that are found once
 LATER = 4  # of each block behind them, where a stamp does not stand at one place in all messages
 STAMPS = ("header.stamp_ns", "timestamp_ns")
 

@@ -27,7 +27,9 @@ COUNT = ".count"  # behind the name of an array of which the length alone is kep
 
 
 class ShapeError(Exception):
-    """A message that its definition does not describe."""
+    """A message that its definition does not describe; ``steps`` that it took to find out."""
+
+    steps: int = 0
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,8 @@ class Shape:
         Arrays of which the length alone is kept.
     start : int
         Byte of the first value; the encapsulation stands before it.
+    steps : int
+        Values that were passed to find it.
     """
 
     size: int
@@ -93,6 +97,7 @@ class Shape:
     order: str
     shortened: tuple[str, ...]
     start: int = 0
+    steps: int = 0
 
     def holds(self, buffer: ByteArray, starts: Int64Array) -> BoolArray:
         """Which messages of this size have this shape, shape (n,)."""
@@ -169,6 +174,14 @@ def walk(definition: Definition, message: bytes, serialisation: Serialisation) -
         When the message ends before its definition does, or goes on behind it.
     """
     walker = _Walker(definition, message, serialisation)
+    try:
+        return _walked(walker, definition, message, serialisation)
+    except ShapeError as error:
+        error.steps = walker.steps
+        raise
+
+
+def _walked(walker: "_Walker", definition: Definition, message: bytes, serialisation: Serialisation) -> Shape:
     walker.part(definition.root, "")
     left = len(message) - walker.at
     if not 0 <= left < (serialisation.alignment if serialisation.alignment > 1 else 1):
@@ -176,7 +189,8 @@ def walk(definition: Definition, message: bytes, serialisation: Serialisation) -
     first = [(0, int.from_bytes(message[:4], "little" if serialisation.order == "<" else "big"))]
     guards = (first if serialisation.start else []) + walker.guards
     leaves, shortened = tuple(walker.leaves), tuple(walker.shortened)
-    return Shape(len(message), leaves, tuple(guards), serialisation.order, shortened, serialisation.start)
+    how = serialisation
+    return Shape(len(message), leaves, tuple(guards), how.order, shortened, how.start, walker.steps)
 
 
 class _Walker:
@@ -185,7 +199,7 @@ class _Walker:
     def __init__(self, definition: Definition, message: bytes, serialisation: Serialisation) -> None:
         self._types, self._message, self._how = definition.types, message, serialisation
         self._is_noted = True
-        self._steps = 0
+        self.steps = 0
         self.at = serialisation.start
         self.leaves: list[Leaf] = []
         self.guards: list[tuple[int, int]] = []
@@ -228,8 +242,8 @@ class _Walker:
 
     def value(self, kind: str, path: str) -> None:
         """One value, or one part."""
-        self._steps += 1
-        if self._steps > MOST_STEPS:
+        self.steps += 1
+        if self.steps > MOST_STEPS:
             raise ShapeError("too many values")
         if kind in PRIMITIVES:
             dtype = PRIMITIVES[kind]

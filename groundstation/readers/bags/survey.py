@@ -18,6 +18,7 @@ from groundstation.readers.bags.profile import MessageProfile
 from groundstation.readers.bags.seen import Seen
 from groundstation.readers.bags.sources import in_order, sources_of
 from groundstation.readers.bags.values import Values
+from groundstation.readers.bags.work import Work
 from groundstation.readers.clock_offsets import Offsets
 from groundstation.readers.mapping import Columns, mapped
 
@@ -89,10 +90,11 @@ def survey(bag: Bag, profile: MessageProfile | None = None) -> Survey:
     """Look at all messages of a bag, into the first of each topic; ``profile`` says what some of them mean."""
     found = Survey()
     decoders: dict[int, Decoder] = {}
+    work = Work.of(bag.size).of_a_first_look()
     for part in bag:
         if isinstance(part, Block) and len(part):
             number = part.connection.number
-            decoder = decoders.setdefault(number, Decoder(part.connection))
+            decoder = decoders.setdefault(number, Decoder(part.connection, work=work))
             if number not in found.seen:
                 rule = profile.rule_for(part.connection) if profile is not None else None
                 found.seen[number] = Seen(part.connection, (number,), rule)

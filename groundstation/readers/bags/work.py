@@ -1,0 +1,48 @@
+"""What a bag may cost, by its size: chunks expand, and a message may be made to take long.
+
+Steps are some microseconds of decoding. Messages of recorded bags take less than a tenth of what is allowed.
+"""
+
+from dataclasses import dataclass
+
+FREE_STEPS, STEPS_PER_BYTE = 1_000_000, 4
+FREE_MESSAGES, BYTES_PER_MESSAGE = 200_000, 2  # messages of any file, and what one more takes of it when compressed
+FIRST_LOOK = 4  # a first look may take as much by this factor less
+STEPS_PER_VALUE, BYTES_PER_STEP = 3, 16
+
+
+@dataclass
+class Work:
+    """Steps that are left.
+
+    Parameters
+    ----------
+    steps : int
+
+    Examples
+    --------
+    >>> work = Work.of(0)
+    >>> work.spend(FREE_STEPS), work.spend(1)
+    (True, False)
+    """
+
+    steps: int
+
+    @classmethod
+    def of(cls, size: int) -> "Work":
+        """What a file of so many bytes is given."""
+        return cls(FREE_STEPS + STEPS_PER_BYTE * size)
+
+    def of_a_first_look(self) -> "Work":
+        """What a first look may take."""
+        return Work(self.steps // FIRST_LOOK)
+
+    def spend(self, steps: int) -> bool:
+        """Take some steps; False when there are none left."""
+        self.steps -= steps
+        return self.steps >= 0
+
+
+def most_messages(size: int) -> int:
+    """Messages that a file of so many bytes may hold."""
+    return FREE_MESSAGES + size // BYTES_PER_MESSAGE
