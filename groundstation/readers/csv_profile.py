@@ -187,10 +187,11 @@ def _sections(source: Source, first: Fit, utc_of_zero_ns: int | None) -> tuple[l
             break
         remarks.append(told(place, is_same))
         fits, ends, shifts = [*fits, found], [*ends, end_byte], [*shifts, shift_ns]
-    sections = []
+    sections = list[Section]()
     for fit, end, shift_ns in zip(fits, (*ends, last_byte), shifts, strict=True):
         layout, more = layout_of(fit, source, utc_of_zero_ns, end)
-        sections.append(Section(fit.dialect_to(end, stands_again), layout, shift_ns))
+        facts = _metadata(fit) if sections else {}
+        sections.append(Section(fit.dialect_to(end, stands_again), layout, shift_ns, facts))
         remarks += more
     return sections, remarks
 
