@@ -1,5 +1,6 @@
 """Logs in processes of their own: what goes beyond its limits costs itself alone, and nothing of it is left."""
 
+import gzip
 import multiprocessing
 import os
 import subprocess
@@ -8,13 +9,16 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from groundstation.base.errors import GroundstationError, SettingsError, UsageError
-from groundstation.pipeline.many_flights import apart
+from groundstation.pipeline.many_flights import apart, watched_batch
+from groundstation.pipeline.many_flights import batch as batch_of_logs
 from groundstation.pipeline.many_flights.apart import DIED, bounds_of, outcomes_apart
 from groundstation.pipeline.many_flights.batch import _crew, run_many
 from groundstation.pipeline.many_flights.confined import Bounds
+from groundstation.pipeline.many_flights.watched_batch import Batch
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.pipeline.one_flight.isolation import Isolation
 from groundstation.pipeline.one_flight.outcome import Outcome
@@ -24,6 +28,7 @@ from groundstation.pipeline.verbs.check import check_many
 from groundstation.pipeline.verbs.check_apart import check_apart, describe_apart
 from groundstation.pipeline.verbs.conversions import convert_many
 from groundstation.pipeline.verbs.describe import describe
+from groundstation.readers import registry
 from groundstation.results.flight import Source
 from tests.apart_deeds import Deed, act
 from tests.test_cli import groundstation
@@ -145,10 +150,15 @@ def test_checks_and_descriptions_are_those_of_this_process() -> None:
     assert str(there.value) == str(here_too.value)
 
 
-def test_the_verbs_keep_a_limit_of_time(tmp_path: Path) -> None:
-    long = tmp_path / "long.csv"  # 20 MB: with its process, which loads all libraries, no machine reads it in a second
+def long_log(path: Path) -> Path:
+    """Write 36 MB: with its process, which loads all libraries, no machine reads it in a second."""
     names = ",".join(["ins.roll_deg", "ins.pitch_deg", *(f"a{number}" for number in range(1_500))])
-    long.write_text(f"time_s,{names}\n" + "".join(f"{row / 10}{',1.5' * 1_502}\n" for row in range(3_400)))
+    path.write_text(f"time_s,{names}\n" + "".join(f"{row / 10}{',1.5' * 1_502}\n" for row in range(6_000)))
+    return path
+
+
+def test_the_verbs_keep_a_limit_of_time(tmp_path: Path) -> None:
+    long = long_log(tmp_path / "long.csv")
     for verb, *more in (("info",), ("check",), ("convert", "-o", str(tmp_path / "out.mcap"))):
         code, _, err = groundstation(verb, str(long), *more, "--timeout", "1")
         assert (code, err) == (1, "error: long.csv: not done within 1 s (--timeout), ended\n"), verb
@@ -196,3 +206,48 @@ def test_a_system_without_limits_says_so(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_one_log_is_read_apart_too() -> None:
     assert _crew("", 1, 1, silent, bounds=ISOLATED).func is outcomes_apart
+
+
+def test_a_watch_that_isolates_reads_no_log_in_its_own_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is given to a process of its own; of the others no more than the first bytes are looked at."""
+    (tmp_path / "a.csv").write_bytes(SHORT.read_bytes())
+    (tmp_path / "a.csv.gz").write_bytes(gzip.compress(b"time_s,ins.roll_deg\n0,1\n1,2\n"))
+    (tmp_path / "note.txt").write_text("lunch at noon")
+    given = list[tuple[list[str], list[Path], bool]]()
+
+    def take(paths: list[str], *_: object, unclaimed: list[Path], is_isolated: bool, **__: object) -> tuple[Outcome]:
+        given.append((sorted(Path(path).name for path in paths), unclaimed, is_isolated))
+        return (Outcome(str(tmp_path / "a.csv"), "done", ""),)
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("it is read here")
+
+    for name in ("identify", "read"):
+        monkeypatch.setattr(registry, name, refuse)
+    monkeypatch.setattr(batch_of_logs, "run_many", take)
+    monkeypatch.setattr(watched_batch, "_list_too", lambda *_: None)
+    paths = tuple(tmp_path / name for name in ("a.csv", "a.csv.gz", "note.txt"))
+    one = Batch(paths, tmp_path / "out", Configuration(), "none", False, 1, None, False, True, is_isolated=True)
+    assert [outcome.state for outcome in watched_batch._outcomes(one, silent)] == ["skipped", "done"]
+    assert given == [(["a.csv", "a.csv.gz"], [tmp_path / "note.txt"], True)]
+
+
+def test_a_watch_and_a_check_keep_the_limits(tmp_path: Path) -> None:
+    """By the command, with the limits of settings: the size of a file for `watch` and `run`, time for `check`."""
+    folder, settings = tmp_path / "in", tmp_path / "settings.toml"
+    folder.mkdir()
+    numbers = np.random.default_rng(39).random((20_000, 20))
+    rows = (f"{row / 50:.2f},{','.join(f'{one:.9f}' for one in line)}\n" for row, line in enumerate(numbers))
+    names = ",".join(["ins.roll_deg", *(f"a{number}" for number in range(19))])
+    (folder / "large.csv").write_text(f"time_s,{names}\n" + "".join(rows))
+    settings.write_text("[isolation]\nfile_mb = 1.0\n")
+    same = ("--isolate", "--config", str(settings), "--progress", "none")
+    for verb, *more in (("run", "--only", "results"), ("watch", "--only", "results", "--once", "--every", "0.1")):
+        out = tmp_path / verb
+        code, _, err = groundstation(verb, str(folder), "-o", str(out), *same, *more)
+        assert code == 1 and "flight.mcap: cannot be written (File too large)" in err, verb
+        assert not [path for path in out.iterdir() if path.is_dir() and path.name.startswith(".partial")]
+    settings.write_text("[isolation]\ntime_s = 1.0\n")
+    code, _, err = groundstation("check", str(long_log(tmp_path / "long.csv")), *same)
+    assert (code, err) == (1, "error: long.csv: not done within 1 s (isolation.time_s), ended\n")
+    assert not multiprocessing.active_children()
