@@ -236,7 +236,7 @@ def main() -> int:
         if found["fault"]:
             faults[case.format] += 1
             report(case, found)
-        if (number + 1) % 1000 == 0:
+        if (number + 1) % 200 == 0:
             print(f"{number + 1} logs, {faults.total()} with faults, {time.monotonic() - began:.0f} s", flush=True)
     crew.end()
     told = ", ".join(f"exit code {code}: {count}" for code, count in sorted(counts.items()))
