@@ -9,7 +9,8 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import frozen
-from groundstation.estimators.inertial.coupled import coupled_variance, hindcast_coupled, run_coupled
+from groundstation.estimators.inertial.coupled import run_coupled
+from groundstation.estimators.inertial.coupled_forecast import coupled_variance, hindcast_coupled
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, run_filter
 from groundstation.estimators.inertial.hindcast import Hindcast, hindcast
 from groundstation.estimators.inertial.leads import MEMORY_S, built_up

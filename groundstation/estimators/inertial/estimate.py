@@ -14,7 +14,6 @@ from groundstation.estimators.inertial.azimuth import estimate_azimuth
 from groundstation.estimators.inertial.coupled import CoupledRun
 from groundstation.estimators.inertial.differences import Differences, differences, only_used, seconds_covered
 from groundstation.estimators.inertial.filter import (
-    PATIENCE_S,
     Epochs,
     FilterRun,
     Smoothed,
@@ -27,6 +26,7 @@ from groundstation.estimators.inertial.model import POSITION, STATES, ChannelMod
 from groundstation.estimators.inertial.navigation_start import navigation_start, stated_start
 from groundstation.estimators.inertial.noise import InsNoise, choose_class
 from groundstation.estimators.inertial.outages import Bridged, bridge_outages
+from groundstation.estimators.inertial.seams import PATIENCE_S
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import QUANTILES
 from groundstation.results.inertial import ChannelResult, InertialResult, NavigationStart, StateEstimate
@@ -267,10 +267,27 @@ def _findings(compared: Differences, run: FilterRun, result: InertialResult) -> 
             f"or the noise of INS class {result.ins_class} does not fit"
         )
         found.append(Finding("warn", "inertial.reopened", text, compared.gnss_topic, count=run.reopened))
+    found += _seam_findings(compared, run)
     if result.other_ins:
         text = f"INS errors are those of {result.ins_topic} only; not used: {', '.join(result.other_ins)}"
         found.append(Finding("info", "inertial.other_ins", text, count=len(result.other_ins)))
     return [*found, *_outage_findings(compared, result)]
+
+
+def _seam_findings(compared: Differences, run: FilterRun) -> list[Finding]:
+    """One finding for each outage at whose end GNSS was beyond the gate and used, or one for all where many are."""
+    time_s, found = run.epochs.time_s, []
+    says = "agrees with itself but not with the forecast: used, sigma through the outage times"
+    if len(run.seams) > OUTAGES_LISTED:
+        worst = max(run.seams, key=lambda seam: seam.factor)
+        text = f"GNSS after {len(run.seams)} outages {says} up to {worst.factor:.1f}"
+        place = f"largest at {time_s[worst.back]:.1f} s"
+        return [Finding("warn", "inertial.seam", text, compared.gnss_topic, place, len(run.seams))]
+    for seam in run.seams:
+        length_s = time_s[seam.first] - time_s[seam.last]
+        text = f"GNSS after {length_s:.0f} s without it {says} {seam.factor:.1f}"
+        found.append(Finding("warn", "inertial.seam", text, compared.gnss_topic, f"at {time_s[seam.back]:.1f} s"))
+    return found
 
 
 def _outage_findings(compared: Differences, result: InertialResult) -> list[Finding]:
