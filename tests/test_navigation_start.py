@@ -13,6 +13,7 @@ from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.chapters import inertial as chapter
 from groundstation.cli.main import app
+from groundstation.estimators.fleet.ins_errors import ins_errors
 from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
 from groundstation.estimators.known import AircraftData
 from groundstation.pipeline.many_flights.acceptance import accept
@@ -81,11 +82,29 @@ def test_a_standstill_with_ins_and_gnss_together_is_a_start() -> None:
     assert found.radial_error_rate_50_nmiph == pytest.approx(RATE_NMIPH, rel=0.02)  # scale of the sphere
 
 
+def test_the_headline_is_the_fit_of_the_acceptance() -> None:
+    """Slope through the origin over all epochs: what the acceptance finds in the saved arrays of the same flight."""
+    found = result(flight_from_stand(offset_m=10.0))
+    states, track = (
+        next(part for part in found.figures if part.name == f"inertial_{name}") for name in ("states", "track")
+    )
+    errors = ins_errors(
+        states["time_s"],
+        *(states[f"measured_{channel}_position_m"] for channel in ("north", "east")),
+        *(track[f"ins_{name}_deg"] for name in ("latitude", "longitude")),
+        start_s=start_of(found)[0],
+    )
+    assert errors is not None and found.radial_error_rate_50_nmiph is not None
+    assert found.radial_error_rate_fit_nmiph == pytest.approx(errors.values()["radial_rate_fit_nmiph"], rel=1e-3)
+    assert found.radial_error_rate_fit_nmiph != pytest.approx(found.radial_error_rate_50_nmiph, rel=1e-3)
+
+
 @pytest.mark.parametrize("begin_s", [STAND_S + 10.0, 900.0, 2700.0])
 def test_a_log_that_begins_in_motion_has_no_rate_but_its_growth(begin_s: float) -> None:
     found = result(begun_at(flight_from_stand(), begin_s))
     assert start_of(found) == (None, "unknown")
-    assert found.radial_error_rate_50_nmiph is None and found.radial_error_rate_95_nmiph is None
+    rates = [getattr(found, f"radial_error_rate_{kind}_nmiph") for kind in ("50", "95", "fit")]
+    assert rates == [None, None, None]
     hours = (LENGTH_S - begin_s) / S_PER_H
     assert found.compared_hours == pytest.approx(hours, abs=0.001)
     assert found.radial_error_first_m is not None and found.radial_error_last_m is not None
@@ -209,5 +228,6 @@ def test_a_real_ins_whose_log_begins_in_the_air_has_its_rate_by_a_stated_start(t
         call = ["run", str(log), "-o", str(tmp_path / name), "--only", "results", *more]
         assert CliRunner().invoke(app, call).exit_code == 0
         (summary,) = (tmp_path / name).glob("*/summary.json")
-        rates[name] = json.loads(summary.read_text())["results"]["inertial"]["radial_error_rate_50_nmiph"]
-    assert rates == {"alone": None, "stated": pytest.approx(0.65, abs=0.006)}
+        found = json.loads(summary.read_text())["results"]["inertial"]
+        rates[name] = [found[f"radial_error_rate_{kind}_nmiph"] for kind in ("50", "fit")]
+    assert rates == {"alone": [None, None], "stated": pytest.approx([0.65, 0.61], abs=0.006)}
