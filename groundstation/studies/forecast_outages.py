@@ -1,6 +1,8 @@
 """Flights with outages in the log: the smoother inside them, the forecasts through and after them, and their bands."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from zlib import crc32
 
@@ -20,6 +22,7 @@ from groundstation.estimators.inertial.start_covariance import lead_growth
 from groundstation.results.figures import FigureData
 from groundstation.simulation.inertial_family import simulate_family
 from groundstation.studies.forecast_cases import NO_GATE, Case, differences_of, epochs_of, model_of
+from groundstation.studies.forecast_runs import WORKERS, mean_known
 
 FIRST_S, LENGTHS_S, BETWEEN_S = 3600.0, (60.0, 3600.0), (900.0, 1800.0)
 AFTER_MIN = (10.0, 30.0, 60.0)
@@ -59,7 +62,8 @@ class OutageOutcome:
 def outages_of(time_s: FloatArray, seed: int, run: int) -> list[tuple[float, float]]:
     """Begin and end of the outages of a flight, seconds."""
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(run, crc32(b"outages"))))
-    found, begin = [], float(time_s[0]) + FIRST_S
+    begin = float(time_s[0]) + FIRST_S
+    found: list[tuple[float, float]] = []
     while True:
         length = float(np.exp(rng.uniform(*np.log(LENGTHS_S))))
         if begin + length + BETWEEN_S[0] > time_s[-1]:
@@ -93,13 +97,16 @@ def fly_with_outages(case: Case, run: int, settings: InertialSettings) -> Outage
     runs = (flown, run_filter(whole, model, case.noise, gate=case.gate))
     after = [_after(*pair, at, whole, settings) for pair in zip(runs, coupled, strict=True)]
     return OutageOutcome(
-        len(gaps),
-        len(flown.seams),
-        flown.reopened,
-        *rms,
-        *inside,
-        _through(flown, coupled[0], gaps, whole, settings),
-        *after,
+        outages=len(gaps),
+        seams=len(flown.seams),
+        reopened=flown.reopened,
+        smoothed_m=rms[0],
+        free_m=rms[1],
+        inside=inside[0],
+        free_inside=inside[1],
+        through=_through(flown, coupled[0], gaps, whole, settings),
+        after=after[0],
+        undisturbed=after[1],
     )
 
 
@@ -149,7 +156,17 @@ def _after(
     return np.where(count > 0, (inside & known).sum(axis=(0, 2)) / np.maximum(count, 1), np.nan)
 
 
-def outage_table(outcomes: dict[str, Sequence[OutageOutcome]]) -> FigureData:
+def fly_outages(cases: Sequence[Case], runs: int, settings: InertialSettings) -> dict[str, list[OutageOutcome]]:
+    """Fly so many flights of every case that stands for real ones, with outages in their logs."""
+    chosen = [case for case in cases if case.is_held_out]
+    with ThreadPoolExecutor(min(WORKERS, os.cpu_count() or 1)) as pool:
+        return {
+            case.name: list(pool.map(lambda run, case=case: fly_with_outages(case, run, settings), range(runs)))
+            for case in chosen
+        }
+
+
+def outage_table(outcomes: Mapping[str, Sequence[OutageOutcome]]) -> FigureData:
     """One row a case: means over flights of the coverages, RMS over flights of the smoother's errors."""
     names = (
         *(
@@ -175,7 +192,7 @@ def outage_table(outcomes: dict[str, Sequence[OutageOutcome]]) -> FigureData:
         counts = (sum(getattr(one, name) for one in several) for name in ("outages", "seams", "reopened"))
         inside = (float(np.mean([getattr(one, name) for one in several])) for name in ("inside", "free_inside"))
         through = float(np.mean(np.concatenate([one.through for one in several])))
-        after = [np.nanmean([getattr(one, name) for one in several], axis=0) for name in ("after", "undisturbed")]
+        after = [mean_known(np.array([getattr(one, name) for one in several])) for name in ("after", "undisturbed")]
         rows.append((case, len(several), *counts, smoothed, smoothed / free, *inside, through, *np.concatenate(after)))
     columns = {name: np.array([row[place] for row in rows]) for place, name in enumerate(names)}
     return FigureData("forecast_outages", columns, {"smoothed_m": 1} | dict.fromkeys(names[6:], 3))
