@@ -147,6 +147,7 @@ def inertial_result(duration_s: float = LONG_S, **changes: Any) -> InertialResul
         east=channel_result("east"),
         radial_error_rate_50_nmiph=0.41,
         radial_error_rate_95_nmiph=1.32,
+        radial_error_rate_fit_nmiph=0.37,
         velocity_error_rms_mps=0.87,
         largest_radial_error_m=2140.0,
         navigation_start=NavigationStart(
@@ -176,6 +177,7 @@ AIDED: dict[str, Any] = {
     "azimuth": None,
     "radial_error_rate_50_nmiph": None,
     "radial_error_rate_95_nmiph": None,
+    "radial_error_rate_fit_nmiph": None,
     "velocity_error_rms_mps": None,
     "largest_radial_error_m": None,
     "navigation_start": None,

@@ -77,7 +77,7 @@ def test_every_figure_is_drawn_in_its_order_and_names_its_arrays() -> None:
 
 def test_drift_and_error_after_an_hour_stand_on_the_front(tmp_path: Path) -> None:
     told = told_above(tmp_path)
-    assert told.headline.replace("\u202f", " ") == "Unaided INS, drifts 0.41 nmi/h"
+    assert told.headline.replace("\u202f", " ") == "Unaided INS, drifts 0.37 nmi/h"
     (tile,) = told.others
     assert tile.claim.value.replace("\u202f", " ") == "483 m"
     assert "raw INS 1790 m" in tile.claim.remark.replace("\u202f", " ")

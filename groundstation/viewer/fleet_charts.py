@@ -28,8 +28,8 @@ VERDICTS: Final[dict[str, Colour]] = {
     "undecided": colours.GREY,
     "not assessed": colours.DIM,
 }
-HEADING, RATE = "error_deg", "radial_error_rate_50_nmiph"
-TITLES = {HEADING: "Heading error ± 95 %, deg", RATE: "INS radial error rate (50 %), nmi/h"}
+HEADING, RATE = "error_deg", "radial_error_rate_fit_nmiph"
+TITLES = {HEADING: "Heading error ± 95 %, deg", RATE: "INS radial error rate, nmi/h"}
 PATHS = {HEADING: "heading_error", RATE: "radial_error_rate"}
 DOT, MARK, THIN = 3.5, 6.0, 1.0
 MOST_IN_LEGEND = 8

@@ -46,7 +46,7 @@ MAIN = re.compile(
     r"status|flight\.duration_s"
     r"|heading\.(verdict|error_deg|standard_error_deg|confidence95_(low|high)_deg|precision_deg|correction_deg|samples"
     r"|taxi_seconds|drift_deg_per_h|lever_arm_m|parking_heading_deg|reference_residual_arcmin)"
-    r"|inertial\.(kind|radial_error_rate_\d\d_nmiph|velocity_error_rms_mps|azimuth\.error_deg)"
+    r"|inertial\.(kind|radial_error_rate_(fit|\d\d)_nmiph|velocity_error_rms_mps|azimuth\.error_deg)"
     r"|inertial\.(north|east)\.states\.[^.]+\.value"
     r"|(magnetic|landing)\.verdict|forecast\.default_method"
     r"|cooperative\.default_algorithm"
