@@ -14,7 +14,8 @@ LEAST_DRAWS = 100  # of a posterior of eleven parameters
 LIMITS = frozenset(  # settings that bound a gate and choose no data: a change of them needs no log
     {
         *("geometry_share_min", "integrity_share_min", "speed_of_mean_max_mps", "outlier_share_max"),
-        *("precision_max_deg", "quality_max_deg", "half_width_max_deg", "whole_half_width_max_deg", "whole_decides"),
+        *("precision_max_deg", "quality_max_deg", "half_width_max_deg", "whole_half_width_max_deg"),
+        *("precision_decides", "half_width_decides", "whole_decides"),
         *("skewness_max", "excess_kurtosis_range", "normal_distance_max", "variance_ratio_range", "drift_sigmas_max"),
     }
 )
@@ -68,8 +69,11 @@ class HeadingSettings:
     precision_max_deg: float = number(0.05, 0.0)  # paper: e
     quality_max_deg: float = number(0.3, 0.0)  # paper
     half_width_max_deg: float = number(0.2, 0.0)  # of what this taxi shows: 20 arcmin is then more than three sigma
-    whole_half_width_max_deg: float = number(1.0 / 3.0, 0.0)  # steady sideslip in it: 20 arcmin
-    whole_decides: bool = True  # whether the latter is required: nothing is accepted that steady terms may spoil
+    whole_half_width_max_deg: float = number(1.0 / 3.0, 0.0)  # taxi, wind and installation: 20 arcmin
+    # Which of the three are required (docs/decisions/011): the last holds what the others measure.
+    precision_decides: bool = False
+    half_width_decides: bool = False
+    whole_decides: bool = True
     skewness_max: float = number(0.5, 0.0)
     excess_kurtosis_range: tuple[float, float] = (-1.2, 2.0)
     normal_distance_max: float = number(0.08, 0.0)
