@@ -146,3 +146,28 @@ def test_crew_runs_are_the_same_again_and_make_a_table() -> None:
     assert found == run_crew(4001, 0)
     table = crew_table([found])
     assert (list(table["kind"]), list(table["runs"])) == (["one way, METAR"], [1])
+
+
+def test_one_engine_is_held_where_it_is_stated_alone() -> None:
+    """Run 7: the sideslip of one engine is the same there and back, and the interval does not hold it."""
+    from groundstation.studies.heading_crew import run_crew
+
+    found, stated = run_crew(4001, 7), run_crew(4001, 7, "one engine, stated")
+    assert found.error_arcmin == pytest.approx(stated.error_arcmin, abs=0.1), "the same taxi"
+    assert (found.is_inside, stated.is_inside) == (False, True)
+    assert stated.verdict != "accept"
+
+
+def test_the_study_of_verdicts_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
+    """Runs of its eleven kinds by turns; the time is over before the second turn, and none is made again."""
+    from groundstation.pipeline.verbs.kept_runs import KeptRuns
+    from groundstation.studies.heading_crew import ALL_KINDS, CrewOutcome, study_crew
+
+    told: list[str] = []
+    for _ in range(2):
+        kept = KeptRuns(tmp_path, CrewOutcome)
+        study = study_crew(2, 4001, told.append, kept=kept, minutes=1e-9)
+    assert len(told) == len(ALL_KINDS)
+    table = next(one for one in study.tables if one.name == "heading_crew")
+    assert list(table["kind"]) == list(ALL_KINDS) and set(table["runs"]) == {1}
+    assert "one engine, stated" in study.markdown

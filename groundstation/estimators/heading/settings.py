@@ -102,6 +102,7 @@ class HeadingSettings:
     wind_sigma_mps: float = number(1.5, 0.0)  # of either component, where it is known
     weather_max_min: float = number(60.0, 0.0)  # a METAR line is no nearer to the taxi than that: not used
     steady_sideslip_sigma_deg: float = number(0.05, 0.0)  # the same in every direction
+    uneven_power_sigma_deg: float = number(0.3, 0.0)  # the same, where the aircraft file says that power is uneven
     mounting_sigma_deg: float = number(0.1, 0.0)  # of the platform's number alone
 
     # Honest interval

@@ -117,14 +117,16 @@ def steady_prior(
     usual = float(np.hypot(factor, factor_sigma))
     along = usual * (settings.ordinary_wind_mps if wind is None else wind.sigma_mps)
     same, mounting = aircraft.steady_sideslip_sigma_deg, aircraft.mounting_sigma_deg
+    same_sigma_deg = settings.steady_sideslip_sigma_deg if same is None else same
+    is_uneven = aircraft.taxi_power == "uneven"
     return SteadyPrior(
         factor=factor,
         factor_sigma=factor_sigma,
         along_sigma_deg=stated if stated is not None and wind is None else along,
-        same_sigma_deg=settings.steady_sideslip_sigma_deg if same is None else same,
+        same_sigma_deg=max(same_sigma_deg, settings.uneven_power_sigma_deg) if is_uneven else same_sigma_deg,
         mounting_deg=aircraft.mounting_deg,
         mounting_sigma_deg=settings.mounting_sigma_deg if mounting is None else mounting,
-        is_stated=any(one is not None for one in (aircraft.sideslip_sigma_deg, same, mounting)),
+        is_stated=is_uneven or any(one is not None for one in (aircraft.sideslip_sigma_deg, same, mounting)),
         aircraft_class=kind,
         wind=wind,
     )
