@@ -139,6 +139,26 @@ def test_what_is_no_straight_taxi_is_refused(kind: str) -> None:
     assert [one.verdict for one in outcomes if one.verdict == "accept" and not one.is_inside] == []
 
 
+def test_the_wide_family_has_its_winds_and_half_of_the_runs_state_them() -> None:
+    """Wind from the left turns the nose left of the path; the cells with a sideslip of their own have no other."""
+    from groundstation.base.metar import metar_wind
+    from groundstation.simulation.taxi_disturbance import CLASS_FACTORS, KINDS, OWN_CRAB, Disturbance, draw_wind
+
+    rng = np.random.default_rng(1)
+    drawn = [draw_wind(rng, Disturbance(KINDS[k % len(KINDS)])) for k in range(1400)]
+    windy = [one for one in drawn if one.kind not in OWN_CRAB]
+    assert all(one.factor == 0.0 and not one.metar for one in drawn if one.kind in OWN_CRAB)
+    assert np.mean([bool(one.metar) for one in windy]) == pytest.approx(0.5, abs=0.05)
+    assert np.std([one.wind_mps for one in windy]) == pytest.approx(3.6, rel=0.05)
+    assert {one.aircraft_class for one in windy} == {"", *CLASS_FACTORS}
+    reported = [(metar_wind(one.metar), one.wind_mps) for one in windy if one.metar]
+    off_mps = [(said.north_mps - true[0], said.east_mps - true[1]) for said, true in reported if said]
+    assert len(off_mps) == len(reported) and np.std(off_mps) == pytest.approx(1.5, rel=0.1)
+    from_left = Disturbance(factor=0.027, wind_mps=(0.0, 10.0))  # northbound, the air moves east
+    track_deg = np.array([0.0, 90.0, 180.0])
+    assert from_left.sideslip(rng, track_deg, 0.0, 0.1) == pytest.approx([-0.27, 0.0, 0.27])
+
+
 def test_crew_runs_are_the_same_again_and_make_a_table() -> None:
     from groundstation.studies.heading_crew import crew_table, run_crew
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
-from groundstation.base.metar import MPS_PER
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.settings import HeadingSettings
@@ -18,7 +17,7 @@ from groundstation.estimators.known import AircraftClass, AircraftData
 from groundstation.results.figures import FigureData
 from groundstation.simulation.processes import damped_oscillation
 from groundstation.simulation.taxi import TaxiCase, TaxiRun, draw_case, simulate_taxi, taxi_flight
-from groundstation.simulation.taxi_disturbance import Disturbance
+from groundstation.simulation.taxi_disturbance import Disturbance, metar_line
 from groundstation.studies.page import StudyResult, section, table
 from groundstation.tables.phases import flight_phases
 
@@ -83,7 +82,7 @@ def run_crew(seed: int, number: int, kind: Kind | None = None) -> CrewOutcome:
     lines: tuple[str, ...] = ()
     if kind not in NOTHING_STATED:
         stated = replace(stated, aircraft_class=flown, taxi_power="uneven" if kind == "one engine, stated" else "")
-        lines = () if kind == "one way, class alone" else (_metar(wind_mps + rng.normal(0.0, 1.5, 2)),)
+        lines = () if kind == "one way, class alone" else (metar_line(wind_mps + rng.normal(0.0, 1.5, 2)),)
     flight = taxi_flight(run)
     found = estimate_heading_error(flight, aircraft=stated, phases=flight_phases(flight), weather=lines)
     platform_deg = run.error_at(found.reference_time_s or 0.0)
@@ -120,13 +119,6 @@ def _case(rng: np.random.Generator, kind: Kind) -> TaxiCase:
         white_mps=float(rng.uniform(0.01, 0.04)),
         is_arm_known=True,
     )
-
-
-def _metar(wind_mps: FloatArray) -> str:
-    """A line with this wind, velocity north and east, to 10 deg and 1 kt, of the time of the simulated flights."""
-    knots = round(float(np.hypot(*wind_mps)) / MPS_PER["KT"])
-    tens = round(float(np.rad2deg(np.arctan2(-wind_mps[1], -wind_mps[0]))) / 10.0) % 36 or 36
-    return f"METAR XXXX 040600Z {10 * tens if knots else 0:03d}{knots:02d}KT 9999 FEW030 12/05 Q1013="
 
 
 def _changed(run: TaxiRun, kind: Kind, rng: np.random.Generator, same_deg: float, mounting_deg: float) -> TaxiRun:
