@@ -266,6 +266,19 @@ def test_pdop_stands_in_for_gdop_and_is_named(flight: Flight) -> None:
     assert found.verdict == "accept"
 
 
+def test_the_receivers_own_sigma_stands_in_where_no_dilution_is_logged(flight: Flight) -> None:
+    """In motion alone: at standstill the noise is measured, whatever the receiver says of it."""
+    bare = without_column(flight, "gnss", "gdop")
+    still = flight.time_s("gnss") < 55.0
+    good = estimate(with_column(bare, "gnss", "velocity_sigma_mps", np.where(still, 0.19, 0.06)))
+    gate = gate_of(good, "geometry")
+    assert (gate.value, gate.state, good.verdict) == (1.0, "passed", "accept")
+    assert "velocity sigma of the receiver at most 0.1 m/s" in gate.title and gate.reason == "largest 0.06"
+    often = np.random.default_rng(0).random(len(still)) < 0.3
+    coarse = estimate(with_column(bare, "gnss", "velocity_sigma_mps", np.where(often, 0.3, 0.06)))
+    assert (gate_of(coarse, "geometry").state, coarse.verdict) == ("failed", "reject")
+
+
 def test_integrity_gate(flight: Flight) -> None:
     good = np.random.default_rng(0).random(len(flight["gnss"])) > 0.3
     assert gate_of(estimate(with_column(flight, "gnss", "integrity_ok", good)), "integrity").state == "failed"

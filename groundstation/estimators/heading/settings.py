@@ -30,6 +30,7 @@ class HeadingSettings:
 
     # Throughout
     geometry_max: float = number(2.0, 0.0)  # geometric factor (paper)
+    velocity_sigma_max_mps: float = number(0.1, 1e-6)  # receiver's own, without any such factor: the paper's noise
     geometry_share_min: float = number(0.9, 0.0, 1.0)  # of the epochs that would otherwise be used
     integrity_share_min: float = number(0.9, 0.0, 1.0)
     heading_gap_max_s: float = number(1.5, 0.0)  # INS heading is interpolated over no longer gap

@@ -10,7 +10,7 @@ from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.checks import Disagreement, VarianceRatio
 from groundstation.estimators.heading.gating import NOT_TAXI, is_straight_and_fast
 from groundstation.estimators.heading.normality import Normality, normality_limits
-from groundstation.estimators.heading.samples import Samples
+from groundstation.estimators.heading.samples import VELOCITY_SIGMA, Samples
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.wording import told
 from groundstation.results.heading import Bound, Gate, HeadingResult, HeadingStep, Standstill, Verdict, judged_gate
@@ -116,15 +116,19 @@ def _throughout_gates(
     )
     geometry, integrity = samples.geometry[judged], samples.integrity[judged]
     geometry, integrity = geometry[np.isfinite(geometry)], integrity[np.isfinite(integrity)]
-    name = samples.geometry_name or "GDOP"
+    is_sigma = samples.geometry_name == VELOCITY_SIGMA
+    most = settings.velocity_sigma_max_mps if is_sigma else settings.geometry_max
+    geometry = geometry * (most / settings.geometry_max)
+    limit = f"at most {most:g} m/s" if is_sigma else f"at most {most:g}"
+    name = f"{VELOCITY_SIGMA} of the receiver" if is_sigma else samples.geometry_name or "GDOP"
     changes = figures.mode_changes
     return (
         judged_gate(
             bounds["geometry"],
             "geometry",
-            f"share of straight taxi with {name} at most {settings.geometry_max:g}",
-            float(np.mean(geometry <= settings.geometry_max)) if len(geometry) else None,
-            reason=f"largest {np.max(geometry):.2f}" if len(geometry) else "no GDOP, PDOP or HDOP in the log",
+            f"share of straight taxi with {name} {limit}",
+            float(np.mean(geometry <= most)) if len(geometry) else None,
+            reason=f"largest {np.max(geometry):.3g}" if len(geometry) else "no GDOP, PDOP or HDOP in the log",
         ),
         judged_gate(
             bounds["integrity"],
@@ -341,8 +345,7 @@ def _is_curable(gate: Gate, standstill: Standstill | None, settings: HeadingSett
 
 def _is_mostly_steady(gates: tuple[Gate, ...]) -> bool:
     """Whether wind and installation are a larger part of the whole interval than this taxi."""
-    width = {gate.name: gate.value for gate in gates}
-    whole, alone = width.get(WHOLE), width.get(TAXI_ALONE)
+    whole, alone = (next((gate.value for gate in gates if gate.name == name), None) for name in (WHOLE, TAXI_ALONE))
     return whole is None or alone is None or whole**2 >= 2.0 * alone**2
 
 
