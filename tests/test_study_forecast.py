@@ -246,9 +246,8 @@ def test_a_flight_with_outages_is_smoothed_as_well_as_without_a_gate() -> None:
 
 def test_every_study_is_listed_and_no_other_is_run(tmp_path: Path) -> None:
     listed = [entry["name"] for entry in catalogue() if entry["kind"] == "study"]
-    assert (
-        listed == list(STUDIES) == ["heading", "forecast", "magnetic", "cooperative", "control", "landing", "approach"]
-    )
-    with pytest.raises(UsageError, match="one of heading, forecast, magnetic"):
+    names = ["heading", "crew", "forecast", "magnetic", "cooperative", "control", "landing", "approach"]
+    assert listed == list(STUDIES) == names
+    with pytest.raises(UsageError, match="one of heading, crew, forecast, magnetic"):
         study_to("weather", tmp_path / "out", runs=10, seed=1, force=False, listen=lambda event: None)
     assert not (tmp_path / "out").exists()

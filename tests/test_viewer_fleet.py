@@ -31,7 +31,7 @@ DRAWN_IN_COLOUR = {"TimeSeries", "StateTimeline", "BarChart", "2D"}
 
 def changed(fleet: FleetResults, **columns: np.ndarray) -> FleetResults:
     """The same fleet with other columns in its table of flights."""
-    return replace(fleet, flights=replace(fleet.flights, columns={**fleet.flights.columns, **columns}))
+    return replace(fleet, flights=FigureData("flights", {**fleet.flights.columns, **columns}, fleet.flights.digits))
 
 
 def untimed(fleet: FleetResults, first: int) -> FleetResults:

@@ -8,6 +8,7 @@ import numpy as np
 import rerun.blueprint as rrb
 
 from groundstation.base.records import BoolArray, Int64Array
+from groundstation.results.figures import numbers
 from groundstation.results.fleet import FleetResults
 from groundstation.viewer import colours
 from groundstation.viewer.chart import Axis, Chart
@@ -16,7 +17,7 @@ from groundstation.viewer.fleet_recorder import FleetRecorder
 from groundstation.viewer.names import clean_text, path_parts, words
 from groundstation.viewer.recorder import Line
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.views import lanes, numbers, plot
+from groundstation.viewer.views import lanes, plot
 
 UNNAMED = "aircraft not named"
 VERDICTS: Final[dict[str, Colour]] = {
