@@ -1,4 +1,4 @@
-"""The bank of noise sets on the coupled model, flown to decide on the default forecast: docs/decisions/011."""
+"""The bank of noise sets on the coupled model, flown to decide on the default forecast: docs/decisions/012."""
 
 import os
 from collections.abc import Mapping, Sequence
