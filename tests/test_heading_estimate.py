@@ -503,7 +503,7 @@ def test_unknown_topic_is_named(flight: Flight) -> None:
 FIGURES = {
     "heading_samples": (
         *("time_s", "segment", "heading_deg", "track_deg", "ground_speed_mps"),
-        *("difference_deg", "residual_deg", "used", "gate", "weight"),
+        *("difference_deg", "residual_deg", "is_used", "gate", "weight"),
     ),
     "heading_lanes": ("start_s", "end_s", "state"),
     "heading_running": (
@@ -512,7 +512,7 @@ FIGURES = {
     "heading_distribution": ("bin_low_deg", "bin_high_deg", "density_per_deg"),
     "heading_normal": ("difference_deg", "density_per_deg"),
     "heading_growth": ("step", "time_s", "bin_center_deg", "density_per_deg"),
-    "standstill_velocity": ("time_s", "velocity_north_mps", "velocity_east_mps", "in_interval"),
+    "standstill_velocity": ("time_s", "velocity_north_mps", "velocity_east_mps", "is_in_interval"),
     "standstill_mean_speed": ("window_s", "speed_of_mean_mps", "density_per_mps"),
     "heading_spectrum": ("frequency_hz", "density_deg2_per_hz", "model_deg2_per_hz"),
 }
@@ -525,9 +525,9 @@ def test_figures_have_their_columns(result: HeadingResult) -> None:
 def test_figures_agree_with_the_answer(result: HeadingResult) -> None:
     figures = {figure.name: figure for figure in result.figures}
     samples, running = figures["heading_samples"], figures["heading_running"]
-    assert int(samples["used"].sum()) == result.samples == len(running)
+    assert int(samples["is_used"].sum()) == result.samples == len(running)
     assert float(running["mean_deg"][-1]) == pytest.approx(result.paper_error_deg)
-    assert float(np.mean(samples["weight"][samples["used"]])) == pytest.approx(1.0)
+    assert float(np.mean(samples["weight"][samples["is_used"]])) == pytest.approx(1.0)
     low, high = result.confidence95_deg
     assert float(running["honest_half_width_deg"][-1]) == pytest.approx(0.5 * (high - low), rel=0.1)
     bins = figures["heading_distribution"]
@@ -648,7 +648,7 @@ def test_the_take_off_run_is_not_taxi() -> None:
     found = disturbed(Disturbance(take_off_crab_deg=2.0))
     figure, gate = figure_of(found, "heading_samples"), gate_of(found, "not_taxi")
     assert int(np.sum(figure["gate"] == "take-off run")) > 20
-    assert not np.any(figure["used"] & (figure["ground_speed_mps"] > 12.0))
+    assert not np.any(figure["is_used"] & (figure["ground_speed_mps"] > 12.0))
     assert gate.value is not None and gate.value > 0.0 and not gate.required
     assert found.error_deg == pytest.approx(CASE.heading_error_deg, abs=0.2)
 

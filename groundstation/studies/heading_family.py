@@ -12,6 +12,8 @@ from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.known import AircraftClass, AircraftData
+from groundstation.results.arrays.heading import HeadingRunning
+from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult
 from groundstation.simulation.taxi import Family, TaxiCase, draw_run, taxi_flight
@@ -92,11 +94,12 @@ def run_once(family: Family, seed: int, number: int, settings: HeadingSettings |
 
 def outcome_of(number: int, case: TaxiCase, result: HeadingResult, truth_deg: float) -> RunOutcome:
     """Set a result beside the true error of its run."""
-    running = next(figure for figure in result.figures if figure.name == "heading_running")
+    running = found_in(result.figures, HeadingRunning)
+    assert running is not None
     limit = next(gate.limit for gate in result.gates if gate.name == "precision")
-    above = np.flatnonzero(~(running["precision_deg"] <= limit))
+    above = np.flatnonzero(~(running.precision_deg <= limit))
     reached = int(above[-1]) + 1 if len(above) else 0
-    step_s = float(np.median(np.diff(running["time_s"])))
+    step_s = float(np.median(np.diff(running.time_s)))
     measured_deg = result.confidence95_measured_deg or result.confidence95_deg
     return RunOutcome(
         number=number,
