@@ -9,6 +9,7 @@ from groundstation.results.heading import Gate
 
 MagneticVerdict = Literal["accept", "reject", "undecided"]
 MethodName = Literal["compass_table", "poisson_attitude", "constant_modulus"]
+SourceName = Literal["taxi", "ground run", "turns"]
 MethodState = Literal["fitted", "refused"]
 TurnState = Literal["used", "rejected"]
 Vector = tuple[float, float, float]
@@ -23,13 +24,32 @@ ADVISORY = "Advisory, not a release to service."
 
 
 @dataclass(frozen=True)
+class AlignmentSource:
+    """One way in which the flight shows the INS heading error, at the time of the figure.
+
+    ``taxi``: the heading analysis; ``ground run``: the run to lift-off; ``turns``: azimuth by turns in flight, the
+    sigma of the mounting included. None where there is no number. ``at_s``: flight seconds at which it was seen.
+    ``reason``: why it is not used.
+    """
+
+    name: SourceName
+    error_deg: float | None
+    sigma_deg: float | None
+    at_s: float | None
+    is_used: bool
+    reason: str = ""
+    verdict: str = ""
+
+
+@dataclass(frozen=True)
 class Alignment:
     """INS heading error at the time of the figure, taken off the INS heading before anything is compared with it.
 
     ``aligned_error_deg`` and ``aligned_sigma_deg`` belong to ``aligned_at_s``, ``error_deg`` and ``sigma_deg`` to
     ``figure_at_s`` (flight seconds), after the drift of the hours between. ``origin`` says whence.
     ``speed_min_mps`` is the speed from which on the track may align. ``gyro_*`` are the drifts along forward, right,
-    down at the standstill before flight and their sigmas; None where no rates are logged.
+    down at the standstill before flight and their sigmas; None where no rates are logged. ``sources`` lists every way
+    in which the flight shows the error. It is the airframe's, less the mounting that the aircraft file states.
     """
 
     origin: str
@@ -44,6 +64,11 @@ class Alignment:
     speed_min_mps: float | None = None
     gyro_drift_deg_per_h: Vector | None = None
     gyro_drift_sigma_deg_per_h: Vector | None = None
+    sources: tuple[AlignmentSource, ...] = ()
+
+    def source(self, name: SourceName) -> AlignmentSource | None:
+        """The source of a name."""
+        return next((one for one in self.sources if one.name == name), None)
 
 
 @dataclass(frozen=True)

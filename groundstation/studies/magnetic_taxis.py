@@ -236,20 +236,20 @@ def _heading_off(flight: Flight, added_deg: FloatArray) -> Flight:
 
 
 def _step(flight: Flight, rng: np.random.Generator) -> Flight:
-    """A step of U(0.3, 0.6) deg of the INS heading at U(0.3, 0.7) of the taxi."""
+    """A step of U(0.3, 0.6) deg of the INS heading at U(0.3, 0.7) of the taxi, to the error of the scenario."""
     begin_s, end_s = _taxi_s(flight)
     at_s = begin_s + rng.uniform(0.3, 0.7) * (end_s - begin_s)
     size = rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 0.6)
-    return _heading_off(flight, size * (flight.time_s("ins") >= at_s))
+    return _heading_off(flight, size * (flight.time_s("ins") < at_s))
 
 
 def _mode_change(flight: Flight, rng: np.random.Generator) -> Flight:
-    """The INS leaves alignment in the middle of the taxi; its heading settles by U(0.2, 0.6) deg over 20 s after it."""
+    """The INS leaves alignment in the middle of the taxi; over 20 s its heading settles to the scenario's."""
     begin_s, end_s = _taxi_s(flight)
     time_s, at_s = flight.time_s("ins"), begin_s + rng.uniform(0.5, 0.7) * (end_s - begin_s)
     size = rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 0.6)
     since_s = np.maximum(time_s - at_s, 0.0)
-    settled = _heading_off(flight, -size * np.expm1(-since_s / 20.0))
+    settled = _heading_off(flight, size * np.exp(-since_s / 20.0))
     return _changed(settled, "ins", mode=np.where(time_s >= at_s, "nav", "align"))
 
 
