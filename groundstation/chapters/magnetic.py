@@ -28,6 +28,7 @@ from groundstation.results.magnetic import (
     LETTERS,
     METHOD_TITLES,
     Alignment,
+    ConditionName,
     MagneticResult,
     Method,
     PoissonParameters,
@@ -51,6 +52,11 @@ MEANING = {
     "E": "quadrantal, cos: oblique soft iron",
 }
 MOST_TURNS = 24
+CONDITIONS: dict[ConditionName, str] = {
+    "pitch": "1° more pitch",
+    "ground": "On the ground",
+    "gain": "Drift of the gains",
+}
 
 
 def magnetic(results: FlightResults) -> Section | None:
@@ -63,6 +69,7 @@ def magnetic(results: FlightResults) -> Section | None:
         *_conclusions(answer),
         _coefficients(answer),
         _card(answer),
+        _other_conditions(answer),
         Note("Card to print, and every degree for programs:", files=(STEER_CARD, DEVIATION_CSV)),
         Figure("magnetic.deviation"),
         gate_grid(answer.gates),
@@ -169,6 +176,22 @@ def _card(answer: MagneticResult) -> Grid | None:
         f"heading; add: the deviation, added to that reading.{starred} {ADVISORY}"
     )
     return Grid("Steer card", heads, rows, caption) if rows else None
+
+
+def _other_conditions(answer: MagneticResult) -> Grid | None:
+    """What the figure did not have, with its size, beside the table."""
+    rows = [
+        (
+            CONDITIONS[row.name],
+            f"{number(row.size_deg, 2)} ± {number(row.sigma_deg, 2)}",
+            number(row.largest_deg, 2),
+            sentence(row.told),
+        )
+        for row in answer.other_conditions
+    ]
+    heads = (Head("Condition"), Head("RMS, °", True), Head("Most, °", True), Head("In words"))
+    caption = "By how much the deviation is another than in the table above; nothing of it is corrected or in its σ."
+    return Grid("Where the table does not hold", heads, rows, caption) if rows else None
 
 
 def _methods(answer: MagneticResult) -> Grid:

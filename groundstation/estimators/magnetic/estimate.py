@@ -28,6 +28,7 @@ from groundstation.estimators.magnetic.methods import (
     method_rows,
     recommend,
 )
+from groundstation.estimators.magnetic.other_conditions import FlownConditions, other_conditions
 from groundstation.estimators.magnetic.poisson import IronFit, corrected_heading_deg
 from groundstation.estimators.magnetic.readings import Readings, choose_topics
 from groundstation.estimators.magnetic.remarks import remarks_on
@@ -157,6 +158,13 @@ def _answer(
         used, swings, coverage, alignment, residual, flown, method, shift.sigmas if shift else None, settings
     )
     verdict, reason = decide(gates)
+    conditions = FlownConditions(
+        readings,
+        is_airborne,
+        np.isin(np.arange(len(readings)), rows),
+        is_airborne & is_level(readings, settings),
+        fits.pitch_deg,
+    )
     card = deviation if method == "compass_table" else -_level_errors(fits)
     return MagneticResult(
         ins_topic=topics[0],
@@ -185,6 +193,9 @@ def _answer(
         modulus=_parameters(fits.modulus, a_sigma),
         table_fit_rms_deg=table.fit_rms_deg,
         attitude_wander_deg=fits.attitude_wander_deg,
+        other_conditions=other_conditions(
+            flight, conditions, fits.attitude, method, wander_deg=settings.attitude_wander_deg
+        ),
         settings={name: value for name, value in asdict(settings).items() if value is not None},
         figures=draw(readings, along, part, figures, fits, deviation, methods, (method, card)),
     )
