@@ -1,5 +1,6 @@
 """Chapter: magnetic deviation (system 3): verdict, coefficients, steer card, and what each correction leaves."""
 
+from groundstation.chapters.agreement import agreement_note
 from groundstation.chapters.assessed import reason_of
 from groundstation.chapters.gates import failed_to_inform, gate_grid, setting_facts
 from groundstation.chapters.magnetic_ground import LEAD as GROUND_LEAD
@@ -21,6 +22,7 @@ from groundstation.chapters.parts import (
     kept,
 )
 from groundstation.chapters.wording import ABSENT, clock, is_number, number, sentence, significant, typeset
+from groundstation.results.agreement import deviation_agreement
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.flight import FlightResults
 from groundstation.results.magnetic import (
@@ -67,6 +69,7 @@ def magnetic(results: FlightResults) -> Section | None:
     told = _claim(answer)
     parts: tuple[Part | None, ...] = (
         *_conclusions(answer),
+        agreement_note(deviation_agreement(results.answers)),
         _coefficients(answer),
         _card(answer),
         _other_conditions(answer),
