@@ -186,7 +186,7 @@ def _other_conditions(answer: MagneticResult) -> Grid | None:
     rows = [
         (
             CONDITIONS[row.name],
-            f"{number(row.size_deg, 2)} ± {number(row.sigma_deg, 2)}",
+            f"{number(row.size_deg, 3)} ± {number(row.sigma_deg, 3)}",
             number(row.largest_deg, 2),
             sentence(row.told),
         )

@@ -20,7 +20,6 @@ from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
 from groundstation.results.latency import Latencies
-from groundstation.results.magnetic import MagneticResult
 from groundstation.simulation.deviation import deviation_truth
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.legs import GroundTurn, Leg, Parked, Taxi
@@ -299,15 +298,3 @@ def _in_the_air(flight: Flight, _rng: np.random.Generator) -> Flight:
     from_ns = int(truth.time_ns[np.argmax(altitude > altitude[0] + 1.0)]) + 20 * 10**9
     kept = {topic: flight[topic].take(flight[topic].time_ns >= from_ns) for topic in flight.topics()}
     return replace(flight, tables=kept, start_ns=from_ns)
-
-
-def deviation_of(simulated: Simulated) -> MagneticResult:
-    """The deviation of a flight as the pipeline finds it.
-
-    Raises
-    ------
-    NotAssessableError
-        With the reason.
-    """
-    heading, inertial, latencies = _answers(simulated.flight)
-    return estimate_deviation(simulated.flight, heading=heading, inertial=inertial, latencies=latencies)

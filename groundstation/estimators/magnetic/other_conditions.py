@@ -65,9 +65,16 @@ def _pitch_flown(flown: FlownConditions) -> tuple[float, str]:
     parts = {"in level flight": flown.is_level & ~flown.in_figure, "on the ground": ~flown.is_airborne}
     seen = {name: flown.readings.pitch_deg[rows] for name, rows in parts.items() if np.count_nonzero(rows) > 1}
     ends = {name: np.quantile(values, (0.05, 0.95)) for name, values in seen.items()}
-    told = "".join(f", {low:+.1f} to {high:+.1f} {name}" for name, (low, high) in ends.items())
+    told = "".join(f", {_signed(low)} to {_signed(high)} {name}" for name, (low, high) in ends.items())
     every = np.concatenate([*ends.values(), [flown.pitch_deg]])
-    return float(every[np.argmax(np.abs(every - flown.pitch_deg))]), f"{flown.pitch_deg:+.1f} deg in the figures{told}"
+    return float(
+        every[np.argmax(np.abs(every - flown.pitch_deg))]
+    ), f"{_signed(flown.pitch_deg)} deg in the figures{told}"
+
+
+def _signed(value_deg: float) -> str:
+    """One decimal, without a negative zero."""
+    return f"{round(value_deg, 1) + 0.0:+.1f}"
 
 
 def _pitch_without_iron(flown: FlownConditions, earth: EarthField) -> OtherCondition:
@@ -96,7 +103,7 @@ def _pitch(flown: FlownConditions, fit: IronFit) -> OtherCondition:
     sigma = float(np.sqrt(harmonics.OVER_CIRCLE @ np.diag(slopes @ fit.covariance @ slopes.T)))
     farthest, told = _pitch_flown(flown)
     most = float(np.max(np.abs(change(fit.iron, farthest))))
-    text = f"pitch {told}: up to {most:.2f} deg at {farthest:+.1f} deg; {_of_levelling(fit.earth)}"
+    text = f"pitch {told}: up to {most:.2f} deg at {_signed(farthest)} deg; {_of_levelling(fit.earth)}"
     return OtherCondition("pitch", _rms(by_degree), sigma, float(np.max(np.abs(by_degree))), text)
 
 
