@@ -32,8 +32,10 @@ from groundstation.estimators.magnetic.gyros import EARTH_DEG_PER_H, GyroDrift, 
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.pipeline.one_flight import configuration as configured
 from groundstation.pipeline.one_flight.analyse import Given, analyse
+from groundstation.pipeline.one_flight.apply_deviation import ins_error_deg
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.results.flight import Source
+from groundstation.results.answer import Answer, by_analysis
+from groundstation.results.flight import FlightResults, Source
 from groundstation.results.heading import Gate, HeadingResult
 from groundstation.results.inertial import AzimuthEstimate, InertialResult
 from groundstation.results.magnetic import Alignment, MagneticResult
@@ -393,6 +395,24 @@ def test_a_correction_is_entered_where_its_value_changes_or_first_appears(before
     ]
     first = table("onboard", time_ns, {"correction_entered_deg": np.full(5, -1.0)})
     assert corrections_entered(Flight({"onboard": first}, {}, START_NS, True, "made.csv")) == []
+
+
+@pytest.mark.parametrize(
+    ("answers", "expected"),
+    [
+        ((failing("variance_ratio"),), -1.78),
+        ((failing("steps"),), 0.0),
+        ((failing("steps"), turned_by(0.5)), 0.5),
+        ((turned_by(0.5, ins_topic="ins.2"),), 0.0),
+        ((), 0.0),
+    ],
+)
+def test_what_another_flights_deviation_is_judged_by_is_what_aligns_too(
+    answers: tuple[Answer, ...], expected: float
+) -> None:
+    source = Source("flight.csv", "ab" * 32, 1, "flat-csv")
+    results = FlightResults("NOTIME_abababab", source, {}, None, 0.0, "ok", answers=by_analysis(*answers))
+    assert ins_error_deg(results, "ins") == expected
 
 
 # Gyros
