@@ -44,7 +44,7 @@ def flight_errors(motion: Trajectory, settings: InsSettings, seed: int) -> Fligh
     heading = heading_error_deg(time_s, settings)
     if settings.turns_velocity:
         turned = turned_velocity_error(time_s, motion.velocity_north_mps, motion.velocity_east_mps, settings)
-        north, east = (np.add(own, added) for own, added in zip((north, east), turned, strict=True))
+        north, east = ((own[0] + added[0], own[1] + added[1]) for own, added in zip((north, east), turned, strict=True))
     roll, pitch = (np.full(len(motion), error) for error in (settings.roll_error_deg, settings.pitch_error_deg))
     return FlightErrors((north[0], east[0]), (north[1], east[1]), heading, roll, pitch)
 

@@ -40,8 +40,7 @@ STAND, LINED_UP = Parked(40.0), Parked(5.0)
 TWO_WAYS = (Taxi(450.0, 10.0), GroundTurn(180.0), Taxi(450.0, 10.0))
 CORNER = (Taxi(400.0, 10.0), GroundTurn(90.0), Taxi(400.0, 10.0))
 LEGS_BEFORE_TAKE_OFF = 5  # of the family's flights
-QUIET = {"velocity_white_mps": 0.02, "velocity_correlated_mps": 0.005}
-NOISY = {"velocity_white_mps": 0.05, "velocity_correlated_mps": 0.03}
+QUIET_MPS, NOISY_MPS = (0.02, 0.005), (0.05, 0.03)  # velocity of the receiver: white, correlated over 3 s
 Spoil = Callable[[Flight, np.random.Generator], Flight]
 
 
@@ -50,7 +49,7 @@ class TaxiCell:
     """A taxi, a receiver, and what is spoilt in the log afterwards."""
 
     taxi: tuple[Leg, ...] = CORNER
-    receiver: tuple[tuple[str, float], ...] = tuple(QUIET.items())
+    receiver_mps: tuple[float, float] = QUIET_MPS
     spoil: Spoil | None = None
 
 
@@ -80,7 +79,7 @@ def taxi_cells() -> dict[str, TaxiCell]:
         "one way": TaxiCell((Taxi(800.0, 10.0),)),
         "short": TaxiCell((Taxi(130.0, 10.0),)),
         "no switch": TaxiCell(spoil=_without_switch),
-        "noisy receiver": TaxiCell(receiver=tuple(NOISY.items())),
+        "noisy receiver": TaxiCell(receiver_mps=NOISY_MPS),
         "multipath": TaxiCell(spoil=_multipath),
         "step": TaxiCell(spoil=_step),
         "mode change": TaxiCell(spoil=_mode_change),
@@ -207,7 +206,13 @@ def _drawn(cell: TaxiCell, seed: int) -> Scenario:
         turns_velocity=True,
     )
     ground = GroundMotion(sideslip_deg=float(rng.normal(0.0, STEADY_DEG)), crosswind_slip_deg_per_mps=factor)
-    gnss = GnssSettings(rate_hz=10.0, velocity_correlation_s=3.0, **dict(cell.receiver))
+    white_mps, correlated_mps = cell.receiver_mps
+    gnss = GnssSettings(
+        rate_hz=10.0,
+        velocity_white_mps=white_mps,
+        velocity_correlated_mps=correlated_mps,
+        velocity_correlation_s=3.0,
+    )
     legs = (STAND, *cell.taxi, LINED_UP, *drawn.legs[LEGS_BEFORE_TAKE_OFF:])
     return replace(drawn, legs=legs, ins=ins, ground=ground, gnss=gnss)
 

@@ -8,7 +8,7 @@ that the magnetometer is compared with. Azimuth by turns (system 2) is the platf
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.before_lift_off import GroundRuns
@@ -79,21 +79,25 @@ def align(
     sources = tuple(_told(one, carried[name], used) for name, (one, _) in listed.items())
     if not used:
         origin, sigma = f"not aligned: {_why_not(sources)}", settings.alignment_sigma_deg
-        return Alignment(
-            *(origin, 0.0, sigma, 0.0, sigma, 0.0, prior, None, figure_at_s, runs.speed_min_mps, *shown),
-            sources=sources,
-        )
+        unaligned = Alignment(origin, 0.0, sigma, 0.0, sigma, 0.0, prior, None, figure_at_s, runs.speed_min_mps, *shown)
+        return replace(unaligned, sources=sources)
     origin = " and ".join(_origin(one, runs) for one in used)
     weights = _weights([one.sigma_deg for one in used])
-    return Alignment(
-        *(origin, _mean(weights, [one.error_deg for one in used]), _sigma([one.sigma_deg for one in used])),
-        _mean(weights, [one.aligned_error_deg for one in used]),
-        math.sqrt(sum((part * one.aligned_sigma_deg) ** 2 for part, one in zip(weights, used, strict=True))),
-        _mean(weights, [one.drift_deg_per_h for one in used]),
-        _mean(weights, [one.drift_sigma_deg_per_h for one in used]),
-        *(_mean(weights, [one.at_s for one in used]), figure_at_s, runs.speed_min_mps, *shown),
-        sources=sources,
+    aligned = Alignment(
+        origin=origin,
+        error_deg=_mean(weights, [one.error_deg for one in used]),
+        sigma_deg=_sigma([one.sigma_deg for one in used]),
+        aligned_error_deg=_mean(weights, [one.aligned_error_deg for one in used]),
+        aligned_sigma_deg=_sigma_of_mean(weights, [one.aligned_sigma_deg for one in used]),
+        drift_deg_per_h=_mean(weights, [one.drift_deg_per_h for one in used]),
+        drift_sigma_deg_per_h=_mean(weights, [one.drift_sigma_deg_per_h for one in used]),
+        aligned_at_s=_mean(weights, [one.at_s for one in used]),
+        figure_at_s=figure_at_s,
+        speed_min_mps=runs.speed_min_mps,
+        gyro_drift_deg_per_h=shown[0],
+        gyro_drift_sigma_deg_per_h=shown[1],
     )
+    return replace(aligned, sources=sources)
 
 
 def against_heading(alignment: Alignment) -> float | None:
@@ -211,6 +215,10 @@ def _weights(sigmas: Sequence[float]) -> list[float]:
 
 def _sigma(sigmas: Sequence[float]) -> float:
     return 1.0 / math.sqrt(sum(sigma**-2 for sigma in sigmas))
+
+
+def _sigma_of_mean(weights: Sequence[float], sigmas: Sequence[float]) -> float:
+    return math.sqrt(sum((part * sigma) ** 2 for part, sigma in zip(weights, sigmas, strict=True)))
 
 
 def _mean(weights: Sequence[float], values: Sequence[float]) -> float:

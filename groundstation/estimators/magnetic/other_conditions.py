@@ -141,8 +141,8 @@ def _on_ground(flight: Flight, flown: FlownConditions, fit: IronFit) -> OtherCon
 def _current(flown: FlownConditions) -> str:
     """Currents on the ground and in the figures, where they are logged."""
     current = flown.readings.current_a
-    means = [current[rows] for rows in (~flown.is_airborne, flown.in_figure)]
-    means = [float(np.mean(part[np.isfinite(part)])) if np.isfinite(part).any() else float("nan") for part in means]
+    parts = [current[rows][np.isfinite(current[rows])] for rows in (~flown.is_airborne, flown.in_figure)]
+    means = [float(np.mean(part)) if part.size else float("nan") for part in parts]
     if not np.isfinite(means).all():
         return "no current in the log"
     return f"current {means[0]:.0f} A there, {means[1]:.0f} A in the figures"
