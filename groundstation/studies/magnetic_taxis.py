@@ -30,6 +30,7 @@ from groundstation.simulation.readings import generator
 from groundstation.simulation.scenario import GnssSettings, GroundMotion, Scenario
 from groundstation.simulation.trajectory import ANGLE_OF_ATTACK_DEG
 from groundstation.studies.magnetic_cases import JUDGED, seed_of
+from groundstation.tables.phases import flight_phases, ground_mask
 from groundstation.tables.table import Flight
 
 TAXIED = replace(JUDGED, wind_sigma_mps=3.6)
@@ -41,6 +42,7 @@ TWO_WAYS = (Taxi(450.0, 10.0), GroundTurn(180.0), Taxi(450.0, 10.0))
 CORNER = (Taxi(400.0, 10.0), GroundTurn(90.0), Taxi(400.0, 10.0))
 LEGS_BEFORE_TAKE_OFF = 5  # of the family's flights
 QUIET_MPS, NOISY_MPS = (0.02, 0.005), (0.05, 0.03)  # velocity of the receiver: white, correlated over 3 s
+QUALITY = frozenset({"gdop", "pdop", "hdop", "vdop", "tdop", "velocity_sigma_mps"})
 Spoil = Callable[[Flight, np.random.Generator], Flight]
 
 
@@ -190,7 +192,12 @@ def _answers(flight: Flight) -> tuple[HeadingResult | None, InertialResult | Non
     with suppress(NotAssessableError):
         latencies = estimate_latencies(flight)
     with suppress(NotAssessableError):
-        heading = estimate_heading_error(flight, latencies=latencies)
+        heading = estimate_heading_error(
+            flight,
+            on_ground=lambda time_ns: ground_mask(flight, time_ns),
+            latencies=latencies,
+            phases=flight_phases(flight),
+        )
     with suppress(NotAssessableError):
         inertial = estimate_ins_errors(flight).result
     return heading, inertial, latencies
@@ -218,7 +225,10 @@ def _drawn(cell: TaxiCell, seed: int) -> Scenario:
 
 
 def _without_switch(flight: Flight, _rng: np.random.Generator) -> Flight:
-    return replace(flight, tables={topic: flight[topic] for topic in flight.topics() if topic != "discrete"})
+    gnss = flight["gnss"]
+    bare = {name: column for name, column in gnss.columns.items() if name not in QUALITY}
+    tables = {topic: flight[topic] for topic in flight.topics() if topic != "discrete"}
+    return replace(flight, tables={**tables, "gnss": replace(gnss, columns=bare)})
 
 
 def _taxi_s(flight: Flight) -> tuple[float, float]:

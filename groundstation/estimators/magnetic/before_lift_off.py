@@ -16,6 +16,8 @@ from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.estimators.magnetic.entered import corrections_entered
 from groundstation.estimators.magnetic.gyros import GyroDrift, gyro_drift
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.results.arrays.heading import HeadingSamples
+from groundstation.results.arrays.typed import found_in
 from groundstation.results.heading import HeadingResult
 from groundstation.results.latency import Latencies
 from groundstation.tables.phases import Phases, ground_mask
@@ -197,10 +199,10 @@ def _speed_min_mps(part: Flight, basis: HeadingBasis, settings: MagneticSettings
 
 def _seconds(found: HeadingResult | None) -> float:
     """Seconds that the epochs used stand for."""
-    samples = next((figure for figure in found.figures if figure.name == "heading_samples"), None) if found else None
+    samples = found_in(found.figures, HeadingSamples) if found else None
     if samples is None:
         return 0.0
-    return int(np.count_nonzero(samples["used"])) * float(np.median(np.diff(samples["time_s"])))
+    return int(np.count_nonzero(samples.is_used)) * float(np.median(np.diff(samples.time_s)))
 
 
 def _estimated(

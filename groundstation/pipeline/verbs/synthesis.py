@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.many_flights.inputs import STUDY_MARK
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 STUDIES = {
     "heading": "heading correction before take-off: errors, coverage of the interval, figures of the paper repeated",
+    "crew": "heading verdicts on taxi in the wind: accepted, advisory, refused; both numbers; what is no straight taxi",
     "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
     "magnetic": "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
     "cooperative": "navigation between aircraft: published figures with ours beside them, divergence, consistency",
@@ -21,6 +22,8 @@ STUDIES = {
     "landing": "landing by reference points and by locators: every published figure with ours beside it",
     "approach": "recorded approaches: the localizer as a reference for positions, how honest its interval is",
 }
+
+RESUMED = ("heading", "crew")  # studies that keep their runs
 
 
 def simulate_to(
@@ -122,9 +125,9 @@ def study_to(
 ) -> str:
     """Run a study into a folder: ``<name>.md`` and tables/*.csv; returns the page's text.
 
-    With ``recorded``, a folder with sets of recorded robots, the cooperative study runs on these instead. The study of
-    the heading keeps its runs in ``runs/``: the same command goes on with them, ``minutes`` ends it before all are
-    made; ``force`` makes them afresh.
+    With ``recorded``, a folder with sets of recorded robots, the cooperative study runs on these. The studies of
+    the heading (heading, crew) keep their runs in ``runs/``: the same command goes on with them, ``minutes`` ends it
+    before all are made; ``force`` makes them afresh.
 
     Raises
     ------
@@ -139,10 +142,10 @@ def study_to(
     kept = folder / "runs"
     if page.exists() and not force and not kept.is_dir():
         raise UsageError(str(page), "a file that exists", "a new folder", "-f overwrites it")
-    if name == "heading":
-        study = _resumed(study, kept, minutes, afresh=force)
+    if name in RESUMED:
+        study = _resumed(name, study, kept, minutes, afresh=force)
     elif minutes is not None:
-        raise UsageError("study", f"--minutes with {name}", "heading")
+        raise UsageError("study", f"--minutes with {name}", " or ".join(RESUMED))
     (folder / "tables").mkdir(parents=True, exist_ok=True)
     listen(Event("begin", total=1))
     result = study(runs=runs, seed=seed, progress=lambda text: listen(Event("stage", name, text)))
@@ -155,18 +158,21 @@ def study_to(
 
 
 def _resumed(
-    study: "Callable[..., StudyResult]", folder: Path, minutes: float | None, *, afresh: bool
+    name: str, study: "Callable[..., StudyResult]", folder: Path, minutes: float | None, *, afresh: bool
 ) -> "Callable[..., StudyResult]":
-    """The study of the heading with the runs kept in a folder."""
+    """A study of the heading with the runs kept in a folder."""
     from functools import partial
     from shutil import rmtree
 
     from groundstation.pipeline.verbs.kept_runs import KeptRuns
+    from groundstation.studies.heading_crew import CrewOutcome
     from groundstation.studies.heading_family import RunOutcome
 
     if afresh and folder.is_dir():
         rmtree(folder)
-    return partial(study, kept=KeptRuns(folder, RunOutcome), minutes=minutes)
+    outcome: type[RunOutcome] | type[CrewOutcome] = CrewOutcome if name == "crew" else RunOutcome
+    kept: KeptRuns[Any] = KeptRuns(folder, outcome)
+    return partial(study, kept=kept, minutes=minutes)
 
 
 def _study_of(name: str, recorded: Path) -> "Callable[..., StudyResult]":
@@ -188,6 +194,10 @@ def _study(name: str) -> "Callable[..., StudyResult]":
         from groundstation.studies.heading import study_heading
 
         return study_heading
+    if name == "crew":
+        from groundstation.studies.heading_crew import study_crew
+
+        return study_crew
     if name == "forecast":
         from groundstation.studies.forecast import study_forecast
 
