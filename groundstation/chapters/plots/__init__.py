@@ -1,0 +1,19 @@
+"""Plots of chapters: a figure is told once, as a description beside the chapter that mentions it."""
+
+from collections.abc import Callable
+
+from groundstation.chapters.plots import heading, standstill
+from groundstation.plots.plot import Plot
+from groundstation.results.flight import FlightResults
+
+# By the name that a chapter gives; a figure that is one of several alike gets which.
+PLOTS: dict[str, Callable[[FlightResults], Plot | None] | Callable[[FlightResults, str], Plot | None]] = {
+    "heading.difference": heading.difference,
+    "heading.density": heading.density,
+    "heading.convergence": heading.convergence,
+    "heading.taxi": heading.taxi,
+    "heading.forest": heading.forest,
+    "heading.spectrum": heading.spectrum,
+    "standstill.components": standstill.components,
+    "standstill.mean_speed": standstill.mean_speed,
+}
