@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from groundstation.chapters.plots import heading, standstill
+from groundstation.chapters.plots import heading, inertial, standstill
 from groundstation.plots.plot import Plot
 from groundstation.results.flight import FlightResults
 
@@ -16,4 +16,11 @@ PLOTS: dict[str, Callable[[FlightResults], Plot | None] | Callable[[FlightResult
     "heading.spectrum": heading.spectrum,
     "standstill.components": standstill.components,
     "standstill.mean_speed": standstill.mean_speed,
+    "inertial.state": inertial.state,
+    "inertial.tilt_and_drift": inertial.tilt_and_drift,
+    "inertial.radial": inertial.radial,
+    "inertial.innovations": inertial.innovations,
+    "inertial.observability": inertial.observability,
+    "inertial.differences": inertial.differences,
+    "inertial.own_innovations": inertial.own_innovations,
 }
