@@ -2,7 +2,12 @@
 
 from collections.abc import Callable
 
-from groundstation.chapters.plots import heading, inertial, standstill
+from groundstation.chapters.plots import (
+    forecast,
+    heading,
+    inertial,
+    standstill,
+)
 from groundstation.plots.plot import Plot
 from groundstation.results.flight import FlightResults
 
@@ -16,6 +21,9 @@ PLOTS: dict[str, Callable[[FlightResults], Plot | None] | Callable[[FlightResult
     "heading.spectrum": heading.spectrum,
     "standstill.components": standstill.components,
     "standstill.mean_speed": standstill.mean_speed,
+    "forecast.growth": forecast.growth,
+    "forecast.calibration": forecast.calibration,
+    "forecast.hindcast_map": forecast.hindcast_map,
     "inertial.state": inertial.state,
     "inertial.tilt_and_drift": inertial.tilt_and_drift,
     "inertial.radial": inertial.radial,
