@@ -2,17 +2,24 @@
 
 from collections.abc import Callable
 
+from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.plots import (
+    flight,
     forecast,
+    generic,
     heading,
     inertial,
+    latency,
+    quality,
     standstill,
+    together,
 )
 from groundstation.plots.plot import Plot
 from groundstation.results.flight import FlightResults
 
 # By the name that a chapter gives; a figure that is one of several alike gets which.
 PLOTS: dict[str, Callable[[FlightResults], Plot | None] | Callable[[FlightResults, str], Plot | None]] = {
+    GENERIC_SERIES: generic.series,
     "heading.difference": heading.difference,
     "heading.density": heading.density,
     "heading.convergence": heading.convergence,
@@ -31,4 +38,11 @@ PLOTS: dict[str, Callable[[FlightResults], Plot | None] | Callable[[FlightResult
     "inertial.observability": inertial.observability,
     "inertial.differences": inertial.differences,
     "inertial.own_innovations": inertial.own_innovations,
+    "latency.search": latency.search,
+    "together.motion": together.motion,
+    "overview.track": flight.track_map,
+    "overview.profile": flight.profile,
+    "overview.attitude": flight.attitude,
+    "overview.states": flight.states,
+    "quality.gaps": quality.gaps,
 }
