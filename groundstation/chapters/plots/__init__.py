@@ -11,6 +11,7 @@ from groundstation.chapters.plots import (
     inertial,
     latency,
     quality,
+    reference,
     standstill,
     together,
 )
@@ -45,4 +46,7 @@ PLOTS: dict[str, Callable[[FlightResults], Plot | None] | Callable[[FlightResult
     "overview.attitude": flight.attitude,
     "overview.states": flight.states,
     "quality.gaps": quality.gaps,
+    "reference.errors": reference.errors,
+    "reference.track": reference.track,
+    "reference.claims": reference.claims,
 }
