@@ -4,6 +4,8 @@ from collections.abc import Callable
 
 from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.plots import (
+    control,
+    cooperative,
     flight,
     forecast,
     generic,
@@ -14,6 +16,7 @@ from groundstation.chapters.plots import (
     landing_ranges,
     latency,
     magnetic,
+    placement,
     quality,
     reference,
     standstill,
@@ -66,4 +69,13 @@ PLOTS: dict[str, Callable[[FlightResults], Plot | None] | Callable[[FlightResult
     "reference.errors": reference.errors,
     "reference.track": reference.track,
     "reference.claims": reference.claims,
+    "cooperative.map": cooperative.session_map,
+    "cooperative.errors": cooperative.errors,
+    "cooperative.geometry": cooperative.geometry,
+    "cooperative.links": cooperative.links,
+    "control.paths": control.paths,
+    "control.measures": control.measures,
+    "control.law": control.law,
+    "placement.map": placement.accuracy_map,
+    "placement.accuracy": placement.accuracy,
 }
