@@ -181,7 +181,7 @@ def error_posterior(
     differences: Differences,
     standstill: StandstillVelocities = NO_STANDSTILL,
     *,
-    draws: int = 2000,
+    draws: int = 4000,
     seed: int = 2015,
     growth: int = 30,
 ) -> ErrorPosterior:
