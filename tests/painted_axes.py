@@ -32,7 +32,7 @@ COLOURS: dict[str, set[str]] = {
     "warn": {"#e69f00", "#fbe9c6"},
     "bad": {"#b3261e"},
     "truth": {"#c3c9d0"},
-    "other": {d.LIMIT},
+    "other": {"#cc79a7"},
     "paper": {"white", "#ffffff"},
     **{role: {colour} for role, colour in zip(marks.SERIES, d.SERIES, strict=True)},
 }
