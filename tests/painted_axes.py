@@ -156,7 +156,9 @@ def _line(axes: Any, line: Any) -> Iterator[Thing]:
     else:
         name = _name(line)
         if line.get_linestyle() not in ("None", "none", ""):
-            kind = "steps" if "steps" in line.get_drawstyle() else "line"
+            kind = "steps" if line.get_drawstyle() == "steps-mid" else "line"
+            if line.get_drawstyle() == "steps-post":  # described by its corners
+                x, y = np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]
             yield Thing(kind, name, colour, is_dashed, x, y, weight=weight)
             name = ""
         if line.get_marker() not in ("None", "none", "", None):

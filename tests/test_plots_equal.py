@@ -3,6 +3,7 @@
 import dataclasses
 import inspect
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,19 +12,29 @@ import pytest
 
 from groundstation.chapters.control import title_of
 from groundstation.chapters.plots import PLOTS
+from groundstation.chapters.plots.acceptance import JUDGED
+from groundstation.chapters.plots.comparison import COMPARED, Side
+from groundstation.pipeline.many_flights.acceptance import accept
 from groundstation.plots.marks import Floats
 from groundstation.plots.plot import Plot
+from groundstation.reports import comparison
+from groundstation.reports.acceptance import DRAWN
 from groundstation.reports.drawing import Drawing, Sketch, sketching
 from groundstation.reports.figures import DRAWERS
+from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
+from tests.acceptance_example import save_flight
 from tests.painted_axes import Shown, Thing, described, painted
 from tests.plot_cases import CASES, RECORDED, names_of, recorded
 from tests.real_logs import real_log
+from tests.report_example import MANIFEST
+from tests.saved import load
 
 THINNED = 400  # a drawer thins no series of fewer samples
 ROUNDING = {"rtol": 1e-9, "atol": 1e-9}
 MILLIMETRE = 0.51
 OFTEN = 4  # recorded logs that are compared each time
+LEAST_COMPARED = 7  # a session has the others
 LEAST_FIGURES = 2  # of any recorded log: track and profile
 BESIDE_KM = 0.3
 
@@ -72,8 +83,7 @@ def compare_figure(results: FlightResults, name: str) -> int:
             continue
         drawing, sketch = old
         assert new.name == ".".join((name, *of))
-        assert (new.title, new.caption, new.alt) == (drawing.title, drawing.caption, drawing.alt)
-        assert tuple(new.numbers) == tuple(drawing.numbers)
+        same_words(drawing, new)
         compare(painted(sketch), new)
         count += 1
     return count
@@ -226,6 +236,44 @@ def contained(old: Floats, new: Floats, what: str) -> None:
     assert THINNED <= len(old) < len(new), what
     known = {tuple(row) for row in np.round(new, 9).tolist()}
     assert all(tuple(row) in known for row in np.round(old, 9).tolist()), what
+
+
+@pytest.mark.parametrize("name", JUDGED)
+def test_the_description_of_an_acceptance_shows_what_the_drawer_paints(name: str, tmp_path: Path) -> None:
+    for number, rate in enumerate((0.3, 0.5, 0.7, 1.4, 0.9)):
+        save_flight(tmp_path, number, rate)
+    found = accept(tmp_path, "app-g")
+    with sketching() as sketches:
+        drawing = DRAWN[name](found)
+    same_words(drawing, JUDGED[name](found))
+    compare(painted(sketches[drawing.svg]), JUDGED[name](found))
+
+
+def test_the_descriptions_of_a_comparison_show_what_the_drawers_paint(tmp_path: Path) -> None:
+    folders = []
+    for letter, case in (("a", "report"), ("b", "viewer")):
+        save(tmp_path / letter, CASES[case](), MANIFEST)
+        folders.append(load(tmp_path / letter))
+    sides = [comparison._Side("A", folders[0], comparison.A), comparison._Side("B", folders[1], comparison.B, 3.0)]
+    told = [Side("A", folders[0], "drift_windows"), Side("B", folders[1], "drift_windows", 3.0)]
+    drawers = {"tracks": comparison._tracks, "growth": comparison._growth}
+    drawers |= {one.name: partial(comparison._overlay, told=one) for one in comparison.LINES}
+    assert list(COMPARED) == ["tracks", *(one.name for one in comparison.LINES), "growth"]
+    count = 0
+    for name, describe in COMPARED.items():
+        with sketching() as sketches:
+            drawing, plot = drawers[name](sides), describe(told)
+        assert (drawing is None) == (plot is None), name
+        if drawing is not None and plot is not None:
+            same_words(drawing, plot)
+            compare(painted(sketches[drawing.svg]), plot)
+            count += 1
+    assert count >= LEAST_COMPARED
+
+
+def same_words(drawing: Drawing, plot: Plot) -> None:
+    assert (plot.title, plot.caption, plot.alt) == (drawing.title, drawing.caption, drawing.alt)
+    assert tuple(plot.numbers) == tuple(drawing.numbers)
 
 
 def test_every_described_plot_has_a_drawer_and_takes_the_same() -> None:
