@@ -45,8 +45,10 @@ def simulate(
 @answers_with_exit_code
 def study(
     name: Annotated[
-        Literal["heading", "forecast", "magnetic", "cooperative", "control", "landing", "approach"],
-        typer.Argument(help="heading, forecast, magnetic, cooperative, control, landing or approach.", metavar="NAME"),
+        Literal["heading", "installation", "forecast", "magnetic", "cooperative", "control", "landing", "approach"],
+        typer.Argument(
+            help="heading, installation, forecast, magnetic, cooperative, control, landing or approach.", metavar="NAME"
+        ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the tables.", metavar="DIR")],
     runs: Annotated[int, typer.Option("--runs", help="Simulated runs of each family or case.", min=10)] = 200,
@@ -58,7 +60,7 @@ def study(
     minutes: Annotated[
         float | None,
         typer.Option(
-            "--minutes", help="Stop after so many minutes (heading only); the same command continues.", min=0.1
+            "--minutes", help="Stop after so many minutes (heading, installation); the same command continues.", min=0.1
         ),
     ] = None,
     force: Force = False,

@@ -65,6 +65,8 @@ class Solution:
     steps : tuple of HeadingStep
     sideslip_deg : float or None
         Mean sideslip taken off, by the weights of the samples; None where no wind is known.
+    mean_direction : (north, east)
+        Mean of the unit vectors of motion, by those weights: a wind's part across it is what the sideslip is made by.
     """
 
     samples: Samples
@@ -84,6 +86,7 @@ class Solution:
     parts: tuple[TaxiSegment, ...]
     steps: tuple[HeadingStep, ...]
     sideslip_deg: float | None
+    mean_direction: tuple[float, float]
 
     @property
     def difference_deg(self) -> FloatArray:
@@ -151,6 +154,7 @@ def solve(
     draws = posterior.draws_of_ordinary_parts(DRAWS_FOR_PARTS)
     drift, drift_sigma = _drift(thinned, reference_time_s, draws)
     segments = tuple(_segment(differences, used, used.segment == number, draws) for number in np.unique(used.segment))
+    direction_rad = np.deg2rad(differences.direction_deg)
     full_weight = np.zeros(len(samples))
     full_weight[samples.is_used] = weight * len(used)
     return Solution(
@@ -161,6 +165,7 @@ def solve(
         growth_samples=posterior.growth_samples * thinning,
         running=run_recursion(_centred(used.difference_deg)),
         sideslip_deg=None if steady.wind is None else float(weight @ steady.sideslip_deg(differences.direction_deg)),
+        mean_direction=(float(weight @ np.cos(direction_rad)), float(weight @ np.sin(direction_rad))),
         knowledge=knowledge,
         uncorrected_deg=float(wrap_180(np.mean(uncorrected))),
         weight=full_weight,

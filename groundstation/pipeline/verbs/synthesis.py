@@ -12,8 +12,10 @@ from groundstation.pipeline.one_flight.progress import Event, Listener
 if TYPE_CHECKING:
     from groundstation.studies.page import StudyResult
 
+KEEPING = ("heading", "installation")  # studies whose runs are kept
 STUDIES = {
     "heading": "heading correction before take-off: errors, coverage of the interval, figures of the paper repeated",
+    "installation": "what earlier flights teach of an INS's mounting and the aircraft's crab: fleets, coverage, verdicts",
     "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
     "magnetic": "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
     "cooperative": "navigation between aircraft: published figures with ours beside them, divergence, consistency",
@@ -123,8 +125,8 @@ def study_to(
     """Run a study into a folder: ``<name>.md`` and tables/*.csv; returns the page's text.
 
     With ``recorded``, a folder with sets of recorded robots, the cooperative study runs on these instead. The study of
-    the heading keeps its runs in ``runs/``: the same command goes on with them, ``minutes`` ends it before all are
-    made; ``force`` makes them afresh.
+    the heading, and that of the installation, keep their runs in ``runs/``: the same command goes on with them,
+    ``minutes`` ends it before all are made; ``force`` makes them afresh.
 
     Raises
     ------
@@ -139,10 +141,10 @@ def study_to(
     kept = folder / "runs"
     if page.exists() and not force and not kept.is_dir():
         raise UsageError(str(page), "a file that exists", "a new folder", "-f overwrites it")
-    if name == "heading":
-        study = _resumed(study, kept, minutes, afresh=force)
+    if name in KEEPING:
+        study = _resumed(name, study, kept, minutes, afresh=force)
     elif minutes is not None:
-        raise UsageError("study", f"--minutes with {name}", "heading")
+        raise UsageError("study", f"--minutes with {name}", " or ".join(KEEPING))
     (folder / "tables").mkdir(parents=True, exist_ok=True)
     listen(Event("begin", total=1))
     result = study(runs=runs, seed=seed, progress=lambda text: listen(Event("stage", name, text)))
@@ -155,18 +157,20 @@ def study_to(
 
 
 def _resumed(
-    study: "Callable[..., StudyResult]", folder: Path, minutes: float | None, *, afresh: bool
+    name: str, study: "Callable[..., StudyResult]", folder: Path, minutes: float | None, *, afresh: bool
 ) -> "Callable[..., StudyResult]":
-    """The study of the heading with the runs kept in a folder."""
+    """A study with the runs kept in a folder."""
     from functools import partial
     from shutil import rmtree
 
     from groundstation.pipeline.verbs.kept_runs import KeptRuns
     from groundstation.studies.heading_family import RunOutcome
+    from groundstation.studies.installation_pool import TaxiOfPool
 
     if afresh and folder.is_dir():
         rmtree(folder)
-    return partial(study, kept=KeptRuns(folder, RunOutcome), minutes=minutes)
+    outcome: type = RunOutcome if name == "heading" else TaxiOfPool
+    return partial(study, kept=KeptRuns(folder, outcome), minutes=minutes)
 
 
 def _study_of(name: str, recorded: Path) -> "Callable[..., StudyResult]":
@@ -188,6 +192,10 @@ def _study(name: str) -> "Callable[..., StudyResult]":
         from groundstation.studies.heading import study_heading
 
         return study_heading
+    if name == "installation":
+        from groundstation.studies.installation import study_installation
+
+        return study_installation
     if name == "forecast":
         from groundstation.studies.forecast import study_forecast
 
