@@ -11,6 +11,7 @@ from groundstation.base.errors import GroundstationError, SettingsError
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.toml_settings import check_ranges, number, required_number
 from groundstation.results.answer import A, Answers, answer_of
+from groundstation.results.installation import Lesson
 from groundstation.tables.phases import Phases
 
 S = TypeVar("S")
@@ -225,6 +226,8 @@ class Known:
         Answers of the analyses before this one.
     workings : mapping
         What an earlier analysis computed on the way, by its name; it is not saved.
+    lessons : tuple of Lesson, optional
+        What earlier flights say of installations, where the user gives a file of them.
     """
 
     phases: Phases
@@ -236,6 +239,7 @@ class Known:
     settings: Mapping[str, Any] = field(default_factory=dict)
     answers: Answers = field(default_factory=dict)
     workings: Mapping[str, Any] = field(default_factory=dict)
+    lessons: tuple[Lesson, ...] | None = None
 
     @property
     def excluded_s(self) -> tuple[tuple[float, float], ...]:

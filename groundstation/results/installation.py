@@ -1,16 +1,19 @@
 """What flights teach of an INS's installation, and the heading errors that follow from it."""
 
-from collections.abc import Mapping
+import json
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import ClassVar
 
+from groundstation.base.errors import SettingsError
+from groundstation.base.serial import MismatchError, from_json, to_json
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
+from groundstation.results.files import json_text
 from groundstation.results.heading import IntervalPart
 
 FORMAT_VERSION = 1
 METHOD_VERSION = 1  # of the model: another one makes every learned answer again
-PLACES: Mapping[str, int] = {"factor": 5, "factor_sigma": 5, "probability": 4}
 
 
 @dataclass(frozen=True)
@@ -139,10 +142,11 @@ class InstallationResult(Answer):
         Of the airframe's interval: from the number to the farther end.
     installed : Installed
         What the earlier flights say.
-    taught_by : tuple of str
-        Those flights.
     odd, changed : tuple of str
         Of them those that were taken for flights of another unit, and those from which on it sits otherwise.
+    residual_deg, residual_sigma_deg : float, optional
+        The platform's error less the azimuth that the same flight showed later, and the sigma of that difference:
+        nothing of that azimuth is in the number.
     """
 
     analysis: ClassVar[str] = "installation"
@@ -166,11 +170,20 @@ class InstallationResult(Answer):
     platform_confidence95_deg: tuple[float, float] | None = None
     platform_parts: tuple[IntervalPart, ...] = ()
     installed: Installed | None = None
-    taught_by: tuple[str, ...] = ()
     odd: tuple[str, ...] = ()
     changed: tuple[str, ...] = ()
+    residual_deg: float | None = None
+    residual_sigma_deg: float | None = None
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
+
+
+@dataclass(frozen=True)
+class InstalledFlight:
+    """A flight of an installation: what it says, and its answer by what earlier ones taught (None without a taxi)."""
+
+    lesson: Lesson
+    answer: InstallationResult | None
 
 
 @dataclass(frozen=True)
@@ -180,20 +193,87 @@ class Installation:
     Parameters
     ----------
     ins_serial, aircraft : str
-    flights : tuple of Lesson
-        In order of time; what each says, and why some teach nothing.
     installed : Installed, optional
         What the next flight can rely on; None where nothing was taught.
     taught_by : tuple of str
         Flights that taught; ``odd`` and ``changed`` go with them.
     odd, changed : tuple of float
         Probabilities, from all flights: it was another unit's; from it on the unit sits otherwise.
+    flights : tuple of InstalledFlight
+        In order of time.
     """
 
     ins_serial: str
     aircraft: str
-    flights: tuple[Lesson, ...]
-    installed: Installed | None = None
-    taught_by: tuple[str, ...] = ()
-    odd: tuple[float, ...] = ()
-    changed: tuple[float, ...] = ()
+    installed: Installed | None
+    taught_by: tuple[str, ...]
+    odd: tuple[float, ...]
+    changed: tuple[float, ...]
+    flights: tuple[InstalledFlight, ...]
+
+    @property
+    def lessons(self) -> tuple[Lesson, ...]:
+        """What its flights say."""
+        return tuple(one.lesson for one in self.flights)
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A flight with a serial that is in no installation, and why."""
+
+    flight_id: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Installations:
+    """installations.json: every installation of a folder of flights, by serial and time.
+
+    ``method_version`` is that of the model: answers of another one are made again. ``without_serial`` counts flights
+    that state no INS serial: nothing is learned from them.
+    """
+
+    format_version: int = FORMAT_VERSION
+    method_version: int = METHOD_VERSION
+    without_serial: int = 0
+    left_out: tuple[LeftOut, ...] = ()
+    installations: tuple[Installation, ...] = ()
+
+    @property
+    def lessons(self) -> tuple[Lesson, ...]:
+        """What all flights say."""
+        return tuple(lesson for one in self.installations for lesson in one.lessons)
+
+
+def as_stored(lesson: Lesson) -> Lesson:
+    """A lesson with its numbers rounded as the file has them: whoever reads the file computes the same."""
+    return from_json(Lesson, to_json(lesson))
+
+
+def installations_text(found: Installations) -> str:
+    """The file as text."""
+    return json_text(to_json(found))
+
+
+def read_installations(path: Path) -> Installations:
+    """Read installations.json.
+
+    Raises
+    ------
+    SettingsError
+        When it cannot be read, or is not such a file.
+    """
+    expected = "installations.json of a folder that `run` made"
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SettingsError(str(path), error.strerror or "cannot be read", expected) from error
+    except ValueError as error:
+        raise SettingsError(str(path), "no JSON", expected) from error
+    if not isinstance(document, dict) or document.get("format_version") != FORMAT_VERSION:
+        version = document.get("format_version") if isinstance(document, dict) else None
+        raise SettingsError(str(path), f"format_version {version!r}", f"{FORMAT_VERSION}: {expected}")
+    try:
+        return from_json(Installations, document)
+    except MismatchError as error:
+        raise SettingsError(f"{path}, {error.place}", error.found, error.expected or expected) from error

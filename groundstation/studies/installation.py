@@ -26,7 +26,7 @@ CHANGING = frozenset(family.name for family in FAMILIES if family.change)
 class Judged:
     """One flight of a fleet against the truth; errors are estimate minus truth, degrees.
 
-    ``flight`` counts from 1; ``taught`` earlier flights taught; another unit first flew ``since`` flights ago (0: none).
+    ``flight`` counts from 1, ``taught`` earlier flights taught, another unit first flew ``since`` flights ago.
     """
 
     family: str

@@ -84,10 +84,20 @@ def learned_answer(
         platform_confidence95_deg=platform.ends_deg,
         platform_parts=platform.parts,
         installed=installed(belief),
-        taught_by=taught_by,
         odd=_named(taught_by, odd, settings),
         changed=_named(taught_by, changed, settings),
+        **_residual(lesson, platform),
     )
+
+
+def _residual(lesson: Lesson, platform: LearnedNumber) -> dict[str, float]:
+    """The platform's number against the azimuth of the same flight."""
+    if lesson.azimuth_deg is None or lesson.azimuth_sigma_deg is None:
+        return {}
+    return {
+        "residual_deg": float(wrap_180(platform.error_deg - lesson.azimuth_deg)),
+        "residual_sigma_deg": float(np.hypot(platform.sigma_deg, lesson.azimuth_sigma_deg)),
+    }
 
 
 def verdict_of(lesson: Lesson, half_width_deg: float) -> str:

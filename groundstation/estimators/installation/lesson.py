@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from groundstation.base.angles import wrap_180
@@ -19,43 +20,65 @@ from groundstation.estimators.installation.settings import (
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
-from groundstation.results.installation import Lesson
+from groundstation.results.installation import Lesson, as_stored
 
+LARGEST = 1e3  # no angle in degrees, no wind in m/s is larger
 RUNWAY_CRAB_DEG = 0.3  # of power and wind on the take-off run
 LATER_ALIGNMENT = frozenset({"inertial.ins_reset", "inertial.realigned"})  # findings: in flight it is another azimuth
 # Gates whose failure leaves the interval by this taxi alone as honest as it was: it is wide, or the standstill noisy.
 STILL_TEACHES = CURED_BY_MORE_DATA | {STANDSTILL_GATE, "skewness", "kurtosis", "normal_distance", "variance_ratio"}
 
 
-def lesson_of(results: FlightResults, stated: Mapping[str, Any], flight_id: str = "") -> Lesson:
-    """What a flight teaches, from what it stored; ``not_taught`` says why it teaches nothing.
+@dataclass(frozen=True)
+class Stored:
+    """What a lesson is made of: the answers of a flight, as they are stored, and who flew when.
 
-    Parameters
-    ----------
-    results : FlightResults
-    stated : mapping
-        The user's ``[aircraft]``: ``ins_serial`` and ``ins_alignment`` of it stand above those of the log.
-    flight_id : str
-        Name of its folder, where that differs.
+    ``stated`` is the user's ``[aircraft]``: its ``ins_serial`` and ``ins_alignment`` stand above those of the log.
     """
 
-    def said(key: str) -> str:
-        return str(stated.get(key) or results.metadata.get(key, "")).strip()
+    flight_id: str
+    metadata: Mapping[str, str]
+    start_utc_ns: int | None
+    stated: Mapping[str, Any]
+    heading: HeadingResult | None
+    inertial: InertialResult | None = None
+    findings: frozenset[str] = frozenset()
 
-    start_ns = results.start_utc_ns
-    plain = Lesson(
-        flight_id=flight_id or results.flight_id,
-        aircraft=results.metadata.get("aircraft", "").strip(),
-        ins_serial=said("ins_serial"),
-        start_utc="" if start_ns is None else utc_ns_to_iso(start_ns),
-        alignment=said("ins_alignment"),
-        alignment_sigma_deg=alignment_sigma_deg(said("ins_alignment")),
+    def said(self, key: str) -> str:
+        """What is stated under a key, else what the log says."""
+        return str(self.stated.get(key) or self.metadata.get(key, "")).strip()
+
+
+def lesson_of_flight(results: FlightResults, stated: Mapping[str, Any], flight_id: str) -> Lesson:
+    """What a flight teaches, from its folder: see :func:`lesson_of`."""
+    return lesson_of(
+        Stored(
+            flight_id,
+            results.metadata,
+            results.start_utc_ns,
+            stated,
+            results.answer(HeadingResult),
+            results.answer(InertialResult),
+            frozenset(finding.code for finding in results.findings),
+        )
     )
-    heading = results.answer(HeadingResult)
+
+
+def lesson_of(stored: Stored) -> Lesson:
+    """What a flight teaches, its numbers rounded as files have them; ``not_taught`` says why it teaches nothing."""
+    heading, alignment = stored.heading, stored.said("ins_alignment")
+    plain = Lesson(
+        flight_id=stored.flight_id,
+        aircraft=stored.metadata.get("aircraft", "").strip(),
+        ins_serial=stored.said("ins_serial"),
+        start_utc="" if stored.start_utc_ns is None else utc_ns_to_iso(stored.start_utc_ns),
+        alignment=alignment,
+        alignment_sigma_deg=alignment_sigma_deg(alignment),
+    )
     fields = vars(plain) | ({} if heading is None else _of_heading(heading))
     if heading is not None and fields["number_deg"] is not None:
-        fields |= _azimuth(results, heading) | _reference(results, heading)
-    return Lesson(**(fields | {"not_taught": _why_not(plain, heading)}))
+        fields |= _azimuth(stored, heading) | _reference(stored.metadata, heading)
+    return as_stored(Lesson(**(fields | {"not_taught": _why_not(plain, heading)})))
 
 
 def _why_not(plain: Lesson, heading: HeadingResult | None) -> str:
@@ -69,9 +92,16 @@ def _why_not(plain: Lesson, heading: HeadingResult | None) -> str:
         return "no heading error found"
     if heading.mean_direction is None:
         return "saved by an older version: run the log again"
+    if _of_heading(heading)["number_deg"] is None:
+        return "numbers of its heading correction are missing"
     named = [gate.name for gate in heading.gates if gate.required and gate.state == "failed"]
     rejecting = [name for name in named if name not in STILL_TEACHES]
     return f"taxi rejected: {', '.join(rejecting)}" if rejecting else ""
+
+
+def _is_sound(*values: float | None) -> bool:
+    """Whether stored numbers can be computed with: a damaged summary has none, or absurd ones."""
+    return all(value is None or (math.isfinite(value) and abs(value) <= LARGEST) for value in values)
 
 
 def _of_heading(heading: HeadingResult) -> dict[str, Any]:
@@ -92,9 +122,14 @@ def _of_heading(heading: HeadingResult) -> dict[str, Any]:
         "platform_error_deg": heading.platform_error_deg,
         "limit_deg": deciding,
         "entry_step_deg": heading.entry_step_deg,
+        "number_deg": None,
     }
     taxi = next((part for part in heading.interval_parts if part.name == "taxi"), None)
+    wind = () if heading.wind is None else (heading.wind.north_mps, heading.wind.east_mps, heading.wind.sigma_mps)
     if heading.mean_direction is None or taxi is None:
+        return found
+    stored = (heading.error_deg, heading.sideslip_deg, taxi.half_width_deg, low, high, *heading.mean_direction, *wind)
+    if not (_is_sound(*stored) and taxi.half_width_deg > 0.0):
         return found
     kind = heading.aircraft_class if heading.aircraft_class in FACTORS else ""
     factor, factor_sigma = next(value for name, value in FACTORS.items() if name == kind)
@@ -126,26 +161,26 @@ def _of_heading(heading: HeadingResult) -> dict[str, Any]:
     }
 
 
-def _azimuth(results: FlightResults, heading: HeadingResult) -> dict[str, float]:
+def _azimuth(stored: Stored, heading: HeadingResult) -> dict[str, float]:
     """Azimuth error in flight, carried back to the taxi; nothing where the INS was another then."""
-    inertial = results.answer(InertialResult)
+    inertial = stored.inertial
     early = None if inertial is None or inertial.azimuth is None else inertial.azimuth.early
     if inertial is None or early is None or inertial.ins_topic != heading.ins_topic:
         return {}
     entered = None if heading.onboard is None else heading.onboard.correction_entered_deg
     if entered or heading.reference_time_s is None or heading.reference_time_s > early.time_s:
         return {}
-    if LATER_ALIGNMENT & {finding.code for finding in results.findings}:
+    if LATER_ALIGNMENT & stored.findings:
         return {}
     error_deg, sigma_deg = early.at(heading.reference_time_s)
     return {"azimuth_deg": error_deg, "azimuth_sigma_deg": sigma_deg}
 
 
-def _reference(results: FlightResults, heading: HeadingResult) -> dict[str, float]:
+def _reference(metadata: Mapping[str, str], heading: HeadingResult) -> dict[str, float]:
     """Heading error against the stand, else the runway: mounting in it, but no sideslip of taxi."""
     shown, reference = heading.parking_ins_heading_deg, heading.reference_parking_heading_deg
     if shown is not None and reference is not None and not heading.steps:
-        logged = logged_reference(results.metadata)
+        logged = logged_reference(metadata)
         sigma = max(logged.sigma_deg if logged else 0.0, REFERENCE_SIGMA_DEG)
         return {"reference_deg": float(wrap_180(shown - reference)), "reference_sigma_deg": sigma}
     for runway in heading.runway:

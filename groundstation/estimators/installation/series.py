@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from groundstation.estimators.installation.answer import alone_answer, learned_answer
 from groundstation.estimators.installation.model import Belief, doubts, first_belief, installed, learn
 from groundstation.estimators.installation.settings import InstallationSettings
-from groundstation.results.installation import Installation, InstallationResult, Lesson
+from groundstation.results.installation import Installation, InstallationResult, InstalledFlight, Lesson
 
 SAME_TIME = "another flight of this serial begins at the same time"
 FIRST = "no earlier flight of this serial in this aircraft taught anything"
@@ -50,41 +50,40 @@ def series_of(lessons: Iterable[Lesson]) -> tuple[Series, ...]:
 
 def answers_of(series: Series, settings: InstallationSettings) -> Iterator[tuple[Lesson, InstallationResult | None]]:
     """Every flight with its learned answer; None where there is no heading error to improve."""
-    teacher = _Teacher(settings)
-    waiting: list[Lesson] = []  # of the same time: none of them teaches the other
-    for lesson in series.lessons:
-        if waiting and waiting[-1].start_utc != lesson.start_utc:
-            teacher.teach(waiting)
-            waiting = []
+    return _answered(series, _Teacher(settings))
+
+
+def _answered(series: Series, teacher: "_Teacher") -> Iterator[tuple[Lesson, InstallationResult | None]]:
+    """Flights with their answers; the teacher then has been taught by all of them."""
+    for lesson in series.lessons:  # of those that begin at one time none teaches
         yield lesson, teacher.answer(lesson)
-        waiting.append(lesson)
+        teacher.teach([lesson])
 
 
-def answer_from(lesson: Lesson, earlier: Sequence[Lesson], settings: InstallationSettings) -> InstallationResult | None:
-    """The learned answer of one flight from flights of its unit in its aircraft; later ones are left out."""
-    if lesson.number_deg is None or lesson.error_deg is None:
-        return None
-    if not (lesson.ins_serial and lesson.aircraft and lesson.start_utc):
+def answer_from(lesson: Lesson, earlier: Sequence[Lesson], settings: InstallationSettings) -> InstallationResult:
+    """The learned answer of a flight with a taxi, from those of its unit in its aircraft; later ones are left out."""
+    if lesson.number_deg is None or not (lesson.ins_serial and lesson.aircraft and lesson.start_utc):
         return alone_answer(lesson, lesson.not_taught)
     others = [one for one in earlier if one.place[0] < lesson.place[0] and one.flight_id != lesson.flight_id]
     same = [one for one in series_of([*others, lesson]) if lesson in one.lessons]
-    return next(answer for series in same for one, answer in answers_of(series, settings) if one is lesson)
+    found = (answer for series in same for one, answer in answers_of(series, settings) if one is lesson)
+    return next((one for one in found if one is not None), None) or alone_answer(lesson, lesson.not_taught)
 
 
 def installation_of(series: Series, settings: InstallationSettings) -> Installation:
-    """What all flights of an installation say, for the page of the aircraft and for the next flight."""
+    """An installation with the answer of each flight, and what all of them say for the next one."""
     teacher = _Teacher(settings)
-    teacher.teach(series.lessons)
+    flights = tuple(InstalledFlight(*one) for one in _answered(series, teacher))
     belief = teacher.belief
     odd, changed = ((), ()) if belief is None else (tuple(one.tolist()) for one in doubts(belief))
     return Installation(
-        series.ins_serial,
-        series.aircraft,
-        series.lessons,
-        None if belief is None else installed(belief),
-        teacher.taught_by,
-        odd,
-        changed,
+        ins_serial=series.ins_serial,
+        aircraft=series.aircraft,
+        installed=None if belief is None else installed(belief),
+        taught_by=teacher.taught_by,
+        odd=odd,
+        changed=changed,
+        flights=flights,
     )
 
 

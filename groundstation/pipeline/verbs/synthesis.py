@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 KEEPING = ("heading", "installation")  # studies whose runs are kept
 STUDIES = {
     "heading": "heading correction before take-off: errors, coverage of the interval, figures of the paper repeated",
-    "installation": "what earlier flights teach of an INS's mounting and the aircraft's crab: fleets, coverage, verdicts",
+    "installation": "what earlier flights teach of mounting and crab: coverage and verdicts on fleets of aircraft",
     "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
     "magnetic": "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
     "cooperative": "navigation between aircraft: published figures with ours beside them, divergence, consistency",
