@@ -267,6 +267,31 @@ class SessionRow:
 
 
 @dataclass(frozen=True)
+class InstallationRow:
+    """One unit in one aircraft: what its flights say together; :class:`groundstation.results.installation.Installed`.
+
+    ``place`` counts the installations of the fleet from 1. ``odd`` and ``changed`` name flights taken for another
+    unit's, and those from which on it sits otherwise, joined by ", ".
+    """
+
+    place: int
+    ins_serial: str
+    aircraft: str
+    first_flight: str
+    last_flight: str
+    flights: int
+    taught: int
+    mounting_deg: float | None = None
+    mounting_sigma_deg: float | None = None
+    sum_deg: float | None = None
+    sum_sigma_deg: float | None = None
+    factor: float | None = None
+    factor_sigma: float | None = None
+    odd: str = ""
+    changed: str = ""
+
+
+@dataclass(frozen=True)
 class FleetResults:
     """Everything the fleet report, fleet.rrd and notebooks show.
 
@@ -303,6 +328,10 @@ class FleetResults:
         By aircraft, then time.
     sessions : tuple of SessionRow
         By session id.
+    installations : tuple of InstallationRow
+        By serial and time.
+    installation_flights : FigureData
+        A row for each flight of them: what earlier ones had taught, its learned answer, its residual.
     """
 
     flights: FigureData
@@ -320,6 +349,8 @@ class FleetResults:
     stated: Mapping[str, float] = field(default_factory=dict)
     deviations: tuple[DeviationRow, ...] = ()
     sessions: tuple[SessionRow, ...] = ()
+    installations: tuple[InstallationRow, ...] = ()
+    installation_flights: FigureData = field(default_factory=lambda: FigureData("installation_flights", {}, {}))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stated", MappingProxyType(dict(self.stated)))
