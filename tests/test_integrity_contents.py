@@ -150,12 +150,12 @@ def test_absent_samples_and_nan_do_not_make_a_stretch_shorter() -> None:
     assert stuck_fields(survey(items).ledger) == {"ins.true_heading_deg"}
 
 
-@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize("bits", [8, 16, 24, 32, 48])
 def test_a_record_counter_tells_what_is_missing(bits: int) -> None:
     count = (np.arange(1000) + 2**bits - 300) % 2**bits
     keep = np.ones(1000, dtype=bool)
     keep[400:407] = keep[700] = False
-    kind = {8: np.uint8, 16: np.uint16}[bits]
+    kind = {8: np.uint8, 16: np.uint16}.get(bits, np.uint64)
     items: list[Item] = [LogHeader("t")]
     for part in np.array_split(np.flatnonzero(keep), 5):
         times = Column(part.astype(np.int64) * 10**8)

@@ -153,6 +153,11 @@ def totals(done: Sequence[Outcome]) -> str:
     '1 session: 1 done, 0 with data lost, 0 at the limit, 0 failed'
     >>> totals([Outcome("a", "incomplete", "")])
     '1 log: 0 done, 0 with data lost, 0 at the limit, 0 failed, 0 skipped, 1 incomplete'
+    >>> totals([Outcome("a", "done", "", power_up=1), Outcome("a", "done", "", power_up=2)]).partition(":")[0]
+    '1 log with 2 power-ups'
+    >>> several = [Outcome("a", "done", ""), *(Outcome("b", "done", "", power_up=at) for at in (1, 2, 3))]
+    >>> totals(several).partition(":")[0]
+    '2 logs, 1 of them with 3 power-ups'
     >>> totals([Outcome("a", "done", "", was_finished=True)])
     '1 log: 1 done, 0 with data lost, 0 at the limit, 0 failed, 0 skipped; 1 was finished before'
     """
@@ -170,7 +175,12 @@ def _counted(noun: str, done: Sequence[Outcome], states: Sequence[State]) -> str
     counts = ", ".join(f"{sum(one.state == state for one in done)} {_STATE_WORDS[state]}" for state in states)
     incomplete = sum(one.state == "incomplete" for one in done)
     more = f", {incomplete} incomplete" if incomplete else ""
-    return f"{len(done)} {noun}{'' if len(done) == 1 else 's'}: {counts}{more}"
+    power_ups = [one.source for one in done if one.power_up]
+    several = len(set(power_ups))
+    count = len(done) - len(power_ups) + several
+    which = "" if count == 1 else f", {several} of them"
+    told = f"{which} with {len(power_ups)} power-ups" if several else ""
+    return f"{count} {noun}{'' if count == 1 else 's'}{told}: {counts}{more}"
 
 
 MOST_SKIPPED = 5  # named in a line

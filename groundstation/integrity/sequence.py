@@ -14,7 +14,7 @@ from groundstation.integrity.stretches import Place
 
 LISTED = 100
 _LARGEST = 2.0**53
-_WRAPS = (1 << 8, 1 << 16, 1 << 32)
+_WRAPS = (1 << 8, 1 << 16, 1 << 24, 1 << 32, 1 << 48)
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Counter:
 
 
 def _unwrapped(count: Int64Array, before: int, longest_jump: int) -> Int64Array:
-    """Steps of a counter; one that begins again at the end of 8, 16 or 32 bits goes on."""
+    """Steps of a counter; one that begins again at the end of 8, 16, 24, 32 or 48 bits goes on."""
     previous = np.concatenate(([before], count[:-1]))
     step = count - previous
     for wrap in _WRAPS:

@@ -27,6 +27,7 @@ DISTINCTIVE_COLUMNS = 4
 _HEAD_LINES = 1000
 DAMAGED_HEAD_LINES = 20  # in which a header row is looked for when the first line is not the profile's
 MOST_LINES = 10_000  # in which it is looked for elsewhere
+_OF_NUMBERS = frozenset(b"%c" % sign for sign in b"0123456789+-.,;")
 FEWEST_ROWS = 3  # above the header row that are those of another log
 
 
@@ -51,7 +52,9 @@ def _best(source: Source) -> tuple[float, Fit] | None:
     profiles = [profile for profile in _shipped() if profile.first_lines]
     is_one = any(first.startswith(profile.first_lines) for profile in profiles)
     encoding = detect_encoding(source.head, source.name)
-    below = {profile.name for profile in profiles if _stands_below(source, profile)}
+    below = (
+        {profile.name for profile in profiles if _stands_below(source, profile)} if _begins_with_rows(source) else set()
+    )
     most = MOST_LINES if below else _HEAD_LINES if is_one else DAMAGED_HEAD_LINES
     lines = head_lines(source, encoding, most)
     found: list[tuple[float, Fit]] = []
@@ -70,8 +73,13 @@ def _best(source: Source) -> tuple[float, Fit] | None:
     return best
 
 
+def _begins_with_rows(source: Source) -> bool:
+    """Tell whether a file begins with numbers, be the first row cut."""
+    return any(line.strip()[:1] in _OF_NUMBERS for line in source.head[:4096].split(b"\n", 2)[:2])
+
+
 def _stands_below(source: Source, profile: Profile) -> bool:
-    """Whether the profile's first line stands below the rows of another log, of which the beginning is lost."""
+    """Tell whether the profile's first line stands below the rows of another log, of which the beginning is lost."""
     return any(b"\n" + line.encode() in source.head for line in profile.first_lines)
 
 
@@ -187,10 +195,11 @@ def _sections(source: Source, first: Fit, utc_of_zero_ns: int | None) -> tuple[l
             break
         remarks.append(told(place, is_same))
         fits, ends, shifts = [*fits, found], [*ends, end_byte], [*shifts, shift_ns]
-    sections = []
+    sections = list[Section]()
     for fit, end, shift_ns in zip(fits, (*ends, last_byte), shifts, strict=True):
         layout, more = layout_of(fit, source, utc_of_zero_ns, end)
-        sections.append(Section(fit.dialect_to(end, stands_again), layout, shift_ns))
+        facts = _metadata(fit) if sections else {}
+        sections.append(Section(fit.dialect_to(end, stands_again), layout, shift_ns, facts))
         remarks += more
     return sections, remarks
 

@@ -202,7 +202,7 @@ def _sections(
         utc_ns, clock_remarks = _utc_of_zero(source, found.dialect, found_layout, metadata, names)
         shift_ns = _shift_ns(utc_of_zero_ns, utc_ns, found, last, sections[-1].shift_ns)
         sections[-1] = ended(sections[-1], first_byte)
-        sections.append(Section(found.dialect, found_layout, shift_ns))
+        sections.append(Section(found.dialect, found_layout, shift_ns, metadata))
         remarks += [told(place, is_same, shift_ns), *more, *_mistakes(found), *clock_remarks]
         last, last_utc_ns = found, last_utc_ns if utc_ns is None else utc_ns
     return sections if stands_again else [without_headers(sections[0])], remarks

@@ -1,17 +1,28 @@
 """Header and comment lines inside a table: what a log that was appended to another says of itself."""
 
 from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 
 import numpy as np
 
 from groundstation.base.records import Column, Int64Array, NewLog
 from groundstation.readers.start import utc_of_zero
 
-START = "start_utc"
+NOTHING: Mapping[int, Mapping[str, str]] = MappingProxyType({})
 
 
-def new_logs(lines: Mapping[int, str]) -> Iterator[NewLog]:
+def new_logs(
+    lines: Mapping[int, str], told: Mapping[int, Mapping[str, str]] = NOTHING, zero_ns: int | None = None
+) -> Iterator[NewLog]:
     """Logs that begin at lines of a header or comments; lines right behind one another are of one log.
+
+    Parameters
+    ----------
+    lines : mapping of line number to text
+    told : mapping of line number to facts
+        What is known of some of the lines.
+    zero_ns : int or None
+        UTC of time zero by the header of the file: times below a line that states another one are by this, too.
 
     Examples
     --------
@@ -21,12 +32,18 @@ def new_logs(lines: Mapping[int, str]) -> Iterator[NewLog]:
     first, facts = -1, dict[str, str]()
     for number, text in sorted(lines.items()):
         if first >= 0 and number - 1 not in lines:
-            yield NewLog(first, facts)
+            yield _new_log(first, facts, zero_ns)
             first, facts = -1, {}
         first = number if first < 0 else first
-        facts.update(_entry(text))
+        facts |= {**told.get(number, {}), **_entry(text)}
     if first >= 0:
-        yield NewLog(first, facts)
+        yield _new_log(first, facts, zero_ns)
+
+
+def _new_log(first: int, facts: Mapping[str, str], zero_ns: int | None) -> NewLog:
+    """A log with the UTC of its time zero, where it states one."""
+    own_ns = utc_of_zero(facts)[0]
+    return NewLog(first, facts, own_ns if own_ns is None or zero_ns is None else zero_ns)
 
 
 def with_own_zeros(time: Column, numbers: Int64Array, lines: Mapping[int, str], zero_ns: int | None) -> Column:

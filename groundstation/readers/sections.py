@@ -5,8 +5,8 @@ columns, other units, another time zero.
 """
 
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import BinaryIO
 
 from groundstation.base.records import Damage, Remark
@@ -33,11 +33,14 @@ class Section:
     layout : Layout
     shift_ns : int, optional
         From the time of these rows to that of the log's header; None where nothing tells it: the rows have no time.
+    facts : mapping of str to str
+        What its header says, where it is not that of the log.
     """
 
     dialect: Dialect
     layout: Layout
     shift_ns: int | None = 0
+    facts: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -68,6 +68,7 @@ class TableReader:
         """The header, batches in the order of the file, then remarks and damages."""
         yield header
         lines: dict[int, str] = {}
+        facts: dict[int, Mapping[str, str]] = {}
         for number, section in enumerate(self._sections):
             self._dialect, self._layout = section.dialect, section.layout
             scanner = RowScanner(self._source, section.dialect, self._losses)
@@ -76,8 +77,10 @@ class TableReader:
                 time, columns = self._typed(block)
                 time = with_own_zeros(time, block.line_numbers, scanner.skipped, zero_ns)
                 yield from self._batches(block.line_numbers, _shifted(time, section.shift_ns), columns)
-            lines |= ({section.dialect.first_line - 1: ""} if number else {}) | scanner.skipped
-        yield from new_logs(lines)
+            above = section.dialect.first_line - 1
+            lines |= ({above: ""} if number else {}) | scanner.skipped
+            facts |= {above: section.facts} if number else {}
+        yield from new_logs(lines, facts, header.utc_of_zero_ns)
         yield from self._remarks(scanner)
         yield from self._losses.damages()
 

@@ -14,7 +14,7 @@ from groundstation.base.errors import UsageError
 from groundstation.base.to_disk import sync_folder
 from groundstation.pipeline.many_flights.apart import bounds_of, outcomes_apart
 from groundstation.pipeline.many_flights.confined import Bounds
-from groundstation.pipeline.many_flights.consecutive import flights_of_parts
+from groundstation.pipeline.many_flights.consecutive import run_joined
 from groundstation.pipeline.many_flights.delta_sink import delta_place, put_flights
 from groundstation.pipeline.many_flights.fleet_store import Scan, refresh
 from groundstation.pipeline.many_flights.found_sessions import Asked, find_sessions, run_sessions
@@ -40,7 +40,6 @@ from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJo
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.cores import cores, painters_of
 from groundstation.pipeline.one_flight.flight import Job, run_flight
-from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
@@ -236,7 +235,7 @@ def _run_here(
             return replace(work[number % len(work)], add_suffix=True, power_up=placement.power_up(number))
 
         _run_into(placement, out, left(), run, suffixed, crew, listen, len(work))
-        apart = _run_joined(placement, work, in_out, crew, listen, is_isolated=is_isolated)
+        apart = run_joined(placement, work, in_out, crew, listen, is_isolated=is_isolated)
         clear_unfinished(out)  # of processes that died or took too long
         found, unwritten = _swept(placement, out, refresher)
         sessions = _run_sessions(placement, asked, found, crew, listen)
@@ -246,38 +245,6 @@ def _run_here(
         sync_folder(out)
         stored = put_flights(asked.store, found, outcomes) if asked.store else ()
         return (*told(outcomes, out), *apart, *unwritten, *problems, *stored)
-
-
-def _run_joined(
-    placement: Placement,
-    work: Sequence[Job],
-    known: KnownFlights,
-    crew: Crew,
-    listen: Listener,
-    *,
-    is_isolated: bool = False,
-) -> tuple[Outcome, ...]:
-    """Run as one flight the consecutive logs among those in place; returns what could not be joined, and why.
-
-    Isolated, files that cannot be read alone are not looked at: that would read them in this process.
-    """
-    outcomes = {number: one for number, one in placement.flights().items() if one.flight_id or not is_isolated}
-    found = flights_of_parts(outcomes, known, work[0].configuration)
-    if not found:
-        return ()
-    tasks: list[tuple[int, Job]] = []
-    for number, stretch in enumerate(found):
-        first = placement.flights()[stretch.numbers[0]]
-        add_suffix = bool(first.flight_id) and plain_id(first.flight_id, first.sha256) != first.flight_id
-        tasks.append((number, work[stretch.numbers[0] % len(work)].of_parts(stretch.parts, add_suffix=add_suffix)))
-    apart = []
-    with closing(crew(tasks, run_flight)) as ended:
-        for number, outcome in ended:
-            stretch = found[number]
-            listen(Event("end", tasks[number][1].name, outcome.text))
-            problem = placement.put_joined(stretch.numbers, outcome)
-            apart += [problem] if problem else []
-    return tuple(apart)
 
 
 def _write_beside(out: Path, outcomes: Sequence[Outcome], asked: Asked, found: Scan) -> tuple[Outcome, ...]:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from groundstation.base.records import Damage, Item, LogHeader, RecordBatch, Remark
+from groundstation.base.records import Damage, Int64Array, Item, LogHeader, RecordBatch, Remark, UtcReadings
+from groundstation.pipeline.one_flight.segments import Segment, segments_in
 from groundstation.readers.chapter10.naming import NAMING_CODES, Seen, named
 from groundstation.readers.icd import Icd
 from groundstation.store.info import StoreInfo
@@ -20,23 +21,35 @@ def items_named(path: Path, icds: Sequence[Icd]) -> Iterator[Item]:
     """
     info = read_info(path)
     renamed = {one["topic"] for one in info.remarks if one.get("code") == "mapped" and one.get("topic")}
+    segments = segments_in(info)
     seen, utc_of_zero_ns = Seen(), None
+    places, zeros = list[int](), list[int]()
     for item in read(path):
-        if isinstance(item, RecordBatch):
-            seen.add(item)
-            if info.has_utc and utc_of_zero_ns is None:
-                utc_of_zero_ns = _utc_of_zero(item)
-    header = LogHeader(info.reader, _facts(info, renamed), utc_of_zero_ns, info.clock.is_counting)
+        if not isinstance(item, RecordBatch):
+            continue
+        seen.add(item)
+        index, zero_ns = _zeros(item, segments) if info.has_utc else (item.record_index[:0],) * 2
+        if not len(index):
+            continue
+        if utc_of_zero_ns is None:
+            utc_of_zero_ns = int(np.sort(zero_ns)[len(zero_ns) // 2])
+        places += index[[0, -1]].tolist()
+        zeros += zero_ns[[0, -1]].tolist()
+    readings = UtcReadings(np.array(places, np.int64), np.array(zeros, np.int64)) if zeros else None
+    facts = _facts(info, renamed)
+    header = LogHeader(info.reader, facts, utc_of_zero_ns, info.clock.is_counting, utc_readings=readings)
     return named(_as_recorded(path, info, header, renamed), icds, seen)
 
 
-def _utc_of_zero(batch: RecordBatch) -> int | None:
-    """UTC of the recorder's zero, by records that have both times."""
-    timed = batch.device_time_ns.mask
-    if batch.time_ns is None or not timed.any():
-        return None
-    zeros = (batch.time_ns - batch.device_time_ns.values)[timed]
-    return int(np.sort(zeros)[len(zeros) // 2])
+def _zeros(batch: RecordBatch, segments: Sequence[Segment]) -> tuple[Int64Array, Int64Array]:
+    """Places of the records that have both times, and UTC of the recorder's zero by them; no UTC, no zero."""
+    index, timed = batch.record_index, batch.device_time_ns.mask
+    for one in segments:
+        if not one.has_utc:
+            timed = timed & ((index < one.first) | (index >= one.end))
+    if batch.time_ns is None:
+        return index[:0], index[:0]
+    return index[timed], (batch.time_ns - batch.device_time_ns.values)[timed]
 
 
 def _facts(info: StoreInfo, renamed: set[str]) -> Mapping[str, str]:
