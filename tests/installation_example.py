@@ -21,6 +21,7 @@ def heading_of(error_deg: float, **changes: Any) -> HeadingResult:
         figures=(),
         error_deg=error_deg,
         samples=0,
+        settings={"whole_half_width_max_deg": 0.333333, "whole_decides": True},
         confidence95_deg=(error_deg - 0.2, error_deg + 0.2),
         interval_parts=PARTS,
         mean_direction=(1.0, 0.0),

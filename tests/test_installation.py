@@ -8,9 +8,9 @@ import pytest
 
 from groundstation.estimators.installation.answer import verdict_of
 from groundstation.estimators.installation.model import doubts, factor_nodes, first_belief, installed, learn, predict
-from groundstation.estimators.installation.series import FIRST, SAME_TIME, answer_from, answers_of, series_of
+from groundstation.estimators.installation.series import FIRST, SAME_TIME, answer_from, answers_of, pooled_of, series_of
 from groundstation.estimators.installation.settings import InstallationSettings
-from groundstation.results.installation import InstallationResult, Lesson
+from groundstation.results.installation import InstallationResult, Lesson, Measured
 from groundstation.studies.installation import judge_family
 from groundstation.studies.installation_family import FAMILIES, draw_fleet
 from groundstation.studies.installation_pool import TaxiOfPool, draw_taxi
@@ -290,6 +290,27 @@ def test_class_stated_later_is_taken_for_the_flights_before() -> None:
 def test_one_flight_from_a_list_has_the_answer_of_the_series() -> None:
     flights = [lesson(day, 0.1 * day) for day in range(1, 6)]
     assert answer_from(flights[3], flights, SETTINGS) == answers(flights)[3]
+
+
+# Other sensors
+
+
+def test_other_sensors_pool_by_the_same_rule_and_name_what_is_odd() -> None:
+    arms = [4.1, 4.0, 3.9, 9.0, 4.0, 4.05]
+    flights = [lesson(day, 0.1, measured=(Measured("antenna_arm_m", arm, 0.2),)) for day, arm in enumerate(arms, 1)]
+    (series,) = series_of(flights)
+    (arm,) = pooled_of(series, SETTINGS)
+    assert (arm.name, arm.flights, arm.odd, arm.changed) == ("antenna_arm_m", 6, ("20260504",), ())
+    assert arm.value == pytest.approx(4.0, abs=0.1) and arm.sigma == pytest.approx(0.2 / np.sqrt(5), rel=0.1)
+
+
+def test_other_sensors_never_pool_across_serials() -> None:
+    flights = [
+        lesson(1, 0.1, measured=(Measured("compass_a_deg", 1.0, 0.1),)),
+        lesson(2, 0.1, ins_serial="S2", measured=(Measured("compass_a_deg", -1.0, 0.1),)),
+    ]
+    found = [pooled_of(series, SETTINGS)[0] for series in series_of(flights)]
+    assert [(one.flights, round(one.value, 1)) for one in found] == [(1, 1.0), (1, -1.0)]
 
 
 # Verdicts

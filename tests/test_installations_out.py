@@ -23,6 +23,7 @@ from groundstation.pipeline.many_flights.installations import (
     show_installation,
 )
 from groundstation.pipeline.many_flights.publishing import write_beside
+from groundstation.pipeline.verbs.rules import RulesTest, rules_test
 from groundstation.reports.flight_report import REPORT, write_flight_report
 from groundstation.results.heading import judged_gate
 from groundstation.results.inertial import InertialResult
@@ -287,3 +288,26 @@ def test_a_file_that_is_none_is_refused_in_a_line(tmp_path: Path, content: str |
 def test_unaided_azimuth_needs_an_answer() -> None:
     assert isinstance(inertial_of(None), InertialResult)
     assert lesson_of(stored(inertial=None)).azimuth_deg is None
+
+
+# Other limits
+
+
+def under(out: Path, text: str) -> RulesTest:
+    file = out.with_suffix(".toml")
+    file.write_text(text, encoding="utf-8")
+    return rules_test(file, out)
+
+
+def test_other_limits_show_both_answers(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    for day in (1, 2, 3):
+        save_installed(out, day, 0.3, gates=(), verdict="accept")
+    learned(out)
+    unchanged = under(out, "")
+    assert [row for row in unchanged.rows if "learned" in row.subject and row.gate] == []
+    assert unchanged.judged == 5  # two of the three flights have learned something
+    stricter = under(out, "[heading]\nwhole_half_width_max_deg = 0.01\n")
+    mine = [row for row in stricter.rows if row.subject == "heading, installation learned"]
+    assert [(row.verdict_before, row.verdict_after) for row in mine] == [("accept", "advisory")] * 2
+    assert {row.gate for row in mine} == {"whole_half_width_learned"}

@@ -14,6 +14,7 @@ from groundstation.base.serial import to_json
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import row_fields, rows_frame
+from groundstation.results.installation import Pooled
 from groundstation.results.magnetic import LETTERS
 
 if TYPE_CHECKING:
@@ -271,7 +272,7 @@ class InstallationRow:
     """One unit in one aircraft: what its flights say together; :class:`groundstation.results.installation.Installed`.
 
     ``place`` counts the installations of the fleet from 1. ``odd`` and ``changed`` name flights taken for another
-    unit's, and those from which on it sits otherwise, joined by ", ".
+    unit's, and those from which on it sits otherwise, joined by ", ". ``pooled`` are figures of other sensors.
     """
 
     place: int
@@ -289,6 +290,7 @@ class InstallationRow:
     factor_sigma: float | None = None
     odd: str = ""
     changed: str = ""
+    pooled: tuple[Pooled, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,16 @@ from groundstation.results.heading import IntervalPart
 
 FORMAT_VERSION = 1
 METHOD_VERSION = 1  # of the model: another one makes every learned answer again
+POOLED = ("compass_a_deg", "antenna_arm_m", "gnss_latency_s")  # figures of other sensors that stay as they are
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A figure of a sensor that one flight measured, in the unit that ends its name, and its sigma."""
+
+    name: str = field(metadata={"one_of": POOLED})
+    value: float
+    sigma: float
 
 
 @dataclass(frozen=True)
@@ -50,6 +60,8 @@ class Lesson:
     limit_deg : float, optional
         Of the whole half width; None where it does not decide.
     entry_step_deg : float
+    measured : tuple of Measured
+        What the flight says of the compass, the antenna and GNSS.
     """
 
     flight_id: str
@@ -80,6 +92,7 @@ class Lesson:
     platform_error_deg: float | None = None
     limit_deg: float | None = None
     entry_step_deg: float = 0.1
+    measured: tuple[Measured, ...] = ()
 
     @property
     def teaches(self) -> bool:
@@ -187,6 +200,21 @@ class InstalledFlight:
 
 
 @dataclass(frozen=True)
+class Pooled:
+    """A figure of a sensor from all flights of an installation, in the unit that ends its name.
+
+    ``odd`` and ``changed`` name flights that another sensor seems to have made, and those from which on it is another.
+    """
+
+    name: str = field(metadata={"one_of": POOLED})
+    flights: int
+    value: float
+    sigma: float
+    odd: tuple[str, ...] = ()
+    changed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Installation:
     """One unit in one aircraft, until it flies in another: what its flights say together.
 
@@ -201,6 +229,8 @@ class Installation:
         Probabilities, from all flights: it was another unit's; from it on the unit sits otherwise.
     flights : tuple of InstalledFlight
         In order of time.
+    pooled : tuple of Pooled
+        Compass A, antenna arm, latency of GNSS: by the same rule, of this installation alone.
     """
 
     ins_serial: str
@@ -210,6 +240,7 @@ class Installation:
     odd: tuple[float, ...]
     changed: tuple[float, ...]
     flights: tuple[InstalledFlight, ...]
+    pooled: tuple[Pooled, ...] = ()
 
     @property
     def lessons(self) -> tuple[Lesson, ...]:

@@ -19,6 +19,11 @@ LEAD = (
     "together, and what each flight's heading error is by what the earlier ones taught."
 )
 FAR = 3.0  # sigmas of a residual that is marked
+OTHERS = {
+    "compass_a_deg": ("A of the compass", "°", 2),
+    "antenna_arm_m": ("antenna ahead of the main gear", "m", 2),
+    "gnss_latency_s": ("latency of GNSS velocity", "s", 3),
+}
 MOST_LISTED = 20  # installations with a table of their own
 
 
@@ -27,7 +32,7 @@ def build(fleet: FleetResults) -> Section | None:
     rows = fleet.installations
     if not rows:
         return None
-    parts: list[Part] = [_table(rows)]
+    parts: list[Part] = [one for one in (_table(rows), _others(rows)) if one is not None]
     shown = [row for row in rows if row.taught][:MOST_LISTED]
     for row in shown:
         parts += [Figure("fleet.installation", str(row.place)), _flights(fleet, row)]
@@ -76,6 +81,32 @@ def _between(value: float | None, sigma: float | None) -> str:
     if not (is_number(value) and is_number(sigma)):
         return ABSENT
     return f"{bounded(value, 2, signed=True)} ± {number(NORMAL_95 * sigma, 2)}"
+
+
+def _others(rows: Sequence[InstallationRow]) -> Grid | None:
+    """Compass, antenna and latency of each installation; None where no flight observed any."""
+    heads = (
+        *(Head("Aircraft"), Head("Serial"), Head("Figure"), Head("Flights", True), Head("Value ± 95 %", True)),
+        Head("Changes and odd flights"),
+    )
+    cells = []
+    for row in rows:
+        for one in row.pooled:
+            title, unit, places = OTHERS[one.name]
+            half = number(NORMAL_95 * one.sigma, places, unit)
+            told = [f"changed: {', '.join(one.changed)}"] * bool(one.changed)
+            told += [f"odd: {', '.join(one.odd)}"] * bool(one.odd)
+            cells.append(
+                (
+                    *(aircraft_name(row.aircraft), clean(row.ins_serial), title, number(one.flights, 0)),
+                    f"{bounded(one.value, places, signed=True)} ± {half}",
+                    Mark("warn", clean("; ".join(told))) if told else "none",
+                )
+            )
+    caption = (
+        "Of all flights of the serial, changes and odd flights doubted as those of the mounting; never across serials."
+    )
+    return Grid("Other sensors by serial", heads, cells, caption) if cells else None
 
 
 def _flights(fleet: FleetResults, row: InstallationRow) -> Grid:

@@ -34,6 +34,7 @@ def installation_rows(installations: Sequence[Installation]) -> tuple[Installati
                 taught=len(one.taught_by),
                 odd=_named(one.taught_by, one.odd, named),
                 changed=_named(one.taught_by, one.changed, named),
+                pooled=one.pooled,
                 **believed,
             )
         )

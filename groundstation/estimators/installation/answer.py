@@ -1,5 +1,6 @@
 """The learned answer of a flight: both numbers, their intervals in parts, and the verdict that follows."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,8 +85,8 @@ def learned_answer(
         platform_confidence95_deg=platform.ends_deg,
         platform_parts=platform.parts,
         installed=installed(belief),
-        odd=_named(taught_by, odd, settings),
-        changed=_named(taught_by, changed, settings),
+        odd=named(taught_by, odd.tolist(), settings),
+        changed=named(taught_by, changed.tolist(), settings),
         **_residual(lesson, platform),
     )
 
@@ -129,10 +130,9 @@ def _reason(lesson: Lesson, verdict: str, number: LearnedNumber, correction_deg:
     return f"good to +-{number.half_width_deg * ARCMIN_PER_DEG:.0f} arcmin only"
 
 
-def _named(flights: tuple[str, ...], probability: FloatArray, settings: InstallationSettings) -> tuple[str, ...]:
-    return tuple(
-        name for name, one in zip(flights, probability.tolist(), strict=True) if one > settings.named_probability
-    )
+def named(flights: Sequence[str], probability: Sequence[float], settings: InstallationSettings) -> tuple[str, ...]:
+    """Flights whose probability is high enough to name them."""
+    return tuple(name for name, one in zip(flights, probability, strict=True) if one > settings.named_probability)
 
 
 def alone_answer(lesson: Lesson, why_not: str) -> InstallationResult:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from groundstation.base.angles import wrap_180
@@ -17,10 +17,13 @@ from groundstation.estimators.installation.settings import (
     STEADY_DEG,
     alignment_sigma_deg,
 )
+from groundstation.results.answer import Answers, answer_of
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
-from groundstation.results.installation import Lesson, as_stored
+from groundstation.results.installation import Lesson, Measured, as_stored
+from groundstation.results.latency import Latencies
+from groundstation.results.magnetic import MagneticResult
 
 LARGEST = 1e3  # no angle in degrees, no wind in m/s is larger
 RUNWAY_CRAB_DEG = 0.3  # of power and wind on the take-off run
@@ -42,6 +45,7 @@ class Stored:
     stated: Mapping[str, Any]
     heading: HeadingResult | None
     inertial: InertialResult | None = None
+    others: Answers = field(default_factory=dict)
     findings: frozenset[str] = frozenset()
 
     def said(self, key: str) -> str:
@@ -59,6 +63,7 @@ def lesson_of_flight(results: FlightResults, stated: Mapping[str, Any], flight_i
             stated,
             results.answer(HeadingResult),
             results.answer(InertialResult),
+            results.answers,
             frozenset(finding.code for finding in results.findings),
         )
     )
@@ -78,7 +83,27 @@ def lesson_of(stored: Stored) -> Lesson:
     fields = vars(plain) | ({} if heading is None else _of_heading(heading))
     if heading is not None and fields["number_deg"] is not None:
         fields |= _azimuth(stored, heading) | _reference(stored.metadata, heading)
-    return as_stored(Lesson(**(fields | {"not_taught": _why_not(plain, heading)})))
+    fields |= {"not_taught": _why_not(plain, heading), "measured": _measured(stored)}
+    return as_stored(Lesson(**fields))
+
+
+def _measured(stored: Stored) -> tuple[Measured, ...]:
+    """What a flight says of compass, antenna and GNSS, as far as it observed them."""
+    found: list[tuple[str, float | None, float | None]] = []
+    magnetic, latencies = answer_of(stored.others, MagneticResult), answer_of(stored.others, Latencies)
+    heading = stored.heading
+    if magnetic is not None and magnetic.verdict != "reject":
+        found.append(("compass_a_deg", magnetic.coefficients_deg.get("A"), magnetic.coefficients_sigma_deg.get("A")))
+    if heading is not None and heading.lever_arm_origin == "estimated":
+        found.append(("antenna_arm_m", heading.lever_arm_m, heading.lever_arm_sigma_m))
+    if heading is not None and latencies is not None:
+        row = latencies.observed(heading.ins_topic, heading.gnss_topic)
+        found += [] if row is None else [("gnss_latency_s", row.latency_s, row.sigma_s)]
+    return tuple(
+        Measured(name, value, sigma)
+        for name, value, sigma in found
+        if value is not None and sigma is not None and sigma > 0.0 and _is_sound(value, sigma)
+    )
 
 
 def _why_not(plain: Lesson, heading: HeadingResult | None) -> str:

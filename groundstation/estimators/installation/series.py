@@ -4,10 +4,10 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from groundstation.estimators.installation.answer import alone_answer, learned_answer
+from groundstation.estimators.installation.answer import alone_answer, learned_answer, named
 from groundstation.estimators.installation.model import Belief, doubts, first_belief, installed, learn
-from groundstation.estimators.installation.settings import InstallationSettings
-from groundstation.results.installation import Installation, InstallationResult, InstalledFlight, Lesson
+from groundstation.estimators.installation.settings import POOLED_SIGMA, InstallationSettings
+from groundstation.results.installation import Installation, InstallationResult, InstalledFlight, Lesson, Pooled
 
 SAME_TIME = "another flight of this serial begins at the same time"
 FIRST = "no earlier flight of this serial in this aircraft taught anything"
@@ -84,7 +84,43 @@ def installation_of(series: Series, settings: InstallationSettings) -> Installat
         odd=odd,
         changed=changed,
         flights=flights,
+        pooled=pooled_of(series, settings),
     )
+
+
+def pooled_of(series: Series, settings: InstallationSettings) -> tuple[Pooled, ...]:
+    """Figures of other sensors from all flights of an installation, by the rule of the mounting.
+
+    Each is a mounting that every flight sees as a reference does: changes and odd flights are doubted alike.
+    """
+    found = []
+    for name, sigma in POOLED_SIGMA.items():
+        flights = [
+            (
+                lesson.flight_id,
+                Lesson("", "", "", "", mounting_sigma_deg=sigma, reference_deg=value, reference_sigma_deg=own),
+            )
+            for lesson in series.lessons
+            if lesson.not_taught != SAME_TIME
+            for value, own in ((one.value, one.sigma) for one in lesson.measured if one.name == name)
+        ]
+        if not flights:
+            continue
+        belief = first_belief(flights[0][1], settings)
+        for _flight_id, one in flights:
+            belief = learn(belief, one, settings)
+        names, (odd, changed), believed = [one for one, _ in flights], doubts(belief), installed(belief)
+        found.append(
+            Pooled(
+                name,
+                len(flights),
+                believed.mounting_deg,
+                believed.mounting_sigma_deg,
+                named(names, odd.tolist(), settings),
+                named(names, changed.tolist(), settings),
+            )
+        )
+    return tuple(found)
 
 
 class _Teacher:

@@ -9,6 +9,7 @@ MOUNTING_DEG = 0.2
 STEADY_DEG = 0.05
 GROSS_DEG = 60.0  # of a unit turned round, or one of which nothing is known
 ORDINARY_WIND_MPS = 3.6
+POOLED_SIGMA: Mapping[str, float] = {"compass_a_deg": 5.0, "antenna_arm_m": 5.0, "gnss_latency_s": 1.0}  # beforehand
 
 
 @dataclass(frozen=True)

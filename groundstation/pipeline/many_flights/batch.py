@@ -244,7 +244,9 @@ def _run_here(
         problems = _write_beside(out, outcomes, asked, found)
         sync_folder(out)
         stored = put_flights(asked.store, found, outcomes) if asked.store else ()
-        return (*told(outcomes, out), *apart, *unwritten, *problems, *stored)
+        if asked.configuration.lessons is None:  # else the answer by the file is told
+            outcomes = told(outcomes, out)
+        return (*outcomes, *apart, *unwritten, *problems, *stored)
 
 
 def _write_beside(out: Path, outcomes: Sequence[Outcome], asked: Asked, found: Scan) -> tuple[Outcome, ...]:
