@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.base.normal import NORMAL_95
 from groundstation.estimators.heading.steady import FACTORS
@@ -97,7 +98,7 @@ def _aircraft(number: int, seed: int, place: int, pool: Sequence[TaxiOfPool]) ->
         azimuth = alignment + float(rng.normal(0.0, azimuth_sigma))
         has_turns, stand = bool(rng.random() >= 0.2), float(rng.normal(0.0, 0.05))
         airframe = alignment + float(mountings[unit])
-        number = airframe + steady + factor * crosswind + taxi.error_deg
+        shown = airframe + steady + factor * crosswind + taxi.error_deg
         is_after = (family.change in ("told", "not told", "turned") and unit == 1) or since > 0
         since += family.change != "" and (is_after or unit == 1)
         flown.append(
@@ -107,7 +108,7 @@ def _aircraft(number: int, seed: int, place: int, pool: Sequence[TaxiOfPool]) ->
                     aircraft=f"A{place:03d}",
                     ins_serial=f"S{place:03d}" + ("b" if family.change == "told" and unit else ""),
                     start_utc=f"2026-05-{flight + 1:02d}T06:00:00Z",
-                    number_deg=number,
+                    number_deg=shown,
                     taxi_sigma_deg=taxi_sigma(taxi),
                     crosswind_mps=told if family.has_metar else 0.0,
                     crosswind_sigma_mps=METAR_MPS if family.has_metar else ORDINARY_WIND_MPS,
@@ -124,9 +125,9 @@ def _aircraft(number: int, seed: int, place: int, pool: Sequence[TaxiOfPool]) ->
                     mounting_sigma_deg=MOUNTING_DEG,
                     verdict=_verdict(taxi),
                     failed=taxi.failed,
-                    error_deg=number - stated[0] * (told if family.has_metar else 0.0),
+                    error_deg=shown - stated[0] * (told if family.has_metar else 0.0),
                     half_width_deg=_alone_half_width(taxi, stated, told, family.has_metar),
-                    platform_error_deg=number - stated[0] * (told if family.has_metar else 0.0),
+                    platform_error_deg=shown - stated[0] * (told if family.has_metar else 0.0),
                     limit_deg=LIMIT_DEG,
                 ),
                 taxi,
@@ -157,20 +158,20 @@ def _alone_half_width(taxi: TaxiOfPool, stated: tuple[float, float], told_mps: f
     return NORMAL_95 * float(np.sqrt(taxi_sigma(taxi) ** 2 + wind**2 + STEADY_DEG**2))
 
 
-def _units(change: str, rng: np.random.Generator) -> np.ndarray:
+def _units(change: str, rng: np.random.Generator) -> NDArray[np.int64]:
     """Which of two units flies each flight."""
     from_flight, odd = int(rng.integers(2, 5)), int(rng.integers(1, 5))
     either = rng.integers(0, 2, FLIGHTS)
     flights = np.arange(FLIGHTS)
     if change in ("told", "not told", "turned"):
-        return (flights >= from_flight).astype(np.int64)
+        return np.asarray(flights >= from_flight, dtype=np.int64)
     if change == "two units":
-        return np.asarray(either)
+        return np.asarray(either, dtype=np.int64)
     if change == "mistyped":
-        return (flights == odd).astype(np.int64)
+        return np.asarray(flights == odd, dtype=np.int64)
     return np.zeros(FLIGHTS, dtype=np.int64)
 
 
-def _from_right(wind_mps: np.ndarray, track_rad: float) -> float:
+def _from_right(wind_mps: NDArray[np.float64], track_rad: float) -> float:
     """Wind across a path from the right, m/s, of a velocity of the air north and east."""
     return float(wind_mps[0] * np.sin(track_rad) - wind_mps[1] * np.cos(track_rad))

@@ -48,7 +48,7 @@ def _named(flights: Sequence[str], probability: Sequence[float], least: float) -
 def installation_flights(installations: Sequence[Installation]) -> FigureData:
     """One row for each flight: what the flights before it had taught, its answers, its residual."""
     rows = [_flight(place, one, flight) for place, one in enumerate(installations, 1) for flight in one.flights]
-    kinds = {"place": np.int64, "flights": np.int64, "start_utc": "datetime64[ns]", "odd": np.float64}
+    kinds: dict[str, Any] = {"place": np.int64, "flights": np.int64, "start_utc": "datetime64[ns]", "odd": np.float64}
     kinds |= dict.fromkeys((*NUMBERS, *BELIEVED, "changed"), np.float64)
     names = list(rows[0]) if rows else []
     columns = {name: np.array([row[name] for row in rows], dtype=kinds.get(name, np.str_)) for name in names}

@@ -65,6 +65,7 @@ def learned_answer(
     verdict = verdict_of(lesson, airframe.half_width_deg)
     correction = round_to_step(-airframe.error_deg, lesson.entry_step_deg)
     odd, changed = doubts(belief)
+    residual, residual_sigma = _residual(lesson, platform)
     return InstallationResult(
         ins_serial=lesson.ins_serial,
         aircraft=lesson.aircraft,
@@ -87,18 +88,17 @@ def learned_answer(
         installed=installed(belief),
         odd=named(taught_by, odd.tolist(), settings),
         changed=named(taught_by, changed.tolist(), settings),
-        **_residual(lesson, platform),
+        residual_deg=residual,
+        residual_sigma_deg=residual_sigma,
     )
 
 
-def _residual(lesson: Lesson, platform: LearnedNumber) -> dict[str, float]:
-    """The platform's number against the azimuth of the same flight."""
+def _residual(lesson: Lesson, platform: LearnedNumber) -> tuple[float | None, float | None]:
+    """The platform's number against the azimuth of the same flight, and the sigma of the difference."""
     if lesson.azimuth_deg is None or lesson.azimuth_sigma_deg is None:
-        return {}
-    return {
-        "residual_deg": float(wrap_180(platform.error_deg - lesson.azimuth_deg)),
-        "residual_sigma_deg": float(np.hypot(platform.sigma_deg, lesson.azimuth_sigma_deg)),
-    }
+        return None, None
+    residual = float(wrap_180(platform.error_deg - lesson.azimuth_deg))
+    return residual, float(np.hypot(platform.sigma_deg, lesson.azimuth_sigma_deg))
 
 
 def verdict_of(lesson: Lesson, half_width_deg: float) -> str:
