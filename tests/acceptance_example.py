@@ -12,9 +12,10 @@ from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult
+from tests.figure_arrays import filled
 from tests.fleet_example import DAY_NS, START_NS
 from tests.inertial_example import inertial_result
-from tests.report_example import MANIFEST, example, figure
+from tests.report_example import MANIFEST, example
 
 ROWS = 61
 
@@ -35,13 +36,13 @@ def save_flight(
     """
     time = np.linspace(0.0, hours * 3600.0, ROWS)
     error_m = rate_nmiph * time / 3600.0 * M_PER_NAUTICAL_MILE
-    states = figure(
+    states = filled(
         "inertial_states",
         time_s=time,
         measured_north_position_m=0.8 * error_m,
         measured_east_position_m=0.6 * error_m,
     )
-    track = figure(
+    track = filled(
         "inertial_track", time_s=time, ins_latitude_deg=np.zeros(ROWS), ins_longitude_deg=10.0 + 0.002 * time
     )
     gnss = {"position_white_m": 3.0, "position_correlated_m": 4.0, "velocity_white_mps": 0.03}

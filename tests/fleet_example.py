@@ -69,7 +69,7 @@ def save_flight(
         ground_speed_mps=np.where(is_slow, 0.5, 9.0),
         difference_deg=np.where(is_slow, np.nan, difference),
         residual_deg=difference - error_deg,
-        used=~is_slow,
+        is_used=~is_slow,
         gate=np.where(is_slow, "too slow", "used"),
         weight=np.where(is_slow, 0.0, 1.0),
     )

@@ -28,6 +28,7 @@ from groundstation.results.inertial import (
     RealOutage,
     StateEstimate,
 )
+from tests.figure_arrays import figure
 
 SCHULER_S = 5064.0
 LONG_S = 16_000.0  # the paper's flight
@@ -43,10 +44,6 @@ STATES = (
 )
 
 
-def _figure(name: str, **columns: Any) -> FigureData:
-    return FigureData(name, {key: np.asarray(values) for key, values in columns.items()}, {})
-
-
 def error_m(channel: str, time_s: Any) -> Any:
     """Position error of the channel: a Schuler sine over a trend."""
     size, phase, trend = {"north": (900.0, 0.4, 0.05), "east": (700.0, 1.9, -0.11)}[channel]
@@ -56,7 +53,7 @@ def error_m(channel: str, time_s: Any) -> Any:
 def _states(time: Any, gone: Any, rng: np.random.Generator) -> FigureData:
     since = time - np.maximum.accumulate(np.where(gone, -np.inf, time))
     settling = np.exp(-time / (0.08 * time[-1]))
-    columns: dict[str, Any] = {"time_s": time, "is_forecast": gone, "gnss_used": ~gone}
+    columns: dict[str, Any] = {"time_s": time, "is_forecast": gone, "is_gnss_used": ~gone}
     for channel in ("north", "east"):
         truth = error_m(channel, time)
         velocity = np.gradient(truth, time)
@@ -80,7 +77,7 @@ def _states(time: Any, gone: Any, rng: np.random.Generator) -> FigureData:
             f"smoothed_{channel}_velocity_mps": velocity,
             f"{channel}_normalised_innovation": np.where(gone, np.nan, rng.normal(0.0, 0.95, len(time))),
         }
-    return _figure("inertial_states", **columns)
+    return figure("inertial_states", **columns)
 
 
 def _observability(time: Any) -> FigureData:
@@ -90,7 +87,7 @@ def _observability(time: Any) -> FigureData:
             columns[f"{channel}_{name}"] = (1.0 - 0.16 * place) * (
                 1.0 - np.exp(-time / ((0.02 + 0.05 * place) * LONG_S))
             )
-    return _figure("inertial_observability", **columns)
+    return figure("inertial_observability", **columns)
 
 
 def _track(states: FigureData) -> FigureData:
@@ -108,7 +105,7 @@ def _track(states: FigureData) -> FigureData:
         columns |= {f"{name}_latitude_deg": latitude, f"{name}_longitude_deg": longitude}
     columns["ins_error_m"] = np.where(gone, np.nan, np.hypot(*errors["ins"]))
     columns["corrected_error_m"] = np.where(gone, np.nan, np.hypot(*errors["corrected"]) + 4.0)
-    return _figure("inertial_track", **columns)
+    return figure("inertial_track", **columns)
 
 
 def inertial_figures(duration_s: float = LONG_S, epochs: int = 2000, seed: int = 5) -> tuple[FigureData, ...]:
@@ -150,6 +147,7 @@ def inertial_result(duration_s: float = LONG_S, **changes: Any) -> InertialResul
         east=channel_result("east"),
         radial_error_rate_50_nmiph=0.41,
         radial_error_rate_95_nmiph=1.32,
+        radial_error_rate_fit_nmiph=0.37,
         velocity_error_rms_mps=0.87,
         largest_radial_error_m=2140.0,
         navigation_start=NavigationStart(
@@ -179,6 +177,7 @@ AIDED: dict[str, Any] = {
     "azimuth": None,
     "radial_error_rate_50_nmiph": None,
     "radial_error_rate_95_nmiph": None,
+    "radial_error_rate_fit_nmiph": None,
     "velocity_error_rms_mps": None,
     "largest_radial_error_m": None,
     "navigation_start": None,
@@ -204,7 +203,7 @@ def aided_figures(duration_s: float, rows: int = 200) -> tuple[FigureData, ...]:
         for name, suffix, size in (("position", "m", 1.5), ("velocity", "mps", 0.2)):
             columns[f"{channel}_{name}_{suffix}"] = rng.normal(0.0, size, rows)
             sigmas[f"{channel}_{name}_sigma_{suffix}"] = np.full(rows, size)
-    return _figure("inertial_differences", **columns), _figure("inertial_own_innovations", **columns, **sigmas)
+    return figure("inertial_differences", **columns), figure("inertial_own_innovations", **columns, **sigmas)
 
 
 def _map(duration_s: float) -> FigureData:
@@ -217,7 +216,7 @@ def _map(duration_s: float) -> FigureData:
     raw[later > max(duration_s, starts[0] + 7300.0)] = np.nan
     columns = {f"{name}_m": raw * factor * (1.0 + 0.2 * np.sin(start / 700.0)) for name, factor in FACTORS.items()}
     columns["raw_ins_m"] = raw
-    return _figure("forecast_map", start_s=start, horizon_min=horizon, **columns)
+    return figure("forecast_map", start_s=start, horizon_min=horizon, **columns)
 
 
 def _fan(duration_s: float) -> FigureData:
@@ -229,7 +228,7 @@ def _fan(duration_s: float) -> FigureData:
         columns[f"{name}_m"] = actual * (0.8 + 0.1 * np.sin(start / 900.0)) + 0.02 * lead
         columns[f"{name}_sigma_m"] = 5.0 + 0.05 * lead
         columns[f"actual_{name}_m"] = np.where(start + lead > max(duration_s, starts[0] + 7300.0), np.nan, actual)
-    return _figure("forecast_fan", **columns)
+    return figure("forecast_fan", **columns)
 
 
 def _classic(duration_s: float) -> FigureData:
@@ -240,7 +239,7 @@ def _classic(duration_s: float) -> FigureData:
         actual = error_m("east", time) - error_m("east", time[0])
         parts.append(np.column_stack([np.full(len(time), 3600.0 * hours), time, actual, 0.6 * actual + 0.1 * lead]))
     start, time, measured, last = np.concatenate(parts).T
-    return _figure(
+    return figure(
         "forecast_classic",
         start_s=start,
         time_s=time,
@@ -257,7 +256,7 @@ def forecast_figures(duration_s: float = LONG_S) -> tuple[FigureData, ...]:
     figures = [
         _map(duration_s),
         _fan(duration_s),
-        _figure(
+        figure(
             "forecast_growth",
             horizon_min=[float(horizon) for horizon in HORIZONS_MIN],
             starts=[43, 42, 41, 37, 31, 25, 19],

@@ -22,6 +22,7 @@ from groundstation.results.heading import (
 )
 from groundstation.results.manifest import Host, Manifest
 from groundstation.simulation.processes import damped_oscillation, gauss_markov
+from tests.figure_arrays import figure
 
 ERROR_DEG = 1.04
 MANIFEST = Manifest(
@@ -30,10 +31,6 @@ MANIFEST = Manifest(
     host=Host(platform="somewhere"),
     configuration={"exclude": [{"from": "+03:10", "to": "+03:15", "reason": "towed"}]},
 )
-
-
-def figure(name: str, **columns: Any) -> FigureData:
-    return FigureData(name, {key: np.asarray(values) for key, values in columns.items()}, {})
 
 
 def taxi_figures(seed: int = 3) -> tuple[FigureData, ...]:
@@ -69,7 +66,7 @@ def taxi_figures(seed: int = 3) -> tuple[FigureData, ...]:
             ground_speed_mps=speed,
             difference_deg=difference,
             residual_deg=difference - ERROR_DEG,
-            used=used,
+            is_used=used,
             gate=gate,
             weight=used.astype(float),
         ),
@@ -117,7 +114,7 @@ def _standstill(time: Any, north: Any, east: Any) -> tuple[FigureData, ...]:
     curves = [speed / scale**2 * np.exp(-0.5 * (speed / scale) ** 2) for scale in (0.0062, 0.0036)]
     return (
         figure(
-            "standstill_velocity", time_s=time, velocity_north_mps=north, velocity_east_mps=east, in_interval=inside
+            "standstill_velocity", time_s=time, velocity_north_mps=north, velocity_east_mps=east, is_in_interval=inside
         ),
         figure(
             "standstill_mean_speed",
@@ -147,6 +144,7 @@ def general_figures() -> tuple[FigureData, ...]:
     latitude, longitude = latitude_longitude_deg(north, east, 56.1234, 38.4321)
     altitude = 182.0 + np.clip(7.0 * (time - 330.0), 0.0, 3200.0) * np.clip((2760.0 - time) / 500.0, 0.0, 1.0)
     columns = {"latitude_deg": latitude, "longitude_deg": longitude, "altitude_m": altitude, "ground_speed_mps": speed}
+    columns["climb_mps"] = np.gradient(altitude, time)
     for values in columns.values():
         values[(time > 1201.0) & (time < 1230.0)] = np.nan
     edges = [0.0, 62.0, 270.0, 312.0, 2780.0, 2840.0, 2900.0, 3000.0]
@@ -172,6 +170,9 @@ def general_figures() -> tuple[FigureData, ...]:
             backward_steps=[0, 0, 1, 0, 0, 0, 0],
             stray_rows=np.zeros(count, dtype=int),
             dropped_rows=np.zeros(count, dtype=int),
+            lost_by_counter=np.zeros(count, dtype=int),
+            out_of_range=np.zeros(count, dtype=int),
+            stuck=np.zeros(count, dtype=int),
         ),
         figure(
             "gaps", topic=["gnss", "gnss", "raw.engine"], start_s=[170.0, 1201.5, 2001.0], length_s=[3.0, 28.1, 3.2]

@@ -107,6 +107,26 @@ def test_a_bag_that_was_never_closed_is_told(bag: Path) -> None:
     assert rows == 480 and damage.kind == "truncated" and "not closed" in damage.what
 
 
+@pytest.mark.parametrize("place", ["beyond any file", "behind the end", "in the first chunk", "within the index"])
+def test_an_index_that_is_not_where_the_header_says_is_found(bag: Path, place: str) -> None:
+    data = bag.read_bytes()
+    last = [start for op, start, _ in records(data) if op == CHUNK_INFO][-1]
+    stated = {
+        "beyond any file": 2**64 - 1,
+        "behind the end": len(data) + 7,
+        "in the first chunk": chunks(data)[0][0] + 90,
+        "within the index": last,
+    }
+    at = data.index(b"index_pos=") + len(b"index_pos=")
+    start, end = chunks(data)[1]
+    moved = data[:at] + stated[place].to_bytes(8, "little") + data[at + 8 :]
+    bag.write_bytes(moved)
+    assert read(bag) == (480, [])
+    bag.write_bytes(moved[:start] + moved[end:])
+    rows, damages = read(bag)
+    assert rows < 480 and missing(damages) == 480 - rows
+
+
 def test_half_an_index_costs_nothing_but_a_chunk_gone_as_well_is_told(bag: Path) -> None:
     data = bag.read_bytes()
     infos = [start for op, start, _end in records(data) if op == CHUNK_INFO]

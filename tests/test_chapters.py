@@ -26,8 +26,9 @@ from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.heading import Gate, HeadingResult
 from groundstation.results.latency import Latencies, Latency
+from tests.figure_arrays import filled
 from tests.inertial_example import forecast_result, inertial_result
-from tests.report_example import example, figure, heading_result
+from tests.report_example import example, heading_result
 
 BARE = FlightResults("NOTIME_00000000", Source("a.csv", "00" * 32, 0, "flat-csv"), {}, None, 0.0, "failed")
 
@@ -298,7 +299,7 @@ def test_ledger_has_a_row_for_each_topic() -> None:
 
 def test_a_long_ledger_is_cut_and_says_so() -> None:
     count = 70
-    ledger = figure("ledger", topic=[f"raw.t{number}" for number in range(count)], rows=[1] * count, stuck=[2] * count)
+    ledger = filled("ledger", topic=[f"raw.t{number}" for number in range(count)], rows=[1] * count, stuck=[2] * count)
     table = grid(quality(example(None, figures=(ledger,))), "Topics")
     assert len(table.rows) == 60 and table.caption == "10 more topics in the table file."
     assert table.heads[-1].title == "Stuck" and table.rows[0][-1] == "2"

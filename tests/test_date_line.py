@@ -24,7 +24,6 @@ from groundstation.exports.kml import write_kml
 from groundstation.exports.tracks import Track
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.simulation.approach import TrueRunway, simulate_approach
 from groundstation.viewer import colours
@@ -32,6 +31,7 @@ from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.recording import write_recording
 from groundstation.viewer.tabs import track as track_tab
 from groundstation.viewer.tabs.track import MAP_LATITUDE_DEG, zoom_of
+from tests.figure_arrays import filled
 from tests.recording_contents import Contents
 from tests.test_approaches import EXACT, PLAIN, only
 from tests.viewer_example import make_flight, make_results
@@ -106,7 +106,7 @@ def recorded(tmp_path: Path, latitude: np.ndarray, longitude: np.ndarray) -> Con
         "ground_speed_mps": np.full(len(latitude), 100.0),
     }
     figures = tuple(one for one in whole.figures if one.name not in ("overview", "phases"))
-    results = replace(whole, answers={}, figures=(FigureData("overview", overview, {}), *figures))
+    results = replace(whole, answers={}, figures=(filled("overview", **overview), *figures))
     write_recording(tmp_path / "a.rrd", flight, results)
     return Contents(tmp_path / "a.rrd")
 

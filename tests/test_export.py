@@ -19,14 +19,16 @@ from groundstation.exports.sbet import write_sbet
 from groundstation.exports.tracks import HALF_WIDTH, MSL, Track, tracks_of
 from groundstation.pipeline.verbs.export import WRITERS_OF_ONE, _written_alone, export
 from groundstation.pipeline.verbs.export_figures import export_figures
-from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults, Source
 from groundstation.tables.table import Flight, Table
+from tests.figure_arrays import filled
 from tests.fleet_example import save_flight
 from tests.saved import load
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 START_NS = 1_777_874_400_000_000_000  # 2026-05-04T06:00Z
 KML, GX = "{http://www.opengis.net/kml/2.2}", "{http://www.google.com/kml/ext/2.2}"
+BARE = FlightResults("NOTIME_00000000", Source("a.csv", "00" * 32, 0, "flat-csv"), {}, None, 0.0, "ok")
 GPX, OWN = "{http://www.topografix.com/GPX/1/1}", "{https://groundstation.invalid/gpx/1}"
 
 
@@ -77,7 +79,7 @@ def flight(has_utc: bool = True, **left_out: None) -> Flight:
 
 
 def track_of(name: str, **options: bool) -> Track:
-    (found,) = (one for one in tracks_of(flight(**options), {}) if one.name == name)
+    (found,) = (one for one in tracks_of(flight(**options), None) if one.name == name)
     return found
 
 
@@ -97,7 +99,7 @@ def test_attitude_of_other_rows_is_interpolated_over_a_short_time_alone() -> Non
         longitude_deg=np.array([math.nan, 1.0, math.nan]),
         roll_deg=np.array([0.0, math.nan, 1.0]),
     )
-    (alone,) = tracks_of(Flight({"ins": sparse}, {}, START_NS, True, "b.csv"), {})
+    (alone,) = tracks_of(Flight({"ins": sparse}, {}, START_NS, True, "b.csv"), None)
     assert np.isnan(alone.column("roll_deg")).all()
 
 
@@ -105,18 +107,15 @@ def test_the_corrected_track_has_its_interval() -> None:
     at_s = np.array([0.0, 5.0, 10.0])
     place = {"corrected_latitude_deg": at_s * 1e-4, "corrected_longitude_deg": at_s * 0.0}
     sigmas = {"north_position_sigma_m": np.full(3, 3.0), "east_position_sigma_m": np.array([4.0, 1.0, 4.0])}
-    figures = {
-        "inertial_track": FigureData("inertial_track", {"time_s": at_s, **place}, {}),
-        "inertial_states": FigureData("inertial_states", {"time_s": at_s, **sigmas}, {}),
-    }
-    (track,) = (one for one in tracks_of(flight(), figures) if one.name == "corrected")
+    figures = filled("inertial_track", time_s=at_s, **place), filled("inertial_states", time_s=at_s, **sigmas)
+    (track,) = (one for one in tracks_of(flight(), replace(BARE, figures=figures)) if one.name == "corrected")
     assert np.allclose(track.column(HALF_WIDTH), math.sqrt(-2.0 * math.log(0.05)) * np.array([4.0, 3.0, 4.0]))
 
 
 def test_the_smoothed_track_is_not_called_as_the_reference_that_judges_is() -> None:
     place = {"reference_latitude_deg": np.array([1.0, 2.0]), "reference_longitude_deg": np.array([3.0, 4.0])}
-    figures = {"inertial_track": FigureData("inertial_track", {"time_s": np.array([0.0, 5.0]), **place}, {})}
-    (track,) = (one for one in tracks_of(flight(), figures) if one.name == "smoothed")
+    figures = (filled("inertial_track", time_s=np.array([0.0, 5.0]), **place),)
+    (track,) = (one for one in tracks_of(flight(), replace(BARE, figures=figures)) if one.name == "smoothed")
     assert track.latitude_deg.tolist() == [1.0, 2.0]
 
 
@@ -181,7 +180,7 @@ def test_places_off_the_earth_and_heights_that_lack(tmp_path: Path) -> None:
         altitude_msl_m=np.array([math.nan, 1.0, 100.0, math.nan, math.nan, 1.0]),
         altitude_ellipsoid_m=np.array([math.nan, 1.0, 120.0, math.nan, 140.0, 1.0]),
     )
-    (track,) = tracks_of(Flight({"gnss": log}, {}, START_NS, True, "b.csv"), {})
+    (track,) = tracks_of(Flight({"gnss": log}, {}, START_NS, True, "b.csv"), None)
     assert track.longitude_deg.tolist() == [-170.0, 180.0, -180.0, -1.0] and np.all(track.latitude_deg == 10.0)
     write_kml(tmp_path / "a.kml", "b", [track])
     root = ET.parse(tmp_path / "a.kml").getroot()
@@ -190,7 +189,7 @@ def test_places_off_the_earth_and_heights_that_lack(tmp_path: Path) -> None:
 
 
 def test_what_a_format_needs_and_the_flight_lacks_is_told(tmp_path: Path) -> None:
-    (gnss, ins) = tracks_of(flight(altitude_ellipsoid_m=None), {})
+    (gnss, ins) = tracks_of(flight(altitude_ellipsoid_m=None), None)
     with pytest.raises(NotAssessableError, match="ins: found no position with altitude above the ellipsoid"):
         write_sbet(tmp_path / "a.out", ins)
     with pytest.raises(NotAssessableError, match="gnss: found no UTC"):
@@ -203,7 +202,7 @@ def test_pages_of_the_earth_hold_every_position(tmp_path: Path, has_utc: bool) -
     from groundstation.exports.gpx import write_gpx
     from groundstation.exports.kml import write_kml
 
-    tracks = tracks_of(flight(has_utc=has_utc), {})
+    tracks = tracks_of(flight(has_utc=has_utc), None)
     write_kml(tmp_path / "a.kml", "a<b>", tracks)
     root = ET.parse(tmp_path / "a.kml").getroot()
     places = root.findall(f".//{KML}Placemark")
@@ -260,10 +259,12 @@ def test_refusals_are_one_line_and_leave_nothing(tmp_path: Path) -> None:
 def test_a_made_track_has_the_height_of_its_ins_and_no_other() -> None:
     at_s = np.array([1.0, 5.0, 40.0])  # the last is long after the log's end
     place = {"corrected_latitude_deg": at_s * 1e-4, "corrected_longitude_deg": at_s * 0.0}
-    figures = {"inertial_track": FigureData("inertial_track", {"time_s": at_s, **place}, {})}
+    figures = (filled("inertial_track", time_s=at_s, **place),)
 
     def made(ins_topic: str) -> Track:
-        (track,) = (one for one in tracks_of(flight(), figures, ins_topic) if one.name == "corrected")
+        (track,) = (
+            one for one in tracks_of(flight(), replace(BARE, figures=figures), ins_topic) if one.name == "corrected"
+        )
         return track
 
     height_m = made("ins").column("altitude_ellipsoid_m")

@@ -83,6 +83,7 @@ def fleet_of(
         "sample_m2_deg2": [part.m2 for part in moments],
         "reference_residual_arcmin": rng.normal(0.0, 3.0, count).tolist(),
         "ins_kind": ["unaided"] * count,
+        "radial_error_rate_fit_nmiph": rate.tolist(),
         "radial_error_rate_50_nmiph": rate.tolist(),
         "radial_error_rate_95_nmiph": (2.0 * rate).tolist(),
         "forecast_60min_rms_m": (900.0 * rate).tolist(),
@@ -269,8 +270,8 @@ ODD: dict[str, Any] = {
     "timeless": lambda: fleet_of(30, start_utc=[None] * 30),
     "one time": lambda: fleet_of(30, start_utc=[START_NS] * 30),
     "no error": lambda: fleet_of(30, error_deg=[math.nan] * 30, verdict=[""] * 30),
-    "absurd": lambda: fleet_of(30, error_deg=[1e15, -1e15] * 15, radial_error_rate_50_nmiph=[1e-300, 1e15] * 15),
-    "aided": lambda: fleet_of(30, radial_error_rate_50_nmiph=[0.0] * 30, ins_kind=["gnss_aided"] * 30),
+    "absurd": lambda: fleet_of(30, error_deg=[1e15, -1e15] * 15, radial_error_rate_fit_nmiph=[1e-300, 1e15] * 15),
+    "aided": lambda: fleet_of(30, radial_error_rate_fit_nmiph=[0.0] * 30, ins_kind=["gnss_aided"] * 30),
     "all failed": lambda: fleet_of(30, status=["failed"] * 30, samples=2),
     "forty aircraft": lambda: fleet_of(80, [f"R{number}" for number in range(40)], samples=5),
 }

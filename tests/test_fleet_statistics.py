@@ -152,10 +152,10 @@ def test_outliers_are_named_with_their_flight_and_reason() -> None:
     rng = np.random.default_rng(10)
     error, rate = rng.normal(1.0, 0.1, 40), np.exp(rng.normal(0.0, 0.5, 40))
     error[7], rate[9], rate[20] = -1.0, 300.0, -1.0
-    found = answer.outliers(table(error_deg=error, radial_error_rate_50_nmiph=rate))
+    found = answer.outliers(table(error_deg=error, radial_error_rate_fit_nmiph=rate))
     assert [(one.flight_id, one.quantity) for one in found] == [
         ("F0007", "error_deg"),
-        ("F0009", "radial_error_rate_50_nmiph"),
+        ("F0009", "radial_error_rate_fit_nmiph"),
     ]
     assert found[0].z < -10.0 and found[0].typical == pytest.approx(1.0, abs=0.1)
     assert "heading error, deg: -1, usual for this aircraft" in found[0].reason

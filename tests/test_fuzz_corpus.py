@@ -2,6 +2,7 @@
 
 import json
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from tests.fuzz import __main__ as every_format
 from tests.fuzz.bases import FORMATS, base_named, bases
 from tests.fuzz.mutation import KINDS, Mutant
 from tests.fuzz.trial import Case, Watch, edits_of, run_case, suffix_of, try_file
-from tests.fuzz.verbs import Answer, disagreements, faults_of
+from tests.fuzz.verbs import Answer, disagreements, faults_of, limit_of
 
 CORPUS = Path(__file__).parent / "fuzz" / "corpus" / "found.jsonl"
 FOUND = [json.loads(line) for line in CORPUS.read_text(encoding="utf-8").splitlines()]
@@ -51,11 +52,16 @@ def test_the_first_mutations_pass(
 
 
 @pytest.mark.parametrize("format_name", FORMATS)
-def test_the_sound_logs_are_read_whole(format_name: str, tmp_path: Path) -> None:
+def test_the_sound_logs_are_read_whole_and_the_harmful_ones_in_time(format_name: str, tmp_path: Path) -> None:
     for base in bases(format_name, recorded=False):
         path = tmp_path / f"log{suffix_of(format_name)}"
         path.write_bytes(base.data)
-        assert try_file(path, tmp_path, is_deep=True) == "read", base.name
+        if base.is_harmful:
+            began = time.process_time()
+            try_file(path, tmp_path, is_deep=True)
+            assert time.process_time() - began < 2.0 * limit_of(len(base.data)), "twice: code may be compiled"
+        else:
+            assert try_file(path, tmp_path, is_deep=True) == "read", base.name
 
 
 def test_every_kind_of_edit_is_drawn_and_a_seed_gives_the_same_file() -> None:

@@ -7,16 +7,17 @@ import pytest
 
 from groundstation.estimators.heading import noise
 from groundstation.estimators.heading.interval import (
-    PRIOR_MEAN,
-    PRIOR_SIGMA,
+    NO_STANDSTILL,
     Differences,
     Regressor,
     StandstillVelocities,
+    _Target,
     error_posterior,
     fixed_noise_estimate,
-    mixture_quantile,
     sample_weights,
 )
+from groundstation.estimators.heading.posterior import mixture_quantile
+from groundstation.estimators.heading.priors import PRIOR_MEAN, PRIOR_SIGMA
 from groundstation.simulation.processes import damped_oscillation, gauss_markov
 
 DENSE_TOLERANCE = 1e-8  # relative: rounding of two ways to the same number
@@ -113,11 +114,43 @@ def test_likelihood_of_standstill_and_taxi_together_is_the_dense_one() -> None:
     prior = (np.zeros(1), np.zeros(1))
     ends = np.array([len(data.time_s)], dtype=np.int64)
     gap_s = float(data.time_s[0] - still[-1])
-    found, still_velocities = (log_likelihood, estimate, variance), (still, north, east, 0, gap_s)
+    alone = np.empty((1, 2))
+    found, still_velocities = (log_likelihood, estimate, variance, prior, alone), (still, north, east, 0, gap_s)
     noise.evaluate(theta[None, :], still_velocities, taxi, prior, ends, *found, noise.room_for(2))
     assert log_likelihood[0] == pytest.approx(expected, rel=DENSE_TOLERANCE)
     assert estimate[0, 0] == pytest.approx(mean, rel=DENSE_TOLERANCE)
     assert variance[0, 0, 0] == pytest.approx(1 / information, rel=DENSE_TOLERANCE)
+    assert alone[0] == pytest.approx([mean, 1 / information], rel=DENSE_TOLERANCE), "no term to be told apart"
+
+
+def test_terms_told_apart_are_left_out_of_what_is_found_alone() -> None:
+    rng = np.random.default_rng(5)
+    data, theta = random_differences(rng), draw_theta(rng)
+    term = Regressor(np.cos(np.deg2rad(data.direction_deg)), 0.0, 0.3, is_apart=True)
+    joint = _Target(NO_STANDSTILL, replace(data, regressors=(*data.regressors, term)), 1)
+    plain = _Target(NO_STANDSTILL, data)
+    found, expected = (target.evaluate(theta[None, :], target.last) for target in (joint, plain))
+    assert found.alone[0] == pytest.approx(expected.alone[0], rel=DENSE_TOLERANCE)
+    assert found.alone[0] == pytest.approx([expected.estimate[0, 0], expected.variance[0, 0, 0]], rel=DENSE_TOLERANCE)
+    assert found.variance[0, 0, 0] > found.alone[0, 1]
+
+
+def test_a_crosswind_there_and_back_is_no_disagreement_of_the_ins() -> None:
+    """Sideslip of 0.3 deg out and -0.3 back: without the term the segments seem to have errors of their own."""
+    taxi, still = simulated(np.random.default_rng(8), 80.0, 0.01)
+    is_back = taxi.time_s > np.median(taxi.time_s)
+    crab = np.where(is_back, -1.0, 1.0)
+    both = replace(
+        taxi,
+        difference_deg=taxi.difference_deg + 0.3 * crab,
+        direction_deg=(taxi.direction_deg + 180.0 * is_back) % 360.0,
+        segment=1 + is_back.astype(np.int64),
+    )
+    told = replace(both, regressors=(Regressor(crab, 0.0, 0.2, is_apart=True),))
+    untold, found = error_posterior(both, still), error_posterior(told, still)
+    assert found.measured_sigma_deg @ found.weight < 0.6 * (untold.measured_sigma_deg @ untold.weight)
+    assert found.error_deg == pytest.approx(untold.error_deg, abs=0.1)
+    assert abs(found.error_deg - error_posterior(taxi, still).error_deg) < 2.0 * found.standard_error_deg
 
 
 def simulated(

@@ -1,6 +1,6 @@
 """The start of an ICD that is written from what is on the buses: known equipment is found, nothing else is named."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +105,15 @@ def test_a_public_layout_is_known_by_how_its_words_hold_together(
     expected = {element.signal for _holder, element in shipped(layout).elements() if element.signal}
     assert signals(found) == expected
     assert signals(read_back(tmp_path, message(layout, RECEIVED, **values))) == set()  # it tells of what another sends
+
+
+def test_a_position_at_the_date_line_is_one(tmp_path: Path) -> None:
+    """Noise of rounding lies on both sides of 180 deg."""
+    here = {"latitude": 50.0, "longitude": 180.0, "true_heading": 77.0}
+    data = message("b100", SENT, **here)
+    assert "ins.longitude_deg" in signals(read_back(tmp_path, data))
+    far = replace(data, sample=np.vstack([data.sample, message("b100", SENT, **here | {"longitude": 177.0}).sample]))
+    assert "ins.longitude_deg" not in signals(read_back(tmp_path, far)), "it jumps"
 
 
 def test_a_message_between_terminals_is_named_once(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import NotAssessableError
+from groundstation.estimators.fleet.ins_errors import ins_errors
 from groundstation.estimators.inertial.analysis import FORECAST, INERTIAL
 from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
 from groundstation.estimators.inertial.settings import InertialSettings
@@ -46,6 +47,23 @@ def test_a_clean_flight_has_no_findings(clean: Estimation) -> None:
     assert clean.findings == ()
     assert clean.result.kind == "unaided"
     assert clean.result.outages == ()
+
+
+def test_the_headline_is_the_fit_of_the_acceptance(clean: Estimation) -> None:
+    """Slope through the origin over all epochs: what the acceptance finds in the saved arrays of the same flight."""
+    found = clean.result
+    states, track = (
+        next(part for part in found.figures if part.name == f"inertial_{name}") for name in ("states", "track")
+    )
+    errors = ins_errors(
+        states["time_s"],
+        *(states[f"measured_{channel}_position_m"] for channel in ("north", "east")),
+        *(track[f"ins_{name}_deg"] for name in ("latitude", "longitude")),
+        start_s=None if found.navigation_start is None else found.navigation_start.time_s,
+    )
+    assert errors is not None and found.radial_error_rate_50_nmiph is not None
+    assert found.radial_error_rate_fit_nmiph == pytest.approx(errors.values()["radial_rate_fit_nmiph"], rel=1e-3)
+    assert found.radial_error_rate_fit_nmiph != pytest.approx(found.radial_error_rate_50_nmiph, rel=1e-3)
 
 
 def test_gnss_never_present(flight: Flight) -> None:

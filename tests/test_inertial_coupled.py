@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
 from groundstation.base.records import Int64Array
-from groundstation.estimators.inertial import coupled
+from groundstation.estimators.inertial import coupled, coupled_forecast
 from groundstation.estimators.inertial.coupled import (
     AZIMUTH,
     AZIMUTH_DRIFT,
@@ -19,7 +19,7 @@ from groundstation.estimators.inertial.coupled import (
 )
 from groundstation.estimators.inertial.craft_motion import CraftMotion
 from groundstation.estimators.inertial.differences import Differences, drag_per_s
-from groundstation.estimators.inertial.filter import PATIENCE_S, Epochs, run_filter
+from groundstation.estimators.inertial.filter import Epochs, run_filter
 from groundstation.estimators.inertial.hindcast import hindcast
 from groundstation.estimators.inertial.leads import built_up, start_epochs
 from groundstation.estimators.inertial.model import (
@@ -33,6 +33,7 @@ from groundstation.estimators.inertial.model import (
     normal_gravity_mps2,
 )
 from groundstation.estimators.inertial.noise import GnssNoise, InsNoise
+from groundstation.estimators.inertial.seams import PATIENCE_S
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.simulation.inertial_family import ErrorBatch, FamilySettings, simulate_family
 from groundstation.simulation.ins_errors import SensorErrors, TrueMotion, propagate
@@ -250,7 +251,7 @@ def test_forecast_from_the_true_state_follows_the_simulation(turn_at: float | No
     run = coupled.CoupledRun(
         differences, PLATFORM, x, np.zeros_like(x), empty, empty, empty.astype(np.int8), NO_COVARIANCE
     )
-    forecast = coupled.hindcast_coupled(run, at, LEADS_S, SETTINGS)[0]
+    forecast = coupled_forecast.hindcast_coupled(run, at, LEADS_S, SETTINGS)[0]
     actual = truth.position_m[0, at[0] + LEADS_S.astype(int)] - truth.position_m[0, at[0]]
     largest = np.abs(actual).max()
     assert largest > 1000.0
@@ -287,7 +288,9 @@ def test_sensors_of_a_strapdown_turn_with_it() -> None:
         run = coupled.CoupledRun(
             differences, noise, x, np.zeros_like(x), empty, empty, empty.astype(np.int8), NO_COVARIANCE
         )
-        apart[noise.is_strapdown] = np.abs(coupled.hindcast_coupled(run, at, LEADS_S, SETTINGS)[0] - actual).max()
+        apart[noise.is_strapdown] = np.abs(
+            coupled_forecast.hindcast_coupled(run, at, LEADS_S, SETTINGS)[0] - actual
+        ).max()
     largest = np.abs(actual).max()
     assert largest > 1000.0
     assert apart[True] < RADII_SHARE * largest
@@ -327,10 +330,10 @@ def test_own_variance_is_that_of_the_model_carried_along() -> None:
     nothing = np.zeros((4001, 2))
     differences = differences_of(motion, nothing, nothing)
     run = coupled.run_coupled(differences, InsNoise(accelerometer_ug=50.0), SETTINGS)
-    variance = coupled.coupled_variance(run, np.array([1000]), np.array([600.0, 1200.0]))[0]
+    variance = coupled_forecast.coupled_variance(run, np.array([1000]), np.array([600.0, 1200.0]))[0]
     P = np.array(run.P[100])
     P[CHANNELS[:, POSITION]] = P[:, CHANNELS[:, POSITION]] = 0.0
-    _, density = coupled._noise_of(run.noise, differences, differences.epochs, 0.0)
+    _, density = coupled.noise_of(run.noise, differences, differences.epochs, 0.0)
     between = CraftMotion.between(differences, 1000.0 + 10.0 * np.arange(121))
     expected = []
     for k, A in enumerate(coupled.coupled_matrix(between, run.noise.beta_per_s)):
@@ -363,7 +366,7 @@ def test_consistent_on_matched_truth() -> None:
     values = coupled.coupled_matrix(
         CraftMotion.between(differences, motion.time_s, is_strapdown=False), noise.beta_per_s
     )
-    covariance, density = coupled._noise_of(noise, differences, differences.epochs, 0.0)
+    covariance, density = coupled.noise_of(noise, differences, differences.epochs, 0.0)
     root = np.linalg.cholesky(covariance + 1e-30 * np.eye(coupled.SIZE))
     runs, total = 60, np.zeros(coupled.SIZE)
     rng = np.random.default_rng(5)
@@ -450,7 +453,7 @@ def assert_forecasts_as_well(run: CoupledRun, whole: CoupledRun, at: Int64Array)
     lead_s: FloatArray = np.array([600.0, 1200.0])
     rms = []
     for one in (run, whole):
-        error = coupled.hindcast_coupled(one, at, lead_s, SETTINGS) - built_up(one.epochs, at, lead_s)
+        error = coupled_forecast.hindcast_coupled(one, at, lead_s, SETTINGS) - built_up(one.epochs, at, lead_s)
         rms.append(np.sqrt(np.mean(np.square(error), axis=(0, 2))))
     assert (rms[0] < AS_GOOD_SHARE * rms[1]).all(), rms
 
@@ -543,7 +546,7 @@ def test_position_at_the_start_of_a_forecast_is_the_estimate_where_gnss_shows_no
         differences, empty = differences_of(motion, position, np.zeros_like(position)), np.zeros((4001, 2, 2))
         used = np.full((4001, 2, 2), mark, dtype=np.int8)
         run = coupled.CoupledRun(differences, PLATFORM, x, np.zeros_like(x), empty, empty, used, NO_COVARIANCE)
-        built.append(coupled.hindcast_coupled(run, at, lead_s, SETTINGS))
+        built.append(coupled_forecast.hindcast_coupled(run, at, lead_s, SETTINGS))
     assert np.array_equal(built[0], built[1]) and np.array_equal(built[0], built[2])
     assert np.abs(built[0] - built[3]).max() > 100.0  # m: what it matters
 
@@ -554,7 +557,7 @@ def test_forecast_from_inside_a_gap_goes_on_as_the_filter_does() -> None:
     position[5000:7001], velocity[5000:7001] = np.nan, np.nan
     run = coupled.run_coupled(differences_of(motion, position, velocity), PLATFORM, SETTINGS)
     at = np.array([5300])
-    forecast = coupled.hindcast_coupled(run, at, np.array([600.0, 1200.0]), SETTINGS)[0]
+    forecast = coupled_forecast.hindcast_coupled(run, at, np.array([600.0, 1200.0]), SETTINGS)[0]
     states = CHANNELS[:, POSITION]
     assert forecast == pytest.approx(run.x[[5900, 6500]][:, states] - run.x[5300, states], abs=1.0)
 
@@ -589,7 +592,7 @@ def test_gain_is_given_against_the_separate_channels_at_the_same_starts() -> Non
     at = start_epochs(differences.epochs, 5400.0, 600.0)
     separate = hindcast(run, at, LEADS_S, ["last_estimate"], SETTINGS)
     ours = coupled.run_coupled(differences, noise, SETTINGS)
-    rows = coupled.coupled_rows(ours, separate, SETTINGS)
+    rows = coupled_forecast.coupled_rows(ours, separate, SETTINGS)
     assert [row.horizon_min for row in rows] == [10.0, 30.0, 60.0, 90.0, 120.0]  # 1 and 5 are no leads of it
     lead = 11
     apart = np.sqrt(np.nanmean(np.square(separate.radial_m("last_estimate")[:, lead])))
@@ -601,4 +604,4 @@ def test_a_simulated_family_runs_through() -> None:
     differences = of_batch(simulate_family(FamilySettings(route="manoeuvring", duration_s=2000.0), 1, 7))
     run = coupled.run_coupled(differences, PLATFORM, SETTINGS)
     assert (run.used == 1).mean() > 0.99
-    assert coupled.hindcast_coupled(run, np.array([1000]), np.zeros(0), SETTINGS).shape == (1, 0, 2)
+    assert coupled_forecast.hindcast_coupled(run, np.array([1000]), np.zeros(0), SETTINGS).shape == (1, 0, 2)

@@ -10,9 +10,8 @@ from scipy.stats import chi2
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.units import MPS2_PER_G
+from groundstation.estimators.inertial.channel_group import RESET_POSITION_M, RESET_VELOCITY_MPS
 from groundstation.estimators.inertial.filter import (
-    RESET_POSITION_M,
-    RESET_VELOCITY_MPS,
     Epochs,
     FilterRun,
     measurement_variances,

@@ -323,8 +323,8 @@ def test_other_sensors_never_pool_across_serials() -> None:
         ("advisory", ("whole_half_width",), 0.4, "advisory"),
         ("accept", (), 0.3, "accept"),
         ("accept", (), 0.4, "advisory"),
-        ("extend", ("half_width", "precision"), 0.3, "accept"),
-        ("extend", ("half_width",), 0.4, "extend"),
+        ("extend", ("whole_half_width",), 0.3, "accept"),
+        ("extend", ("precision",), 0.3, "extend"),
         ("extend", ("taxi_seconds",), 0.1, "extend"),
         ("reject", ("steps",), 0.1, "reject"),
         ("undecided", ("geometry",), 0.1, "undecided"),
@@ -332,6 +332,11 @@ def test_other_sensors_never_pool_across_serials() -> None:
 )
 def test_verdict_is_on_the_sum(verdict: str, failed: tuple[str, ...], half_width: float, expected: str) -> None:
     assert verdict_of(lesson(1, 0.1, verdict=verdict, failed=failed), half_width) == expected
+
+
+def test_taxi_that_is_the_larger_part_asks_for_more_of_it() -> None:
+    assert verdict_of(lesson(1, 0.1, failed=("whole_half_width",), taxi_sigma_deg=0.16), 0.36) == "extend"
+    assert verdict_of(lesson(1, 0.1, failed=("whole_half_width",), taxi_sigma_deg=0.10), 0.36) == "advisory"
 
 
 def test_whole_that_does_not_decide_refuses_nothing() -> None:

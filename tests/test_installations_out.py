@@ -203,6 +203,13 @@ def test_rejected_taxi_teaches_only_where_its_interval_is_honest(gate: str, teac
     assert teaches or gate in lesson.not_taught
 
 
+def test_uneven_power_is_of_its_flight_and_widens_that_alone() -> None:
+    settings: dict[str, float | str | bool] = {"aircraft.taxi_power": "uneven", "uneven_power_sigma_deg": 0.3}
+    even, uneven = lesson_of(stored()), lesson_of(stored(heading=heading_of(0.3, settings=settings)))
+    assert uneven.taxi_sigma_deg == pytest.approx((even.taxi_sigma_deg**2 + 0.3**2) ** 0.5, abs=1e-4)
+    assert uneven.steady_sigma_deg == even.steady_sigma_deg
+
+
 def test_answer_of_an_older_version_says_so() -> None:
     assert "older version" in lesson_of(stored(heading=heading_of(0.3, mean_direction=None))).not_taught
 

@@ -138,7 +138,7 @@ def test_a_receiver_that_states_a_worse_velocity_is_believed() -> None:
 def used_speeds(runs: GroundRuns) -> np.ndarray:
     assert runs.together is not None
     samples = next(figure for figure in runs.together.figures if figure.name == "heading_samples")
-    return np.asarray(samples["ground_speed_mps"][samples["used"]])
+    return np.asarray(samples["ground_speed_mps"][samples["is_used"]])
 
 
 def test_between_taxi_and_the_threshold_nothing_counts() -> None:

@@ -197,7 +197,7 @@ def test_every_run_and_the_curve_come_back_without_noise() -> None:
     assert all(run.phase == "taxi" for run in answer.used)
     line = next(figure for figure in answer.figures if figure.name == "magnetic_ground_curve")
     expected = harmonics.design(line["magnetic_heading_deg"]) @ COEFFICIENTS
-    assert np.all(np.abs(line["error_deg"] - expected) < 3.0 * line["sigma_deg"])
+    assert np.all(np.abs(line["heading_error_deg"] - expected) < 3.0 * line["heading_error_sigma_deg"])
 
 
 @pytest.mark.slow
@@ -261,7 +261,7 @@ def test_a_heading_that_lags_in_turns_is_left_to_settle() -> None:
     for settle_s in (0.0, 3.0, 12.0):
         points = found(late, settle_s=settle_s).figures[0]
         expected = harmonics.design(points["magnetic_heading_deg"]) @ COEFFICIENTS
-        worst.append(float(np.max(np.abs(wrap_180(points["error_deg"] - expected)))))
+        worst.append(float(np.max(np.abs(wrap_180(points["heading_error_deg"] - expected)))))
     assert worst[0] > 1.0
     assert worst[1] < 0.6 * worst[0]
     assert worst[2] < 0.1

@@ -79,13 +79,15 @@ def test_a_standstill_with_ins_and_gnss_together_is_a_start() -> None:
     found = result(flight_from_stand())
     assert start_of(found) == (0.0, "standstill")
     assert found.radial_error_rate_50_nmiph == pytest.approx(RATE_NMIPH, rel=0.02)  # scale of the sphere
+    assert found.radial_error_rate_fit_nmiph == pytest.approx(RATE_NMIPH, rel=0.02)
 
 
 @pytest.mark.parametrize("begin_s", [STAND_S + 10.0, 900.0, 2700.0])
 def test_a_log_that_begins_in_motion_has_no_rate_but_its_growth(begin_s: float) -> None:
     found = result(begun_at(flight_from_stand(), begin_s))
     assert start_of(found) == (None, "unknown")
-    assert found.radial_error_rate_50_nmiph is None and found.radial_error_rate_95_nmiph is None
+    rates = [getattr(found, f"radial_error_rate_{kind}_nmiph") for kind in ("50", "95", "fit")]
+    assert rates == [None, None, None]
     hours = (LENGTH_S - begin_s) / S_PER_H
     assert found.compared_hours == pytest.approx(hours, abs=0.001)
     assert found.radial_error_first_m is not None and found.radial_error_last_m is not None
@@ -209,5 +211,6 @@ def test_a_real_ins_whose_log_begins_in_the_air_has_its_rate_by_a_stated_start(t
         call = ["run", str(log), "-o", str(tmp_path / name), "--only", "results", *more]
         assert CliRunner().invoke(app, call).exit_code == 0
         (summary,) = (tmp_path / name).glob("*/summary.json")
-        rates[name] = json.loads(summary.read_text())["results"]["inertial"]["radial_error_rate_50_nmiph"]
-    assert rates == {"alone": None, "stated": pytest.approx(0.65, abs=0.006)}
+        found = json.loads(summary.read_text())["results"]["inertial"]
+        rates[name] = [found[f"radial_error_rate_{kind}_nmiph"] for kind in ("50", "fit")]
+    assert rates == {"alone": [None, None], "stated": pytest.approx([0.65, 0.61], abs=0.006)}

@@ -160,7 +160,7 @@ def test_results_are_frames(flight: OpenLog) -> None:
     assert gates["value"].dtype == np.float64
     assert flight.results.to_frame()["code"].tolist() == [finding.code for finding in flight.results.findings]
     samples = flight.results.to_frame("heading_samples")
-    assert int(samples["used"].sum()) == heading.samples
+    assert int(samples["is_used"].sum()) == heading.samples
     for results in (heading, flight.results):
         for name in results.table_names():
             assert len(results.to_frame(name).columns), name

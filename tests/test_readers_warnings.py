@@ -2,16 +2,20 @@
 
 import json
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mcap.writer import Writer as McapWriter
 
-from groundstation.readers import registry
+from groundstation.base.records import Item
+from groundstation.readers import flat_csv, registry
 from groundstation.readers.layout import velocity_from_track, wind_from_direction
+from groundstation.readers.source import Source
 from tests.telemetry_writer import START_US, Telemetry
 from tests.test_readers_contract import check
+from tests.trajectory_writer import sbet
 
 ODD = ("inf", "-inf", "nan", "1e308", "1e999", "-1e308", "0", "1")
 
@@ -114,3 +118,37 @@ def test_directions_that_are_infinite_give_nan() -> None:
         for function in (velocity_from_track, wind_from_direction):
             assert np.isnan(function(odd, np.full(4, 5.0))[0][:3]).all()
             function(np.full(4, 90.0), odd)
+
+
+@pytest.mark.parametrize("number", [1e308, -1e308, np.inf, np.nan, np.finfo(np.float64).max, 5e-324])
+@pytest.mark.parametrize("name", ["latitude", "longitude", "altitude", "time", "roll", "x_velocity", "wander_angle"])
+def test_a_trajectory_with_odd_numbers(name: str, number: float, tmp_path: Path) -> None:
+    rows = sbet(count=200)
+    rows[name][[12, 90, 91]] = number
+    path = tmp_path / "a.sbet"
+    path.write_bytes(rows.tobytes())
+    read_in_silence(path)
+
+
+def test_what_a_reader_computes_of_odd_numbers_warns_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The kind: readers of others and those to come, too."""
+
+    def warm(*_: object) -> float:
+        return float((np.array([1e308, np.inf]) * 1e10 - np.inf)[0])
+
+    sniff, read = flat_csv.sniff, flat_csv.read
+
+    def reads(source: Source) -> Iterator[Item]:
+        warm()
+        for item in read(source):
+            warm()
+            yield item
+
+    monkeypatch.setattr(flat_csv, "sniff", lambda source: warm() and sniff(source))
+    monkeypatch.setattr(flat_csv, "read", reads)
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,ins.roll_deg\n" + "".join(f"{row},1\n" for row in range(50)))
+    read_in_silence(path)
+    with warnings.catch_warnings(), pytest.raises(RuntimeWarning):
+        warnings.simplefilter("error")
+        warm()

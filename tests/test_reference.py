@@ -109,6 +109,18 @@ def test_a_flight_without_errors_has_none(answered: Answered) -> None:
     assert check.is_inside
 
 
+@pytest.mark.parametrize("sigma", [5e-324, 1e-320, 1e-300, 1e-160, 0.0])
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_sigma_of_nothing_is_no_claim(sigma: float) -> None:
+    """What is left over of a zero is told by no device: nothing is divided by it, and the errors are judged as ever."""
+    away = np.random.default_rng(39).normal(0.0, 1.0, (3_000, 2))
+    names = ("horizontal_sigma_m", "velocity_sigma_mps", "vertical_sigma_m", "true_heading_sigma_deg")
+    answer = judged(ride(away, **dict.fromkeys(names, sigma)))
+    assert not answer.claims
+    assert answer.errors == judged(ride(away)).errors
+    assert judged(ride(away, horizontal_sigma_m=1.4)).claims
+
+
 def test_signs_of_every_axis() -> None:
     """Error = subject - reference: ahead, to the right and above are positive."""
     time_s = np.arange(0.0, 100.0, 1.0)

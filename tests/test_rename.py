@@ -1,4 +1,4 @@
-"""A field of an answer that is renamed where it is made stops the type check wherever it is still read by the old name.
+"""A field of an answer, or a column of its arrays, renamed where it is made stops the type check where it is read.
 
 Every answer is a type to its last reader; a mapping between the two would let the old name pass, and the page would
 show a dash.
@@ -20,11 +20,17 @@ CHECKED = (
     *("results/heading.py", "results/inertial.py", "base/ledger.py", "integrity/ledger.py"),
     *("estimators/heading/answer.py", "estimators/inertial/estimate.py"),
     *("chapters/heading.py", "chapters/inertial.py", "cli/check_table.py"),
+    *("results/arrays/heading.py", "estimators/heading/figures.py"),
+    *("reports/figures/heading.py", "viewer/tabs/heading.py", "reports/comparison.py"),
 )
+ARRAYS = ("results/arrays/heading.py", "estimators/heading/figures.py")
 # Field, and the files that define and make it; those that read it keep the old name.
 RENAMED = (
     ("estimate_sd_deg", ("results/heading.py", "estimators/heading/answer.py"), "chapters/heading.py"),
     ("radial_error_rate_50_nmiph", ("results/inertial.py", "estimators/inertial/estimate.py"), "chapters/inertial.py"),
+    ("honest_half_width_deg", ARRAYS, "reports/figures/heading.py"),
+    ("honest_half_width_deg", ARRAYS, "reports/comparison.py"),
+    ("mean_deg", ARRAYS, "viewer/tabs/heading.py"),
     ("longest_s", ("base/ledger.py", "integrity/ledger.py"), "cli/check_table.py"),
 )
 
@@ -47,7 +53,7 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize(("field", "made", "read"), RENAMED, ids=[field for field, _, _ in RENAMED])
+@pytest.mark.parametrize(("field", "made", "read"), RENAMED, ids=[f"{field} of {read}" for field, _, read in RENAMED])
 def test_a_renamed_field_is_missed_by_who_reads_it(field: str, made: tuple[str, ...], read: str, copied: Path) -> None:
     files = [copied / "groundstation" / name for name in made]
     before = [path.read_text(encoding="utf-8") for path in files]

@@ -50,19 +50,19 @@ def test_a_stricter_limit_changes_the_verdict_and_says_why(out: Path, tmp_path: 
     accepted = {name: answer for name, answer in heading.items() if answer is not None and answer.verdict == "accept"}
     assert accepted
     least = min(_half_width_deg(answer) for answer in accepted.values())
-    found = under(out, f'[rules]\nversion = "2026-12"\n[heading]\nhalf_width_max_deg = {0.9 * least}\n', tmp_path)
+    found = under(out, f'[rules]\nversion = "2026-12"\n[heading]\nwhole_half_width_max_deg = {0.9 * least}\n', tmp_path)
     assert found.no_longer_accepted == len(accepted) <= found.changed and found.need_log == 0
     assert "2026-12" in found.rules
     for row in found.rows:
-        assert row.gate == "half_width" and (row.limit_before, row.state_after) == ("<= 0.2", "failed")
+        assert row.gate == "whole_half_width" and (row.limit_before, row.state_after) == ("<= 0.333333", "failed")
         if row.flight_id in accepted:
-            assert (row.verdict_before, row.verdict_after) == ("accept", "extend")
+            assert row.verdict_before == "accept" and row.verdict_after in ("extend", "advisory")
     text = rules_text(found)
     assert all(name in text for name in accepted) and f"{len(accepted)} no longer accepted" in text
 
 
 def _half_width_deg(answer: HeadingResult) -> float:
-    (value,) = (gate.value for gate in answer.gates if gate.name == "half_width")
+    (value,) = (gate.value for gate in answer.gates if gate.name == "whole_half_width")
     assert value is not None
     return value
 
@@ -70,6 +70,7 @@ def _half_width_deg(answer: HeadingResult) -> float:
 def test_rules_agree_with_a_run_under_them(out: Path, tmp_path: Path) -> None:
     """Limits that choose no data: every gate and verdict is that of a run with the new settings."""
     limits = {"precision_max_deg": 0.01, "quality_max_deg": 0.05, "variance_ratio_range": [0.9, 1.1]}
+    limits |= {"precision_decides": True, "half_width_decides": True, "half_width_max_deg": 0.1}
     limits |= {"skewness_max": 0.1, "drift_sigmas_max": 0.5, "whole_half_width_max_deg": 0.9, "whole_decides": False}
     (tmp_path / "new.toml").write_text(
         "[heading]\n" + "\n".join(f"{key} = {json.dumps(limits[key])}" for key in limits)
@@ -109,17 +110,19 @@ def test_every_analysis_with_gates_has_rules_and_its_limits_are_settings() -> No
 
 def test_the_verb_writes_a_table_and_answers_by_its_exit_code(out: Path, tmp_path: Path) -> None:
     new, table = tmp_path / "new.toml", tmp_path / "changes.csv"
-    new.write_text("[heading]\nhalf_width_max_deg = 0.001\n")
+    new.write_text("[heading]\nwhole_half_width_max_deg = 0.001\n")
     run, call = CliRunner(), ["rules", "test", str(new), "--over", str(out), "-o", str(table), "-f"]
     assert [run.invoke(app, [*call, "--fail-on", level]).exit_code for level in ("none", "warn", "fail")] == [0, 4, 4]
     rows = list(csv.DictReader(table.read_text().splitlines()))
-    assert {row["gate"] for row in rows} == {"half_width"} and {row["limit_after"] for row in rows} == {"<= 0.001"}
+    assert {row["gate"] for row in rows} == {"whole_half_width"} and {row["limit_after"] for row in rows} == {
+        "<= 0.001"
+    }
     lines = run.invoke(app, call).stdout.splitlines()  # a line for each changed verdict, their heads, the totals
     assert len(lines) == rules_test(new, out).changed + 2 and "?" not in "".join(lines)
     assert run.invoke(app, call[:-1]).exit_code == 2  # the table is there already
     told = json.loads(run.invoke(app, [*call, "--json"]).stdout)
     assert told["changed"] == rules_test(new, out).changed
-    new.write_text("[heading]\nhalf_width_max_degrees = 0.001\n")
+    new.write_text("[heading]\nwhole_half_width_max_degrees = 0.001\n")
     assert run.invoke(app, call).exit_code == 2
     assert run.invoke(app, ["rules", "test", str(table), "--over", str(tmp_path / "none")]).exit_code == 2
 

@@ -2,10 +2,12 @@
 
 import errno
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 from numpy.typing import NDArray
 
 from groundstation.base.clock import BreakEntry, Clock, RelationEntry
@@ -24,6 +26,7 @@ from groundstation.base.ledger import (
 )
 from groundstation.base.records import Column, Damage, LogHeader, RecordBatch
 from groundstation.base.signals import TOPICS
+from groundstation.store import channel
 from groundstation.store.channel import CHUNK_SPAN_NS, SHORT_SPAN_NS
 from groundstation.store.info import StoreInfo
 from groundstation.store.reader import read, read_info
@@ -233,6 +236,20 @@ def test_one_chunk_of_a_busy_topic_is_no_more_than_a_minute(tmp_path: Path) -> N
     assert len(found["event"]) == 1
     for batch in found["gnss"]:
         assert batch.time_ns[-1] // SHORT_SPAN_NS == batch.time_ns[0] // SHORT_SPAN_NS
+
+
+def test_of_small_chunks_a_file_has_few_however_slow_its_topics_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(channel, "MOST_SMALL", 50)
+    slow = [batch_of(f"raw.t{number}", count=400, step_ns=CHUNK_SPAN_NS, seed=number) for number in range(20)]
+    thin = [replace(one, columns={"a": Column(one.record_index.astype("f8"))}) for one in slow]
+    path = written(tmp_path / "a.mcap", thin)
+    with path.open("rb") as file:
+        count = make_reader(file).get_summary().statistics.chunk_count
+    assert 50 < count < 500  # each row would have one: 8 000
+    for one in thin:
+        assert joined(batches_of(path)[one.topic]).columns["a"].values.tolist() == list(range(400))
 
 
 def test_equal_input_gives_equal_bytes(tmp_path: Path) -> None:

@@ -46,6 +46,15 @@ def messages(path: Path, topic: str) -> list[tuple[int, Any]]:
         return [(message.log_time, value) for _, _, message, value in reader.iter_decoded_messages(topics=[topic])]
 
 
+def test_a_place_beyond_the_earth_is_on_no_map(tmp_path: Path) -> None:
+    latitudes = np.array([56.0, 95.0, -90.0, np.nan, 56.0, -1e308, 90.0])
+    longitudes = np.array([38.0, 38.0, 180.0, 38.0, np.inf, 38.0, 361.0])
+    path = written(tmp_path / "a.mcap", batch("gnss", 7, latitude_deg=latitudes, longitude_deg=longitudes))
+    assert [(fix.latitude, fix.longitude) for _, fix in messages(path, "location_fix.gnss")] == [(56, 38), (-90, 180)]
+    kept = [item for item in read(path) if isinstance(item, RecordBatch) and item.topic == "gnss"]
+    assert [value for item in kept for value in item.columns["latitude_deg"].values][1] == 95.0, "as it was logged"
+
+
 def test_a_position_has_the_covariance_of_its_geometry_where_that_is_known(tmp_path: Path) -> None:
     geometry = Column(np.full(4, 2.0), np.array([True, True, False, True]))
     rows = batch(

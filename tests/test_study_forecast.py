@@ -1,6 +1,7 @@
 """The forecast study on a few flights: where windows help and where they do not, honesty, tables and page."""
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from groundstation.simulation.inertial_family import simulate_family
 from groundstation.studies import forecast, forecast_tables
 from groundstation.studies.forecast import study_forecast
 from groundstation.studies.forecast_cases import FIRST_SEED, NEW_ROUTES, Case, epochs_of, study_cases
+from groundstation.studies.forecast_outages import fly_with_outages, outages_of
 from groundstation.studies.forecast_runs import (
     COUPLED,
     METHOD_NAMES,
@@ -185,16 +187,39 @@ def test_study_writes_its_tables_and_page(monkeypatch: pytest.MonkeyPatch, left_
     assert set(tables["forecast_rms"]["starts"]) == {"all", "1.5 h", "2 h", "2.5 h", "3 h"}
     assert set(tables["forecast_rms"]["case"]) == set(cases)
     assert set(tables["forecast_honesty"]["case"]) == {"matched", *held_out}
-    for text in ("Are windows better than the last estimate?", "Best by score: ", "confirmed at "):
+    assert set(tables["forecast_outages"]["case"]) == held_out
+    for text in (
+        "Outages in the log",
+        "Are windows better than the last estimate?",
+        "Best by score: ",
+        "confirmed at ",
+    ):
         assert text in study.markdown
     assert "nan" not in study.markdown
 
 
+def test_outages_are_drawn_by_flight_and_leave_gnss_between_them() -> None:
+    time_s = np.arange(16_001.0)
+    several = [outages_of(time_s, 50_920, run) for run in range(20)]
+    assert several[3] == outages_of(time_s, 50_920, 3) != several[4]
+    lengths = np.array([end - begin for gaps in several for begin, end in gaps])
+    assert 60.0 <= lengths.min() < 120.0 and 1800.0 < lengths.max() <= 3600.0
+    assert all(gaps[0][0] == 3600.0 and gaps[-1][1] <= 15_100.0 for gaps in several)
+    between = np.array([later - end for gaps in several for (_, end), (later, _) in pairwise(gaps)])
+    assert between.min() >= 900.0 and between.max() <= 1800.0
+
+
+def test_a_flight_with_outages_is_smoothed_as_well_as_without_a_gate() -> None:
+    found = fly_with_outages(CASES["manoeuvring"], 0, SETTINGS)
+    assert found.outages >= 3 and len(found.through) == found.outages and found.reopened == 0
+    assert found.smoothed_m < 1.2 * found.free_m
+    assert np.isfinite(found.after).any() and np.isfinite(found.undisturbed).any()
+
+
 def test_every_study_is_listed_and_no_other_is_run(tmp_path: Path) -> None:
     listed = [entry["name"] for entry in catalogue() if entry["kind"] == "study"]
-    assert (
-        listed == list(STUDIES) == ["heading", "forecast", "magnetic", "cooperative", "control", "landing", "approach"]
-    )
-    with pytest.raises(UsageError, match="one of heading, forecast, magnetic"):
+    names = ["heading", "crew", "forecast", "magnetic", "cooperative", "control", "landing", "approach"]
+    assert listed == list(STUDIES) == names
+    with pytest.raises(UsageError, match="one of heading, crew, forecast, magnetic"):
         study_to("weather", tmp_path / "out", runs=10, seed=1, force=False, listen=lambda event: None)
     assert not (tmp_path / "out").exists()

@@ -139,6 +139,26 @@ def test_what_is_no_straight_taxi_is_refused(kind: str) -> None:
     assert [one.verdict for one in outcomes if one.verdict == "accept" and not one.is_inside] == []
 
 
+def test_the_wide_family_has_its_winds_and_half_of_the_runs_state_them() -> None:
+    """Wind from the left turns the nose left of the path; the cells with a sideslip of their own have no other."""
+    from groundstation.base.metar import metar_wind
+    from groundstation.simulation.taxi_disturbance import CLASS_FACTORS, KINDS, OWN_CRAB, Disturbance, draw_wind
+
+    rng = np.random.default_rng(1)
+    drawn = [draw_wind(rng, Disturbance(KINDS[k % len(KINDS)])) for k in range(1400)]
+    windy = [one for one in drawn if one.kind not in OWN_CRAB]
+    assert all(one.factor == 0.0 and not one.metar for one in drawn if one.kind in OWN_CRAB)
+    assert np.mean([bool(one.metar) for one in windy]) == pytest.approx(0.5, abs=0.05)
+    assert np.std([one.wind_mps for one in windy]) == pytest.approx(3.6, rel=0.05)
+    assert {one.aircraft_class for one in windy} == {"", *CLASS_FACTORS}
+    reported = [(metar_wind(one.metar), one.wind_mps) for one in windy if one.metar]
+    off_mps = [(said.north_mps - true[0], said.east_mps - true[1]) for said, true in reported if said]
+    assert len(off_mps) == len(reported) and np.std(off_mps) == pytest.approx(1.5, rel=0.1)
+    from_left = Disturbance(factor=0.027, wind_mps=(0.0, 10.0))  # northbound, the air moves east
+    track_deg = np.array([0.0, 90.0, 180.0])
+    assert from_left.sideslip(rng, track_deg, 0.0, 0.1) == pytest.approx([-0.27, 0.0, 0.27])
+
+
 def test_crew_runs_are_the_same_again_and_make_a_table() -> None:
     from groundstation.studies.heading_crew import crew_table, run_crew
 
@@ -146,3 +166,28 @@ def test_crew_runs_are_the_same_again_and_make_a_table() -> None:
     assert found == run_crew(4001, 0)
     table = crew_table([found])
     assert (list(table["kind"]), list(table["runs"])) == (["one way, METAR"], [1])
+
+
+def test_one_engine_is_held_where_it_is_stated_alone() -> None:
+    """Run 7: the sideslip of one engine is the same there and back, and the interval does not hold it."""
+    from groundstation.studies.heading_crew import run_crew
+
+    found, stated = run_crew(4001, 7), run_crew(4001, 7, "one engine, stated")
+    assert found.error_arcmin == pytest.approx(stated.error_arcmin, abs=0.1), "the same taxi"
+    assert (found.is_inside, stated.is_inside) == (False, True)
+    assert stated.verdict != "accept"
+
+
+def test_the_study_of_verdicts_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
+    """Runs of its eleven kinds by turns; the time is over before the second turn, and none is made again."""
+    from groundstation.pipeline.verbs.kept_runs import KeptRuns
+    from groundstation.studies.heading_crew import ALL_KINDS, CrewOutcome, study_crew
+
+    told: list[str] = []
+    for _ in range(2):
+        kept = KeptRuns(tmp_path, CrewOutcome)
+        study = study_crew(2, 4001, told.append, kept=kept, minutes=1e-9)
+    assert len(told) == len(ALL_KINDS)
+    table = next(one for one in study.tables if one.name == "heading_crew")
+    assert list(table["kind"]) == list(ALL_KINDS) and set(table["runs"]) == {1}
+    assert "one engine, stated" in study.markdown

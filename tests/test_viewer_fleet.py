@@ -31,7 +31,7 @@ DRAWN_IN_COLOUR = {"TimeSeries", "StateTimeline", "BarChart", "2D"}
 
 def changed(fleet: FleetResults, **columns: np.ndarray) -> FleetResults:
     """The same fleet with other columns in its table of flights."""
-    return replace(fleet, flights=replace(fleet.flights, columns={**fleet.flights.columns, **columns}))
+    return replace(fleet, flights=FigureData("flights", {**fleet.flights.columns, **columns}, fleet.flights.digits))
 
 
 def untimed(fleet: FleetResults, first: int) -> FleetResults:
@@ -235,7 +235,7 @@ def test_one_flight_and_none(tmp_path: Path) -> None:
 
 def test_flights_without_any_heading_leave_the_charts_out(fleet: FleetResults, tmp_path: Path) -> None:
     unknown = np.full(FLIGHTS, np.nan)
-    bare = changed(fleet, error_deg=unknown, radial_error_rate_50_nmiph=unknown, verdict=np.full(FLIGHTS, ""))
+    bare = changed(fleet, error_deg=unknown, radial_error_rate_fit_nmiph=unknown, verdict=np.full(FLIGHTS, ""))
     none = FigureData("trend", {name: values[:0] for name, values in fleet.trend.columns.items()}, {})
     empty = gather_nothing(tmp_path).densities
     write_fleet_recording(

@@ -163,7 +163,7 @@ def test_a_taxi_in_a_long_flight_has_a_time_axis_of_its_own(
     (drawn,) = (
         batch.column("Points2D:positions").to_pylist()[0] for batch in long.fixed["/heading/run/1/difference/samples"]
     )
-    assert len(drawn) == np.isfinite(samples["difference_deg"][samples["used"]]).sum()
+    assert len(drawn) == np.isfinite(samples["difference_deg"][samples["is_used"]]).sum()
     ground_s = samples["time_s"][samples["gate"] != "airborne"]
     cursor_s = np.sort(long.times("/heading/run/1/speed/cursor")) / 1e9
     assert cursor_s[0] == pytest.approx(ground_s[0]) and cursor_s[-2] == pytest.approx(ground_s[-1])

@@ -13,6 +13,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.heading import Gate, HeadingResult, OnboardComparison, Standstill, TaxiSegment
 from groundstation.tables.table import Flight, Table
+from tests.figure_arrays import figure
 from tests.inertial_example import forecast_result, inertial_result
 
 START_NS = iso_to_utc_ns("2026-05-04T06:00:00Z")[0]
@@ -119,10 +120,6 @@ def make_flight(duration_s: float = 400.0, rate_hz: float = 100.0, *, has_utc: b
     return Flight({one.topic: one for one in tables}, {"aircraft": "A12"}, START_NS, has_utc, "example.csv")
 
 
-def _figure(name: str, **columns: np.ndarray) -> FigureData:
-    return FigureData(name, columns, {})
-
-
 def heading_figures(flight: Flight) -> tuple[FigureData, ...]:
     """Figures of the heading estimator over the example's taxi, by the plain formulas of the paper."""
     gnss = flight["gnss"]
@@ -138,7 +135,14 @@ def heading_figures(flight: Flight) -> tuple[FigureData, ...]:
     mean = np.cumsum(d) / count
     sigma = np.sqrt(np.maximum(np.cumsum(d * d) / count - mean**2, 1e-6))
     precision = 1.96 * sigma / np.sqrt(np.maximum(count - 1, 1))
-    running = {"mean_deg": mean, "precision_deg": precision, "honest_half_width_deg": 2.5 * precision}
+    running = {
+        "cycles": count,
+        "mean_deg": mean,
+        "sigma_deg": sigma,
+        "precision_deg": precision,
+        "quality_deg": np.abs(mean - ERROR_DEG),
+        "honest_half_width_deg": 2.5 * precision,
+    }
     edges = np.linspace(d.mean() - 3.5 * d.std(), d.mean() + 3.5 * d.std(), 36)
     centre = 0.5 * (edges[1:] + edges[:-1])
     steps = np.unique(np.linspace(40, len(d), 60).astype(int))
@@ -149,34 +153,37 @@ def heading_figures(flight: Flight) -> tuple[FigureData, ...]:
     still = time_s < TAXI_S[0]
     mean_speed = np.linspace(0.0, 0.02, 60)
     return (
-        _figure(
+        figure(
             "heading_samples",
             time_s=time_s,
             heading_deg=heading,
             track_deg=gnss.values("track_deg"),
             ground_speed_mps=speed,
             difference_deg=difference,
-            used=used,
+            residual_deg=difference - ERROR_DEG,
+            segment=np.where(used, 1, 0),
+            is_used=used,
             gate=gate,
+            weight=used.astype(float),
         ),
-        _figure("heading_running", time_s=time_s[used], **running),
-        _figure("heading_distribution", bin_low_deg=edges[:-1], bin_high_deg=edges[1:], density_per_deg=growth[-1]),
-        _figure("heading_normal", difference_deg=x, density_per_deg=normal),
-        _figure(
+        figure("heading_running", time_s=time_s[used], **running),
+        figure("heading_distribution", bin_low_deg=edges[:-1], bin_high_deg=edges[1:], density_per_deg=growth[-1]),
+        figure("heading_normal", difference_deg=x, density_per_deg=normal),
+        figure(
             "heading_growth",
             step=np.repeat(np.arange(len(steps)), len(centre)),
             time_s=np.repeat(time_s[used][steps - 1], len(centre)),
             bin_center_deg=np.tile(centre, len(steps)),
             density_per_deg=np.concatenate(growth),
         ),
-        _figure(
+        figure(
             "standstill_velocity",
             time_s=time_s[still],
             velocity_north_mps=gnss.values("velocity_north_mps")[still],
             velocity_east_mps=gnss.values("velocity_east_mps")[still],
-            in_interval=time_s[still] > 30.0,
+            is_in_interval=time_s[still] > 30.0,
         ),
-        _figure(
+        figure(
             "standstill_mean_speed",
             window_s=np.repeat([10.0, 30.0], len(mean_speed)),
             speed_of_mean_mps=np.tile(mean_speed, 2),
@@ -184,7 +191,7 @@ def heading_figures(flight: Flight) -> tuple[FigureData, ...]:
                 [mean_speed / width**2 * np.exp(-0.5 * (mean_speed / width) ** 2) for width in (0.006, 0.0035)]
             ),
         ),
-        _figure("heading_lanes", start_s=time_s[change], end_s=time_s[[*change[1:], -1]], state=gate[change]),
+        figure("heading_lanes", start_s=time_s[change], end_s=time_s[[*change[1:], -1]], state=gate[change]),
     )
 
 
@@ -198,7 +205,7 @@ def pipeline_figures(flight: Flight) -> tuple[FigureData, ...]:
     rows = np.array([len(flight[topic]) for topic in topics])
     count = len(topics)
     return (
-        _figure(
+        figure(
             "overview",
             time_s=time_s,
             latitude_deg=truth["latitude_deg"],
@@ -212,13 +219,13 @@ def pipeline_figures(flight: Flight) -> tuple[FigureData, ...]:
             climb_mps=np.gradient(truth["altitude_m"], time_s),
             true_airspeed_mps=np.where(time_s > TAXI_S[1], truth["speed_mps"] + 4.0, np.nan),
         ),
-        _figure(
+        figure(
             "phases",
             start_s=np.array([0.0, 60.0, 180.0, 208.0]),
             end_s=np.array([60.0, 180.0, 208.0, end]),
             phase=np.array(["standstill", "taxi", "take-off run", "airborne"]),
         ),
-        _figure(
+        figure(
             "ledger",
             topic=np.array(topics),
             rows=rows,
@@ -233,9 +240,12 @@ def pipeline_figures(flight: Flight) -> tuple[FigureData, ...]:
             backward_steps=np.zeros(count, dtype=int),
             stray_rows=np.zeros(count, dtype=int),
             dropped_rows=np.zeros(count, dtype=int),
+            lost_by_counter=np.zeros(count, dtype=int),
+            out_of_range=np.zeros(count, dtype=int),
+            stuck=np.zeros(count, dtype=int),
         ),
-        _figure("gaps", topic=np.array(["gnss"]), start_s=np.array([GNSS_GAP_S[0]]), length_s=np.array([3.0])),
-        _figure(
+        figure("gaps", topic=np.array(["gnss"]), start_s=np.array([GNSS_GAP_S[0]]), length_s=np.array([3.0])),
+        figure(
             "gnss_lanes",
             start_s=np.array([0.0, GNSS_GAP_S[0], GNSS_GAP_S[1]]),
             end_s=np.array([GNSS_GAP_S[0], GNSS_GAP_S[1], end]),

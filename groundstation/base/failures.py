@@ -8,7 +8,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar, TypeVarTuple
 
-from groundstation.base.errors import lack_of_memory
+from groundstation.base.errors import GroundstationError, lack_of_memory
 from groundstation.base.printable import in_a_line
 
 if TYPE_CHECKING:
@@ -148,6 +148,8 @@ def reason_of(error: BaseException) -> str:
         return lacking
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
+    if isinstance(error, GroundstationError):
+        return in_a_line(str(error))
     told = _ADDRESS.sub("0x...", in_a_line(str(error)))
     told = told if len(told) <= MOST_OF_AN_ERROR else f"{told[:MOST_OF_AN_ERROR]}..."
     return f"internal error ({type(error).__name__}{': ' if told else ''}{told}); please report it"

@@ -29,7 +29,8 @@ def toml_text(path: Path, where: str, expected: str = "a TOML file", next_step: 
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise SettingsError(where, f"not TOML ({error})", expected, next_step) from error
+        place = f"byte {error.start + 1}: 0x{content[error.start]:02x}"
+        raise SettingsError(where, f"text that is not UTF-8 ({place})", expected, next_step) from error
 
 
 def toml_table(text: str, where: str, expected: str = "a TOML file", next_step: str = "") -> dict[str, Any]:

@@ -6,8 +6,8 @@ from groundstation.chapters.assessed import reason_of, without_answer
 from groundstation.chapters.parts import Cell, Facts, Figure, Front, Grid, Head, Mark, Note, Part, Section
 from groundstation.chapters.verdict import NOT_ASSESSABLE, sentence
 from groundstation.chapters.wording import any_value, clock, is_number, named_quantity, number, significant, words
+from groundstation.results.arrays.cooperative import SessionClocks
 from groundstation.results.cooperative import AlgorithmRow, CooperativeResult, LinkRow
-from groundstation.results.figures import FigureData, flags, numbers, texts
 from groundstation.results.fleet import SessionRow
 from groundstation.results.flight import FlightResults
 
@@ -312,22 +312,22 @@ def _links(answer: CooperativeResult) -> Grid | None:
 
 
 def _clocks(results: FlightResults) -> Grid | None:
-    data = results.figure_with_rows("session_clocks")
+    data = results.rows_of(SessionClocks)
     if data is None:
         return None
     caption = "Offset: log time minus time of transmission and travel, against the group; absent without UTC or ranges."
     return Grid("Clocks of the logs", CLOCK_HEADS, _clock_rows(data), caption, ("session_clocks",))
 
 
-def _clock_rows(data: FigureData) -> list[tuple[str | Mark, ...]]:
+def _clock_rows(data: SessionClocks) -> list[tuple[str | Mark, ...]]:
     columns = zip(
-        texts(data, "aircraft"),
-        texts(data, "log"),
-        flags(data, "has_utc"),
-        numbers(data, "ranges"),
-        numbers(data, "offset_s"),
-        numbers(data, "leaps"),
-        flags(data, "is_corrected"),
+        data.aircraft,
+        data.log,
+        data.has_utc,
+        data.ranges,
+        data.offset_s,
+        data.leaps,
+        data.is_corrected,
         strict=True,
     )
     return [

@@ -6,7 +6,7 @@ from dataclasses import replace
 from groundstation.chapters.aided_ins import aided
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.gates import setting_facts
-from groundstation.chapters.inertial_claim import growth, inertial_claim, is_start_unknown
+from groundstation.chapters.inertial_claim import drift_of, growth, inertial_claim, is_start_unknown
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section, Tone, kept
 from groundstation.chapters.wording import (
     ABSENT,
@@ -66,8 +66,8 @@ def inertial(results: FlightResults) -> Section | None:
 
 
 def _headline(answer: InertialResult) -> str:
-    rate = number(answer.radial_error_rate_50_nmiph, 2, "nmi/h")
-    return "Unaided INS" if rate == ABSENT else f"Unaided INS, {rate} (median)"
+    rate = number(drift_of(answer)[0], 2, "nmi/h")
+    return "Unaided INS" if rate == ABSENT else f"Unaided INS, {rate}"
 
 
 def _conclusions(answer: InertialResult) -> list[Note]:
@@ -84,14 +84,14 @@ def _conclusions(answer: InertialResult) -> list[Note]:
 
 
 def _rates(answer: InertialResult) -> tuple[str, str]:
-    """Radial error rate, median and 95 %."""
+    """Radial error over time, median and 95 %."""
     median, p95 = answer.radial_error_rate_50_nmiph, answer.radial_error_rate_95_nmiph
     return number(median, 2, "nmi/h"), number(p95, 2, "nmi/h")
 
 
 def _quality(answer: InertialResult) -> Note:
-    rates = _rates(answer)
-    rate = "" if ABSENT in rates else f" of {rates[0]} (median; 95 % of the time below {rates[1]})"
+    drift, measure = drift_of(answer)
+    rate = f" of {number(drift, 2, 'nmi/h')} ({measure})" if is_number(drift) else ""
     velocity = number(answer.velocity_error_rms_mps, 2, "m/s")
     largest = number(answer.largest_radial_error_m, 0, "m")
     in_words = _in_words(answer.channels)
@@ -145,9 +145,15 @@ def _figures_of_merit(answer: InertialResult) -> Facts:
     origin, others = answer.ins_class_origin, answer.other_ins
     pairs = (
         (
-            "Radial error rate, median / 95 %",
+            "Radial error rate, time-position fit",
+            number(answer.radial_error_rate_fit_nmiph, 2, "nmi/h"),
+            "slope through the origin, least squares, over all epochs since navigation began: as in the acceptance",
+        ),
+        (
+            "Error over time, median / 95 % of the epochs",
             " / ".join(_rates(answer)),
-            "position error over time since navigation began, without the first ten minutes",
+            "position error over time since navigation began, without the first ten minutes; the 95 % is mostly the "
+            "Schuler wave of the first half hour",
         ),
         *_start(answer),
         ("Velocity error, RMS", number(answer.velocity_error_rms_mps, 3, "m/s"), "both channels together"),

@@ -14,17 +14,17 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
 
     ``quality`` says in a sentence whether the filter can be trusted; ``is_doubtful`` that its sigmas are too small.
     """
-    rate, most = answer.radial_error_rate_50_nmiph, number(answer.radial_error_rate_95_nmiph, 2, "nmi/h")
+    rate, measure = drift_of(answer)
     drift = number(rate, 2, "nmi/h")
     if is_number(rate):
-        headline, remark = f"Unaided INS, drifts {drift}", f"median; 95 % below {most}"
+        headline, remark = f"Unaided INS, drifts {drift}", measure
     elif is_start_unknown(answer):
         headline = f"INS error {growth(answer)}"
         remark = "no rate: nothing shows when navigation began"
     else:
         headline, remark = "INS errors measured, flight too short for a drift", ""
     found = (
-        ("INS drift", drift, f"median; 95 % of the time below {most}"),
+        ("INS drift", drift, measure),
         ("Velocity error", number(answer.velocity_error_rms_mps, 2, "m/s"), "RMS"),
         ("Largest position error", number(answer.largest_radial_error_m, 0, "m"), "against GNSS"),
     )
@@ -38,6 +38,13 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
         sentences=(quality,) if quality else (),
         figures=tuple(figure for figure in found if figure[1] != "—"),
     )
+
+
+def drift_of(answer: InertialResult) -> tuple[float | None, str]:
+    """How fast the position error grows, nmi/h, and by what measure: the median where an older version saved no fit."""
+    if answer.radial_error_rate_fit_nmiph is None:
+        return answer.radial_error_rate_50_nmiph, "median"
+    return answer.radial_error_rate_fit_nmiph, "time-position fit"
 
 
 def is_start_unknown(answer: InertialResult) -> bool:

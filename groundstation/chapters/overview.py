@@ -1,6 +1,7 @@
 """Chapter: the flight at a glance: track map, altitude, speed, attitude, phases and the state of GNSS."""
 
 from groundstation.chapters.parts import Figure, Section
+from groundstation.results.arrays.flight import Overview, StateLanes
 from groundstation.results.flight import FlightResults
 
 FIGURES = (
@@ -11,5 +12,5 @@ FIGURES = (
 
 def overview(results: FlightResults) -> Section | None:
     """The chapter, None when the flight has no overview."""
-    known = any(results.figure_with_rows(name) is not None for name in ("overview", "state_lanes"))
+    known = results.rows_of(Overview) is not None or results.rows_of(StateLanes) is not None
     return Section("overview", "Overview of the flight", "", FIGURES) if known else None

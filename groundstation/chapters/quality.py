@@ -3,8 +3,6 @@
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-import numpy as np
-
 from groundstation.base.clock import Clock, RelationEntry
 from groundstation.base.ledger import DamageEntry, Ledger
 from groundstation.base.signals import RAW_PREFIX
@@ -20,28 +18,13 @@ from groundstation.chapters.wording import (
     typeset,
     words,
 )
-from groundstation.results.figures import numbers, texts
+from groundstation.results.arrays.flight import LedgerRows
 from groundstation.results.flight import FlightResults
 
 LEAD = ""
 MOST_TOPICS = 60
 MOST_ENTRIES = 20
 MOST_DAMAGES = 60
-TITLES = {
-    "topic": "Topic",
-    "rows": "Rows",
-    "rate": "Rate / nominal, Hz",
-    "coverage": "Coverage",
-    "longest_gap": "Longest gap, s",
-    "gaps": "Gaps",
-    "duplicates": "Duplicates",
-    "backward_steps": "Steps back",
-    "stray_rows": "Stray",
-    "dropped_rows": "Dropped",
-    "lost_by_counter": "Lost by counter",
-    "out_of_range": "Out of range",
-    "stuck": "Stuck",
-}
 NOTHING = ("0", "no", "none", ABSENT)
 IN_TABLES = ("topics", "damages", "remarks", "spans", "spans_more", "steps", "relations")  # remarks are findings
 STEP_HEADS = (
@@ -70,23 +53,31 @@ def quality(results: FlightResults) -> Section:
 
 def _topics(results: FlightResults) -> Grid | None:
     """The topics that answers rest on; those of raw data where there are no others. Counts of nothing are left out."""
-    data = results.figure_with_rows("ledger")
+    data = results.rows_of(LedgerRows)
     if data is None:
         return None
-    names = texts(data, "topic").tolist()
+    names = data.topic.tolist()
     own = [place for place, name in enumerate(names) if not name.startswith(RAW_PREFIX)]
     shown = (own or list(range(len(names))))[:MOST_TOPICS]
-    counts = [name for name in list(TITLES)[5:] if np.nansum(numbers(data, name)[shown]) > 0.0]
-    measured = ("rows", "nominal_rate_hz", "actual_rate_hz", "longest_gap_s", "coverage", *counts)
-    columns = {name: numbers(data, name) for name in measured}
+    counted = (
+        ("Gaps", data.gaps),
+        ("Duplicates", data.duplicates),
+        ("Steps back", data.backward_steps),
+        ("Stray", data.stray_rows),
+        ("Dropped", data.dropped_rows),
+        ("Lost by counter", data.lost_by_counter),
+        ("Out of range", data.out_of_range),
+        ("Stuck", data.stuck),
+    )
+    counts = [(title, values) for title, values in counted if values[shown].sum() > 0]
     rows = []
     for place in shown:
-        topic = names[place]
-        row = {name: float(values[place]) for name, values in columns.items()}
-        rates = f"{significant(row['actual_rate_hz'])} / {significant(row['nominal_rate_hz'])}"
-        whole, gap = number(row["coverage"] * 100, 1, "%"), number(row["longest_gap_s"], 2)
-        rows.append((topic, number(row["rows"], 0), rates, whole, gap, *(number(row[name], 0) for name in counts)))
-    heads = [Head(TITLES[name], name != "topic") for name in (*list(TITLES)[:5], *counts)]
+        rates = f"{significant(data.actual_rate_hz[place])} / {significant(data.nominal_rate_hz[place])}"
+        whole, gap = number(100.0 * data.coverage[place], 1, "%"), number(data.longest_gap_s[place], 2)
+        others = (number(int(values[place]), 0) for _, values in counts)
+        rows.append((names[place], number(int(data.rows[place]), 0), rates, whole, gap, *others))
+    titles = ("Topic", "Rows", "Rate / nominal, Hz", "Coverage", "Longest gap, s", *(title for title, _ in counts))
+    heads = [Head(title, title != "Topic") for title in titles]
     more = len(data) - len(rows)
     caption = f"{more} {'raw' if own else 'more'} topics in the table file." if more else ""
     return Grid("Topics", heads, rows, caption, ("ledger",))

@@ -12,8 +12,10 @@ from groundstation.results.heading import HeadingResult
 PUBLISHED_LIMIT_ARCMIN = 20.0
 PARTS: Mapping[str, str] = {"taxi": "this taxi", "wind": "wind", "installation": "installation"}
 SAME_EVERYWHERE = (
-    "Sideslip that is the same in every direction (one engine, a dragging brake) cannot be seen, there and back."
+    "It holds for even power and free brakes: taxi on one engine, or against a brake that drags, adds 9 to 24 arcmin "
+    "that nothing shows, not even there and back."
 )
+UNEVEN_POWER = "Uneven power is stated: what it may add is in the interval, under installation."
 VERDICTS: Mapping[str, Mark] = {
     "accept": Mark("good", "Accept"),
     "advisory": Mark("warn", "Advisory"),
@@ -82,7 +84,8 @@ def steady_terms(heading: HeadingResult) -> str:
         f"95 % interval {interval(heading.confidence95_deg, 3, '°')}, including steady sideslip that "
         f"{driven} (σ {number(sigma, 2, '°')}, {origin}); {interval(measured, 3, '°')} from this taxi alone."
     )
-    return " ".join(filter(None, (text, _parts(heading), _typed(heading), SAME_EVERYWHERE)))
+    power = UNEVEN_POWER if heading.settings.get("aircraft.taxi_power") == "uneven" else SAME_EVERYWHERE
+    return " ".join(filter(None, (text, _parts(heading), _typed(heading), power)))
 
 
 def _parts(heading: HeadingResult) -> str:

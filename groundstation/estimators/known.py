@@ -39,6 +39,8 @@ class AircraftData:
         the class in the wind.
     steady_sideslip_sigma_deg : float or None
         Sigma of sideslip that is the same in every direction; None: the settings' figure.
+    taxi_power : str
+        ``uneven``: it taxis on some of its engines, or against a brake that drags; ``even``; empty: not stated.
     aircraft_class : str
         How far a crosswind pushes its nose off the path on taxi: ``light``, ``jet trainer``, ``business jet``,
         ``airliner``, ``car`` or ``uav``; empty: not known, with a sigma that holds them all.
@@ -64,6 +66,7 @@ class AircraftData:
     mounting_sigma_deg: float | None = number(None, 0.0)
     sideslip_sigma_deg: float | None = number(None, 0.0)
     steady_sideslip_sigma_deg: float | None = number(None, 0.0)
+    taxi_power: Literal["", "even", "uneven"] = ""
     aircraft_class: AircraftClass = ""
     gnss_latency_s: float | None = number(None, -10.0, 10.0)
     gnss_latency_sigma_s: float = number(0.01, 0.0, 10.0)

@@ -1,7 +1,6 @@
 """Arrays of the overview and data-quality figures: the flight thinned, its phases and states, GNSS, the ledger."""
 
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +9,7 @@ from groundstation.base.gaps import Gaps
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
+from groundstation.results.arrays.flight import GapRows, GnssLanes, LedgerRows, Overview, PhaseSpans, StateLanes
 from groundstation.results.figures import FigureData
 from groundstation.tables.phases import Phases
 from groundstation.tables.sources import sources_of_kind
@@ -38,18 +38,15 @@ def first_of_kind(flight: Flight, kind: str, *fields: str) -> str | None:
     return next((topic for topic in sources_of_kind(flight, kind) if flight[topic].has(*fields)), None)
 
 
-def runs_of(states: NDArray[np.str_], time_s: NDArray[np.float64], end_s: float) -> FigureData:
+def runs_of(states: NDArray[np.str_], time_s: NDArray[np.float64], end_s: float) -> GnssLanes:
     """Run-length form of a state per sample: ``start_s``, ``end_s``, ``state``; each run lasts until the next one."""
     change = np.flatnonzero(np.r_[True, states[1:] != states[:-1]]) if len(states) else np.array([], dtype=int)
     starts = time_s[change]
-    return FigureData(
-        "gnss_lanes",
-        {"start_s": starts, "end_s": np.r_[starts[1:], end_s] if len(starts) else starts, "state": states[change]},
-        {"start_s": 2, "end_s": 2},
-    )
+    ends = np.r_[starts[1:], end_s] if len(starts) else starts
+    return GnssLanes(start_s=starts, end_s=ends, state=states[change])
 
 
-def gnss_lanes(flight: Flight, geometry_limit: float) -> FigureData | None:
+def gnss_lanes(flight: Flight, geometry_limit: float) -> GnssLanes | None:
     """State of GNSS over the flight: good, geometry above the limit, integrity lost, no geometry factor, no GNSS."""
     topic = first_of_kind(flight, "gnss", "velocity_north_mps") or first_of_kind(flight, "gnss", "latitude_deg")
     if topic is None:
@@ -72,14 +69,15 @@ def gnss_lanes(flight: Flight, geometry_limit: float) -> FigureData | None:
         states, time_s = np.insert(states, at, "no GNSS"), np.insert(time_s, at, time_s[after])
     lanes = runs_of(states, time_s, flight.duration_s)
     if time_s.size and time_s[-1] < flight.duration_s - LARGEST_QUIET_GAP_S:
-        start, end, state = (np.asarray(lanes[key]) for key in ("start_s", "end_s", "state"))
-        end = np.r_[end[:-1], time_s[-1], flight.duration_s]
-        start, state = np.r_[start, time_s[-1]], np.r_[state, np.array(["no GNSS"])]
-        lanes = FigureData(lanes.name, {"start_s": start, "end_s": end, "state": state}, lanes.digits)
+        lanes = GnssLanes(
+            start_s=np.r_[lanes.start_s, time_s[-1]],
+            end_s=np.r_[lanes.end_s[:-1], time_s[-1], flight.duration_s],
+            state=np.r_[lanes.state, np.array(["no GNSS"])],
+        )
     return lanes
 
 
-def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_topic: str | None) -> FigureData | None:
+def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_topic: str | None) -> Overview | None:
     """Thinned flight for the map and profiles, on the times of GNSS, else of INS, else of the barometer; NaN at gaps.
 
     Position, altitude, ground speed, climb, heading and track are always there; the columns of :data:`ALSO` where they
@@ -110,8 +108,7 @@ def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_t
         if source is not None and is_wanted:
             columns[name] = _nearest(flight[source].time_ns, flight[source].values(name), time_ns)
     columns = _break_at_gaps(columns, flight.duration_s / MAX_OVERVIEW_ROWS)
-    places = {"latitude_deg": 7, "longitude_deg": 7, "altitude_m": 1, "pressure_altitude_m": 1}
-    return FigureData("overview", columns, {name: places.get(name, 2) for name in columns})
+    return Overview(**columns)
 
 
 def _rows_with_motion(table: Table) -> NDArray[np.intp]:
@@ -181,13 +178,12 @@ def _break_at_gaps(columns: dict[str, NDArray[np.float64]], thinned_step_s: floa
     return {"time_s": np.insert(columns["time_s"], after + 1, middle), **broken}
 
 
-def phase_figure(phases: Phases) -> FigureData:
+def phase_figure(phases: Phases) -> PhaseSpans:
     """Phases of the flight as figure data."""
-    columns: dict[str, NDArray[Any]] = {"start_s": phases.start_s, "end_s": phases.end_s, "phase": phases.phase}
-    return FigureData("phases", columns, {"start_s": 1, "end_s": 1})
+    return PhaseSpans(start_s=phases.start_s, end_s=phases.end_s, phase=phases.phase)
 
 
-def state_lanes(flight: Flight) -> FigureData | None:
+def state_lanes(flight: Flight) -> StateLanes | None:
     """What the log says of flight mode, arming and ground contact: spans, ``lane``, ``start_s``, ``end_s``, ``state``.
 
     Mode and arming are read off the events (``mode LOITER``, ``armed``, ``disarmed``), each holds until the next one.
@@ -218,43 +214,45 @@ def state_lanes(flight: Flight) -> FigureData | None:
     spans = [(lane, runs_of(states, flight.seconds(times), flight.duration_s)) for lane, times, states in lanes]
     if not any(len(runs) for _, runs in spans):
         return None
-    columns: dict[str, NDArray[Any]] = {"lane": np.array([lane for lane, runs in spans for _ in range(len(runs))])}
-    for key in ("start_s", "end_s", "state"):
-        columns[key] = np.concatenate([runs[key] for _, runs in spans if len(runs)])
-    return FigureData("state_lanes", columns, {"start_s": 2, "end_s": 2})
+    return StateLanes(
+        lane=np.array([lane for lane, runs in spans for _ in range(len(runs))]),
+        start_s=np.concatenate([runs.start_s for _, runs in spans]),
+        end_s=np.concatenate([runs.end_s for _, runs in spans]),
+        state=np.concatenate([runs.state for _, runs in spans]),
+    )
 
 
 def ledger_figures(flight: Flight, ledger: Ledger, gaps_of: Mapping[str, Gaps]) -> tuple[FigureData, ...]:
     """The ledger's topics and gaps as figure data, times in flight seconds."""
     names = [topic for topic in flight.topics() if topic in ledger.topics]
     topics = [ledger.topics[name] for name in names]
-    columns: dict[str, NDArray[Any]] = {"topic": np.array(names, dtype=np.str_)}
-    columns["rows"] = _counts(one.rows for one in topics)
-    columns["duplicates"] = _counts(one.duplicates for one in topics)
-    columns["backward_steps"] = _counts(one.backward_steps for one in topics)
-    columns["stray_rows"] = _counts(one.stray_rows for one in topics)
-    columns["nominal_rate_hz"] = _numbers(one.nominal_rate_hz for one in topics)
-    columns["actual_rate_hz"] = _numbers(one.actual_rate_hz for one in topics)
-    columns["coverage"] = _numbers(one.coverage for one in topics)
-    columns["gaps"] = _counts(one.gaps.count for one in topics)
-    columns["longest_gap_s"] = _numbers(one.gaps.longest_s for one in topics)
-    columns["dropped_rows"] = _counts(_dropped(ledger, name) for name in names)
-    columns["lost_by_counter"] = _counts(one.missing for one in topics)
-    columns["out_of_range"] = _counts(one.out_of_range for one in topics)
-    columns["stuck"] = _counts(one.stuck for one in topics)
-    columns["first_s"] = np.array([flight.time_s(name)[0] for name in names])
-    columns["last_s"] = np.array([flight.time_s(name)[-1] for name in names])
-    digits = {"coverage": 4, "nominal_rate_hz": 3, "actual_rate_hz": 3, "longest_gap_s": 2, "first_s": 2, "last_s": 2}
-    return FigureData("ledger", columns, digits), _gap_figure(flight, [gaps_of[name] for name in names])
+    rows = LedgerRows(
+        topic=np.array(names, dtype=np.str_),
+        rows=_counts(one.rows for one in topics),
+        duplicates=_counts(one.duplicates for one in topics),
+        backward_steps=_counts(one.backward_steps for one in topics),
+        stray_rows=_counts(one.stray_rows for one in topics),
+        nominal_rate_hz=_numbers(one.nominal_rate_hz for one in topics),
+        actual_rate_hz=_numbers(one.actual_rate_hz for one in topics),
+        coverage=_numbers(one.coverage for one in topics),
+        gaps=_counts(one.gaps.count for one in topics),
+        longest_gap_s=_numbers(one.gaps.longest_s for one in topics),
+        dropped_rows=_counts(_dropped(ledger, name) for name in names),
+        lost_by_counter=_counts(one.missing for one in topics),
+        out_of_range=_counts(one.out_of_range for one in topics),
+        stuck=_counts(one.stuck for one in topics),
+        first_s=np.array([flight.time_s(name)[0] for name in names]),
+        last_s=np.array([flight.time_s(name)[-1] for name in names]),
+    )
+    return rows, _gap_figure(flight, [gaps_of[name] for name in names])
 
 
-def _gap_figure(flight: Flight, found: list[Gaps]) -> FigureData:
-    columns: dict[str, NDArray[Any]] = {
-        "topic": np.array([gaps.topic for gaps in found for _ in range(len(gaps))], dtype=np.str_),
-        "start_s": np.concatenate([np.zeros(0), *(flight.seconds(gaps.start_ns) for gaps in found)]),
-        "length_s": np.concatenate([np.zeros(0), *(gaps.length_s for gaps in found)]),
-    }
-    return FigureData("gaps", columns, {"start_s": 2, "length_s": 2})
+def _gap_figure(flight: Flight, found: list[Gaps]) -> GapRows:
+    return GapRows(
+        topic=np.array([gaps.topic for gaps in found for _ in range(len(gaps))], dtype=np.str_),
+        start_s=np.concatenate([np.zeros(0), *(flight.seconds(gaps.start_ns) for gaps in found)]),
+        length_s=np.concatenate([np.zeros(0), *(gaps.length_s for gaps in found)]),
+    )
 
 
 def _dropped(ledger: Ledger, topic: str) -> int:

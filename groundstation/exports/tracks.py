@@ -11,7 +11,8 @@ from groundstation.base.ellipse import ELLIPSE_95, principal_axes
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.inertial import InertialStates, InertialTrack
+from groundstation.results.flight import FlightResults
 from groundstation.tables.motion import horizontal_speed_mps
 from groundstation.tables.table import Flight, Table
 
@@ -24,10 +25,10 @@ OF_THE_FIX = ("hdop", "satellites_used")
 BRIDGED_S = 0.25  # altitude, attitude and velocity of other rows are interpolated over at most so long
 EPOCH_BRIDGED_S = 1.5  # altitude of the INS at the epochs of the estimator, which bridges as much
 SPEED, HALF_WIDTH = "ground_speed_mps", "horizontal95_m"
-# Tracks of the estimator: what begins their columns, and what they are.
-MADE = {
-    "corrected": ("corrected", "INS less its estimated error, height of the INS"),
-    "smoothed": ("reference", "INS less its smoothed error, height of the INS"),
+CORRECTED, SMOOTHED = "corrected", "smoothed"
+MADE = {  # tracks of the estimator
+    CORRECTED: "INS less its estimated error, height of the INS",
+    SMOOTHED: "INS less its smoothed error, height of the INS",
 }
 NORTH_SIGMA, EAST_SIGMA = "north_sigma_m", "east_sigma_m"
 
@@ -78,14 +79,14 @@ class Track:
         return tuple(slice(first, last) for first, last in pairwise((0, *crossings, len(self))))
 
 
-def tracks_of(flight: Flight, figures: Mapping[str, FigureData], ins_topic: str = "") -> tuple[Track, ...]:
+def tracks_of(flight: Flight, results: FlightResults | None, ins_topic: str = "") -> tuple[Track, ...]:
     """Tracks of a flight: of every receiver and INS that has positions, then those of the estimator.
 
     ``ins_topic`` is the INS whose errors were estimated: its altitude stands beside the estimator's positions.
     """
     topics = [topic for kind in ("gnss", "ins", "truth") for topic in topics_of_kind(kind, flight.topics())]
     logged = [_logged(flight, flight[topic].unique_times()) for topic in topics]
-    made = [_made(flight, figures, name, ins_topic) for name in MADE]
+    made = [_made(flight, results, name, ins_topic) for name in MADE]
     return tuple(track for track in (*logged, *made) if track is not None and len(track))
 
 
@@ -128,30 +129,31 @@ def _bridged(
     return np.where(near, between, np.nan)
 
 
-def _made(flight: Flight, figures: Mapping[str, FigureData], name: str, ins_topic: str) -> Track | None:
+def _made(flight: Flight, results: FlightResults | None, name: str, ins_topic: str) -> Track | None:
     """A track of the estimator, at the times its figures have; half of the 95 % ellipse's major axis is its width.
 
     No error of height is estimated: the altitude is that of the INS, as logged.
     """
-    data, states = figures.get("inertial_track"), figures.get("inertial_states")
-    prefix, text = MADE[name]
-    if data is None or f"{prefix}_latitude_deg" not in data.columns:
+    data = None if results is None else results.rows_of(InertialTrack)
+    if results is None or data is None:
         return None
-    latitude, longitude = (np.asarray(data[f"{prefix}_{axis}"], dtype=np.float64) for axis in POSITION)
+    latitude, longitude = data.corrected_latitude_deg, data.corrected_longitude_deg
+    if name == SMOOTHED:
+        latitude, longitude = data.reference_latitude_deg, data.reference_longitude_deg
+    if latitude is None or longitude is None:
+        return None
     known = np.isfinite(latitude) & np.isfinite(longitude)
-    time_s = np.asarray(data["time_s"], dtype=np.float64)[known]
+    time_s = data.time_s[known]
     columns = _altitudes(flight, ins_topic, time_s)
-    if name == "corrected" and states is not None and len(states):
-        at_s = np.asarray(states["time_s"], dtype=np.float64)
-        north, east = (
-            np.interp(time_s, at_s, np.asarray(states[f"{axis}_position_sigma_m"], dtype=np.float64))
-            for axis in ("north", "east")
-        )
+    states = results.rows_of(InertialStates)
+    if name == CORRECTED and states is not None:
+        sigmas = states.north.position_sigma_m, states.east.position_sigma_m
+        north, east = (np.interp(time_s, states.time_s, sigma) for sigma in sigmas)
         major = principal_axes(north, east, np.zeros(len(north)))[0]
         columns |= {NORTH_SIGMA: north, EAST_SIGMA: east, HALF_WIDTH: ELLIPSE_95 * major}
     time_ns = flight.start_ns + np.rint(time_s * NS_PER_S).astype(np.int64)
     place = (latitude[known], longitude[known])
-    return Track(name, text, time_ns, flight.start_ns, flight.has_utc, *place, columns)
+    return Track(name, MADE[name], time_ns, flight.start_ns, flight.has_utc, *place, columns)
 
 
 def _altitudes(flight: Flight, ins_topic: str, at_s: FloatArray) -> dict[str, FloatArray]:

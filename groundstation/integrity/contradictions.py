@@ -141,7 +141,10 @@ def _windows_of(one: _Series) -> _Windows | None:
     time_s, latitude = known.time_s, known.columns["latitude_deg"]
     if len(time_s) < 2:
         return None
-    ends = np.unique(np.searchsorted(time_s, np.arange(time_s[0], time_s[-1], WINDOW_S)))
+    # Edges beside a sample only: damaged times may be centuries apart.
+    steps = np.unique(np.floor((time_s - time_s[0]) / WINDOW_S))
+    edges_s = time_s[0] + WINDOW_S * np.unique(np.concatenate([steps, steps + 1.0]))
+    ends = np.unique(np.searchsorted(time_s, edges_s[edges_s < time_s[-1]]))
     if len(ends) < 2:
         return None
     start, end = ends[:-1], ends[1:]

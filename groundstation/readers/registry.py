@@ -12,6 +12,8 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.base.records import Item, RecordBatch, Remark
 from groundstation.readers import (
@@ -146,7 +148,17 @@ def read(path: str | Path | Source, profile: Path | None = None, icds: "Sequence
         *(Remark("plug_in", trouble) for trouble in troubles),
         *(unused if icds and reader is not chapter10 else []),
     ]
-    return chain(items, _of_the_source(source), remarks)
+    return chain(_in_silence(iter(items)), _of_the_source(source), remarks)
+
+
+def _in_silence(items: Iterator[Item]) -> Iterator[Item]:
+    """Items of a reader without the warnings of numpy: a log may hold any number, and the ledger flags what is odd."""
+    while True:
+        with np.errstate(all="ignore"):
+            item = next(items, None)
+        if item is None:
+            return
+        yield item
 
 
 def _of_the_source(source: Source) -> Iterator[Item]:
@@ -164,6 +176,7 @@ def _guarded(reader: Reader, claim: Claim, source: Source) -> Iterator[Item]:
         raise UnreadableLogError(source.name, f"reader {claim.reader!r} failed ({_named(error)})") from error
 
 
+@np.errstate(all="ignore")  # the first bytes of a file, taken for numbers, may be any
 def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]]:
     if source.is_empty or magic.companion(source) is not None:
         raise _unclaimed(source, [], [])
@@ -176,6 +189,7 @@ def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]
     raise _unclaimed(source, refusals, troubles)
 
 
+@np.errstate(all="ignore")
 def unclaimed(path: Path) -> UnclaimedLogError | None:
     """Why no reader claims a file, found by its first bytes alone, or None where those do not show it.
 

@@ -68,7 +68,8 @@ def _fits_the_way(records: NDArray[Any]) -> bool:
 
 def has_place(records: NDArray[Any]) -> NDArray[np.bool_]:
     """Tell which records have a place, shape (n,)."""
-    return has_position(records["latitude"] * DEG_PER_RAD, records["longitude"] * DEG_PER_RAD)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return has_position(records["latitude"] * DEG_PER_RAD, records["longitude"] * DEG_PER_RAD)
 
 
 def next_start(data: bytes, at: int) -> int | None:

@@ -16,7 +16,6 @@ from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures import drawn_by
 from groundstation.reports.flight_report import ACCEPTANCE, Written, flight_report_html, write_pages
 from groundstation.results.acceptance import ENSEMBLE, Acceptance, Limit
-from groundstation.results.figures import numbers
 
 MOST_CURVES = 150
 RATE, FIXED = "radial_rate_fit_nmiph", ("radial_largest_nmi", "radial_final_nmi")
@@ -52,24 +51,23 @@ def _single(found: Acceptance, *quantities: str) -> list[Limit]:
 
 def _growth(found: Acceptance) -> Drawing:
     growth, curves = found.growth, found.curves
-    hours, flight = numbers(growth, "hours"), numbers(curves, "flight")
+    hours, flight = growth.hours, curves.flight
     shown = d.thin(len(found.included), MOST_CURVES)
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 16, 12, 174, 86)
         for place in shown:
             own = flight == place
-            d.line(axes, numbers(curves, "hours")[own], numbers(curves, "radial_nmi")[own], d.UNUSED, 0.5, zorder=1)
-        for name, colour, title, style in (
-            ("cep50_nmi", d.INS, "CEP50", "-"),
-            ("r95_nmi", d.GNSS, "R95", "-"),
-            ("two_drms_nmi", d.USED, "2drms", "--"),
-            ("bound95_nmi", d.INK, "95 % stay below", "-"),
+            d.line(axes, curves.hours[own], curves.radial_nmi[own], d.UNUSED, 0.5, zorder=1)
+        for values, colour, title, style in (
+            (growth.cep50_nmi, d.INS, "CEP50", "-"),
+            (growth.r95_nmi, d.GNSS, "R95", "-"),
+            (growth.two_drms_nmi, d.USED, "2drms", "--"),
+            (growth.bound95_nmi, d.INK, "95 % stay below", "-"),
         ):
-            values = numbers(growth, name)
             if np.isfinite(values).any():
                 d.line(axes, hours, values, colour, 1.4, label=title, linestyle=style, zorder=3)
-        end = float(max(numbers(curves, "hours").max(), 1e-3))
+        end = float(max(curves.hours.max(), 1e-3))
         for limit in _single(found, RATE, *FIXED):
             bound, last = limit.bounds[0], min(end, limit.hours_up_to or end)
             times = np.array([limit.hours_over, last])

@@ -1,7 +1,8 @@
 """The page of a comparison: what differs between two flights, and their figures over each other."""
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, NamedTuple
 
 import numpy as np
 
@@ -15,24 +16,90 @@ from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.reports.page import TEMPLATES, render
+from groundstation.results.arrays.cooperative import SessionErrors
+from groundstation.results.arrays.flight import Overview
+from groundstation.results.arrays.forecast import ForecastGrowth
+from groundstation.results.arrays.heading import HeadingRunning
+from groundstation.results.arrays.inertial import InertialStates, InertialTrack
+from groundstation.results.arrays.typed import Floats, T
 from groundstation.results.comparison import Comparison
-from groundstation.results.figures import FigureData, numbers
 from groundstation.results.files import SavedFlight
 from groundstation.results.forecast import ForecastResult
 
 A, B = d.INS, d.GNSS
 MOST = 3000  # points of a line
 NEAR_M = 200_000.0  # flights that begin no further apart share one map
-LINES = (  # figure, column, column of the half width and what it is multiplied by, axis, title
-    ("overview", "altitude_m", None, "altitude, m", "Altitude"),
-    ("overview", "ground_speed_mps", None, "ground speed, m/s", "Ground speed"),
-    ("overview", "heading_deg", None, "true heading, °", "INS heading"),
-    ("heading_running", "mean_deg", ("honest_half_width_deg", 1.0), "heading error, °", "Heading error, running mean"),
-    ("inertial_track", "ins_error_m", None, "radial error, m", "Radial error of the INS against GNSS"),
-    ("inertial_states", "north_position_m", ("north_position_sigma_m", NORMAL_95), "north, m", "North position error"),
-    ("inertial_states", "east_position_m", ("east_position_sigma_m", NORMAL_95), "east, m", "East position error"),
-    ("session_errors", "two_sigma_r_m", None, "m", "2σ_r as computed, worst aircraft"),
-    ("session_errors", "rms_error_m", None, "m", "Horizontal error against the truth, RMS of all aircraft"),
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """What is drawn of a flight over its time, with half of its 95 % band; None where there is no band."""
+
+    time_s: Floats
+    values: Floats | None
+    half: Floats | None = None
+
+
+class _Line(Generic[T]):
+    """A curve of both flights: its figure, what is read of it, its axis and title."""
+
+    def __init__(self, kind: type[T], key: str, read: Callable[[T], _Curve], axis: str, title: str) -> None:
+        self.name, self.axis, self.title = f"{kind.figure}-{key}", axis, title
+        self._kind, self._read = kind, read
+
+    def of(self, saved: SavedFlight) -> _Curve | None:
+        """The curve of a flight, None where it has no number."""
+        rows = saved.rows_of(self._kind)
+        curve = None if rows is None else self._read(rows)
+        return curve if curve is not None and curve.values is not None and np.isfinite(curve.values).any() else None
+
+
+def _altitude(data: Overview) -> _Curve:
+    return _Curve(data.time_s, data.altitude_m)
+
+
+def _speed(data: Overview) -> _Curve:
+    return _Curve(data.time_s, data.ground_speed_mps)
+
+
+def _heading(data: Overview) -> _Curve:
+    return _Curve(data.time_s, d.broken_at_wrap(data.heading_deg))
+
+
+def _mean(data: HeadingRunning) -> _Curve:
+    return _Curve(data.time_s, data.mean_deg, data.honest_half_width_deg)
+
+
+def _radial(data: InertialTrack) -> _Curve:
+    return _Curve(data.time_s, data.ins_error_m)
+
+
+def _north(data: InertialStates) -> _Curve:
+    return _Curve(data.time_s, data.north.position_m, NORMAL_95 * data.north.position_sigma_m)
+
+
+def _east(data: InertialStates) -> _Curve:
+    return _Curve(data.time_s, data.east.position_m, NORMAL_95 * data.east.position_sigma_m)
+
+
+def _computed(data: SessionErrors) -> _Curve:
+    return _Curve(data.time_s, data.two_sigma_r_m)
+
+
+def _error(data: SessionErrors) -> _Curve:
+    return _Curve(data.time_s, data.rms_error_m)
+
+
+LINES: tuple[_Line[Any], ...] = (
+    _Line(Overview, "altitude_m", _altitude, "altitude, m", "Altitude"),
+    _Line(Overview, "ground_speed_mps", _speed, "ground speed, m/s", "Ground speed"),
+    _Line(Overview, "heading_deg", _heading, "true heading, °", "INS heading"),
+    _Line(HeadingRunning, "mean_deg", _mean, "heading error, °", "Heading error, running mean"),
+    _Line(InertialTrack, "ins_error_m", _radial, "radial error, m", "Radial error of the INS against GNSS"),
+    _Line(InertialStates, "north_position_m", _north, "north, m", "North position error"),
+    _Line(InertialStates, "east_position_m", _east, "east, m", "East position error"),
+    _Line(SessionErrors, "two_sigma_r_m", _computed, "m", "2σ_r as computed, worst aircraft"),
+    _Line(SessionErrors, "rms_error_m", _error, "m", "Horizontal error against the truth, RMS of all aircraft"),
 )
 
 
@@ -60,7 +127,7 @@ def _figures(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> Section 
     sides = (_Side("A", a, A), _Side("B", b, B, comparison.alignment.offset_s))
     drawings = [
         attempt("figure", "tracks", _tracks, sides),
-        *(attempt("figure", f"{row[0]}.{row[1]}", _overlay, sides, *row) for row in LINES),
+        *(attempt("figure", line.name, _overlay, sides, line) for line in LINES),
         attempt("figure", "growth", _growth, sides),
     ]
     parts = [drawing for drawing in drawings if drawing is not None]
@@ -79,28 +146,21 @@ class _Side(NamedTuple):
         """Of its lines: where both agree, A is seen behind B."""
         return 2.4 if self.letter == "A" else 1.0
 
-    def figure(self, name: str, *columns: str) -> FigureData | None:
-        """Figure data that has numbers in every column named."""
-        data = self.saved.figure(name)
-        has_all = data is not None and all(np.isfinite(numbers(data, column)).any() for column in columns)
-        return data if has_all else None
 
-
-def _overlay(
-    sides: Sequence[_Side], name: str, column: str, width: tuple[str, float] | None, axis: str, title: str
-) -> Drawing | None:
-    """A column of both flights over the flight time of A, with its band; ``width``: its half width and a factor."""
-    drawn = [(side, data) for side in sides if (data := side.figure(name, "time_s", column)) is not None]
+def _overlay(sides: Sequence[_Side], told: _Line[Any]) -> Drawing | None:
+    """A curve of both flights over the flight time of A, with its band."""
+    drawn = [(side, curve) for side in sides if (curve := told.of(side.saved)) is not None]
     if not drawn:
         return None
+    title, has_band = told.title, any(curve.half is not None for _, curve in drawn)
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 20, 12, 174, 54)
         times, shown = [], []
-        for side, data in drawn:
-            values = d.broken_at_wrap(numbers(data, column)) if column == "heading_deg" else numbers(data, column)
-            half = np.full(len(data), np.nan) if width is None else width[1] * numbers(data, width[0])
-            time, values, half = d.broken_at_gaps(numbers(data, "time_s") + side.offset_s, values, half)
+        for side, curve in drawn:
+            unknown = np.full(len(curve.time_s), np.nan)
+            known = (unknown if one is None else one for one in (curve.values, curve.half))
+            time, values, half = d.broken_at_gaps(curve.time_s + side.offset_s, *known)
             for edge in (values - half, values + half):
                 d.line(axes, time, edge, side.colour, 0.5, MOST, alpha=0.7)
                 shown.append(edge)
@@ -108,23 +168,23 @@ def _overlay(
             times.append(time)
             shown.append(values)
         # The bands of the first samples may leave the picture.
-        low, high = np.percentile(d.finite(*shown), (0.0, 100.0) if width is None else (0.5, 99.5))
+        low, high = np.percentile(d.finite(*shown), (0.5, 99.5) if has_band else (0.0, 100.0))
         axes.set_ylim(*layout.padded(float(low), float(high)))
-        axes.set_ylabel(axis)
+        axes.set_ylabel(told.axis)
         every = d.finite(*times)
         layout.time_axis(axes, float(every.min()), float(every.max()))
         layout.legend_above(axes)
 
     caption = f"{title} of both flights." if len(drawn) == len(sides) else f"{title}: only {drawn[0][0].letter} has it."
-    return Drawing(title, caption, f"{title} of A and B over flight time.", d.draw(f"{name}-{column}", 60, paint))
+    return Drawing(title, caption, f"{title} of A and B over flight time.", d.draw(told.name, 60, paint))
 
 
 def _tracks(sides: Sequence[_Side]) -> Drawing | None:
     drawn = []
     for side in sides:
-        data = side.figure("overview", "latitude_deg", "longitude_deg")
+        data = side.saved.rows_of(Overview)
         if data is not None:
-            latitude, longitude = on_earth(numbers(data, "latitude_deg"), numbers(data, "longitude_deg"))
+            latitude, longitude = on_earth(data.latitude_deg, data.longitude_deg)
             known = np.flatnonzero(np.isfinite(latitude))
             if known.size:
                 first = float(latitude[known[0]]), float(longitude[known[0]])
@@ -158,13 +218,12 @@ def _growth(sides: Sequence[_Side]) -> Drawing | None:
     for side in sides:
         forecast = side.saved.results.answer(ForecastResult)
         default = forecast.default_method if forecast else ""
+        data = side.saved.rows_of(ForecastGrowth)
         for method, style in ((default, "-"), ("raw_ins", ":")):
-            data = side.figure("forecast_growth", "horizon_min", f"{method}_rms_m")
-            if data is not None:
+            rms_m = None if data is None else data.rms_m.get(method)
+            if data is not None and rms_m is not None and np.isfinite(rms_m).any():
                 name = f"{side.letter}: {d.label(method.replace('_', ' '))}"
-                curves.append(
-                    (numbers(data, "horizon_min"), numbers(data, f"{method}_rms_m"), name, side.colour, style)
-                )
+                curves.append((data.horizon_min, rms_m, name, side.colour, style))
     if not curves:
         return None
 

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number, required_number
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.acceptance import AcceptanceCurves, AcceptanceGrowth
 
 Claim = Literal["type", "units", "these"]
 Decision = Literal["pass", "fail", "not enough flights", "not flown", "no limit"]
@@ -257,8 +257,8 @@ class Acceptance:
     flights: tuple[FlightError, ...]
     rows: tuple[InsRow, ...]
     judgements: tuple[Judgement, ...]
-    growth: FigureData
-    curves: FigureData
+    growth: AcceptanceGrowth
+    curves: AcceptanceCurves
     settings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property

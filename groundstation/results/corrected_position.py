@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.ellipse import ELLIPSE_95, magnified
-from groundstation.results.figures import numbers
+from groundstation.results.arrays.inertial import InertialStates, InertialTrack
 from groundstation.results.flight import FlightResults
 
 FloatArray = NDArray[np.float64]
@@ -36,14 +36,12 @@ class CorrectedPosition:
 
 def corrected_position(results: FlightResults) -> CorrectedPosition | None:
     """The rows with a place and sigmas; None of an INS that was not corrected."""
-    track, states = results.figure_with_rows("inertial_track"), results.figure_with_rows("inertial_states")
-    names = "corrected_latitude_deg", "corrected_longitude_deg"
-    sigmas = "north_position_sigma_m", "east_position_sigma_m"
+    track, states = results.rows_of(InertialTrack), results.rows_of(InertialStates)
     if track is None or states is None or len(track) != len(states):
         return None
-    if not (set(names) <= set(track.columns) and set(sigmas) <= set(states.columns)):
+    if track.corrected_latitude_deg is None or track.corrected_longitude_deg is None:
         return None
-    columns = [numbers(track, "time_s"), *(numbers(track, name) for name in names)]
-    columns += [numbers(states, name) for name in sigmas]
+    columns = [track.time_s, track.corrected_latitude_deg, track.corrected_longitude_deg]
+    columns += [states.north.position_sigma_m, states.east.position_sigma_m]
     known = np.isfinite(columns).all(axis=0) & (np.abs(columns[3:]) < LARGEST_SIGMA_M).all(axis=0)
     return CorrectedPosition(*(column[known] for column in columns)) if known.any() else None

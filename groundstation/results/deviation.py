@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 from typing import Any, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.base.errors import UsageError
 from groundstation.base.serial import MismatchError
+from groundstation.results.arrays.magnetic import MagneticCurves, MagneticTable
 from groundstation.results.figures import FigureData
 from groundstation.results.files import csv_text, mapping
 from groundstation.results.flight import FlightResults
@@ -145,21 +147,19 @@ def deviation_csv(results: FlightResults) -> str | None:
     Source of the form: RFC 4180, Common Format and MIME Type for CSV Files, 2005.
     """
     magnetic = results.answer(MagneticResult)
-    curves, table = results.figure_with_rows("magnetic_curves"), results.figure_with_rows("magnetic_table")
+    curves, table = results.rows_of(MagneticCurves), results.rows_of(MagneticTable)
     if magnetic is None or curves is None or table is None:
         return None
-    wanted = (
-        (READING, table, READING),
-        (TO_ADD, curves, TO_ADD),
-        (SIGMA, curves, SIGMA),
-        (TABLE_TO_ADD, table, "deviation_deg"),
-        (TABLE_SIGMA, curves, "sigma_compass_table_deg"),
-        (COVERAGE, table, "is_interpolated"),
-    )
-    if len(table) != len(curves) or any(column not in figure.columns for _, figure, column in wanted):
+    if len(table) != len(curves) or "compass_table" not in curves.sigma_deg:
         return None
-    columns = {name: figure[column] for name, figure, column in wanted}
-    columns[COVERAGE] = np.where(columns[COVERAGE], "interpolated", "covered")
+    columns: dict[str, NDArray[Any]] = {
+        READING: table.uncorrected_magnetic_heading_deg,
+        TO_ADD: curves.deviation_to_add_deg,
+        SIGMA: curves.deviation_sigma_deg,
+        TABLE_TO_ADD: table.deviation_deg,
+        TABLE_SIGMA: curves.sigma_deg["compass_table"],
+        COVERAGE: np.where(table.is_interpolated, "interpolated", "covered"),
+    }
     owner = {
         METHOD: magnetic.recommended_method,
         VERDICT: magnetic.verdict,

@@ -1,7 +1,6 @@
 """Arrays behind the figures: small named tables whose columns carry their units."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, overload
 
@@ -14,7 +13,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True, repr=False)
 class FigureData:
     """The numbers of one figure (or of one plain table).
 
@@ -33,10 +31,10 @@ class FigureData:
     columns: Mapping[str, NDArray[Any]]
     digits: Mapping[str, int]
 
-    def __post_init__(self) -> None:
-        columns = {name: frozen(np.asarray(values)) for name, values in self.columns.items()}
-        object.__setattr__(self, "columns", MappingProxyType(columns))
-        object.__setattr__(self, "digits", MappingProxyType(dict(self.digits)))
+    def __init__(self, name: str, columns: Mapping[str, Any], digits: Mapping[str, int]) -> None:
+        self.name = name
+        self.columns = MappingProxyType({name: frozen(np.asarray(values)) for name, values in columns.items()})
+        self.digits = MappingProxyType(dict(digits))
 
     def __len__(self) -> int:
         return min((len(values) for values in self.columns.values()), default=0)

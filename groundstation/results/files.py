@@ -17,6 +17,7 @@ from groundstation.base.printable import csv_cell, printable_json
 from groundstation.base.serial import MismatchError, from_json, to_json, to_json_exactly
 from groundstation.base.to_disk import sync_file
 from groundstation.results.answer import Answer
+from groundstation.results.arrays.typed import T
 from groundstation.results.chosen import chosen_intervals
 from groundstation.results.document import SummaryDocument
 from groundstation.results.figures import FigureData, FigureSet
@@ -28,6 +29,16 @@ from groundstation.results.summary import digits_of, summary_of
 
 Document = TypeVar("Document")
 OLD_COLUMNS: Mapping[str, Mapping[str, str]] = {  # names of an earlier version, still read
+    "heading_samples": {"used": "is_used"},
+    "standstill_velocity": {"in_interval": "is_in_interval"},
+    "inertial_states": {"gnss_used": "is_gnss_used"},
+    "magnetic_ground_epochs": {"error_deg": "heading_error_deg"},
+    "magnetic_ground_curve": {"error_deg": "heading_error_deg", "sigma_deg": "heading_error_sigma_deg"},
+    "reference_errors": {
+        **{f"{axis}_m": f"{axis}_error_m" for axis in ("north", "east", "up")},
+        **{f"{axis}_mps": f"{axis}_error_mps" for axis in ("north", "east", "up")},
+        **{f"{angle}_deg": f"{angle}_error_deg" for angle in ("roll", "pitch", "heading")},
+    },
     "magnetic_samples": {"magnetic_heading_deg": "uncorrected_magnetic_heading_deg"},
     "magnetic_table": {"magnetic_heading_deg": "uncorrected_magnetic_heading_deg"},
     "magnetic_curves": {
@@ -66,6 +77,17 @@ class SavedFlight:
         results = restored(self.summary, str(self.folder / SUMMARY), self.answer_types)
         figures = FigureSet(self.figures, self.figures.__getitem__)
         return replace(results, figures=figures, chosen=chosen_intervals(self.manifest.configuration))
+
+    def rows_of(self, kind: type[T]) -> T | None:
+        """The typed arrays of a figure, None when the flight has none, they are empty or lack a column.
+
+        Raises
+        ------
+        MissingColumnError
+            When they lack a column that they must have, and nobody gathers failures.
+        """
+        found = self.figure(kind.figure)
+        return None if found is None else attempt("arrays", found.name, kind.of, found)
 
     def figure(self, name: str) -> FigureData | None:
         """The figure data of that name, None when the flight has none or it is empty."""

@@ -20,7 +20,7 @@ from groundstation.results.magnetic import LETTERS
 if TYPE_CHECKING:
     import pandas as pd
 
-TrendQuantity = Literal["error_deg", "radial_error_rate_50_nmiph"]
+TrendQuantity = Literal["error_deg", "radial_error_rate_fit_nmiph"]
 WHOLE_FLEET = ""  # where an aircraft is named and all of them are meant
 
 

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from groundstation.base.clock import Clock
 from groundstation.base.errors import UnknownNameError
+from groundstation.base.failures import attempt
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.units import NS_PER_S
 from groundstation.results.answer import A, Answers, answer_of
+from groundstation.results.arrays.typed import T
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.figures import FigureData, FigureSet, numbers
 from groundstation.results.frames import Tabular
@@ -100,6 +102,23 @@ class FlightResults(Tabular):
         if isinstance(self.figures, FigureSet):
             return self.figures.named(name)
         return next((figure for figure in self.figures if figure.name == name), None)
+
+    def rows_of(self, kind: type[T], *of: str) -> T | None:
+        """The typed arrays of a figure, None when the flight has none, they are empty or lack a column.
+
+        Parameters
+        ----------
+        kind : type of Arrays
+        *of : str
+            Whose they are, where there are several of a kind: ``together_<of>_motion``.
+
+        Raises
+        ------
+        MissingColumnError
+            When arrays that were saved lack a column that they must have, and nobody gathers failures.
+        """
+        found = self.figure(kind.figure.format(*of))
+        return attempt("arrays", found.name, kind.of, found) if found is not None and len(found) else None
 
     def figure_with_rows(self, name: str) -> FigureData | None:
         """The figure data of that name, None when the flight has none or it is empty."""

@@ -64,7 +64,7 @@ def row_fields(results: type) -> dict[str, type]:
     found: dict[str, type] = {}
     for name, hint in typing.get_type_hints(results).items():
         row = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else None
-        if is_dataclass(row) and row is not FigureData:
+        if is_dataclass(row) and not issubclass(cast(type, row), FigureData):
             found[name] = cast(type, row)
     return found
 

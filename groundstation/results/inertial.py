@@ -197,6 +197,9 @@ class InertialResult(Answer):
     radial_error_rate_50_nmiph, radial_error_rate_95_nmiph : float or None
         Radial position error over the time since navigation began (or the INS was reset), nautical miles per hour,
         median and 95 % over epochs later than ten minutes after it. None where nothing proves the start.
+    radial_error_rate_fit_nmiph : float or None
+        The time-position fit of the same error, the figure of the acceptance: slope through the origin by least
+        squares over all epochs since navigation began. None where the median is.
     navigation_start : NavigationStart or None
         When navigation began; None of an INS that GNSS corrects.
     radial_error_first_m, radial_error_last_m : float or None
@@ -236,6 +239,7 @@ class InertialResult(Answer):
     east: ChannelResult | None = None
     radial_error_rate_50_nmiph: float | None = None
     radial_error_rate_95_nmiph: float | None = None
+    radial_error_rate_fit_nmiph: float | None = None
     velocity_error_rms_mps: float | None = None
     largest_radial_error_m: float | None = None
     navigation_start: NavigationStart | None = None

@@ -18,6 +18,7 @@ from groundstation.simulation.taxi_disturbance import (
     NO_DISTURBANCE,
     Disturbance,
     draw_disturbance,
+    draw_wind,
     turns_of,
 )
 from groundstation.tables.table import Flight, Table
@@ -134,6 +135,7 @@ def draw_run(family: Family, seed: int, number: int) -> "TaxiRun":
         if rng.random() < QUIET_SHARE:
             quiet, white = float(rng.uniform(0.003, 0.015)), float(rng.uniform(0.01, 0.04))
             case = replace(case, correlated_mps=quiet, white_mps=white)
+        case = replace(case, disturbance=draw_wind(rng, case.disturbance))
     return simulate_taxi(case, rng)
 
 

@@ -9,6 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.metar import MPS_PER
 from groundstation.simulation.processes import gauss_markov
 
 FloatArray = NDArray[np.float64]
@@ -30,6 +31,10 @@ Kind = Literal[
 ]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 PLAIN: Kind = "plain"
+OWN_CRAB: tuple[Kind, ...] = ("crab one way", "crab back-taxi")  # their sideslip is what the cell is about
+# Sideslip by crosswind, deg per m/s: the mean of a class; an aircraft has its own, half of the mean away (one sigma).
+CLASS_FACTORS = {"light": 0.051, "jet trainer": 0.027, "business jet": 0.038, "airliner": 0.031}
+WIND_MPS, REPORT_MPS = 3.6, 1.5  # sigma of either component of the wind, and of what a report says of it
 
 
 @dataclass(frozen=True)
@@ -61,6 +66,10 @@ class Disturbance:
         GNSS velocity as it was so long ago, and the time constant of a first-order filter before that.
     gnss_every_s : float
         Interval of the GNSS epochs; 0: as in the first family.
+    factor, wind_mps : float, (float, float)
+        Sideslip by crosswind, deg per m/s, and the velocity of the air, north and east.
+    aircraft_class, metar : str
+        What the estimator is told: class of the aircraft and a METAR line; empty where nothing is stated.
     take_off_crab_deg : float or None
         The log goes on with a take-off run with so much sideslip; None: it ends at the holding point.
     """
@@ -84,12 +93,18 @@ class Disturbance:
     latency_s: float = 0.0
     filter_s: float = 0.0
     gnss_every_s: float = 0.0
+    factor: float = 0.0
+    wind_mps: tuple[float, float] = (0.0, 0.0)
+    aircraft_class: str = ""
+    metar: str = ""
     take_off_crab_deg: float | None = None
 
     def sideslip(self, rng: np.random.Generator, track_deg: FloatArray, first_deg: float, step_s: float) -> FloatArray:
         """Heading minus track beside sway, degrees, shape (n,)."""
         wind = np.cos(np.deg2rad(track_deg - first_deg)) if self.is_crab_of_wind else 1.0
-        steady = self.crab_deg * wind * np.ones(len(track_deg))
+        track_rad, (north_mps, east_mps) = np.deg2rad(track_deg), self.wind_mps
+        from_left_mps = east_mps * np.cos(track_rad) - north_mps * np.sin(track_rad)
+        steady = self.crab_deg * wind * np.ones(len(track_deg)) - self.factor * from_left_mps
         if not self.sideslip_deg:
             return steady
         return steady + gauss_markov(rng, (len(track_deg),), step_s, self.sideslip_deg, self.sideslip_s)
@@ -176,6 +191,24 @@ def draw_disturbance(rng: np.random.Generator, kind: Kind) -> Disturbance:
             ins_wander_deg=float(rng.uniform(0.0, 0.1)),
         )
     return none
+
+
+def draw_wind(rng: np.random.Generator, disturbance: Disturbance) -> Disturbance:
+    """The same with the wind of an ordinary day; in half of the runs class and wind are stated."""
+    name = str(rng.choice(list(CLASS_FACTORS)))
+    wind_mps, off_mps = rng.normal(0.0, WIND_MPS, 2), rng.normal(0.0, REPORT_MPS, 2)
+    factor, is_stated = CLASS_FACTORS[name] * float(rng.normal(1.0, 0.5)), rng.random() < 0.5
+    if disturbance.kind in OWN_CRAB:
+        return disturbance
+    there = replace(disturbance, factor=factor, wind_mps=(float(wind_mps[0]), float(wind_mps[1])))
+    return replace(there, aircraft_class=name, metar=metar_line(wind_mps + off_mps)) if is_stated else there
+
+
+def metar_line(wind_mps: FloatArray) -> str:
+    """A line with this wind, velocity north and east, to 10 deg and 1 kt, of the time of the simulated flights."""
+    knots = round(float(np.hypot(*wind_mps)) / MPS_PER["KT"])
+    tens = round(float(np.rad2deg(np.arctan2(-wind_mps[1], -wind_mps[0]))) / 10.0) % 36 or 36
+    return f"METAR XXXX 040600Z {10 * tens if knots else 0:03d}{knots:02d}KT 9999 FEW030 12/05 Q1013="
 
 
 def turns_of(kind: Kind, rng: np.random.Generator, turns_deg: tuple[float, ...]) -> tuple[float, ...]:

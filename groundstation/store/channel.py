@@ -21,6 +21,7 @@ CHUNK_BYTES = 1 << 20  # a chunk is closed when it has so many bytes: a flipped 
 CHUNK_SPAN_NS = 300 * NS_PER_S  # or at each such boundary of time, which bounds the loss of slow topics
 SHORT_SPAN_NS = 60 * NS_PER_S  # or at such a boundary when it has enough bytes to be worth a chunk
 SHORT_SPAN_BYTES = 32 << 10
+SMALL_BYTES, MOST_SMALL = 1 << 10, 4_096  # a chunk takes as long as a hundred rows: of so small ones a file has few
 COLUMNS_KEY = "columns"
 DERIVED_KEY = "derived_from"  # in the metadata of a channel made from another one: reading skips it
 
@@ -34,6 +35,25 @@ class Chunk:
     buffers: Sequence[ByteArray]
     log_times: Sequence[Int64Array]
     starts: Sequence[Int64Array]
+
+
+class Pace:
+    """Time in which a topic gets a chunk however few bytes it has: the longer the more such chunks a file has.
+
+    A flight has some hundred of them; a log of a row a day would have as many as rows.
+    """
+
+    def __init__(self) -> None:
+        self._small = 0
+
+    def count(self, nbytes: int) -> None:
+        """Take note of a chunk of so many bytes."""
+        self._small += nbytes < SMALL_BYTES
+
+    @property
+    def span_ns(self) -> int:
+        """Time between two boundaries: four times as long after each ``MOST_SMALL`` small chunks."""
+        return CHUNK_SPAN_NS << 2 * min(self._small // MOST_SMALL, 12)
 
 
 class ChannelWriter:
@@ -51,6 +71,7 @@ class ChannelWriter:
         self.id = channel_id
         self.topic = topic
         self.count = 0
+        self.pace = Pace()  # the file puts its own here
         self._emit = emit
         self._buffers: list[ByteArray] = []
         self._times: list[Int64Array] = []
@@ -73,7 +94,7 @@ class ChannelWriter:
         row_bytes = 64 + sum(2 + _width(column.values.dtype) for column in batch.columns.values())
         publish_ns = time_ns if batch.validity_time_ns is None else batch.validity_time_ns
         slots = self.slots(batch)
-        for pieces in _together(_pieces(time_ns, row_bytes), CHUNK_BYTES // row_bytes):
+        for pieces in _together(_pieces(time_ns, row_bytes, self.pace.span_ns), CHUNK_BYTES // row_bytes):
             rows = slice(pieces[0].start, pieces[-1].stop)
             buffer, starts = encode(self.id, self.count, time_ns[rows], publish_ns[rows], taken(slots, rows))
             self.count += len(starts)
@@ -88,6 +109,8 @@ class ChannelWriter:
     def _close_at_boundary(self, time_ns: int) -> None:
         before, self._piece_ns = self._piece_ns, time_ns
         span = SHORT_SPAN_NS if self._bytes >= SHORT_SPAN_BYTES else CHUNK_SPAN_NS
+        if self._bytes < SMALL_BYTES:
+            span = self.pace.span_ns
         if before // span != time_ns // span:
             self.flush()
 
@@ -103,6 +126,7 @@ class ChannelWriter:
         if not self._bytes:
             return
         chunk = Chunk(self.id, self.topic, self._buffers, self._times, self._starts)
+        self.pace.count(self._bytes)
         self._buffers, self._times, self._starts, self._bytes = [], [], [], 0
         self._emit(chunk)
 
@@ -181,8 +205,11 @@ def _width(dtype: np.dtype[Any]) -> int:
     return dtype.itemsize // 4 if dtype.kind == "U" else dtype.itemsize
 
 
-def _pieces(time_ns: Int64Array, row_bytes: int) -> Iterator[slice]:
-    """Rows in pieces of no more than a chunk's bytes that cross no boundary at which a chunk ends."""
+def _pieces(time_ns: Int64Array, row_bytes: int, span_ns: int = CHUNK_SPAN_NS) -> Iterator[slice]:
+    """Rows in pieces of no more than a chunk's bytes that cross no boundary at which a chunk ends.
+
+    ``span_ns`` lies between two boundaries for so few rows that they make a small chunk.
+    """
     at, count = 0, len(time_ns)
     most_rows = max(1, CHUNK_BYTES // row_bytes)
     while at < count:
@@ -190,6 +217,8 @@ def _pieces(time_ns: Int64Array, row_bytes: int) -> Iterator[slice]:
         rows = _rows_before_boundary(ahead, SHORT_SPAN_NS)
         if rows * row_bytes < SHORT_SPAN_BYTES:
             rows = _rows_before_boundary(ahead, CHUNK_SPAN_NS)
+        if rows * row_bytes < SMALL_BYTES and span_ns > CHUNK_SPAN_NS:
+            rows = _rows_before_boundary(ahead, span_ns)
         yield slice(at, at + rows)
         at += rows
 

@@ -81,11 +81,12 @@ class LocationFixWriter(DerivedWriter):
         }
 
     def write(self, batch: RecordBatch) -> None:
-        """Take in the rows that have a position."""
-        position = [batch.columns.get(name) for name in ("latitude_deg", "longitude_deg")]
-        if any(column is None for column in position):
+        """Take in the rows that have a position on Earth: no viewer can draw another."""
+        latitude, longitude = (batch.columns.get(name) for name in ("latitude_deg", "longitude_deg"))
+        if latitude is None or longitude is None:
             return
-        known = np.logical_and.reduce([column.mask & np.isfinite(column.values) for column in position if column])
+        place = on_earth(latitude.values, longitude.values)
+        known = np.logical_and.reduce([latitude.mask, longitude.mask, *map(np.isfinite, place)])
         if known.any():
             super().write(batch if known.all() else batch.take(known))
 

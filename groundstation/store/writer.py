@@ -36,7 +36,7 @@ from groundstation.base.records import RecordBatch
 from groundstation.base.signals import is_canonical, kind_of
 from groundstation.base.to_disk import sync_folder, sync_open
 from groundstation.base.version import __version__
-from groundstation.store.channel import ChannelWriter, Chunk, TopicWriter
+from groundstation.store.channel import ChannelWriter, Chunk, Pace, TopicWriter
 from groundstation.store.derived import LOG_TOPIC, LocationFixWriter, LogWriter, Origin, PoseWriter
 from groundstation.store.framing import chunk_head, message_index, to_bytes
 from groundstation.store.info import COPY_NAME, StoreInfo
@@ -125,6 +125,7 @@ class StoreWriter:
         self._derived_of: dict[str, ChannelWriter] = {}
         self._log = LogWriter(self._hand_over, self._has_utc)
         self._origin = Origin()
+        self._pace = Pace()
         self._names: set[str] = set()
         self._compressor = zstandard.ZstdCompressor(level=ZSTD_LEVEL)
         self._chunks: list[_Finished] = []
@@ -186,8 +187,10 @@ class StoreWriter:
                 raise GroundstationError(str(self.path), "more topics than an MCAP file has channels")
             new_id = len(self._channels) + 1
             self._channels[topic] = TopicWriter(new_id, topic, self._name_for(topic), self._hand_over)
+            self._channels[topic].pace = self._pace
             derived = self._derived(new_id + 1, topic)
             if derived is not None:
+                derived.pace = self._pace
                 self._channels[derived.topic] = derived
                 self._derived_of[topic] = derived
         yield self._channels[topic]

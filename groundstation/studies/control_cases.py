@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 
 from groundstation.estimators.control.analysis import SESSION_PLAN
 from groundstation.estimators.control.scenario import Placement, SessionPlan
+from groundstation.results.arrays.cooperative import ControlMeasures
+from groundstation.results.arrays.typed import found_in
 from groundstation.results.control import UNCONTROLLED, ControlPlan
-from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.studies.shipped_plans import load_plan
 
 FIRST_SEED = 95_000  # no smaller seed belongs to this study
@@ -38,15 +39,23 @@ def scenario(name: str) -> SessionPlan:
     return load_plan(SESSION_PLAN, name).scenario
 
 
-def measures(answer: ControlPlan) -> FigureData:
+def measures(answer: ControlPlan) -> ControlMeasures:
     """Accuracy and geometry with time."""
-    return next(figure for figure in answer.figures if figure.name == "control_measures")
+    found = found_in(answer.figures, ControlMeasures)
+    assert found is not None
+    return found
 
 
 def least_sigma_m(answer: ControlPlan, axis: str) -> float:
     """Least sigma along the way under the recommended law."""
     data = measures(answer)
-    return float(numbers(data, f"two_sigma_{axis}_m")[texts(data, "law") == answer.recommended].min() / 2.0)
+    two_sigma_m = {
+        "north": data.two_sigma_north_m,
+        "east": data.two_sigma_east_m,
+        "up": data.two_sigma_up_m,
+        "r": data.two_sigma_r_m,
+    }[axis]
+    return float(two_sigma_m[data.law == answer.recommended].min() / 2.0)
 
 
 def _ratio(answer: ControlPlan, name: str) -> float:

@@ -37,6 +37,7 @@ def page(
         _later(cases, tables["forecast_later_starts"]),
         _held_out(cases, tables, default_method),
         _honesty(tables, calibrated_runs),
+        _outages(tables["forecast_outages"]),
         section(
             "RMS of every method, all starts",
             *(part for case in cases for part in _rms_of(case, tables["forecast_rms"])),
@@ -155,6 +156,18 @@ def _honesty(tables: dict[str, FigureData], calibrated_runs: int) -> Section:
         table(shown),
         "Position measurements that the gate rejected:",
         table(tables["forecast_gate"]),
+    )
+
+
+def _outages(outages: FigureData) -> Section:
+    return section(
+        "Outages in the log",
+        f"{int(outages['flights'][0])} flights a case, GNSS taken away for 1 to 60 min again and again. smoothed: RMS "
+        "of the smoother's radial error inside the outages, against the truth; over free: the same over that without a "
+        "gate; inside95: share of its errors in its band, scaled by the class; free95: without a gate. through95: the "
+        "band of the default's forecast at the end of an outage, against GNSS; after: forecasts that start after an "
+        "outage, to 10, 30 and 60 min; without: the same starts of the same flights without outages.",
+        table(outages),
     )
 
 

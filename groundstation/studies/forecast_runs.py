@@ -9,7 +9,8 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import frozen
-from groundstation.estimators.inertial.coupled import coupled_variance, hindcast_coupled, run_coupled
+from groundstation.estimators.inertial.coupled import run_coupled
+from groundstation.estimators.inertial.coupled_forecast import coupled_variance, hindcast_coupled
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, run_filter
 from groundstation.estimators.inertial.hindcast import Hindcast, hindcast
 from groundstation.estimators.inertial.leads import MEMORY_S, built_up
@@ -180,7 +181,7 @@ def mean_squares(replay: Hindcast) -> FloatArray:
             continue
         square = np.square(replay.radial_m(method)[:, leads])
         for place, rows in enumerate((np.arange(len(square)), *classic)):
-            out[index, place] = _mean_known(square[rows])
+            out[index, place] = mean_known(square[rows])
     return out
 
 
@@ -203,7 +204,7 @@ def _honesty(run: FilterRun, replay: Hindcast, since: slice, settings: InertialS
         parts.append(
             [
                 *(np.stack([_share_inside(ratio, level) for level in LEVELS], axis=1) for ratio in ratios),
-                *(_mean_known(ratio.mean(axis=2)) for ratio in ratios),
+                *(mean_known(ratio.mean(axis=2)) for ratio in ratios),
                 *(ratio[0].sum(axis=1) for ratio in ratios),
             ]
         )
@@ -219,10 +220,10 @@ def _honesty(run: FilterRun, replay: Hindcast, since: slice, settings: InertialS
 def _share_inside(ratio: FloatArray, level: int) -> FloatArray:
     """Share of the squared ratios (s, h, c) inside a band, per horizon."""
     inside = np.where(np.isfinite(ratio), ratio <= QUANTILES[level] ** 2, np.nan)
-    return _mean_known(inside.mean(axis=2))
+    return mean_known(inside.mean(axis=2))
 
 
-def _mean_known(values: FloatArray) -> FloatArray:
+def mean_known(values: FloatArray) -> FloatArray:
     """Mean over the first axis of what is known, NaN where nothing is."""
     known = np.isfinite(values)
     count = known.sum(axis=0)

@@ -1,9 +1,9 @@
 """The estimator on simulated taxi runs of the family: errors, coverage of both intervals, acceptance by gate."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.known import AircraftData
+from groundstation.estimators.known import AircraftClass, AircraftData
+from groundstation.results.arrays.heading import HeadingRunning
+from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult
 from groundstation.simulation.taxi import Family, TaxiCase, draw_run, taxi_flight
@@ -78,17 +80,26 @@ def run_once(family: Family, seed: int, number: int, settings: HeadingSettings |
         antenna_arm_m=case.antenna_arm_m if case.is_arm_known else None, antenna_arm_sigma_m=NAMED_ARM_SIGMA_M
     )
     flight = taxi_flight(run)
-    result = estimate_heading_error(flight, aircraft=aircraft, settings=settings, phases=flight_phases(flight))
+    told = case.disturbance
+    aircraft = replace(aircraft, aircraft_class=cast(AircraftClass, told.aircraft_class))
+    result = estimate_heading_error(
+        flight,
+        aircraft=aircraft,
+        settings=settings,
+        phases=flight_phases(flight),
+        weather=(told.metar,) if told.metar else (),
+    )
     return outcome_of(number, case, result, run.error_at(result.reference_time_s or 0.0))
 
 
 def outcome_of(number: int, case: TaxiCase, result: HeadingResult, truth_deg: float) -> RunOutcome:
     """Set a result beside the true error of its run."""
-    running = next(figure for figure in result.figures if figure.name == "heading_running")
+    running = found_in(result.figures, HeadingRunning)
+    assert running is not None
     limit = next(gate.limit for gate in result.gates if gate.name == "precision")
-    above = np.flatnonzero(~(running["precision_deg"] <= limit))
+    above = np.flatnonzero(~(running.precision_deg <= limit))
     reached = int(above[-1]) + 1 if len(above) else 0
-    step_s = float(np.median(np.diff(running["time_s"])))
+    step_s = float(np.median(np.diff(running.time_s)))
     measured_deg = result.confidence95_measured_deg or result.confidence95_deg
     return RunOutcome(
         number=number,

@@ -14,7 +14,8 @@ from groundstation.estimators.magnetic.apply import corrected_by_iron, corrected
 from groundstation.estimators.magnetic.compass_table import CENTRES_DEG, filled_on_circle
 from groundstation.estimators.magnetic.estimate import estimate_deviation
 from groundstation.estimators.magnetic.settings import MagneticSettings
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.magnetic import MagneticSamples, MagneticTable
+from groundstation.results.arrays.typed import found_in
 from groundstation.results.heading import HeadingResult
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import LETTERS, MagneticResult, MethodName, PoissonParameters
@@ -200,8 +201,9 @@ def errors_deg(circle: Circle, result: MagneticResult) -> dict[str, tuple[FloatA
     One branch alone is both of them, each by itself.
     """
     shown, declination = circle.shown_deg, result.declination.value_deg
-    figure = _figure(result, "magnetic_table")
-    branches = [-wrap_180(filled_on_circle(figure[f"{side}_turn_deg"]) + declination) for side in ("right", "left")]
+    table = found_in(result.figures, MagneticTable)
+    turns = () if table is None else (table.right_turn_deg, table.left_turn_deg)
+    branches = [-wrap_180(filled_on_circle(turn_deg) + declination) for turn_deg in turns]
     corrected = {
         "none": (shown,),
         "one_branch": tuple(corrected_by_table(shown, branch) for branch in branches),
@@ -245,18 +247,18 @@ def _coefficients(flown: Flown, field_ned_nt: FloatArray) -> FloatArray:
 
 def _held_out(flown: Flown, result: MagneticResult) -> dict[str, FloatArray]:
     """Errors on the held-out part against the true magnetic heading, and the uncorrected heading; empty without one."""
-    samples = _figure(result, "magnetic_samples")
-    rows = samples["part"] == "held out"
-    if not rows.any():
+    every = found_in(result.figures, MagneticSamples)
+    samples = None if every is None else every.where(every.part == "held out")
+    if not samples:
         return {}
-    time_s, shown = samples["time_s"][rows], samples["uncorrected_magnetic_heading_deg"][rows]
+    time_s, shown = samples.time_s, samples.uncorrected_magnetic_heading_deg
     motion_s = flown.motion.time_ns / NS_PER_S
     field = [np.interp(time_s, motion_s, flown.field_ned_nt[:, axis]) for axis in (0, 1)]
     true_heading = np.interp(time_s, motion_s, unwrap(flown.motion.heading_deg))
     before = wrap_180(shown - true_heading + np.rad2deg(np.arctan2(field[1], field[0])))
     found = {"shown": shown, "before": before}
     for name in JUDGED_METHODS:
-        correction = samples[f"error_{name}_deg"][rows] - samples["error_before_deg"][rows]
+        correction = samples.error_after_deg(name) - samples.error_before_deg
         found[name] = wrap_180(before + correction)
     return found
 
@@ -294,10 +296,6 @@ def _judged(
         held_out_rms_deg=held_rms,
         own_rms_deg=nan if row.held_out_after_deg is None else row.held_out_after_deg,
     )
-
-
-def _figure(result: MagneticResult, name: str) -> FigureData:
-    return next(figure for figure in result.figures if figure.name == name)
 
 
 def _rms(values: FloatArray) -> float:

@@ -25,7 +25,7 @@ COLUMNS = (
     ("heading:confidence95_low_deg", "95 % from, deg"),
     ("heading:confidence95_high_deg", "95 % to, deg"),
     ("heading:correction_deg", "correction to type, deg"),
-    ("inertial:radial_error_rate_50_nmiph", "INS radial error rate (50 %), nmi/h"),
+    ("inertial:radial_error_rate_fit_nmiph", "INS radial error rate, nmi/h"),
     ("inertial:velocity_error_rms_mps", "INS velocity error, RMS, m/s"),
     ("magnetic:verdict", "magnetic verdict"),
     ("magnetic:residual_rms_deg_before", "magnetic residual before, deg"),

@@ -12,8 +12,13 @@ from groundstation.base.failures import attempt
 from groundstation.base.geodesy import north_east_m, on_earth, plan_north_east_m
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.results.arrays.cooperative import SessionErrors
+from groundstation.results.arrays.flight import Overview, PhaseSpans
+from groundstation.results.arrays.forecast import ForecastGrowth
+from groundstation.results.arrays.heading import HeadingRunning, HeadingSamples
+from groundstation.results.arrays.inertial import InertialStates, InertialTrack
+from groundstation.results.arrays.typed import T
 from groundstation.results.comparison import Comparison
-from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight
 from groundstation.results.forecast import ForecastResult
 from groundstation.viewer import colours
@@ -25,7 +30,7 @@ from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.recording import save_stream, send_layout
 from groundstation.viewer.series import FloatArray, gap_after, wraps_after
 from groundstation.viewer.tabs.track import bounds_of, grid, grid_unit
-from groundstation.viewer.views import document, lanes, numbers, plot
+from groundstation.viewer.views import document, lanes, plot
 
 THIN, MARK = 1.0, 5.0
 WIDTHS = {"A": 3.5, "B": 1.5}  # where both agree, A is seen behind B
@@ -50,16 +55,24 @@ class Half:
         """Of its lines, in points."""
         return WIDTHS[self.letter]
 
-    def figure(self, name: str, *columns: str) -> FigureData | None:
-        """Figure data with all the columns, a number in the last of them at least; None otherwise."""
-        found = self.saved.figure(name)
-        if found is None or not set(columns) <= set(found.columns):
-            return None
-        return found if np.isfinite(numbers(found, columns[-1])).any() else None
+    def rows_of(self, kind: type[T]) -> T | None:
+        """The typed arrays of a figure, None when the flight has none or they are empty."""
+        found = self.saved.figure(kind.figure)
+        return None if found is None else kind.of(found)
 
-    def time_s(self, figure: FigureData, column: str = "time_s") -> FloatArray:
-        """Flight seconds of a column on the clock of A."""
-        return np.asarray(numbers(figure, column) + self.offset_s)
+    def on_clock_of_a(self, time_s: FloatArray) -> FloatArray:
+        """Flight seconds of this flight on the clock of A."""
+        return np.asarray(time_s + self.offset_s)
+
+
+@dataclass(frozen=True)
+class CurveOfHalf:
+    """Values of one flight over its time, and half the width of a band around them."""
+
+    half: Half
+    time_s: FloatArray
+    values: FloatArray | None
+    half_width: FloatArray | None = None
 
 
 def write_comparison(path: Path, comparison: Comparison, a: SavedFlight, b: SavedFlight) -> None:
@@ -91,12 +104,22 @@ def send_comparison(
     return send_layout(stream, [tab for tab in tabs if tab is not None])
 
 
+def _of_both(halves: Sequence[Half], kind: type[T]) -> list[tuple[Half, T]]:
+    """The typed arrays of a figure, of those flights that have them."""
+    return [(half, rows) for half in halves if (rows := half.rows_of(kind)) is not None]
+
+
 def _overview(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container:
+    flown = _of_both(halves, Overview)
+    altitude = [CurveOfHalf(half, rows.time_s, rows.altitude_m) for half, rows in flown]
+    pressure_altitude = [CurveOfHalf(half, rows.time_s, rows.pressure_altitude_m) for half, rows in flown]
+    speed = [CurveOfHalf(half, rows.time_s, rows.ground_speed_mps) for half, rows in flown]
+    heading = [CurveOfHalf(half, rows.time_s, rows.heading_deg) for half, rows in flown]
     views = [
-        _overlay(recorder, halves, "overview", "altitude_m", "Altitude, m"),
-        _overlay(recorder, halves, "overview", "pressure_altitude_m", "Pressure altitude, m"),
-        _overlay(recorder, halves, "overview", "ground_speed_mps", "Ground speed, m/s"),
-        _overlay(recorder, halves, "overview", "heading_deg", "INS true heading, deg", is_direction=True),
+        _overlay(recorder, "overview/altitude_m", "Altitude, m", altitude),
+        _overlay(recorder, "overview/pressure_altitude_m", "Pressure altitude, m", pressure_altitude),
+        _overlay(recorder, "overview/ground_speed_mps", "Ground speed, m/s", speed),
+        _overlay(recorder, "overview/heading_deg", "INS true heading, deg", heading, is_direction=True),
         _phases(recorder, halves),
     ]
     right = [view for view in views if view is not None]
@@ -109,35 +132,24 @@ def _overview(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container:
 
 
 def _overlay(
-    recorder: Recorder,
-    halves: Sequence[Half],
-    name: str,
-    column: str,
-    title: str,
-    *,
-    half_width: tuple[str, float] | None = None,
-    is_direction: bool = False,
+    recorder: Recorder, path: str, title: str, curves: Sequence[CurveOfHalf], *, is_direction: bool = False
 ) -> rrb.View | None:
-    """Log a column of both flights, and the band around it where there is a half width; one view for both.
-
-    ``half_width``: its column, and what it is multiplied by.
-    """
+    """Log the curves of both flights that have values, and the bands around them; one view for both."""
     paths, shown, edges = [], [], []
-    for half in halves:
-        figure = half.figure(name, "time_s", column)
-        if figure is None:
+    for curve in curves:
+        half, values = curve.half, curve.values
+        if values is None or not np.isfinite(values).any():
             continue
-        time_ns, values = recorder.time_ns(half.time_s(figure)), numbers(figure, column)
+        time_ns = recorder.time_ns(half.on_clock_of_a(curve.time_s))
         breaks = gap_after(time_ns) | wraps_after(values) if is_direction else gap_after(time_ns)
-        path = f"{half.letter}/{name}/{column}"
-        if half_width is not None and half_width[0] in figure.columns:
-            width = half_width[1] * numbers(figure, half_width[0])
+        paths.append(f"{half.letter}/{path}")
+        if curve.half_width is not None:
+            width, line = curve.half_width, Line(f"{half.letter}: ± 95 %", half.colour, half.width)
             edges += [values - width, values + width]
-            recorder.band(path, time_ns, values, width, Line(f"{half.letter}: ± 95 %", half.colour, half.width), breaks)
+            recorder.band(paths[-1], time_ns, values, width, line, breaks)
         else:
             line = Line(f"{half.letter}: {title}", half.colour, half.width)
-            recorder.lines(path, time_ns, values[:, None], [line], breaks)
-        paths.append(path)
+            recorder.lines(paths[-1], time_ns, values[:, None], [line], breaks)
         shown.append(values)
     if not paths:
         return None
@@ -159,26 +171,22 @@ def _range(shown: Sequence[FloatArray], edges: Sequence[FloatArray]) -> tuple[fl
 
 def _phases(recorder: Recorder, halves: Sequence[Half]) -> rrb.View | None:
     paths = []
-    for half in halves:
-        figure = half.figure("phases", "phase", "start_s", "end_s")
-        if figure is not None:
+    for half, spans in _of_both(halves, PhaseSpans):
+        if np.isfinite(spans.end_s).any():
             paths.append(f"{half.letter}/phase")
-            ends_s = half.time_s(figure, "start_s"), half.time_s(figure, "end_s")
-            recorder.spans(paths[-1], *ends_s, figure["phase"].astype(np.str_), colours.PHASES)
+            ends_s = half.on_clock_of_a(spans.start_s), half.on_clock_of_a(spans.end_s)
+            recorder.spans(paths[-1], *ends_s, spans.phase, colours.PHASES)
     return lanes("Flight phase of A and B", paths) if paths else None
 
 
 def _plan(recorder: Recorder, halves: Sequence[Half]) -> rrb.View | None:
     """Both tracks from above, each with a marker at the cursor; of flights far apart each from its own beginning."""
     tracks = []
-    for half in halves:
-        figure = half.figure("overview", "time_s", "latitude_deg", "longitude_deg")
-        if figure is None:
-            continue
-        positions = np.column_stack(on_earth(numbers(figure, "latitude_deg"), numbers(figure, "longitude_deg")))
+    for half, flown in _of_both(halves, Overview):
+        positions = np.column_stack(on_earth(flown.latitude_deg, flown.longitude_deg))
         known = np.asarray(np.isfinite(positions).all(axis=1))
         if known.any():
-            tracks.append((half, half.time_s(figure), positions, known))
+            tracks.append((half, half.on_clock_of_a(flown.time_s), positions, known))
     if not tracks:
         return None
     origins = [positions[known][0] for _, _, positions, known in tracks]
@@ -220,52 +228,70 @@ def _track(recorder: Recorder, half: Half, time_s: FloatArray, points: FloatArra
 
 def _heading(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | None:
     """Running mean of the heading difference with its interval."""
-    width = ("honest_half_width_deg", 1.0)
     title = "Heading error, running mean ± 95 %, deg"
-    view = _overlay(recorder, halves, "heading_running", "mean_deg", title, half_width=width)
-    speed = _overlay(recorder, halves, "heading_samples", "ground_speed_mps", "Ground speed at the samples, m/s")
+    running = [
+        CurveOfHalf(half, rows.time_s, rows.mean_deg, rows.honest_half_width_deg)
+        for half, rows in _of_both(halves, HeadingRunning)
+    ]
+    view = _overlay(recorder, "heading_running/mean_deg", title, running)
+    speeds = [CurveOfHalf(half, rows.time_s, rows.ground_speed_mps) for half, rows in _of_both(halves, HeadingSamples)]
+    speed = _overlay(recorder, "heading_samples/ground_speed_mps", "Ground speed at the samples, m/s", speeds)
     views = [one for one in (view, speed) if one is not None]
     return None if view is None else rrb.Vertical(contents=views, row_shares=[2.0, 1.0], name="Heading")
 
 
 def _inertial(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | None:
     """Errors of position and velocity that the filter estimated, and the radial error against GNSS."""
+    positions: dict[str, list[CurveOfHalf]] = {"north": [], "east": []}
+    velocities: dict[str, list[CurveOfHalf]] = {"north": [], "east": []}
+    for half, states in _of_both(halves, InertialStates):
+        for channel, one in (("north", states.north), ("east", states.east)):
+            width = NORMAL_95 * one.position_sigma_m
+            positions[channel].append(CurveOfHalf(half, states.time_s, one.position_m, width))
+            width = NORMAL_95 * one.velocity_sigma_mps
+            velocities[channel].append(CurveOfHalf(half, states.time_s, one.velocity_mps, width))
     rows = []
-    for state, suffix, unit in (("position", "m", "m"), ("velocity", "mps", "m/s")):
+    for state, suffix, unit, of_both in (("position", "m", "m", positions), ("velocity", "mps", "m/s", velocities)):
         views = []
-        for channel in ("north", "east"):
-            width = (f"{channel}_{state}_sigma_{suffix}", NORMAL_95)
+        for channel, curves in of_both.items():
             title = f"{channel.capitalize()} {state} error, {unit}"
-            column = f"{channel}_{state}_{suffix}"
-            views.append(_overlay(recorder, halves, "inertial_states", column, title, half_width=width))
+            views.append(_overlay(recorder, f"inertial_states/{channel}_{state}_{suffix}", title, curves))
         shown = [view for view in views if view is not None]
         if shown:
             rows.append(rrb.Horizontal(contents=shown))
-    radial = _overlay(recorder, halves, "inertial_track", "ins_error_m", "Radial error of the INS against GNSS, m")
+    errors = [CurveOfHalf(half, track.time_s, track.ins_error_m) for half, track in _of_both(halves, InertialTrack)]
+    radial = _overlay(recorder, "inertial_track/ins_error_m", "Radial error of the INS against GNSS, m", errors)
     contents: list[rrb.View | rrb.Container] = [*rows, *([] if radial is None else [radial])]
     return rrb.Vertical(contents=contents, name="INS errors") if contents else None
 
 
 def _cooperative(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | None:
     """What two sessions computed of their errors, and what these were."""
-    computed = _overlay(recorder, halves, "session_errors", "two_sigma_r_m", "2σ_r as computed, worst aircraft, m")
-    error = _overlay(recorder, halves, "session_errors", "rms_error_m", "Horizontal error, RMS of all aircraft, m")
-    views = [one for one in (computed, error) if one is not None]
+    found = [(half, rows) for half in halves if (rows := half.saved.rows_of(SessionErrors)) is not None]
+    views = []
+    computed = [CurveOfHalf(half, rows.time_s, rows.two_sigma_r_m) for half, rows in found]
+    errors = [CurveOfHalf(half, rows.time_s, rows.rms_error_m) for half, rows in found]
+    for column, title, curves in (
+        ("two_sigma_r_m", "2σ_r as computed, worst aircraft, m", computed),
+        ("rms_error_m", "Horizontal error, RMS of all aircraft, m", errors),
+    ):
+        view = _overlay(recorder, f"session_errors/{column}", title, curves)
+        if view is not None:
+            views.append(view)
     return rrb.Vertical(contents=views, name="Cooperative") if views else None
 
 
 def _forecast(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | None:
     """RMS of the forecast by horizon, the shipped method and the INS without one; both axes logarithmic."""
     curves: list[tuple[FloatArray, FloatArray, Line]] = []
-    for half in halves:
+    for half, growth in _of_both(halves, ForecastGrowth):
         forecast = half.saved.results.answer(ForecastResult)
         default = forecast.default_method if forecast else ""
         for method, width in ((default, half.width), ("raw_ins", THIN)):
-            figure = half.figure("forecast_growth", "horizon_min", f"{method}_rms_m")
-            if figure is not None:
+            rms_m = growth.rms_m.get(method)
+            if rms_m is not None and np.isfinite(rms_m).any():
                 name = f"{half.letter}: {'raw INS' if method == 'raw_ins' else method.replace('_', ' ')}"
-                drawn = numbers(figure, "horizon_min"), numbers(figure, f"{method}_rms_m")
-                curves.append((*drawn, Line(clean_text(name), half.colour, width)))
+                curves.append((growth.horizon_min, rms_m, Line(clean_text(name), half.colour, width)))
     ends = [np.concatenate([one[axis] for one in curves] or [np.zeros(0)]) for axis in (0, 1)]
     ends = [values[np.isfinite(values) & (values > 0.0)] for values in ends]
     if not all(values.size for values in ends):

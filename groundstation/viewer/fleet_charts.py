@@ -8,6 +8,7 @@ import numpy as np
 import rerun.blueprint as rrb
 
 from groundstation.base.records import BoolArray, Int64Array
+from groundstation.results.figures import numbers
 from groundstation.results.fleet import FleetResults
 from groundstation.viewer import colours
 from groundstation.viewer.chart import Axis, Chart
@@ -16,7 +17,7 @@ from groundstation.viewer.fleet_recorder import FleetRecorder
 from groundstation.viewer.names import clean_text, path_parts, words
 from groundstation.viewer.recorder import Line
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.views import lanes, numbers, plot
+from groundstation.viewer.views import lanes, plot
 
 UNNAMED = "aircraft not named"
 VERDICTS: Final[dict[str, Colour]] = {
@@ -27,8 +28,8 @@ VERDICTS: Final[dict[str, Colour]] = {
     "undecided": colours.GREY,
     "not assessed": colours.DIM,
 }
-HEADING, RATE = "error_deg", "radial_error_rate_50_nmiph"
-TITLES = {HEADING: "Heading error ± 95 %, deg", RATE: "INS radial error rate (50 %), nmi/h"}
+HEADING, RATE = "error_deg", "radial_error_rate_fit_nmiph"
+TITLES = {HEADING: "Heading error ± 95 %, deg", RATE: "INS radial error rate, nmi/h"}
 PATHS = {HEADING: "heading_error", RATE: "radial_error_rate"}
 DOT, MARK, THIN = 3.5, 6.0, 1.0
 MOST_IN_LEGEND = 8

@@ -2,12 +2,9 @@
 
 from collections.abc import Sequence
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.results.figures import FigureData
-from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
 from groundstation.viewer.recorder import Line
 
@@ -59,16 +56,3 @@ def told_by_colour(lines: Sequence[Line], unit: str) -> str:
 def document(name: str, path: str) -> rrb.TextDocumentView:
     """Text panel."""
     return rrb.TextDocumentView(name=name, origin=f"/{path}")
-
-
-def figure_of(results: FlightResults, name: str, *columns: str) -> FigureData | None:
-    """Figure data that has rows and every column named, None otherwise: the view is then left out."""
-    own = [figure for answer in results.answers.values() for figure in answer.figures]
-    found = results.figure(name) or next((figure for figure in own if figure.name == name), None)
-    usable = found is not None and len(found) > 0 and all(column in found.columns for column in columns)
-    return found if usable else None
-
-
-def numbers(figure: FigureData, column: str) -> np.ndarray:
-    """A figure's column as float64."""
-    return np.asarray(figure[column], dtype=np.float64)

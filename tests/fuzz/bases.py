@@ -1,4 +1,4 @@
-"""Sound logs that are mutated: written here, and the beginnings of recorded ones where those are."""
+"""Logs that are mutated: sound ones and some made to harm, and the beginnings of recorded ones where those are."""
 
 import gzip
 import io
@@ -17,6 +17,7 @@ from tests.bag_writer import write_ros1, write_ros2
 from tests.dataflash_writer import MAGIC as DATAFLASH_MAGIC
 from tests.dataflash_writer import flight_log
 from tests.flightdata_writer import write_flightdata
+from tests.fuzz.harmful import bomb, computed_sqlite3, unallocated_hdf5
 from tests.real_logs import REAL_LOGS
 from tests.receiver_writer import nmea_log, novatel_log, novatel_text_log, ubx_log
 from tests.telemetry_writer import telemetry
@@ -29,7 +30,7 @@ CSV_BYTES, BINARY_BYTES = 40_000, 150_000  # of a recorded log: enough for all t
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """A sound log.
+    """A log before it is mutated.
 
     Parameters
     ----------
@@ -41,6 +42,8 @@ class Base:
         Where its records begin, as far as known: their lengths stand there.
     is_recorded : bool
         It is of a real aircraft: nothing of it may be kept.
+    is_harmful : bool
+        It is no sound log, but one that would take memory or time without end.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Base:
     data: bytes
     starts: np.ndarray
     is_recorded: bool = False
+    is_harmful: bool = False
 
 
 def flat_csv() -> bytes:
@@ -275,6 +279,12 @@ _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
     "tlog": (lambda: bytes(telemetry().data),),
     "hdf5": (hdf5,),
 }
+_HARMFUL: dict[str, Callable[[], bytes]] = {
+    "gzip": lambda: bomb(lambda data: gzip.compress(data, mtime=0)),
+    "zstd": lambda: bomb(zstandard.compress),
+    "sqlite3": lambda: computed_sqlite3(_bag("sqlite3")),
+    "hdf5": lambda: unallocated_hdf5(hdf5()),
+}
 _RECORDED = {
     "csv-profile": ("g1000/log_220502_135932_EGPN.csv", "fixedwing/umn_thor_flight75.csv"),
     "ulog": ("ulog/sample_px4_events.ulg", "ulog/pyulog_sample_log_small_vtol.ulg"),
@@ -297,17 +307,19 @@ def _cut(data: bytes, format_name: str, size: int) -> bytes:
     return data[: ends[-1]]
 
 
-def _make(name: str, format_name: str, data: bytes, *, is_recorded: bool = False) -> Base:
-    return Base(name, format_name, data, np.fromiter(_STARTS[format_name](data), np.int64), is_recorded)
+def _make(name: str, format_name: str, data: bytes, **kind: bool) -> Base:
+    return Base(name, format_name, data, np.fromiter(_STARTS[format_name](data), np.int64), **kind)
 
 
 @cache
 def bases(format_name: str, *, recorded: bool = True) -> tuple[Base, ...]:
-    """Logs of a format, those written here first."""
+    """Logs of a format, those written here first, then what is made to harm."""
     found = [
         _make(f"{format_name}-written-{number}", format_name, write())
         for number, write in enumerate(_WRITTEN[format_name], 1)
     ]
+    if format_name in _HARMFUL:
+        found.append(_make(f"{format_name}-harmful", format_name, _HARMFUL[format_name](), is_harmful=True))
     for name in _RECORDED.get(format_name, ()) if recorded else ():
         path = REAL_LOGS / name
         if not path.exists():

@@ -16,15 +16,18 @@ import time
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from tests.fuzz.bases import FORMATS
-from tests.fuzz.pool import LIMIT_S, WALL, Child
+from tests.fuzz.pool import WALL, Child
 from tests.fuzz.trial import Case, Watch, content_of, edits_of, suffix_of
 
+BASE_S, PER_MB_S = 3.0, 5.0  # of processor time that a verb may take, and as much again for each 10^6 bytes of a log
+ONE_MB_S = BASE_S + PER_MB_S
+MOST_SHOWN = 12  # of the slowest
 FULL_EVERY = 40  # logs: a report and a recording take many times as long as everything else
 LIMIT_MB = 400.0  # of memory that a log may take beyond those before it
 CODES = (0, 1, 3, 4)  # 2 is a wrong call, and no call here is wrong
@@ -58,6 +61,11 @@ def streams_into(folder: Path) -> Iterator[None]:
         for number, saved in zip((1, 2), kept, strict=True):
             os.dup2(saved, number)
             os.close(saved)
+
+
+def limit_of(size_bytes: int) -> float:
+    """Processor time that a verb may take for a log of so many bytes."""
+    return BASE_S + PER_MB_S * size_bytes / 1e6
 
 
 def call(arguments: list[str], folder: Path) -> Answer:
@@ -124,7 +132,8 @@ def run_verbs(case: Case, folder: Path, watch: Watch) -> dict[str, Any]:
     out.mkdir()
     scratch.mkdir()
     log = folder / f"log{suffix_of(case.format)}"
-    log.write_bytes(content_of(base, other, edits))
+    size_bytes = log.write_bytes(content_of(base, other, edits))
+    limit_s = limit_of(size_bytes)
     is_full = case.seed // len(FORMATS) % FULL_EVERY == 0
     answers, faults = {}, []
     watch.seen.clear()
@@ -132,10 +141,11 @@ def run_verbs(case: Case, folder: Path, watch: Watch) -> dict[str, Any]:
     for verb in VERBS:
         arguments = arguments_of(verb, log, out, is_full=is_full)
         answers[verb] = call(arguments, scratch)
-        if answers[verb].seconds > LIMIT_S:  # once more: code may have been compiled, pages fetched
+        if answers[verb].seconds > limit_s:  # once more: code may have been compiled, pages fetched
             again = call([*arguments, *({"convert": ["-f"], "run": ["--redo"]}.get(verb, []))], scratch)
-            if again.seconds > LIMIT_S and not (is_full and verb == "run"):
-                faults.append(f"{verb}: {again.seconds:.1f} s of processor time")
+            if again.seconds > limit_s and not (is_full and verb == "run"):
+                faults.append(f"{verb}: {again.seconds:.1f} s of processor time, limit {limit_s:.1f} s")
+            answers[verb] = replace(answers[verb], seconds=min(answers[verb].seconds, again.seconds))
         faults += faults_of(verb, answers[verb])
     watch.folder = ""
     faults += disagreements(answers)
@@ -152,7 +162,7 @@ def run_verbs(case: Case, folder: Path, watch: Watch) -> dict[str, Any]:
     gc.collect()
     code = answers["check"].code
     spent = {verb: answer.seconds for verb, answer in answers.items()} | {"is_full": is_full}
-    return {"came_to": str(code), "fault": "\n".join(faults), "spent": spent}
+    return {"came_to": str(code), "fault": "\n".join(faults), "spent": spent, "bytes": size_bytes, "base": base.name}
 
 
 class Crew:
@@ -165,7 +175,7 @@ class Crew:
     def run(self, case: Case) -> dict[str, Any]:
         """Result of a case; a death or a hang is a fault."""
         self._child = self._child or Child(self._warm_up, run_verbs)
-        limit_s = WALL * LIMIT_S * len(VERBS)
+        limit_s = WALL * ONE_MB_S * len(VERBS)
         found = self._child.run(case, limit_s)
         if found is None:
             code, self._child = self._child.end(), None
@@ -179,6 +189,23 @@ class Crew:
         """Stop the child."""
         if self._child is not None:
             self._child.end()
+
+
+def slowest_of(case: Case, found: dict[str, Any]) -> Iterator[tuple[float, str]]:
+    """Share of its limit that each verb took, and a row of the table that tells so."""
+    for verb in VERBS:
+        if verb in found["spent"]:
+            seconds, size_bytes = found["spent"][verb], found["bytes"]
+            name = "run with everything" if verb == "run" and found["spent"]["is_full"] else verb
+            share = seconds / limit_of(size_bytes)
+            yield share, f"| {name} | {found['base']} | {case.seed} | {size_bytes / 1e6:.2f} MB | {seconds:.2f} s |"
+
+
+def print_slowest(rows: Iterable[tuple[float, str]]) -> None:
+    """Print the rows with the largest share of their limits as a table."""
+    print("| verb | base | seed | size | processor time |\n|---|---|---|---|---|")
+    for _, row in sorted(rows, reverse=True)[:MOST_SHOWN]:
+        print(row)
 
 
 def report(case: Case, found: dict[str, Any]) -> None:
@@ -197,26 +224,26 @@ def main() -> int:
     options = parser.parse_args()
     formats = list(options.formats or FORMATS)
     crew, began = Crew(formats), time.monotonic()
-    counts, faults, slowest, spent, most_mb = Counter[str](), Counter[str](), 0.0, Counter[str](), 0.0
+    counts, faults, spent, most_mb = Counter[str](), Counter[str](), Counter[str](), 0.0
+    slowest: list[tuple[float, str]] = []
     for number in range(options.cases):
         case = Case(formats[number % len(formats)], options.first + number)
         found = crew.run(case)
         counts[found["came_to"]] += 1
-        slowest = max([slowest, *(found["spent"].get(verb, 0.0) for verb in VERBS[:3])])
+        slowest = sorted([*slowest, *slowest_of(case, found)], reverse=True)[:MOST_SHOWN]
         most_mb = max(most_mb, found["growth_mb"])
         spent.update({verb: found["spent"].get(verb, 0.0) for verb in VERBS})
         if found["fault"]:
             faults[case.format] += 1
             report(case, found)
-        if (number + 1) % 1000 == 0:
+        if (number + 1) % 200 == 0:
             print(f"{number + 1} logs, {faults.total()} with faults, {time.monotonic() - began:.0f} s", flush=True)
     crew.end()
     told = ", ".join(f"exit code {code}: {count}" for code, count in sorted(counts.items()))
     each = ", ".join(f"{verb} {seconds / options.cases:.2f} s" for verb, seconds in spent.items())
-    print(
-        f"{options.cases} logs in {time.monotonic() - began:.0f} s: {told}; on average {each}; slowest of info, check"
-    )
-    print(f"and convert {slowest:.1f} s; largest growth of memory {most_mb:.0f} MB; faults: {dict(faults) or 0}")
+    print(f"{options.cases} logs in {time.monotonic() - began:.0f} s: {told}; on average {each};")
+    print(f"largest growth of memory {most_mb:.0f} MB; faults: {dict(faults) or 0}")
+    print_slowest(slowest)
     return 1 if faults else 0
 
 

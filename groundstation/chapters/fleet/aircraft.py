@@ -15,15 +15,14 @@ from groundstation.chapters.parts import Figure, Grid, Head, Note, Section
 from groundstation.chapters.wording import number, percent
 from groundstation.results.fleet import AircraftRow, FleetResults
 
-RATE = "radial_error_rate_50_nmiph"
-WORST_RATE = "radial_error_rate_95_nmiph"
+RATE = "radial_error_rate_fit_nmiph"
 HEADING_LEAD = (
     "Does an aircraft's INS, or its mounting, err in one direction? The mean of each over its flights; flights with "
     "the verdict reject are left out."
 )
 RATE_LEAD = (
-    "How fast the position of the unaided INS drifts: radial error over time; half of each flight is below the rate "
-    "shown."
+    "How fast the position of the unaided INS drifts: radial error over the hours since navigation began, "
+    "time-position fit of each flight."
 )
 
 
@@ -80,8 +79,8 @@ def ins(fleet: FleetResults) -> Section | None:
         parts.append(Note(f"{told} aided by GNSS, or may be, so the rate does not show its drift.", "unknown"))
     if not unaided.any():
         return Section("ins", title, RATE_LEAD, parts)
-    rates, worst = unaided_figures(fleet, RATE), unaided_figures(fleet, WORST_RATE)
-    return Section("ins", title, RATE_LEAD, (*parts, Figure("fleet.rates"), _rate_table(rates, worst)))
+    rates = unaided_figures(fleet, RATE)
+    return Section("ins", title, RATE_LEAD, (*parts, Figure("fleet.rates"), _rate_table(rates)))
 
 
 def _has_rate(fleet: FleetResults) -> NDArray[np.bool_]:
@@ -103,17 +102,16 @@ def median_rate(fleet: FleetResults) -> tuple[float | None, int]:
     return (float(np.median(rate)), len(rate)) if len(rate) else (None, 0)
 
 
-def _rate_table(rates: dict[str, Any], worst: dict[str, Any]) -> Grid:
+def _rate_table(rates: dict[str, Any]) -> Grid:
     heads = (
         *(Head("Aircraft"), Head("Flights", True), Head("Lowest", True)),
-        *(Head("Median", True), Head("Highest", True), Head("Highest, 95 % of the time below", True)),
+        *(Head("Median", True), Head("Highest", True)),
     )
     rows = [
         (
             aircraft_name(name),
             number(len(own), 0),
             *(bounded(float(value), 2) for value in (own.min(), np.median(own), own.max())),
-            bounded(float(np.max(worst[name], initial=-np.inf, where=np.isfinite(worst[name]))), 2),
         )
         for name, own in sorted(rates.items())
     ]
@@ -121,5 +119,5 @@ def _rate_table(rates: dict[str, Any], worst: dict[str, Any]) -> Grid:
         "Error rate by aircraft, nmi/h",
         heads,
         rows,
-        "Over the flights; each flight is below its rate half of the time.",
+        "Over the flights, the time-position fit of each.",
     )

@@ -16,7 +16,7 @@ QUANTITIES: Mapping[str, tuple[str, str, int]] = {  # title, unit, decimals
     "estimate_sd_deg": ("spread of the differences", "°", 3),
     "onboard_difference_deg": ("heading error found on board − ours", "°", 3),
     "reference_residual_arcmin": ("parking heading − reference", "′", 1),
-    "radial_error_rate_50_nmiph": ("INS error rate", "nmi/h", 2),
+    "radial_error_rate_fit_nmiph": ("INS error rate", "nmi/h", 2),
     "forecast_60min_rms_m": ("forecast error after 60 min", "m", 0),
 }
 

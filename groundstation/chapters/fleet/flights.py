@@ -91,7 +91,7 @@ def _line(row: dict[str, Any], remarks: Sequence[Mark]) -> FlightLine:
         *(row["flight_id"], aircraft_name(row["aircraft"]), row["start"], verdict_mark(row["verdict"])),
         *(bounded(row["error_deg"], 3, signed=True), bounded(half, 3), bounded(row["correction_deg"], 2, signed=True)),
         bounded(row["reference_residual_arcmin"], 1, signed=True),
-        *(bounded(row["radial_error_rate_50_nmiph"], 2), bounded(row["forecast_60min_rms_m"], 0)),
+        *(bounded(row["radial_error_rate_fit_nmiph"], 2), bounded(row["forecast_60min_rms_m"], 0)),
     )
     links = [(text, row[name]) for name, text in LINKED if row[name]]
     return FlightLine(row["report"], cells, remarks, [*links, ("folder", row["flight_id"] + "/")])

@@ -13,7 +13,7 @@ from groundstation.chapters.parts import Cell, Figure, Grid, Head, Note, Part, S
 from groundstation.chapters.wording import number, significant
 from groundstation.results.fleet import ChangePoint, FleetResults
 
-QUANTITIES = {"error_deg": "error, °", "radial_error_rate_50_nmiph": "nmi/h"}
+QUANTITIES = {"error_deg": "error, °", "radial_error_rate_fit_nmiph": "nmi/h"}
 LEAD = "Has an aircraft changed? Every flight in order of time against the level of its aircraft."
 
 

@@ -1,5 +1,6 @@
 """Recorded approaches as an analysis: every final of a flight against its runway."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
 from groundstation.estimators.analysis import Analysis, Found, RestsOn, Rules, Shortfall
 from groundstation.estimators.approaches.columns import COLUMNS
-from groundstation.estimators.approaches.figures import path_columns, path_figure, protection_figure
+from groundstation.estimators.approaches.figures import path_columns
 from groundstation.estimators.approaches.finals import Final, ends_of, final_of
 from groundstation.estimators.approaches.findings import findings_of
 from groundstation.estimators.approaches.geometry import (
@@ -36,6 +37,9 @@ from groundstation.estimators.approaches.stabilised import rejudge, stabilised
 from groundstation.estimators.approaches.touchdown import touchdown_of
 from groundstation.estimators.known import Known
 from groundstation.results.answer import Answers, answer_of
+from groundstation.results.arrays.landing import LandingPath, LandingProtection
+from groundstation.results.arrays.typed import joined
+from groundstation.results.figures import FigureData
 from groundstation.results.landing import (
     Approach,
     Established,
@@ -61,8 +65,8 @@ class _Told:
     """An approach with the arrays behind its figures."""
 
     approach: Approach
-    path: dict[str, FloatArray]
-    protection: dict[str, FloatArray]
+    path: LandingPath
+    protection: LandingProtection | None
 
 
 def _run(flight: "Flight", known: Known, settings: LandingSettings) -> Found[LandingResult]:
@@ -74,7 +78,7 @@ def _run(flight: "Flight", known: Known, settings: LandingSettings) -> Found[Lan
         left_out,
         (ACCURACY_ONLY,),
         asdict(settings),
-        (path_figure([one.path for one in told]), *protection_figure([one.protection for one in told])),
+        _figures(told),
     )
     return Found(answer, findings_of(answer))
 
@@ -118,6 +122,12 @@ def _examine(flight: "Flight", known: Known, settings: LandingSettings) -> tuple
     return tuple(found)
 
 
+def _figures(told: Sequence[_Told]) -> tuple[FigureData, ...]:
+    """All approaches, one after the other, and the protection levels of those that have any."""
+    levels = [one.protection for one in told if one.protection is not None]
+    return joined([one.path for one in told]), *([joined(levels)] if levels else [])
+
+
 def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, settings: LandingSettings) -> _Told:
     runway = runway_of(path, final, settings)
     near = against(path, final, runway)
@@ -126,7 +136,7 @@ def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, set
     step_m, source = _step_m(path), _source(flight, path, final)
     sensitivity = _sensitivity(path, near, runway, source, float(np.hypot(*step_m))) if path.guidance_topic else None
     errors = _position_errors(flight, path, final, runway, source, sensitivity, settings)
-    protection = protection_along(flight, path.time_s[final.first], final.end.time_s)
+    protection = protection_along(flight, path.time_s[final.first], final.end.time_s, number)
     lands = final.end.outcome == "landing"
     approach = Approach(
         number,
@@ -150,7 +160,7 @@ def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, set
         step_m if any(step_m) else None,
         _height_errors(flight, path, runway, final.end.time_s, settings) if lands else (),
     )
-    return _Told(approach, path_columns(number, path, near, rows), {} if protection is None else protection[1])
+    return _Told(approach, path_columns(number, path, near, rows), None if protection is None else protection[1])
 
 
 def _step_m(path: FlightPath) -> tuple[float, float]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.signals import topics_of_kind
+from groundstation.results.arrays.landing import LandingProtection
 from groundstation.results.landing import Protection
 
 if TYPE_CHECKING:
@@ -21,8 +22,10 @@ OPERATIONS = (
 )
 
 
-def protection_along(flight: "Flight", start_s: float, end_s: float) -> tuple[Protection, dict[str, FloatArray]] | None:
-    """Protection levels between two times, and their arrays; None where the log has none there."""
+def protection_along(
+    flight: "Flight", start_s: float, end_s: float, number: int
+) -> tuple[Protection, LandingProtection] | None:
+    """Protection levels of an approach between two times, and their arrays; None where the log has none there."""
     for topic in topics_of_kind("gnss_integrity", flight.topics()):
         table, time_s = flight[topic], flight.time_s(topic)
         window = (time_s >= start_s) & (time_s <= end_s)
@@ -30,9 +33,14 @@ def protection_along(flight: "Flight", start_s: float, end_s: float) -> tuple[Pr
         if not np.isfinite(levels["horizontal"]).any():
             continue
         limits = {axis: table.values(f"{axis}_alarm_limit_m")[window] for axis in ("horizontal", "vertical")}
-        arrays = {"time_s": time_s[window]}
-        for axis in ("horizontal", "vertical"):
-            arrays[f"{axis}_protection_m"], arrays[f"{axis}_alarm_limit_m"] = levels[axis], limits[axis]
+        arrays = LandingProtection(
+            time_s=time_s[window],
+            horizontal_protection_m=levels["horizontal"],
+            horizontal_alarm_limit_m=limits["horizontal"],
+            vertical_protection_m=levels["vertical"],
+            vertical_alarm_limit_m=limits["vertical"],
+            approach=np.full(int(window.sum()), float(number)),
+        )
         return _told(levels, limits), arrays
     return None
 

@@ -10,6 +10,7 @@ from groundstation.estimators.control.accuracy import PLACE, AccuracyModel
 from groundstation.estimators.control.measures import Geometry, geometry_of
 from groundstation.estimators.control.placing import PlaceLoss, Site, place, starts_of
 from groundstation.estimators.control.scenario import NEAREST_M, Criterion, Over, SessionPlan
+from groundstation.results.arrays.cooperative import PlacementAccuracy, PlacementKeepOut, PlacementMap, PlacementPoints
 from groundstation.results.figures import FigureData
 from groundstation.results.placement import GIVEN, DesignRow, PlacementPlan, PlaceRow
 
@@ -196,36 +197,38 @@ def _figures(site: Site, model: AccuracyModel, designs: list[Design], best: Desi
     positions = [site.positions(one.places) for one in designs]
     names = [one.name for one in designs]
     stand = np.concatenate([position[0, count:] for position in positions])
-    points = {
-        "design": np.repeat(names, len(plan.points)),
-        "name": np.tile([point.name for point in plan.points], len(designs)),
-        **{f"{axis}_m": stand[:, column] for column, axis in enumerate(("north", "east", "up"))},
-        "is_placed": np.tile([point.is_placed or bool(point.mirrors) for point in plan.points], len(designs)),
-    }
+    points = PlacementPoints(
+        design=np.repeat(names, len(plan.points)),
+        label=np.tile([point.name for point in plan.points], len(designs)),
+        north_m=stand[:, 0],
+        east_m=stand[:, 1],
+        up_m=stand[:, 2],
+        is_placed=np.tile([point.is_placed or bool(point.mirrors) for point in plan.points], len(designs)),
+    )
     epochs = plan.steps + 1
     sigma = np.concatenate([_two_sigma(model, position) for position in positions])
     dop = np.concatenate([np.append(np.nan, _geometry(site, model, position).dilution()) for position in positions])
     way = np.tile(site.way[:, model.user], (len(designs), 1))
-    accuracy = {
-        "time_s": np.tile(plan.step_s * np.arange(epochs), len(designs)),
-        "design": np.repeat(names, epochs),
-        **{f"{axis}_m": way[:, column] for column, axis in enumerate(("north", "east", "up"))},
-        "dop": dop,
-        **{f"two_sigma_{axis}_m": sigma[:, column] for column, axis in enumerate(("north", "east", "up"))},
-    }
+    accuracy = PlacementAccuracy(
+        time_s=np.tile(plan.step_s * np.arange(epochs), len(designs)),
+        design=np.repeat(names, epochs),
+        north_m=way[:, 0],
+        east_m=way[:, 1],
+        up_m=way[:, 2],
+        dop=dop,
+        two_sigma_north_m=sigma[:, 0],
+        two_sigma_east_m=sigma[:, 1],
+        two_sigma_up_m=sigma[:, 2],
+    )
     rings = [(one.name, *corner) for one in plan.placement.keep_out for corner in (*one.corners_m, one.corners_m[0])]
-    found = [
-        FigureData("placement_points", points, {}),
-        FigureData("placement_accuracy", accuracy, {}),
-        _map(site, model, best),
-    ]
+    found: list[FigureData] = [points, accuracy, _map(site, model, best)]
     if rings:
         name, north, east = (np.array(column) for column in zip(*rings, strict=True))
-        found.append(FigureData("placement_keep_out", {"name": name, "north_m": north, "east_m": east}, {}))
+        found.append(PlacementKeepOut(label=name, north_m=north, east_m=east))
     return tuple(found)
 
 
-def _map(site: Site, model: AccuracyModel, best: Design) -> FigureData:
+def _map(site: Site, model: AccuracyModel, best: Design) -> PlacementMap:
     """Weighted sigma and determinant at the fixed point over places of the last placed point, the others standing."""
     region, side = site.regions[-1], site.plan.placement.map_side
     north, east = (np.linspace(low, high, side) for low, high in zip(region.low_m, region.high_m, strict=True))
@@ -240,8 +243,7 @@ def _map(site: Site, model: AccuracyModel, best: Design) -> FigureData:
         if model.links(site.positions(places)).range_m.min() >= NEAREST_M:
             sigma[place_number] = np.sqrt(variance.largest(places))
             determinant[place_number] = -geometry.largest(places)
-    columns = {"north_m": grid[:, 0], "east_m": grid[:, 1], "sigma_m": sigma, "determinant": determinant}
-    return FigureData("placement_map", columns, {})
+    return PlacementMap(north_m=grid[:, 0], east_m=grid[:, 1], sigma_m=sigma, determinant=determinant)
 
 
 def _findings(site: Site, designs: list[Design], answer: PlacementPlan) -> tuple[Finding, ...]:

@@ -15,6 +15,7 @@ from groundstation.estimators.control.placement import plan_placement
 from groundstation.estimators.control.scenario import LOCAL_CRITERIA, NEAREST_M, SessionPlan
 from groundstation.estimators.plan import Planned
 from groundstation.results.answer import by_analysis
+from groundstation.results.arrays.cooperative import ControlMeasures, ControlPaths, ControlPoints
 from groundstation.results.control import UNCONTROLLED, ControlPlan, ControlRow, Horizon, LawRow
 from groundstation.results.figures import FigureData
 
@@ -198,36 +199,45 @@ def _figures(session: Session, flown: dict[str, Flown]) -> tuple[FigureData, ...
         np.stack([getattr(one.paths, name) for one in flown.values()]) for name in ("speed_mps", "heading_rad")
     )
     whole = (len(laws), len(time_s), count)
-    paths = {
-        "time_s": np.broadcast_to(time_s[None, :, None], whole).ravel(),
-        "law": np.repeat(laws, len(time_s) * count),
-        "aircraft": np.tile(names, len(laws) * len(time_s)),
-        **{name: places[..., axis].ravel() for axis, name in enumerate(("north_m", "east_m", "up_m"))},
-        "speed_mps": speed.ravel(),
-        "track_deg": wrap_360(np.rad2deg(heading)).ravel(),
-    }
+    north_m, east_m, up_m = (places[..., axis].ravel() for axis in range(3))
+    paths = ControlPaths(
+        time_s=np.broadcast_to(time_s[None, :, None], whole).ravel(),
+        law=np.repeat(laws, len(time_s) * count),
+        aircraft=np.tile(names, len(laws) * len(time_s)),
+        north_m=north_m,
+        east_m=east_m,
+        up_m=up_m,
+        speed_mps=speed.ravel(),
+        track_deg=wrap_360(np.rad2deg(heading)).ravel(),
+    )
     sigma = np.concatenate([_two_sigma(session, one.accuracy) for one in flown.values()])
     unknown = np.full(1, np.nan)  # of the geometry before the first range
 
-    def joined(name: str) -> FloatArray:
-        of = {"determinant": "determinant", "eigenvalue": "least_eigenvalue"}
-        values = [
-            one.geometry.dilution() if name == "dop" else getattr(one.geometry, of[name]) for one in flown.values()
-        ]
+    def one_behind_another(values: list[FloatArray]) -> FloatArray:
         return np.concatenate([part for one in values for part in (unknown, one)])
 
-    measures = {
-        "time_s": np.tile(time_s, len(laws)),
-        "law": np.repeat(laws, len(time_s)),
-        **{name: joined(name) for name in ("determinant", "eigenvalue", "dop")},
-        **{f"two_sigma_{name}_m": sigma[:, column] for column, name in enumerate(("north", "east", "up", "r"))},
-    }
-    found = [FigureData("control_paths", paths, {}), FigureData("control_measures", measures, {})]
+    geometries = [one.geometry for one in flown.values()]
+    measures = ControlMeasures(
+        time_s=np.tile(time_s, len(laws)),
+        law=np.repeat(laws, len(time_s)),
+        determinant=one_behind_another([one.determinant for one in geometries]),
+        eigenvalue=one_behind_another([one.least_eigenvalue for one in geometries]),
+        dop=one_behind_another([one.dilution() for one in geometries]),
+        two_sigma_north_m=sigma[:, 0],
+        two_sigma_east_m=sigma[:, 1],
+        two_sigma_up_m=sigma[:, 2],
+        two_sigma_r_m=sigma[:, 3],
+    )
+    found: list[FigureData] = [paths, measures]
     if plan.points:
-        points = {"name": np.array([point.name for point in plan.points])}
-        for axis, attribute in (("north", "north_m"), ("east", "east_m"), ("up", "height_m")):
-            points[f"{axis}_m"] = np.array([getattr(point, attribute) for point in plan.points])
-        found.append(FigureData("control_points", points, {}))
+        found.append(
+            ControlPoints(
+                label=np.array([point.name for point in plan.points]),
+                north_m=np.array([point.north_m for point in plan.points]),
+                east_m=np.array([point.east_m for point in plan.points]),
+                up_m=np.array([point.height_m for point in plan.points]),
+            )
+        )
     return tuple(found)
 
 

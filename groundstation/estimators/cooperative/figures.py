@@ -9,7 +9,14 @@ from groundstation.estimators.cooperative.consistency import Judgement
 from groundstation.estimators.cooperative.events import Prepared
 from groundstation.estimators.cooperative.geometry import Geometry
 from groundstation.estimators.cooperative.tracks import AlgorithmRun
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.cooperative import (
+    CooperativeGeometry,
+    CooperativeLinks,
+    CooperativeMap,
+    CooperativeTracks,
+    CooperativeTraffic,
+)
+from groundstation.results.arrays.typed import joined
 
 
 def source_name(prepared: Prepared, kind: int, source: int) -> str:
@@ -19,87 +26,84 @@ def source_name(prepared: Prepared, kind: int, source: int) -> str:
     return prepared.session.points[source].name if kind == POINT else KINDS[kind]
 
 
-def tracks_figure(runs: Sequence[tuple[AlgorithmRun, Sequence[Judgement | None]]]) -> FigureData:
+def tracks_figure(runs: Sequence[tuple[AlgorithmRun, Sequence[Judgement | None]]]) -> CooperativeTracks:
     """Positions, sigmas and errors of every vehicle under every algorithm."""
-    parts: dict[str, list[np.ndarray]] = {}
+    parts = []
     for run, judgements in runs:
         for track, judgement in zip(run.tracks, judgements, strict=True):
             n = len(track.time_s)
             nothing = np.full(n, np.nan)
             error = nothing if judgement is None else np.linalg.norm(judgement.error_m, axis=1)
-            columns = {
-                "time_s": track.time_s,
-                "vehicle": np.full(n, track.name),
-                "algorithm": np.full(n, run.algorithm),
-                "x_m": track.position_m[:, 0],
-                "y_m": track.position_m[:, 1],
-                "z_m": track.position_m[:, 2],
-                "sigma_north_m": np.sqrt(track.covariance[:, 0, 0]),
-                "sigma_east_m": np.sqrt(track.covariance[:, 1, 1]),
-                "sigma_up_m": track.sigma_up_m,
-                "correlation_north_east": track.correlation,
-                "two_sigma_r_m": track.two_sigma_r_m,
-                "error_m": error,
-                "nees": nothing if judgement is None else judgement.nees,
-            }
-            for name, values in columns.items():
-                parts.setdefault(name, []).append(values)
-    joined = {name: np.concatenate(values) for name, values in parts.items()}
-    digits = {name: 3 for name in joined if name.endswith("_m")} | {"correlation_north_east": 4}
-    return FigureData("cooperative_tracks", joined, digits)
+            parts.append(
+                CooperativeTracks(
+                    time_s=track.time_s,
+                    vehicle=np.full(n, track.name),
+                    algorithm=np.full(n, run.algorithm),
+                    x_m=track.position_m[:, 0],
+                    y_m=track.position_m[:, 1],
+                    z_m=track.position_m[:, 2],
+                    sigma_north_m=np.sqrt(track.covariance[:, 0, 0]),
+                    sigma_east_m=np.sqrt(track.covariance[:, 1, 1]),
+                    sigma_up_m=track.sigma_up_m,
+                    correlation_north_east=track.correlation,
+                    two_sigma_r_m=track.two_sigma_r_m,
+                    error_m=error,
+                    nees=nothing if judgement is None else judgement.nees,
+                )
+            )
+    return joined(parts)
 
 
-def geometry_figure(geometry: Sequence[Geometry], bound: AlgorithmRun) -> FigureData:
+def geometry_figure(geometry: Sequence[Geometry], bound: AlgorithmRun) -> CooperativeGeometry:
     """Geometry of every vehicle with time, and the bound of its position (sigma_r)."""
-    names = ("time_s", "sources", "hdop", "gdop", "determinant", "eigenvalue", "gram_determinant")
-    columns = {name: np.concatenate([getattr(one, name) for one in geometry]) for name in names}
-    columns["vehicle"] = np.concatenate([np.full(len(one.time_s), one.name) for one in geometry])
-    sigma = []
-    for one, track in zip(geometry, bound.tracks, strict=True):
-        sigma.append(np.interp(one.time_s, track.time_s, 0.5 * track.two_sigma_r_m))
-    columns["bound_m"] = np.concatenate(sigma)
-    return FigureData("cooperative_geometry", columns, {"time_s": 3, "bound_m": 3})
-
-
-def map_figure(runs: Sequence[AlgorithmRun]) -> FigureData:
-    """Spectral radius of the joint error map of every decentralised run, window by window."""
-    return FigureData(
-        "cooperative_map",
-        {
-            "time_s": np.concatenate([run.map_time_s for run in runs]),
-            "algorithm": np.concatenate([np.full(len(run.map_time_s), run.algorithm) for run in runs]),
-            "spectral_radius": np.concatenate([run.map_radius for run in runs]),
-        },
-        {"time_s": 3},
+    return joined(
+        [
+            CooperativeGeometry(
+                time_s=one.time_s,
+                sources=one.sources,
+                hdop=one.hdop,
+                gdop=one.gdop,
+                determinant=one.determinant,
+                eigenvalue=one.eigenvalue,
+                gram_determinant=one.gram_determinant,
+                vehicle=np.full(len(one.time_s), one.name),
+                bound_m=np.interp(one.time_s, track.time_s, 0.5 * track.two_sigma_r_m),
+            )
+            for one, track in zip(geometry, bound.tracks, strict=True)
+        ]
     )
 
 
-def links_figure(prepared: Prepared, run: AlgorithmRun) -> FigureData:
+def map_figure(runs: Sequence[AlgorithmRun]) -> CooperativeMap:
+    """Spectral radius of the joint error map of every decentralised run, window by window."""
+    return CooperativeMap(
+        time_s=np.concatenate([run.map_time_s for run in runs]),
+        algorithm=np.concatenate([np.full(len(run.map_time_s), run.algorithm) for run in runs]),
+        spectral_radius=np.concatenate([run.map_radius for run in runs]),
+    )
+
+
+def links_figure(prepared: Prepared, run: AlgorithmRun) -> CooperativeLinks:
     """Innovations of every range of one algorithm; mark 1 used, -1 gated."""
     judged, events = run.judged, prepared.events
     kind, source, receiver = (part[judged.event].tolist() for part in (events.kind, events.source, events.receiver))
     names = [vehicle.name for vehicle in prepared.vehicles]
-    return FigureData(
-        "cooperative_links",
-        {
-            "time_s": events.time_s[judged.event],
-            "receiver": np.array([names[one] for one in receiver], dtype=np.str_),
-            "source": np.array([source_name(prepared, *one) for one in zip(kind, source, strict=True)], dtype=np.str_),
-            "innovation": judged.innovation,
-            "sigma": judged.sigma,
-            "mark": judged.mark,
-        },
-        {"time_s": 3},
+    return CooperativeLinks(
+        time_s=events.time_s[judged.event],
+        receiver=np.array([names[one] for one in receiver], dtype=np.str_),
+        source=np.array([source_name(prepared, *one) for one in zip(kind, source, strict=True)], dtype=np.str_),
+        innovation=judged.innovation,
+        sigma=judged.sigma,
+        mark=judged.mark,
     )
 
 
-def traffic_figure(runs: Sequence[AlgorithmRun]) -> FigureData:
+def traffic_figure(runs: Sequence[AlgorithmRun]) -> CooperativeTraffic:
     """Messages and bytes of every vehicle under every algorithm."""
     rows = [(run.algorithm, name, *sent) for run in runs for name, sent in sorted(run.messages.items())]
-    names = ("algorithm", "vehicle", "messages", "bytes")
-    kinds = (np.str_, np.str_, np.int64, np.int64)
-    return FigureData(
-        "cooperative_traffic",
-        {name: np.array([row[k] for row in rows], dtype=kinds[k]) for k, name in enumerate(names)},
-        {},
+    return CooperativeTraffic(
+        algorithm=np.array([row[0] for row in rows], dtype=np.str_),
+        vehicle=np.array([row[1] for row in rows], dtype=np.str_),
+        messages=np.array([row[2] for row in rows], dtype=np.int64),
+        bytes=np.array([row[3] for row in rows], dtype=np.int64),
     )

@@ -1,7 +1,6 @@
 """Flights against the limits of a standard: what each INS and all of them show, and how sure that is."""
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +25,7 @@ from groundstation.results.acceptance import (
     Limit,
     Standard,
 )
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.acceptance import AcceptanceCurves, AcceptanceGrowth
 
 FloatArray = NDArray[np.float64]
 # The correlation is reckoned with at the limit that it exceeds with one in five: see docs/acceptance.md.
@@ -159,7 +158,7 @@ def _quantile(values: FloatArray, share: float) -> float | None:
     return float(np.quantile(values, share)) if len(values) else None
 
 
-def growth_figure(growth: Growth, flights: Sequence[FlightError], standard: Standard) -> FigureData:
+def growth_figure(growth: Growth, flights: Sequence[FlightError], standard: Standard) -> AcceptanceGrowth:
     """Errors of all flights by hours of navigation, with the order statistic that bounds 95 % of them."""
     fits = np.log([max(flight.values["radial_rate_fit_nmiph"], 1e-12) for flight in flights])
     units = [flight.ins for flight in flights]
@@ -170,24 +169,22 @@ def growth_figure(growth: Growth, flights: Sequence[FlightError], standard: Stan
         effective = effective_flights([units[one] for one in known], correlation)
         found = order_bound(growth.radial_nmi[known, place], effective, 0.95, standard.confidence)
         bound[place] = np.nan if found is None else found
-    columns = {
-        "hours": growth.hours,
-        "flights": growth.flights.astype(np.int64),
-        "cep50_nmi": growth.within(0.5),
-        "r95_nmi": growth.within(0.95),
-        "two_drms_nmi": growth.two_drms(),
-        "bound95_nmi": bound,
-    }
-    return FigureData("acceptance_growth", columns, {name: 4 for name in columns if name != "flights"})
+    return AcceptanceGrowth(
+        hours=growth.hours,
+        flights=growth.flights.astype(np.int64),
+        cep50_nmi=growth.within(0.5),
+        r95_nmi=growth.within(0.95),
+        two_drms_nmi=growth.two_drms(),
+        bound95_nmi=bound,
+    )
 
 
-def curves_figure(errors: Sequence[InsErrors]) -> FigureData:
+def curves_figure(errors: Sequence[InsErrors]) -> AcceptanceCurves:
     """Radial error of each flight over its hours, thinned to what a page shows."""
     rows = [np.unique(np.linspace(0, len(one.hours) - 1, CURVE_POINTS).round().astype(int)) for one in errors]
     none = np.zeros(0)
-    columns: dict[str, NDArray[Any]] = {
-        "flight": np.repeat(np.arange(len(errors)), [len(row) for row in rows]),
-        "hours": np.concatenate([none, *(one.hours[row] for one, row in zip(errors, rows, strict=True))]),
-        "radial_nmi": np.concatenate([none, *(one.radial_nmi[row] for one, row in zip(errors, rows, strict=True))]),
-    }
-    return FigureData("acceptance_curves", columns, {"hours": 4, "radial_nmi": 4})
+    return AcceptanceCurves(
+        flight=np.repeat(np.arange(len(errors)), [len(row) for row in rows]),
+        hours=np.concatenate([none, *(one.hours[row] for one, row in zip(errors, rows, strict=True))]),
+        radial_nmi=np.concatenate([none, *(one.radial_nmi[row] for one, row in zip(errors, rows, strict=True))]),
+    )

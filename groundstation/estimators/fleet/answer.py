@@ -25,15 +25,15 @@ from groundstation.results.fleet import (
 FloatArray = NDArray[np.float64]
 
 # Figures that are positive and skewed are judged by their logarithm.
-POSITIVE = {"standard_error_deg", "estimate_sd_deg", "radial_error_rate_50_nmiph", "forecast_60min_rms_m"}
-TRENDS: tuple[TrendQuantity, ...] = ("error_deg", "radial_error_rate_50_nmiph")
+POSITIVE = {"standard_error_deg", "estimate_sd_deg", "radial_error_rate_fit_nmiph", "forecast_60min_rms_m"}
+TRENDS: tuple[TrendQuantity, ...] = ("error_deg", "radial_error_rate_fit_nmiph")
 LOOKED_AT: Mapping[str, str] = {
     "error_deg": "heading error, deg",
     "standard_error_deg": "standard error of the heading error, deg",
     "estimate_sd_deg": "spread of the differences, deg",
     "onboard_difference_deg": "onboard heading error - ours, deg",
     "reference_residual_arcmin": "parking heading - reference, arcmin",
-    "radial_error_rate_50_nmiph": "INS radial error rate, nmi/h",
+    "radial_error_rate_fit_nmiph": "INS radial error rate, nmi/h",
     "forecast_60min_rms_m": "forecast error after 60 min, m",
 }
 CHECKS: Mapping[str, str] = {

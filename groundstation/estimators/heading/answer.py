@@ -8,8 +8,8 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.normal import NORMAL_95
 from groundstation.estimators.heading import figures as drawn
 from groundstation.estimators.heading.checks import disagreement, held_seconds, variance_ratio
-from groundstation.estimators.heading.interval import ErrorPosterior
 from groundstation.estimators.heading.normality import normality
+from groundstation.estimators.heading.posterior import ErrorPosterior
 from groundstation.estimators.heading.references import (
     drift_prior,
     mode_changes,
@@ -171,12 +171,12 @@ def _judged_figures(
         whole_half_width_deg=0.5 * (error.whole_deg[1] - error.whole_deg[0]),
         steady_sigma_deg=error.steady_sigma_deg,
         taxi_seconds=float(sum(part.end_s - part.start_s + interval_s for part in solution.segments)),
-        normality=normality(solution.difference_deg),
-        variance=variance_ratio(used, assessed, settings.sway_line_s),
+        normality=normality(solution.without_wind_deg),
+        variance=variance_ratio(used, solution.without_wind_deg, assessed, settings.sway_line_s),
         drift_deg_per_h=solution.drift_deg_per_h,
         drift_sigma_deg_per_h=solution.drift_sigma_deg_per_h,
         mode_changes=mode_changes(flight, ins_topic, begin_s, float(used.time_s[-1])),
-        disagreement=disagreement(solution.parts, settings.disagreement_probability),
+        disagreement=disagreement(solution.parts, settings.disagreement_probability, solution.wind_of_parts_deg),
         steps=solution.steps,
         held_s=held_seconds(solution.samples),
     )

@@ -63,13 +63,17 @@ def _variance_log_sigma(values: FloatArray) -> float:
     return float(np.std(squares)) / mean / float(np.sqrt(effective_samples(squares)))
 
 
-def variance_ratio(used: Samples, standstill: Standstill | None, line_s: float) -> VarianceRatio | None:
+def variance_ratio(
+    used: Samples, difference_deg: FloatArray, standstill: Standstill | None, line_s: float
+) -> VarianceRatio | None:
     """Compare the variance of the differences with that of the track plus that of the heading about its line.
 
     Parameters
     ----------
     used : Samples
         The used samples alone, arm taken out.
+    difference_deg : ndarray, shape (n,)
+        Their differences, what the wind makes in each direction taken off.
     standstill : Standstill or None
         Without it the track's part is not known and neither is the ratio.
 
@@ -93,7 +97,7 @@ def variance_ratio(used: Samples, standstill: Standstill | None, line_s: float) 
     velocity2 = 0.5 * (standstill.sigma_north_mps**2 + standstill.sigma_east_mps**2)
     track2 = velocity2 * float(np.mean(1.0 / used.speed_mps**2)) * DEG_PER_RAD**2
     sway2 = float(np.mean(residual**2))
-    difference = unwrap(used.difference_deg)
+    difference = unwrap(difference_deg)
     about = about_running_line(used.time_s, used.heading_deg - used.track_deg, used.segment, line_s)
     swing2 = max(float(np.nanmean(about[1:] * about[:-1])) - sway2, 0.0)
     most2 = SWING_MPS**2 * float(np.mean(1.0 / used.speed_mps**2)) * DEG_PER_RAD**2
@@ -115,21 +119,24 @@ class Disagreement:
     told: str
 
 
-def disagreement(parts: tuple[TaxiSegment, ...], probability: float) -> Disagreement | None:
+def disagreement(parts: tuple[TaxiSegment, ...], probability: float, wind_deg: FloatArray) -> Disagreement | None:
     """What the parts of a taxi say against each other; None for fewer than two.
 
-    The limit is what chance exceeds with the probability given, were the sigmas of the parts all there is.
+    The limit is what chance exceeds with the probability given, were the sigmas of the parts all there is beside
+    ``wind_deg``, shape (parts, terms): what the sideslip of the wind, one sigma of it, makes of each part. A taxi there
+    and back in a crosswind differs by that.
     """
     if len(parts) < 2:
         return None
     errors = np.array([part.error_deg for part in parts])
-    weights = 1.0 / np.maximum(np.array([part.sigma_deg for part in parts]), 1e-9) ** 2
-    off = errors - float(np.sum(weights * errors) / np.sum(weights))
+    variances = np.maximum(np.array([part.sigma_deg for part in parts]), 1e-9) ** 2
+    inverse = np.linalg.inv(np.diag(variances) + wind_deg @ wind_deg.T)
+    off = errors - float(np.sum(inverse @ errors) / np.sum(inverse))
     freedom = len(parts) - 1
-    worst = int(np.argmax(weights * off**2))
+    worst = int(np.argmax(off**2 / variances))
     told = f"farthest off: {parts[worst].start_s:.0f} to {parts[worst].end_s:.0f} s, by {off[worst]:+.2f} deg"
     limit = float(chi_square_quantile(1.0 - probability, freedom)) / freedom
-    return Disagreement(float(np.sum(weights * off**2)) / freedom, limit, told)
+    return Disagreement(float(off @ inverse @ off) / freedom, limit, told)
 
 
 def held_seconds(samples: Samples) -> float | None:

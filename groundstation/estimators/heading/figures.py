@@ -1,7 +1,5 @@
 """Arrays behind the figures of the heading tab and the report; names and columns are fixed, times flight seconds."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +7,18 @@ from groundstation.base.angles import wrap_180
 from groundstation.estimators.heading.recursion import Running
 from groundstation.estimators.heading.samples import Samples
 from groundstation.estimators.heading.standstill import StandstillData
+from groundstation.results.arrays.heading import (
+    HeadingDistribution,
+    HeadingGrowth,
+    HeadingLanes,
+    HeadingNormal,
+    HeadingRunning,
+    HeadingSamples,
+    HeadingSpectrum,
+    StandstillMeanSpeed,
+    StandstillVelocity,
+)
+from groundstation.results.arrays.typed import joined
 from groundstation.results.figures import FigureData
 
 FloatArray = NDArray[np.float64]
@@ -24,75 +34,64 @@ def _moving_part(samples: Samples) -> slice:
     return slice(int(moving[0]), len(samples)) if len(moving) else slice(0, len(samples))
 
 
-def _with_breaks(columns: dict[str, NDArray[Any]], held: tuple[str, ...] = ()) -> dict[str, NDArray[Any]]:
-    """Insert a row without values after the epoch before each pause, so that lines break there.
-
-    Columns named in ``held`` keep the value of that epoch; numbers become NaN, flags False, text :data:`IN_PAUSE`.
-    """
-    before = np.flatnonzero(np.diff(columns["time_s"]) > PAUSE_S)
-    if not len(before):
-        return columns
-    filler: dict[str, Any] = {"f": np.nan, "b": False, "i": 0, "U": IN_PAUSE}
-    out = {
-        name: np.insert(values, before + 1, values[before] if name in held else filler[values.dtype.kind])
-        for name, values in columns.items()
-        if name != "time_s"
-    }
-    usual_s = float(np.median(np.diff(columns["time_s"])))
-    return {"time_s": np.insert(columns["time_s"], before + 1, columns["time_s"][before] + usual_s), **out}
+def _pauses(time_s: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+    """Epochs before each pause, and the times of the rows behind them that break lines."""
+    before = np.flatnonzero(np.diff(time_s) > PAUSE_S)
+    return before, time_s[before] + (float(np.median(np.diff(time_s))) if len(before) else 0.0)
 
 
-def samples_figure(samples: Samples, error_deg: float, weight: FloatArray) -> FigureData:
+def samples_figure(samples: Samples, error_deg: float, weight: FloatArray) -> HeadingSamples:
     """Every epoch from first motion to lift-off, used or not and why. ``weight`` has mean 1 over the used samples."""
     part = _moving_part(samples)
     difference = samples.difference_deg
     # Below walking pace the direction of a velocity is noise.
     difference = np.where(samples.speed_mps > FIRST_MOTION_MPS, difference, np.nan)
-    columns = {
-        "time_s": samples.time_s,
-        "segment": samples.segment,
-        "heading_deg": samples.heading_deg,
-        "track_deg": np.where(samples.speed_mps > FIRST_MOTION_MPS, samples.track_deg, np.nan),
-        "ground_speed_mps": samples.speed_mps,
-        "difference_deg": difference,
-        "residual_deg": wrap_180(difference - error_deg),
-        "used": samples.is_used,
-        "gate": samples.gate,
-        "weight": weight,
-    }
-    digits = {"time_s": 3, "ground_speed_mps": 3, "heading_deg": 4, "track_deg": 4, "difference_deg": 4, "weight": 3}
-    return FigureData("heading_samples", _with_breaks({name: values[part] for name, values in columns.items()}), digits)
+    found = HeadingSamples(
+        time_s=samples.time_s,
+        segment=samples.segment,
+        heading_deg=samples.heading_deg,
+        track_deg=np.where(samples.speed_mps > FIRST_MOTION_MPS, samples.track_deg, np.nan),
+        ground_speed_mps=samples.speed_mps,
+        difference_deg=difference,
+        residual_deg=wrap_180(difference - error_deg),
+        is_used=samples.is_used,
+        gate=samples.gate,
+        weight=weight,
+    ).where(part)
+    before, break_s = _pauses(found.time_s)
+    return found.with_breaks(before, time_s=break_s, gate=IN_PAUSE)
 
 
-def lanes_figure(samples: Samples) -> FigureData:
+def lanes_figure(samples: Samples) -> HeadingLanes:
     """Runs of equal gate, from first motion on."""
     part = _moving_part(samples)
-    broken = _with_breaks({"time_s": samples.time_s[part], "gate": samples.gate[part]})
-    time_s, gate = broken["time_s"], broken["gate"]
+    before, break_s = _pauses(samples.time_s[part])
+    time_s = np.insert(samples.time_s[part], before + 1, break_s)
+    gate = np.insert(samples.gate[part], before + 1, IN_PAUSE)
     edges = np.flatnonzero(gate[1:] != gate[:-1]) + 1
     starts = np.concatenate([[0], edges]) if len(gate) else np.zeros(0, dtype=np.int64)
     ends = np.concatenate([edges, [len(gate) - 1]]) if len(gate) else np.zeros(0, dtype=np.int64)
-    columns = {"start_s": time_s[starts], "end_s": time_s[ends], "state": gate[starts]}
-    return FigureData("heading_lanes", columns, {"start_s": 3, "end_s": 3})
+    return HeadingLanes(start_s=time_s[starts], end_s=time_s[ends], state=gate[starts])
 
 
 def running_figure(
     time_s: FloatArray, running: Running, growth_samples: NDArray[np.int64], growth_half_width_deg: FloatArray
-) -> FigureData:
+) -> HeadingRunning:
     """The paper's running figures, and the honest half width held between the steps it was computed at."""
     count = np.arange(1, len(time_s) + 1)
     held = np.searchsorted(growth_samples, count, side="right") - 1
     half_width = np.where(held >= 0, growth_half_width_deg[np.maximum(held, 0)], np.nan)
-    columns = {
-        "time_s": time_s,
-        "cycles": count,
-        "mean_deg": running.mean_deg,
-        "sigma_deg": running.sigma_deg,
-        "precision_deg": running.precision_deg,
-        "quality_deg": running.quality_deg,
-        "honest_half_width_deg": half_width,
-    }
-    return FigureData("heading_running", _with_breaks(columns, held=("cycles",)), {"time_s": 3})
+    found = HeadingRunning(
+        time_s=time_s,
+        cycles=count,
+        mean_deg=running.mean_deg,
+        sigma_deg=running.sigma_deg,
+        precision_deg=running.precision_deg,
+        quality_deg=running.quality_deg,
+        honest_half_width_deg=half_width,
+    )
+    before, break_s = _pauses(time_s)
+    return found.with_breaks(before, time_s=break_s, cycles=count[before])
 
 
 def _bin_edges(difference_deg: FloatArray) -> FloatArray:
@@ -121,21 +120,13 @@ def distribution_figures(time_s: FloatArray, difference_deg: FloatArray, steps: 
         growth[step] = np.bincount(place[:end], minlength=len(edges) - 1) / (end * width)
     centers = 0.5 * (edges[1:] + edges[:-1])
     return (
-        FigureData(
-            "heading_distribution",
-            {"bin_low_deg": edges[:-1], "bin_high_deg": edges[1:], "density_per_deg": density},
-            {},
-        ),
-        FigureData("heading_normal", {"difference_deg": points, "density_per_deg": normal}, {}),
-        FigureData(
-            "heading_growth",
-            {
-                "step": np.repeat(np.arange(len(ends)), len(centers)),
-                "time_s": np.repeat(time_s[ends - 1], len(centers)),
-                "bin_center_deg": np.tile(centers, len(ends)),
-                "density_per_deg": growth.ravel(),
-            },
-            {"time_s": 3},
+        HeadingDistribution(bin_low_deg=edges[:-1], bin_high_deg=edges[1:], density_per_deg=density),
+        HeadingNormal(difference_deg=points, density_per_deg=normal),
+        HeadingGrowth(
+            step=np.repeat(np.arange(len(ends)), len(centers)),
+            time_s=np.repeat(time_s[ends - 1], len(centers)),
+            bin_center_deg=np.tile(centers, len(ends)),
+            density_per_deg=growth.ravel(),
         ),
     )
 
@@ -145,23 +136,16 @@ def standstill_figures(samples: Samples, standstill: StandstillData) -> tuple[Fi
     still = standstill.is_still
     if not still.any():
         return ()
-    velocity = FigureData(
-        "standstill_velocity",
-        {
-            "time_s": samples.time_s[still],
-            "velocity_north_mps": samples.north_mps[still],
-            "velocity_east_mps": samples.east_mps[still],
-            "in_interval": standstill.in_interval[still],
-        },
-        {"time_s": 3, "velocity_north_mps": 4, "velocity_east_mps": 4},
+    velocity = StandstillVelocity(
+        time_s=samples.time_s[still],
+        velocity_north_mps=samples.north_mps[still],
+        velocity_east_mps=samples.east_mps[still],
+        is_in_interval=standstill.in_interval[still],
     )
-    parts = [_mean_speed_density(samples, standstill, window_s) for window_s in (10.0, 30.0)]
-    names = ("window_s", "speed_of_mean_mps", "density_per_mps")
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
-    return velocity, FigureData("standstill_mean_speed", columns, {"window_s": 0})
+    return velocity, joined([_mean_speed_density(samples, standstill, window_s) for window_s in (10.0, 30.0)])
 
 
-def _mean_speed_density(samples: Samples, standstill: StandstillData, window_s: float) -> dict[str, FloatArray]:
+def _mean_speed_density(samples: Samples, standstill: StandstillData, window_s: float) -> StandstillMeanSpeed:
     """Histogram of the length of the mean velocity over windows that overlap by three quarters."""
     lengths: list[float] = []
     for first, end in standstill.stretches:
@@ -173,17 +157,17 @@ def _mean_speed_density(samples: Samples, standstill: StandstillData, window_s: 
                 lengths.append(float(np.hypot(*(part[high] - part[low] for part in sums)) / (high - low)))
     if not lengths:
         empty = np.zeros(0)
-        return {"window_s": empty, "speed_of_mean_mps": empty, "density_per_mps": empty}
+        return StandstillMeanSpeed(window_s=empty, speed_of_mean_mps=empty, density_per_mps=empty)
     top = max(max(lengths) * 1.05, 0.02)
     edges = np.linspace(0.0, top, 21)
     density = np.histogram(lengths, edges)[0] / (len(lengths) * (edges[1] - edges[0]))
     centers = 0.5 * (edges[1:] + edges[:-1])
-    return {"window_s": np.full(20, window_s), "speed_of_mean_mps": centers, "density_per_mps": density}
+    return StandstillMeanSpeed(window_s=np.full(20, window_s), speed_of_mean_mps=centers, density_per_mps=density)
 
 
 def spectrum_figure(
     time_s: FloatArray, residual_deg: FloatArray, speed_mps: FloatArray, parameters: FloatArray
-) -> FigureData | None:
+) -> HeadingSpectrum | None:
     """Spectral density of the residuals beside that of the fitted noise model, one-sided, deg^2/Hz.
 
     The periodogram is that of unevenly kept samples, smoothed over neighbouring frequencies; the model is given at the
@@ -202,8 +186,7 @@ def spectrum_figure(
     measured = 2.0 * step * transform / float(np.sum(taper**2))
     smooth = np.convolve(np.pad(measured, 2, mode="edge"), np.full(5, 0.2), mode="valid")
     model = model_density(frequency, parameters, float(np.sqrt(np.mean(1.0 / speed_mps**2))), step)
-    columns = {"frequency_hz": frequency, "density_deg2_per_hz": smooth, "model_deg2_per_hz": model}
-    return FigureData("heading_spectrum", columns, {})
+    return HeadingSpectrum(frequency_hz=frequency, density_deg2_per_hz=smooth, model_deg2_per_hz=model)
 
 
 def model_density(frequency_hz: FloatArray, parameters: FloatArray, inverse_speed: float, step_s: float) -> FloatArray:

@@ -9,38 +9,25 @@ The sampling itself is in ``sampling.py``.
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.angles import wrap_360
 from groundstation.base.units import ARCMIN_PER_DEG, DEG_PER_RAD
 from groundstation.estimators.heading import noise
+from groundstation.estimators.heading.posterior import ErrorPosterior, even_draws
+from groundstation.estimators.heading.priors import PRIOR_MEAN, PRIOR_SIGMA, SPREAD
 from groundstation.estimators.heading.sampling import find_mode, sample
 
 FloatArray = NDArray[np.float64]
 
-# Priors: each parameter is log-normal. (median, sigma of the natural logarithm): two sigma either side reach over
-# 0.007-0.37 m/s, 0.007-0.12 m/s, 0.36-44 s, 0.05-3 deg, 0.1-1.3 Hz, 0.012-0.99, 0.003-0.2 deg, 0.2-5 times,
-# 0.1-11 arcmin, 0.1-40 arcmin, 8-440 s.
-PRIOR: dict[str, tuple[float, float]] = {
-    "white_mps": (0.05, 1.0),
-    "correlated_mps": (0.03, 0.7),
-    "correlation_s": (4.0, 1.2),
-    "sway_deg": (0.4, 1.0),
-    "sway_hz": (0.36, 0.65),
-    "sway_damping": (0.15, 1.25),
-    "heading_white_deg": (0.025, 1.05),
-    "motion_factor": (1.0, 0.8),
-    "segment_deg": (1.0 / ARCMIN_PER_DEG, 1.2),
-    "wander_deg": (2.0 / ARCMIN_PER_DEG, 1.5),
-    "wander_s": (60.0, 1.0),
-}
-PRIOR_MEAN = np.log([PRIOR[name][0] for name in noise.PARAMETER_NAMES])
-PRIOR_SIGMA = np.array([PRIOR[name][1] for name in noise.PARAMETER_NAMES])
-SPREAD = (noise.SEGMENT, noise.WANDER)  # what parts of a run have of their own
 LEAST_WEIGHT, LEAST_VARIANCE_DEG2 = 1e-5, 1e-18  # of a draw, times the mean; below it there is nothing to add
 DRAWS_OF_GROWTH = 200
 NO_SPREAD = np.log(1e-3 / ARCMIN_PER_DEG)
+NOTICED_DEG = 0.03  # of a term told apart: what it differs by along a taxi before the noise model is told of it
+WIDEST_GAP_DEG = 210.0  # between the directions of a taxi that goes there and back
 
 
 @dataclass(frozen=True)
@@ -100,135 +87,28 @@ class Differences:
     segment: NDArray[np.int64] | None = None
 
 
-@dataclass(frozen=True)
-class ErrorPosterior:
-    """Posterior of the heading error: a mixture of normals, one for each draw of the noise parameters.
+class _Found(NamedTuple):
+    """Of k draws: log posterior (k,), coefficients (k, c), variances (k, m, c), the error without terms told apart.
 
-    Parameters
-    ----------
-    mean_deg, sigma_deg, weight : ndarray, shape (k,)
-    measured_sigma_deg : ndarray, shape (k,)
-        Sigma without what the regressors leave in the error that are told apart.
-    coefficients, coefficient_sigma : ndarray, shape (k, c)
-        Regression coefficients of each draw, the heading error first.
-    growth_sigma_deg : ndarray, shape (g, m)
-        Measured sigma of draws of equal weight after the samples counted in ``growth_samples``.
-    parameters : ndarray, shape (k, 11)
-        Draws, natural logarithms, in the order of ``noise.PARAMETER_NAMES``.
-    effective_draws : float
-        1 / sum of squared weights: a small figure means a badly sampled posterior.
-    has_converged : bool
-        Whether the search for the maximum ended at one.
+    ``alone``: error and variance, shape (k, 2), were the terms told apart known to be zero.
     """
 
-    mean_deg: FloatArray
-    sigma_deg: FloatArray
-    measured_sigma_deg: FloatArray
-    weight: FloatArray
-    coefficients: FloatArray
-    coefficient_sigma: FloatArray
-    growth_samples: NDArray[np.int64]
-    growth_sigma_deg: FloatArray
-    parameters: FloatArray
-    effective_draws: float
-    has_converged: bool
-
-    @property
-    def error_deg(self) -> float:
-        """Posterior mean."""
-        return float(self.weight @ self.mean_deg)
-
-    @property
-    def standard_error_deg(self) -> float:
-        """Posterior standard deviation."""
-        return float(np.sqrt(self.weight @ (self.sigma_deg**2 + (self.mean_deg - self.error_deg) ** 2)))
-
-    @property
-    def apart_sigma_deg(self) -> float:
-        """Standard deviation of what the regressors told apart leave in the error."""
-        return float(np.sqrt(self.weight @ np.maximum(self.sigma_deg**2 - self.measured_sigma_deg**2, 0.0)))
-
-    def typical(self) -> FloatArray:
-        """Posterior mean of the parameters (natural logarithms), shape (11,)."""
-        return np.asarray(self.weight @ self.parameters)
-
-    def parameter(self, name: str) -> float:
-        """Posterior median of one parameter, in its unit."""
-        values = self.parameters[:, noise.PARAMETER_NAMES.index(name)]
-        order = np.argsort(values)
-        return float(np.exp(values[order][np.searchsorted(np.cumsum(self.weight[order]), 0.5)]))
-
-    def coefficient(self, index: int) -> tuple[float, float]:
-        """Posterior mean and standard deviation of a regression coefficient."""
-        mean = float(self.weight @ self.coefficients[:, index])
-        spread = self.coefficient_sigma[:, index] ** 2 + (self.coefficients[:, index] - mean) ** 2
-        return mean, float(np.sqrt(self.weight @ spread))
-
-    def interval_deg(
-        self, probability: float = 0.95, extra_sigma_deg: float = 0.0, *, is_measured: bool = False
-    ) -> tuple[float, float]:
-        """Equal-tailed interval of the mixture, widened by a further independent sigma.
-
-        ``is_measured``: without what the regressors leave in the error that are told apart.
-        """
-        sigma = np.hypot(self.measured_sigma_deg if is_measured else self.sigma_deg, extra_sigma_deg)
-        tail = 0.5 * (1.0 - probability)
-        return (
-            mixture_quantile(tail, self.mean_deg, sigma, self.weight),
-            mixture_quantile(1.0 - tail, self.mean_deg, sigma, self.weight),
-        )
-
-    def growth_half_width_deg(self, probability: float = 0.95, extra_sigma_deg: float = 0.0) -> FloatArray:
-        """Half width of the interval after ``growth_samples``, shape (m,), noise and terms told apart as at the end."""
-        extra_deg = np.hypot(self.apart_sigma_deg, extra_sigma_deg)
-        upper = 0.5 * (1.0 + probability)
-        columns = np.hypot(self.growth_sigma_deg, extra_deg).T
-        zeros, even = np.zeros(columns.shape[1]), np.full(columns.shape[1], 1.0 / columns.shape[1])
-        return np.array([mixture_quantile(upper, zeros, sigma, even) for sigma in columns])
-
-    def even_draws(self, count: int = 40) -> FloatArray:
-        """Draws of the parameters with equal weights, shape (count, 11): systematic resampling."""
-        return even_draws(self.parameters, self.weight, count)
-
-    def draws_of_ordinary_parts(self, count: int = 40) -> FloatArray:
-        """The same, parts of a run taken to have no more of their own than usual: what they say beyond that shows."""
-        draws = self.even_draws(count)
-        draws[:, SPREAD] = PRIOR_MEAN[np.array(SPREAD)]
-        return draws
-
-
-def even_draws(points: FloatArray, weight: FloatArray, count: int) -> FloatArray:
-    """Draws with equal weights, shape (count, p), from weighted ones: systematic resampling."""
-    places = (np.arange(count) + 0.5) / count
-    return np.asarray(points[np.minimum(np.searchsorted(np.cumsum(weight), places), len(weight) - 1)])
-
-
-def mixture_quantile(probability: float, mean: FloatArray, sigma: FloatArray, weight: FloatArray) -> float:
-    """Quantile of a mixture of normal distributions, by bisection.
-
-    Examples
-    --------
-    >>> round(mixture_quantile(0.975, np.zeros(2), np.array([1.0, 1.0]), np.array([0.3, 0.7])), 3)
-    1.96
-    """
-    from scipy.special import ndtr
-
-    low, high = float(np.min(mean - 12.0 * sigma)), float(np.max(mean + 12.0 * sigma))
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if float(weight @ ndtr((middle - mean) / sigma)) < probability:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
+    density: FloatArray
+    estimate: FloatArray
+    variance: FloatArray
+    alone: FloatArray
 
 
 @dataclass
 class _Target:
-    """Log posterior density of the noise parameters, with the error and the coefficients integrated out."""
+    """Log posterior density of the noise parameters, with the error and the coefficients integrated out.
+
+    ``apart``: so many regressors at the end are told apart.
+    """
 
     standstill: StandstillVelocities
     differences: Differences
+    apart: int = 0
 
     def __post_init__(self) -> None:
         data, still = self.differences, self.standstill
@@ -259,20 +139,21 @@ class _Target:
         sigmas = np.array([sigma, *(regressor.prior_sigma for regressor in data.regressors)])
         means = [mean - self.reference_deg, *(regressor.prior_mean for regressor in data.regressors)]
         self.prior = (np.array(means), 1.0 / np.maximum(sigmas, 1e-6) ** 2)
+        without = len(means) - self.apart
+        self.prior_of_alone = (self.prior[0][:without].copy(), self.prior[1][:without].copy())
         self.last = np.array([len(data.time_s)], dtype=np.int64)
 
-    def evaluate(self, thetas: FloatArray, checkpoints: NDArray[np.int64]) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Log posterior (k,), coefficients (k, c), variances (k, m, c); thetas (k, 11)."""
+    def evaluate(self, thetas: FloatArray, checkpoints: NDArray[np.int64]) -> _Found:
+        """What is found for draws of the noise parameters, shape (k, 11)."""
         count, width = len(thetas), self.taxi[1].shape[1] - 1
         log_likelihood, estimate = np.empty(count), np.empty((count, width))
-        variance = np.empty((count, len(checkpoints), width))
+        variance, alone = np.empty((count, len(checkpoints), width)), np.empty((count, 2))
         bounded = np.clip(thetas, PRIOR_MEAN - 6.0 * PRIOR_SIGMA, PRIOR_MEAN + 6.0 * PRIOR_SIGMA)
         room = noise.room_for(width + 1, len(checkpoints))
-        noise.evaluate(
-            bounded, self.still, self.taxi, self.prior, checkpoints, log_likelihood, estimate, variance, room
-        )
+        out = (log_likelihood, estimate, variance, self.prior_of_alone, alone)
+        noise.evaluate(bounded, self.still, self.taxi, self.prior, checkpoints, *out, room)
         scaled = ((thetas - PRIOR_MEAN) / PRIOR_SIGMA)[:, self.free]
-        return log_likelihood - 0.5 * np.sum(scaled**2, axis=1), estimate, variance
+        return _Found(log_likelihood - 0.5 * np.sum(scaled**2, axis=1), estimate, variance, alone)
 
     def whole(self, thetas: FloatArray) -> FloatArray:
         """All parameters, shape (k, 11), from those that are sampled."""
@@ -282,7 +163,7 @@ class _Target:
         return out
 
     def log_density(self, thetas: FloatArray) -> FloatArray:
-        return self.evaluate(self.whole(thetas), self.last)[0]
+        return self.evaluate(self.whole(thetas), self.last).density
 
 
 def _start(differences: Differences, standstill: StandstillVelocities) -> FloatArray:
@@ -320,31 +201,37 @@ def error_posterior(
     """
     count = len(differences.time_s)
     checkpoints = np.unique(np.linspace(min(2, count), count, growth).astype(np.int64))
-    target = _Target(standstill, without_apart(differences))
+    target = _target_of(differences, standstill)
     scale = PRIOR_SIGMA[target.free]
     mode, has_converged = find_mode(target.log_density, _start(differences, standstill)[target.free], scale)
-    found: list[tuple[FloatArray, FloatArray]] = []
+    found: list[tuple[FloatArray, FloatArray, FloatArray]] = []
 
     def evaluate(thetas: FloatArray) -> FloatArray:
-        density, estimate, variance = target.evaluate(target.whole(thetas), target.last)
-        found.append((estimate, variance[:, -1]))
-        return density
+        now = target.evaluate(target.whole(thetas), target.last)
+        found.append((now.estimate, now.variance[:, -1], now.alone))
+        return now.density
 
     points, weight = sample(target.log_density, mode, scale, draws, np.random.default_rng(seed), evaluate)
-    coefficients, variance = (np.vstack(arrays) for arrays in zip(*found, strict=True))
+    coefficients, variance, alone = (np.vstack(arrays) for arrays in zip(*found, strict=True))
     kept = weight > LEAST_WEIGHT / len(weight)
     points, weight = target.whole(points[kept]), weight[kept] / weight[kept].sum()
-    coefficients, measured = coefficients[kept], np.sqrt(np.maximum(variance[kept], LEAST_VARIANCE_DEG2))
+    coefficients, variance, alone = coefficients[kept], np.maximum(variance[kept], LEAST_VARIANCE_DEG2), alone[kept]
+    measured_deg = np.sqrt(np.maximum(alone[:, 1], LEAST_VARIANCE_DEG2))
+    if target.apart and goes_there_and_back(differences.direction_deg):
+        sigma_deg = np.sqrt(np.maximum(variance[:, 0], measured_deg**2))
+    else:  # a number moved by them would be an extrapolation
+        coefficients[:, 0], variance[:, 0] = alone[:, 0], measured_deg**2
+        sigma_deg = np.hypot(measured_deg, _left_in_error(differences, np.asarray(weight @ points)))
     coefficients[:, 0] += target.reference_deg
-    apart_deg = _left_in_error(differences, np.asarray(weight @ points))
-    _density, _estimate, growing = target.evaluate(even_draws(points, weight, DRAWS_OF_GROWTH), checkpoints)
+    plain = _Target(standstill, without_apart(differences))
+    growing = plain.evaluate(even_draws(points, weight, DRAWS_OF_GROWTH), checkpoints).variance
     return ErrorPosterior(
         mean_deg=coefficients[:, 0],
-        sigma_deg=np.hypot(measured[:, 0], apart_deg),
-        measured_sigma_deg=measured[:, 0],
+        sigma_deg=sigma_deg,
+        measured_sigma_deg=measured_deg,
         weight=weight,
         coefficients=coefficients,
-        coefficient_sigma=measured,
+        coefficient_sigma=np.sqrt(variance),
         growth_samples=checkpoints,
         growth_sigma_deg=np.sqrt(np.maximum(growing[:, :, 0], LEAST_VARIANCE_DEG2)),
         parameters=points,
@@ -353,12 +240,36 @@ def error_posterior(
     )
 
 
+def _target_of(differences: Differences, standstill: StandstillVelocities) -> _Target:
+    """Target of the noise: with the terms told apart, at the end, where they differ along the taxi.
+
+    Directions then disagree by what a crosswind does; without these terms that would be taken for errors of the INS.
+    """
+    apart = [one for one in differences.regressors if one.is_apart]
+    if all(float(np.ptp(one.values)) * one.prior_sigma < NOTICED_DEG for one in apart):
+        return _Target(standstill, without_apart(differences))
+    known = without_apart(differences).regressors
+    return _Target(standstill, replace(differences, regressors=(*known, *apart)), len(apart))
+
+
+def goes_there_and_back(direction_deg: FloatArray) -> bool:
+    """Whether directions of motion leave no wide gap: what turns with the aircraft then shows by itself.
+
+    Examples
+    --------
+    >>> [goes_there_and_back(np.array(one)) for one in ([10.0, 190.0], [10.0, 100.0], [0.0, 120.0, 240.0])]
+    [True, False, True]
+    """
+    ordered = np.sort(wrap_360(direction_deg))
+    return bool(np.max(np.diff(ordered, append=ordered[0] + 360.0)) <= WIDEST_GAP_DEG)
+
+
 def _left_in_error(differences: Differences, parameters: FloatArray) -> float:
     """Standard deviation of what the terms told apart leave in the error, degrees.
 
-    They do not move the number, for from a few directions they would extrapolate: so all of them that the weights of
-    the samples let through is in it, and as the number is linear in the differences, that is what it would be were
-    each term the differences.
+    Where a taxi does not go there and back they do not move the number, for they would extrapolate: so all of them that
+    the weights of the samples let through is in it, and as the number is linear in the differences, that is what it
+    would be were each term the differences.
     """
     variance, measured = 0.0, without_apart(differences)
     known = tuple(replace(one, prior_mean=0.0) for one in measured.regressors)
@@ -383,7 +294,7 @@ def fixed_noise_estimate(
     regressors (drift), with the noise as found from the whole of it.
     """
     target = _Target(standstill, differences)
-    _log_density, coefficients, variance = target.evaluate(parameters, target.last)
+    _log_density, coefficients, variance, _alone = target.evaluate(parameters, target.last)
     coefficients[:, 0] += target.reference_deg
     mean = coefficients.mean(axis=0)
     spread = variance[:, -1, :].mean(axis=0) + coefficients.var(axis=0)

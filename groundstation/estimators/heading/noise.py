@@ -381,6 +381,8 @@ def evaluate(
     log_likelihood: FloatArray,
     estimate: FloatArray,
     variance: FloatArray,
+    prior_of_alone: tuple[FloatArray, FloatArray],
+    alone: FloatArray,
     room: Room,
 ) -> None:
     """Log likelihood, estimate and its variance for every row of ``thetas``, shape (k, 11).
@@ -397,6 +399,10 @@ def evaluate(
         The last is n.
     log_likelihood, estimate, variance : ndarray, shapes (k,), (k, c - 1), (k, m, c - 1)
         Out: log likelihood, coefficients, and the variances of the coefficients at the checkpoints.
+    prior_of_alone : (mean, precision), shapes (a,)
+        Of the first ``a`` coefficients, taken without the others.
+    alone : ndarray, shape (k, 2)
+        Out: the first coefficient and its variance, were the coefficients after the first ``a`` known to be zero.
     """
     width = taxi[1].shape[1]
     information, start, mean, inverse, history = room.information, room.start, room.mean, room.inverse, room.history
@@ -424,3 +430,7 @@ def evaluate(
         for j in range(width - 1):
             estimate[k, j] = mean[j]
         log_likelihood[k] = total - 0.5 * (log_determinant + rest)
+        if len(prior_of_alone[0]) < width - 1:
+            last = len(checkpoints) - 1
+            rest = solve_normal_equations(information[last], prior_of_alone[0], prior_of_alone[1], mean, inverse, room)
+        alone[k, 0], alone[k, 1] = mean[0], inverse[0, 0]

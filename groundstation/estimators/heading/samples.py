@@ -26,6 +26,7 @@ GATE_TEXT = "U20"
 MOVING_MPS = 1.0
 GEOMETRY_FIELDS = ("gdop", "pdop", "hdop")
 GEOMETRY_NAMES = {"gdop": "GDOP", "pdop": "PDOP", "hdop": "HDOP"}
+VELOCITY_SIGMA = "velocity sigma"
 
 
 class GroundContact(Protocol):
@@ -84,7 +85,8 @@ class Samples:
     north_mps, east_mps : velocity of the main-gear axle (of the antenna until an arm is taken out)
     rate_dps, arm_rate_dps : slope of the INS heading over the long (gate) and the short window (lever arm)
     difference_deg : INS heading minus track
-    geometry, integrity : NaN where not logged; integrity 1 good, 0 bad
+    geometry, integrity : NaN where not logged; integrity 1 good, 0 bad. Where the velocity sigma stands in for a
+        dilution of precision, ``geometry`` is 2 at the limit of that sigma
     on_ground : proven
     is_after_lift_off : the epoch is later than the first lift-off
     gate : why a sample is used or not
@@ -256,7 +258,7 @@ def pair_samples(
     gnss, mask = gnss.take(part), np.asarray(ground.mask)[part]
     time_s = flight.seconds(gnss.time_ns)
     ins_time, ins_heading = _ins_heading(flight, ins_topic, given.values_deg, time_s)
-    geometry_field = next((name for name in GEOMETRY_FIELDS if gnss.has(name)), "")
+    geometry, geometry_name = _geometry(gnss, settings)
     raw = settings.turn_rate_kind == "raw"
     return Samples(
         time_s=time_s,
@@ -266,17 +268,33 @@ def pair_samples(
         east_mps=gnss.values("velocity_east_mps"),
         rate_dps=window_slope(time_s, ins_time, ins_heading, 0.0 if raw else settings.turn_rate_window_s),
         arm_rate_dps=window_slope(time_s, ins_time, ins_heading, settings.arm_rate_window_s),
-        geometry=gnss.values(geometry_field) if geometry_field else np.full(len(gnss), np.nan),
+        geometry=geometry,
         integrity=gnss.values("integrity_ok"),
         on_ground=mask,
         is_after_lift_off=is_after,
         gate=np.full(len(gnss), "", dtype=GATE_TEXT),
         segment=np.zeros(len(gnss), dtype=np.int64),
-        geometry_name=GEOMETRY_NAMES.get(geometry_field, ""),
+        geometry_name=geometry_name,
         ground_method=method,
         heading_source=given.description,
         heading_sigma_deg=given.declination_sigma_deg or 0.0,
     )
+
+
+def _geometry(gnss: Table, settings: HeadingSettings) -> tuple[FloatArray, str]:
+    """Dilution of precision of each epoch and its name; without any, in motion, the sigma that the receiver states.
+
+    That sigma is the dilution of precision times the noise of the ranges' rates. At standstill the noise is measured.
+    """
+    field = next((name for name in GEOMETRY_FIELDS if gnss.has(name)), "")
+    if field:
+        return gnss.values(field), GEOMETRY_NAMES[field]
+    if not gnss.has("velocity_sigma_mps"):
+        return np.full(len(gnss), np.nan), ""
+    speed = np.hypot(gnss.values("velocity_north_mps"), gnss.values("velocity_east_mps"))
+    scale = settings.geometry_max / settings.velocity_sigma_max_mps
+    sigma_mps = np.where(speed > settings.taxi_speed_min_mps, gnss.values("velocity_sigma_mps"), np.nan)
+    return sigma_mps * scale, VELOCITY_SIGMA
 
 
 def _ground_part(

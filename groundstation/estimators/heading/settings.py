@@ -14,7 +14,8 @@ LEAST_DRAWS = 100  # of a posterior of eleven parameters
 LIMITS = frozenset(  # settings that bound a gate and choose no data: a change of them needs no log
     {
         *("geometry_share_min", "integrity_share_min", "speed_of_mean_max_mps", "outlier_share_max"),
-        *("precision_max_deg", "quality_max_deg", "half_width_max_deg", "whole_half_width_max_deg", "whole_decides"),
+        *("precision_max_deg", "quality_max_deg", "half_width_max_deg", "whole_half_width_max_deg"),
+        *("precision_decides", "half_width_decides", "whole_decides"),
         *("skewness_max", "excess_kurtosis_range", "normal_distance_max", "variance_ratio_range", "drift_sigmas_max"),
     }
 )
@@ -29,6 +30,7 @@ class HeadingSettings:
 
     # Throughout
     geometry_max: float = number(2.0, 0.0)  # geometric factor (paper)
+    velocity_sigma_max_mps: float = number(0.1, 1e-6)  # receiver's own, without any such factor: the paper's noise
     geometry_share_min: float = number(0.9, 0.0, 1.0)  # of the epochs that would otherwise be used
     integrity_share_min: float = number(0.9, 0.0, 1.0)
     heading_gap_max_s: float = number(1.5, 0.0)  # INS heading is interpolated over no longer gap
@@ -68,8 +70,11 @@ class HeadingSettings:
     precision_max_deg: float = number(0.05, 0.0)  # paper: e
     quality_max_deg: float = number(0.3, 0.0)  # paper
     half_width_max_deg: float = number(0.2, 0.0)  # of what this taxi shows: 20 arcmin is then more than three sigma
-    whole_half_width_max_deg: float = number(1.0 / 3.0, 0.0)  # steady sideslip in it: 20 arcmin
-    whole_decides: bool = True  # whether the latter is required: nothing is accepted that steady terms may spoil
+    whole_half_width_max_deg: float = number(1.0 / 3.0, 0.0)  # taxi, wind and installation: 20 arcmin
+    # Which of the three are required (docs/decisions/011): the last holds what the others measure.
+    precision_decides: bool = False
+    half_width_decides: bool = False
+    whole_decides: bool = True
     skewness_max: float = number(0.5, 0.0)
     excess_kurtosis_range: tuple[float, float] = (-1.2, 2.0)
     normal_distance_max: float = number(0.08, 0.0)
@@ -98,6 +103,7 @@ class HeadingSettings:
     wind_sigma_mps: float = number(1.5, 0.0)  # of either component, where it is known
     weather_max_min: float = number(60.0, 0.0)  # a METAR line is no nearer to the taxi than that: not used
     steady_sideslip_sigma_deg: float = number(0.05, 0.0)  # the same in every direction
+    uneven_power_sigma_deg: float = number(0.3, 0.0)  # the same, where the aircraft file says that power is uneven
     mounting_sigma_deg: float = number(0.1, 0.0)  # of the platform's number alone
 
     # Honest interval

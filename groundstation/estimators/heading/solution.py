@@ -11,7 +11,6 @@ from groundstation.base.records import BoolArray
 from groundstation.estimators.heading.arms import ArmKnowledge, know_arm, straight_regressors
 from groundstation.estimators.heading.interval import (
     Differences,
-    ErrorPosterior,
     Regressor,
     StandstillVelocities,
     error_posterior,
@@ -19,6 +18,7 @@ from groundstation.estimators.heading.interval import (
     sample_weights,
     without_apart,
 )
+from groundstation.estimators.heading.posterior import ErrorPosterior
 from groundstation.estimators.heading.recursion import Running, run_recursion
 from groundstation.estimators.heading.samples import Samples, without_arm
 from groundstation.estimators.heading.settings import HeadingSettings
@@ -47,6 +47,8 @@ class Solution:
     differences : Differences
         Of the used samples, without a jump at +-180 deg, the mean sideslip of a known wind taken off.
     posterior : ErrorPosterior
+    without_wind_deg : ndarray, shape (n,)
+        The differences less what the terms of the wind are found to make in each direction.
     growth_samples : ndarray of int64
         Numbers of used samples at which the posterior's growth was taken.
     running : Running
@@ -62,6 +64,8 @@ class Solution:
     segments, directions : tuple of TaxiSegment
     parts : tuple of TaxiSegment
         The segments, long ones cut: what their errors say against each other is judged.
+    wind_of_parts_deg : ndarray, shape (parts, terms)
+        What one sigma of each term of the wind makes of the error of each part.
     steps : tuple of HeadingStep
     sideslip_deg : float or None
         Mean sideslip taken off, by the weights of the samples; None where no wind is known.
@@ -73,6 +77,7 @@ class Solution:
     used: Samples
     differences: Differences
     posterior: ErrorPosterior
+    without_wind_deg: FloatArray
     growth_samples: NDArray[np.int64]
     running: Running
     knowledge: ArmKnowledge
@@ -84,13 +89,10 @@ class Solution:
     segments: tuple[TaxiSegment, ...]
     directions: tuple[TaxiSegment, ...]
     parts: tuple[TaxiSegment, ...]
+    wind_of_parts_deg: FloatArray
     steps: tuple[HeadingStep, ...]
     sideslip_deg: float | None
     mean_direction: tuple[float, float]
-
-    @property
-    def difference_deg(self) -> FloatArray:
-        return self.differences.difference_deg
 
 
 def _centred(difference_deg: FloatArray) -> FloatArray:
@@ -155,6 +157,7 @@ def solve(
     drift, drift_sigma = _drift(thinned, reference_time_s, draws)
     segments = tuple(_segment(differences, used, used.segment == number, draws) for number in np.unique(used.segment))
     direction_rad = np.deg2rad(differences.direction_deg)
+    parts = _parts(differences, used, segments, draws, settings.part_max_s)
     full_weight = np.zeros(len(samples))
     full_weight[samples.is_used] = weight * len(used)
     return Solution(
@@ -162,6 +165,7 @@ def solve(
         used=used,
         differences=differences,
         posterior=posterior,
+        without_wind_deg=differences.difference_deg - _wind_found(differences, posterior),
         growth_samples=posterior.growth_samples * thinning,
         running=run_recursion(_centred(used.difference_deg)),
         sideslip_deg=None if steady.wind is None else float(weight @ steady.sideslip_deg(differences.direction_deg)),
@@ -174,7 +178,8 @@ def solve(
         drift_sigma_deg_per_h=drift_sigma,
         segments=segments,
         directions=_directions(differences, used, segments, draws),
-        parts=_parts(differences, used, segments, draws, settings.part_max_s),
+        parts=parts,
+        wind_of_parts_deg=_wind_of(parts, differences),
         steps=steps,
     )
 
@@ -255,6 +260,24 @@ def _parts(
         masks = (inside & (number == part) for part in range(count))
         parts += [_segment(differences, used, mask, draws) for mask in masks if mask.sum() > 1]
     return tuple(parts)
+
+
+def _wind_found(differences: Differences, posterior: ErrorPosterior) -> FloatArray:
+    """What the terms told apart are found to make of each difference, degrees; zero where one direction hides them."""
+    known = 1 + len(without_apart(differences).regressors)
+    terms = [one for one in differences.regressors if one.is_apart]
+    found = [posterior.coefficient(place)[0] for place in range(known, posterior.coefficients.shape[1])]
+    return sum(
+        (size * term.values for size, term in zip(found, terms, strict=False)), np.zeros(len(differences.time_s))
+    )
+
+
+def _wind_of(parts: tuple[TaxiSegment, ...], differences: Differences) -> FloatArray:
+    """One sigma of each term told apart, averaged over each part, degrees, shape (parts, terms)."""
+    terms, time_s = [one for one in differences.regressors if one.is_apart], differences.time_s
+    inside = [(time_s >= part.start_s) & (time_s <= part.end_s) for part in parts]
+    means = [[one.prior_sigma * float(np.mean(one.values[mask])) for one in terms] for mask in inside]
+    return np.array(means).reshape(len(parts), len(terms))
 
 
 def _directions(

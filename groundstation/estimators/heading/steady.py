@@ -84,10 +84,19 @@ class SteadyPrior:
     def regressors(self, direction_deg: FloatArray) -> tuple[Regressor, ...]:
         """What remains of the sideslip of a crosswind in these directions of motion, shape (n,)."""
         north, east = np.cos(np.deg2rad(direction_deg)), np.sin(np.deg2rad(direction_deg))
-        unknown = tuple(Regressor(part, 0.0, self.along_sigma_deg, is_apart=True) for part in (north, east))
-        if self.wind is None:
-            return unknown
-        return (Regressor(self.from_left_mps(direction_deg), 0.0, self.factor_sigma, is_apart=True), *unknown)
+        wind = (0.0, 0.0) if self.wind is None else (self.wind.east_mps, -self.wind.north_mps)
+        speed_mps = float(np.hypot(*wind))
+        across = (wind[0] / speed_mps, wind[1] / speed_mps) if speed_mps else (1.0, 0.0)
+        along_deg = self.along_sigma_deg
+        return (  # the mean wind from the left, where the factor is uncertain too, and a quarter turn from it
+            Regressor(
+                across[0] * north + across[1] * east,
+                0.0,
+                float(np.hypot(along_deg, self.factor_sigma * speed_mps)),
+                is_apart=True,
+            ),
+            Regressor(across[0] * east - across[1] * north, 0.0, along_deg, is_apart=True),
+        )
 
 
 def steady_prior(
@@ -108,14 +117,16 @@ def steady_prior(
     usual = float(np.hypot(factor, factor_sigma))
     along = usual * (settings.ordinary_wind_mps if wind is None else wind.sigma_mps)
     same, mounting = aircraft.steady_sideslip_sigma_deg, aircraft.mounting_sigma_deg
+    same_sigma_deg = settings.steady_sideslip_sigma_deg if same is None else same
+    is_uneven = aircraft.taxi_power == "uneven"
     return SteadyPrior(
         factor=factor,
         factor_sigma=factor_sigma,
         along_sigma_deg=stated if stated is not None and wind is None else along,
-        same_sigma_deg=settings.steady_sideslip_sigma_deg if same is None else same,
+        same_sigma_deg=max(same_sigma_deg, settings.uneven_power_sigma_deg) if is_uneven else same_sigma_deg,
         mounting_deg=aircraft.mounting_deg,
         mounting_sigma_deg=settings.mounting_sigma_deg if mounting is None else mounting,
-        is_stated=any(one is not None for one in (aircraft.sideslip_sigma_deg, same, mounting)),
+        is_stated=is_uneven or any(one is not None for one in (aircraft.sideslip_sigma_deg, same, mounting)),
         aircraft_class=kind,
         wind=wind,
     )

@@ -10,7 +10,7 @@ from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.checks import Disagreement, VarianceRatio
 from groundstation.estimators.heading.gating import NOT_TAXI, is_straight_and_fast
 from groundstation.estimators.heading.normality import Normality, normality_limits
-from groundstation.estimators.heading.samples import Samples
+from groundstation.estimators.heading.samples import VELOCITY_SIGMA, Samples
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.wording import told
 from groundstation.results.heading import Bound, Gate, HeadingResult, HeadingStep, Standstill, Verdict, judged_gate
@@ -18,7 +18,7 @@ from groundstation.results.rules import Rejudged
 
 # Required gates whose failure more data may cure; the failure of any other required gate rejects.
 CURED_BY_MORE_DATA = frozenset({"standstill_duration", "taxi_seconds", "precision", "half_width", "whole_half_width"})
-STEADY_GATE = "whole_half_width"  # alone: no length of the same taxi cures it
+WHOLE, TAXI_ALONE = "whole_half_width", "half_width"
 PAPER_RATE_HZ, LEAST_RATE_HZ = 10.0, 0.2
 HELD_MAX_S = 1.0  # a receiver is late by less
 CURES = "taxi the other way, state the wind, or let the tool learn the installation"
@@ -78,11 +78,19 @@ def rejudge(answer: HeadingResult, settings: HeadingSettings) -> tuple[Rejudged,
     rate_hz = next((gate.value for gate in answer.gates if gate.name == "gnss_rate"), None) or PAPER_RATE_HZ
     bounds = gate_bounds(settings, answer.samples, rate_hz)
     after = tuple(gate.under(bounds[gate.name]) if gate.name in bounds else gate for gate in answer.gates)
-    after = tuple(
-        replace(gate, required=settings.whole_decides) if gate.name == "whole_half_width" else gate for gate in after
-    )
+    required = _required_by(settings)
+    after = tuple(replace(gate, required=required.get(gate.name, gate.required)) for gate in after)
     verdict, _ = decide(after, answer.standstill, settings)
     return (Rejudged("heading", answer.verdict, verdict, answer.gates, after),)
+
+
+def _required_by(settings: HeadingSettings) -> dict[str, bool]:
+    """Whether the gates of which that is a setting are required."""
+    return {
+        "precision": settings.precision_decides,
+        TAXI_ALONE: settings.half_width_decides,
+        WHOLE: settings.whole_decides,
+    }
 
 
 def build_gates(
@@ -108,15 +116,19 @@ def _throughout_gates(
     )
     geometry, integrity = samples.geometry[judged], samples.integrity[judged]
     geometry, integrity = geometry[np.isfinite(geometry)], integrity[np.isfinite(integrity)]
-    name = samples.geometry_name or "GDOP"
+    is_sigma = samples.geometry_name == VELOCITY_SIGMA
+    most = settings.velocity_sigma_max_mps if is_sigma else settings.geometry_max
+    geometry = geometry * (most / settings.geometry_max)
+    limit = f"at most {most:g} m/s" if is_sigma else f"at most {most:g}"
+    name = f"{VELOCITY_SIGMA} of the receiver" if is_sigma else samples.geometry_name or "GDOP"
     changes = figures.mode_changes
     return (
         judged_gate(
             bounds["geometry"],
             "geometry",
-            f"share of straight taxi with {name} at most {settings.geometry_max:g}",
-            float(np.mean(geometry <= settings.geometry_max)) if len(geometry) else None,
-            reason=f"largest {np.max(geometry):.2f}" if len(geometry) else "no GDOP, PDOP or HDOP in the log",
+            f"share of straight taxi with {name} {limit}",
+            float(np.mean(geometry <= most)) if len(geometry) else None,
+            reason=f"largest {np.max(geometry):.3g}" if len(geometry) else "no GDOP, PDOP or HDOP in the log",
         ),
         judged_gate(
             bounds["integrity"],
@@ -183,6 +195,7 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings, b
     outliers, used = int(np.sum(samples.gate == "outlier")), int(samples.is_used.sum())
     later = int(samples.is_after_lift_off[samples.is_used].sum())
     run = is_straight_and_fast(samples, settings) & np.isin(samples.gate, NOT_TAXI)
+    required = _required_by(settings)
     return (
         judged_gate(
             (None, 1.0),
@@ -230,6 +243,7 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings, b
             "precision e of Markelov 2015",
             figures.precision_deg,
             unit="deg",
+            required=required["precision"],
         ),
         judged_gate(bounds["quality"], "quality", "spread of the running mean", figures.quality_deg, unit="deg"),
         judged_gate(
@@ -238,6 +252,7 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings, b
             "half width of the 95 % interval from this taxi alone",
             figures.half_width_deg,
             unit="deg",
+            required=required[TAXI_ALONE],
         ),
         judged_gate(
             bounds["whole_half_width"],
@@ -246,7 +261,7 @@ def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings, b
             figures.whole_half_width_deg,
             unit="deg",
             reason=f"{NORMAL_95 * figures.steady_sigma_deg:.2f} deg of it wind and installation",
-            required=settings.whole_decides,
+            required=required[WHOLE],
         ),
     )
 
@@ -328,19 +343,26 @@ def _is_curable(gate: Gate, standstill: Standstill | None, settings: HeadingSett
     return gate.name == STANDSTILL_GATE and is_short
 
 
+def _is_mostly_steady(gates: tuple[Gate, ...]) -> bool:
+    """Whether wind and installation are a larger part of the whole interval than this taxi."""
+    whole, alone = (next((gate.value for gate in gates if gate.name == name), None) for name in (WHOLE, TAXI_ALONE))
+    return whole is None or alone is None or whole**2 >= 2.0 * alone**2
+
+
 def decide(
     gates: tuple[Gate, ...], standstill: Standstill | None, settings: HeadingSettings
 ) -> tuple[Verdict, tuple[Gate, ...]]:
     """The verdict and every gate that stands against a correction.
 
     reject: a required gate failed that more data cannot cure; extend: only such failed as more of the same may cure;
-    undecided: nothing failed but for steady terms, but a required gate could not be measured; advisory: only the steady
-    terms leave the interval too wide, which no length of the same taxi cures; accept: every required gate passed.
+    undecided: nothing failed but for steady terms, but a required gate could not be measured; advisory: only the whole
+    interval is too wide, and wind and installation are the larger part of it, which no length of the same taxi cures;
+    accept: every required gate passed.
     """
     failed = tuple(gate for gate in gates if gate.required and gate.state == "failed")
     if any(not _is_curable(gate, standstill, settings) for gate in failed):
         return "reject", failed
-    if failed and {gate.name for gate in failed} != {STEADY_GATE}:
+    if failed and ({gate.name for gate in failed} != {WHOLE} or not _is_mostly_steady(gates)):
         return "extend", failed
     missing = tuple(gate for gate in gates if gate.required and gate.state == "not_measured")
     if missing:

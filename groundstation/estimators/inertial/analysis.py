@@ -95,8 +95,8 @@ def _sentence(answers: Answers) -> str:
         within = "" if position is None else f", within {position.p95:.1f} m of it (95 %)"
         return f"{says}{within}: no errors, no forecast"
     parts = []
-    if inertial.radial_error_rate_50_nmiph is not None:
-        parts.append(f"{inertial.radial_error_rate_50_nmiph:.2f} nmi/h")
+    if inertial.radial_error_rate_fit_nmiph is not None:
+        parts.append(f"{inertial.radial_error_rate_fit_nmiph:.2f} nmi/h")
     elif inertial.navigation_start is not None and inertial.navigation_start.time_s is None:
         parts.append("no rate: start of navigation not known")
     if forecast is not None:

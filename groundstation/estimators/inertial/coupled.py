@@ -1,4 +1,4 @@
-"""The coupled north-east model: both channels, azimuth, Earth and craft rate; its gain over the two separate channels.
+"""The coupled north-east model: both channels, azimuth, Earth and craft rate.
 
 Sixteen states: the six of each channel (``model.STATES``; north, then east), the azimuth error and its drift, and two
 accelerometer biases. Gyro drifts and biases are those of sensors fixed to the body, named by the channel they act on
@@ -8,8 +8,8 @@ Signs: error = INS - truth. With the phi-angle (computed attitude = (I - [phi x]
 the east tilt +phi_N - positive where the velocity error falls - and the heading error -phi_D.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,23 +17,18 @@ from numpy.typing import NDArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.base.records import Int64Array, frozen
 from groundstation.base.units import MPS2_PER_G
+from groundstation.estimators.inertial.channel_group import RESET_POSITION_M, RESET_VELOCITY_MPS
 from groundstation.estimators.inertial.craft_motion import CraftMotion, latitude_rad, radii_m, rates_radps
 from groundstation.estimators.inertial.differences import Differences, only_used
-from groundstation.estimators.inertial.filter import (
-    PATIENCE_S,
-    RESET_POSITION_M,
-    RESET_VELOCITY_MPS,
-    Epochs,
-    measurement_variances,
-)
-from groundstation.estimators.inertial.hindcast import Hindcast
+from groundstation.estimators.inertial.filter import Epochs, measurement_variances, patience_of
 from groundstation.estimators.inertial.model import POSITION, VELOCITY, FloatArray
 from groundstation.estimators.inertial.noise import InsNoise
+from groundstation.estimators.inertial.seams import Fixes, fixes_since, returns_of
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.kalman import filter as kalman
 from groundstation.estimators.kalman.arrays import NO_STEP, REJECTED, Lines
 from groundstation.estimators.kalman.rates import Rates
-from groundstation.results.forecast import HORIZONS_MIN, CoupledRow
+from groundstation.estimators.kalman.transition import Transition
 
 # The six states of each channel (model.STATES), the azimuth error and its constant drift, the accelerometer biases.
 NORTH, EAST = 0, 6
@@ -63,7 +58,6 @@ LONGEST_STEP_S = 10.0  # (Earth and Schuler rate x step)^5 / 120: below 1e-10 of
 AT_ONCE = 4096  # epochs whose transitions are held in memory, 3 MB
 KEPT = kalman.Kept(gains=False, variances=True, judged=True)
 EVERY = 10  # epochs from one covariance that is kept to the next
-VARIANCE_STEP_S = 60.0  # of covariances carried forward: 0.07 of a Schuler radian
 
 
 @dataclass(frozen=True)
@@ -158,7 +152,8 @@ def run_coupled(differences: Differences, noise: InsNoise, settings: InertialSet
     The noise of a horizontal channel is the class's; the azimuth starts with ``azimuth_deg``, its gyro with the
     constant drift of the class, and walks like a tilt. An azimuth sigma of zero leaves two coupled channels of six.
     Position and velocity error may be anything at the start (a log may begin in flight) and after a reset of the INS;
-    a filter that has rejected GNSS for :data:`filter.PATIENCE_S` is opened in the same way, tilt and drift kept.
+    a filter that has rejected GNSS for :data:`seams.PATIENCE_S` is opened too, the position by the innovation, tilt and
+    drift kept. Where GNSS comes back after an outage beyond the gate and agrees with itself, the covariance is widened.
     """
     epochs = only_used(differences.epochs, settings)
     n = len(epochs)
@@ -166,35 +161,86 @@ def run_coupled(differences: Differences, noise: InsNoise, settings: InertialSet
     values = np.zeros((n, len(PATTERN)))
     motion = CraftMotion.between(differences, epochs.time_s, is_strapdown=noise.is_strapdown)
     values[1:] = coupled_values(motion, noise.beta_per_s)
-    covariance, densities = _noise_of(noise, differences, epochs, float(motion.heading_rad[0]) if n > 1 else 0.0)
-    opened = np.zeros(SIZE)
-    opened[CHANNELS[:, [POSITION, VELOCITY]]] = _opened_variances(noise, epochs)
-    patience = [max(1, round(PATIENCE_S / interval_s)) for interval_s in epochs.gnss_intervals_s]
-    gate = kalman.Gate(settings.gate_sigmas, patience, opened)
-    lines, z = _lines(epochs, noise), np.stack([epochs.position_m, epochs.velocity_mps], axis=1).reshape(-1, 4)
-    parts, start = [], kalman.Start(np.zeros(SIZE), covariance)
-    begins = range(0, n, AT_ONCE)
-    for begin in begins:
-        use = slice(begin, min(begin + AT_ONCE, n))
-        count = np.maximum(1, np.ceil(interval[use] / LONGEST_STEP_S - 1e-9)).astype(np.int64)
-        transition = RATES.transition(values[use], interval[use] / count, densities)
-        step, last = np.repeat(np.arange(len(count)), count), np.cumsum(count) - 1
-        if begin == 0:
-            step[0] = NO_STEP  # the start belongs to the first epoch
-        jump = np.full(len(step), NO_STEP, dtype=np.int64)
-        jump[last[epochs.is_reset[use]]] = 0
-        seen = kalman.Measurements(np.repeat(last, 4), z[use].ravel(), np.tile(np.arange(4), len(count)), lines)
-        run = kalman.run_filter(transition, step, seen, start, gate=gate, jump=jump, jumps=opened[None], kept=KEPT)
-        parts.append((run, last))
+    covariance, densities = noise_of(noise, differences, epochs, float(motion.heading_rad[0]) if n > 1 else 0.0)
+    reset = np.zeros(SIZE)
+    reset[CHANNELS[:, [POSITION, VELOCITY]]] = _opened_variances(noise, epochs)
+    opened = np.where(np.isin(np.arange(SIZE), CHANNELS[:, POSITION]), 0.0, reset)
+    gate = kalman.Gate(settings.gate_sigmas, patience_of(epochs), opened, is_by_innovation=True)
+    lines, z = lines_of(epochs, noise), np.stack([epochs.position_m, epochs.velocity_mps], axis=1).reshape(-1, 4)
+    parts, start, odd = [], kalman.Start(np.zeros(SIZE), covariance), np.zeros(n, dtype=bool)
+    returns = returns_of(epochs.time_s, epochs.has_gnss)
+    begins = np.unique([*range(0, n, AT_ONCE), *returns, *(returns + 1)])
+    begins = begins[begins < n]
+    for begin, end in pairwise([*begins.tolist(), n]):
+        use, factor = slice(begin, end), 1.0
+        stretch = _Stretch.over(values[use], interval[use], densities, is_first=begin == 0)
+        if begin in returns:
+            good, factor = _seam_at(begin, start, epochs, values, interval, densities, lines, settings.gate_sigmas**2)
+            odd[begin:good] = True
+        if factor > 1.0:
+            start = kalman.Start(start.x, factor**2 * start.P, start.in_a_row)
+            stretch = _Stretch.over(values[use], interval[use], factor**2 * densities, is_first=False)
+        jump = np.full(len(stretch.step), NO_STEP, dtype=np.int64)
+        jump[stretch.last[epochs.is_reset[use]]] = 0
+        shown = np.where(odd[use, None], np.nan, z[use]).ravel()
+        seen = kalman.Measurements(np.repeat(stretch.last, 4), shown, np.tile(np.arange(4), end - begin), lines)
+        run = kalman.run_filter(
+            stretch.transition, stretch.step, seen, start, gate=gate, jump=jump, jumps=reset[None], kept=KEPT
+        )
+        parts.append((run, stretch.last))
         start = run.end
     x, variance = (np.concatenate(part) for part in zip(*((_at_epochs(*part)) for part in parts), strict=True))
     y, S, used = (
         np.concatenate([np.asarray(getattr(run.record, name)) for run, _ in parts]).reshape(n, 2, 2)
         for name in ("judged_innovation", "judged_variance", "mark")
     )
+    used = np.where(odd[:, None, None] & np.isfinite(z).reshape(n, 2, 2), np.int8(REJECTED), used)
     reopened = sum(run.reopened for run, _ in parts)
-    P = np.concatenate([run.P[last[-first % EVERY :: EVERY]] for (run, last), first in zip(parts, begins, strict=True)])
+    kept = [run.P[last[-first % EVERY :: EVERY]] for (run, last), first in zip(parts, begins.tolist(), strict=True)]
+    P = np.concatenate(kept)
     return CoupledRun(differences, noise, x, np.sqrt(np.maximum(variance, 0.0)), y, S, used, P, reopened)
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """Transitions over neighbouring epochs: which of them each step takes, and the step that ends at each epoch."""
+
+    transition: Transition
+    step: Int64Array
+    last: Int64Array
+
+    @classmethod
+    def over(cls, values: FloatArray, interval_s: FloatArray, densities: FloatArray, *, is_first: bool) -> "_Stretch":
+        count = np.maximum(1, np.ceil(interval_s / LONGEST_STEP_S - 1e-9)).astype(np.int64)
+        step = np.repeat(np.arange(len(count)), count)
+        if is_first:
+            step[0] = NO_STEP  # the start belongs to the first epoch
+        return cls(RATES.transition(values, interval_s / count, densities), step, np.cumsum(count) - 1)
+
+
+def _seam_at(
+    back: int,
+    start: kalman.Start,
+    epochs: Epochs,
+    values: FloatArray,
+    interval_s: FloatArray,
+    densities: FloatArray,
+    lines: Lines,
+    gate: float,
+) -> tuple[int, float]:
+    """Epoch of the first fix of those that agree after a return, and the factor on the filter's sigma; 1: none."""
+    fixes = fixes_since(epochs.time_s, epochs.position_m, epochs.velocity_mps, back)
+    if not len(fixes) or epochs.is_reset[back : fixes[-1] + 1].any():
+        return back, 1.0
+    use, rows = slice(back, int(fixes[-1]) + 1), fixes - back
+    stretch = _Stretch.over(values[use], interval_s[use], densities, is_first=back == 0)
+    unseen = kalman.Measurements(np.zeros(0, np.int64), np.zeros((0, 1)), np.zeros(0, np.int64), lines)
+    ahead = kalman.run_filter(stretch.transition, stretch.step, unseen, start, kept=kalman.Kept(gains=False))
+    at, states = stretch.last[rows], CHANNELS[:, [POSITION, VELOCITY]].T.ravel()
+    measured = np.stack([epochs.position_m[fixes], epochs.velocity_mps[fixes]], axis=1)
+    predicted, covariance = ahead.x[at][:, states, 0].reshape(-1, 2, 2), ahead.P[at][:, states][:, :, states]
+    seam = Fixes(epochs.time_s[fixes], measured, predicted, covariance, lines.believed[::2]).seam(gate)
+    return (back, 1.0) if seam is None else (int(fixes[seam[0]]), seam[1])
 
 
 def _at_epochs(run: kalman.FilterRun, last: Int64Array) -> tuple[FloatArray, FloatArray]:
@@ -202,7 +248,7 @@ def _at_epochs(run: kalman.FilterRun, last: Int64Array) -> tuple[FloatArray, Flo
     return run.x[last, :, 0], run.record.variance[last]
 
 
-def _lines(epochs: Epochs, noise: InsNoise) -> Lines:
+def lines_of(epochs: Epochs, noise: InsNoise) -> Lines:
     """Position north and east, velocity north and east; the two of a kind are judged together."""
     weighted, believed = measurement_variances(epochs, noise)
     states = CHANNELS[:, [POSITION, VELOCITY]].T.ravel()
@@ -211,116 +257,7 @@ def _lines(epochs: Epochs, noise: InsNoise) -> Lines:
     )
 
 
-def hindcast_coupled(run: CoupledRun, at: Int64Array, lead_s: FloatArray, settings: InertialSettings) -> FloatArray:
-    """Forecast from the last estimate at epochs ``at``, along the INS's own motion.
-
-    Parameters
-    ----------
-    run : CoupledRun
-    at : ndarray of int, shape (s,)
-    lead_s : ndarray, shape (l,)
-        Equal steps from the first: k times ``lead_s[0]``.
-
-    The position error at a start is what GNSS showed; where it showed none, or none that was believed, the estimate.
-
-    Returns
-    -------
-    ndarray, shape (s, l, 2)
-        Position error forecast to build up since the start, metres: as ``Hindcast.forecast_m``.
-    """
-    out = np.zeros((len(at), len(lead_s), 2))
-    if not len(lead_s):
-        return out
-    every, step_s, elapsed = _steps(lead_s, min(settings.forecast_step_s, LONGEST_STEP_S))
-    measured = run.epochs.position_m[at]
-    is_known = np.isfinite(measured) & (run.used[at, POSITION] != REJECTED)
-    known = np.where(is_known, measured, run.x[at][:, CHANNELS[:, POSITION]])
-    for index, epoch in enumerate(at):
-        values = _values_along(run, float(run.epochs.time_s[epoch]), elapsed)
-        start = run.x[epoch].copy()
-        start[CHANNELS[:, POSITION]] = known[index]
-        out[index] = RATES.carried(values, step_s, every, start)[:, CHANNELS[:, POSITION]] - known[index]
-    return out
-
-
-def coupled_variance(run: CoupledRun, at: Int64Array, lead_s: FloatArray) -> FloatArray:
-    """Variance of what :func:`hindcast_coupled` forecasts by the model, m^2, shape (s, l, 2).
-
-    That of the states at the start (at most nine epochs before it), their position known, and of the noise since.
-    """
-    out = np.zeros((len(at), len(lead_s), 2))
-    if not len(lead_s):
-        return out
-    every, step_s, elapsed = _steps(lead_s, VARIANCE_STEP_S)
-    _, densities = _noise_of(run.noise, run.differences, run.epochs, 0.0)
-    seconds, nothing = np.full(len(elapsed) - 1, step_s), _lines(run.epochs, run.noise)
-    unseen = kalman.Measurements(np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0, np.int64), nothing)
-    kept = kalman.Kept(states=False, covariances=False, gains=False, variances=True)
-    for index, epoch in enumerate(at):
-        values = _values_along(run, float(run.epochs.time_s[epoch]), elapsed)
-        start = np.array(run.P[epoch // EVERY])
-        start[CHANNELS[:, POSITION]] = start[:, CHANNELS[:, POSITION]] = 0.0
-        carried = kalman.run_filter(
-            RATES.transition(values, seconds, densities),
-            np.arange(len(seconds)),
-            unseen,
-            kalman.Start(np.zeros((SIZE, 0)), start),
-            kept=kept,
-        )
-        out[index] = carried.record.variance[every - 1 :: every][:, CHANNELS[:, POSITION]]
-    return out
-
-
-def _steps(lead_s: FloatArray, longest_s: float) -> tuple[int, float, FloatArray]:
-    """Steps from one lead to the next, their length, and the times since the start, from zero."""
-    every = max(1, round(float(lead_s[0]) / longest_s))
-    step_s = float(lead_s[0]) / every
-    return every, step_s, step_s * np.arange(every * len(lead_s) + 1, dtype=np.float64)
-
-
-def _values_along(run: CoupledRun, start_s: float, elapsed_s: FloatArray) -> FloatArray:
-    """Entries of A over steps since a start, along the INS's own motion."""
-    motion = CraftMotion.between(run.differences, start_s + elapsed_s, is_strapdown=run.noise.is_strapdown)
-    return coupled_values(motion, run.noise.beta_per_s)
-
-
-def coupled_rows(
-    run: CoupledRun,
-    separate: Hindcast,
-    settings: InertialSettings,
-    *,
-    horizons_min: Sequence[float] = HORIZONS_MIN,
-    method: str = "last_estimate",
-) -> tuple[CoupledRow, ...]:
-    """Gain of the coupled model over the separate channels: same starts, same horizons, last estimate of both.
-
-    Parameters
-    ----------
-    separate : Hindcast
-        With ``method``; horizons that are none of its leads are left out, and those without a start.
-
-    Returns
-    -------
-    tuple of CoupledRow
-        ``gain`` is 1 - RMS ratio of the radial error: positive where coupling helps.
-    """
-    forecast = hindcast_coupled(run, separate.at, separate.lead_s, settings)
-    coupled = np.sqrt(np.sum(np.square(forecast - separate.actual_m), axis=2))
-    apart = separate.radial_m(method)
-    rows = []
-    for horizon in horizons_min:
-        lead = np.flatnonzero(np.abs(separate.lead_s - 60.0 * horizon) < 0.5)
-        if not lead.size:
-            continue
-        errors = np.stack([part[:, lead[0]] for part in (coupled, apart)])
-        known = np.isfinite(errors).all(axis=0)
-        if known.any():
-            ours, theirs = np.sqrt(np.mean(np.square(errors[:, known]), axis=1))
-            rows.append(CoupledRow(float(horizon), float(ours), float(1.0 - ours / theirs) if theirs > 0.0 else 0.0))
-    return tuple(rows)
-
-
-def _noise_of(
+def noise_of(
     noise: InsNoise, differences: Differences, epochs: Epochs, heading_rad: float
 ) -> tuple[FloatArray, FloatArray]:
     """Covariance at the start, shape (16, 16), and densities (16,).

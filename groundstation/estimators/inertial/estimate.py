@@ -9,12 +9,12 @@ from groundstation.base.findings import Finding
 from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import M_PER_NAUTICAL_MILE
+from groundstation.estimators.fleet.ins_errors import slope_through_origin
 from groundstation.estimators.inertial import figures
 from groundstation.estimators.inertial.azimuth import estimate_azimuth
 from groundstation.estimators.inertial.coupled import CoupledRun
 from groundstation.estimators.inertial.differences import Differences, differences, only_used, seconds_covered
 from groundstation.estimators.inertial.filter import (
-    PATIENCE_S,
     Epochs,
     FilterRun,
     Smoothed,
@@ -27,6 +27,7 @@ from groundstation.estimators.inertial.model import POSITION, STATES, ChannelMod
 from groundstation.estimators.inertial.navigation_start import navigation_start, stated_start
 from groundstation.estimators.inertial.noise import InsNoise, choose_class
 from groundstation.estimators.inertial.outages import Bridged, bridge_outages
+from groundstation.estimators.inertial.seams import PATIENCE_S
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import QUANTILES
 from groundstation.results.inertial import ChannelResult, InertialResult, NavigationStart, StateEstimate
@@ -162,7 +163,7 @@ def _result(
 ) -> InertialResult:
     visible, epochs = observability(run), run.epochs
     radial, velocity = np.hypot(*run.measured(0).T), run.measured(1)
-    rate_50, rate_95 = _radial_rates(epochs, radial, start.time_s)
+    rate_50, rate_95, rate_fit = _radial_rates(epochs, radial, start.time_s)
     with_error = np.flatnonzero(np.isfinite(radial))
     ends = with_error[[0, -1]] if len(with_error) else with_error
     speed = velocity[np.isfinite(velocity).all(axis=1)]
@@ -180,6 +181,7 @@ def _result(
         east=_channel(run, visible, 1),
         radial_error_rate_50_nmiph=rate_50,
         radial_error_rate_95_nmiph=rate_95,
+        radial_error_rate_fit_nmiph=rate_fit,
         velocity_error_rms_mps=float(np.sqrt(np.mean(np.sum(speed**2, axis=1)))) if len(speed) else None,
         largest_radial_error_m=float(np.nanmax(radial)) if len(ends) else None,
         navigation_start=start,
@@ -237,20 +239,27 @@ def _channel(run: FilterRun, visible: FloatArray, channel: int) -> ChannelResult
     )
 
 
-def _radial_rates(epochs: Epochs, radial_m: FloatArray, start_s: float | None) -> tuple[float | None, float | None]:
-    """Radial error over the time since navigation began or the INS was last reset, nmi/h: median and 95 %.
+Rates = tuple[float, float, float] | tuple[None, None, None]
 
-    Over epochs later than ten minutes after it; none where nobody knows when navigation began.
+
+def _radial_rates(epochs: Epochs, radial_m: FloatArray, start_s: float | None) -> Rates:
+    """Radial error over the time since navigation began or the INS was last reset, nmi/h: median, 95 %, and the fit.
+
+    Median and 95 % over epochs later than ten minutes after it, the fit over all; none where nobody knows when
+    navigation began, or no epoch is so late.
     """
     if start_s is None:
-        return None, None
+        return None, None, None
     reset_s = np.where(epochs.is_reset, epochs.time_s, -np.inf)
     elapsed_s = epochs.time_s - np.maximum(np.maximum.accumulate(reset_s), start_s)
-    late = (elapsed_s > RATE_FROM_S) & np.isfinite(radial_m)
+    known = (elapsed_s >= 0.0) & np.isfinite(radial_m)
+    late = known & (elapsed_s > RATE_FROM_S)
     if not late.any():
-        return None, None
-    rates = radial_m[late] / M_PER_NAUTICAL_MILE / (elapsed_s[late] / S_PER_H)
-    return float(np.median(rates)), float(np.quantile(rates, 0.95))
+        return None, None, None
+    hours, radial_nmi = elapsed_s / S_PER_H, radial_m / M_PER_NAUTICAL_MILE
+    rates = radial_nmi[late] / hours[late]
+    fit = slope_through_origin(hours[known], radial_nmi[known], np.ones(int(known.sum())))
+    return float(np.median(rates)), float(np.quantile(rates, 0.95)), fit
 
 
 def _findings(compared: Differences, run: FilterRun, result: InertialResult) -> list[Finding]:
@@ -267,10 +276,27 @@ def _findings(compared: Differences, run: FilterRun, result: InertialResult) -> 
             f"or the noise of INS class {result.ins_class} does not fit"
         )
         found.append(Finding("warn", "inertial.reopened", text, compared.gnss_topic, count=run.reopened))
+    found += _seam_findings(compared, run)
     if result.other_ins:
         text = f"INS errors are those of {result.ins_topic} only; not used: {', '.join(result.other_ins)}"
         found.append(Finding("info", "inertial.other_ins", text, count=len(result.other_ins)))
     return [*found, *_outage_findings(compared, result)]
+
+
+def _seam_findings(compared: Differences, run: FilterRun) -> list[Finding]:
+    """One finding for each outage at whose end GNSS was beyond the gate and used, or one for all where many are."""
+    time_s, found = run.epochs.time_s, []
+    says = "agrees with itself but not with the forecast: used, sigma through the outage times"
+    if len(run.seams) > OUTAGES_LISTED:
+        worst = max(run.seams, key=lambda seam: seam.factor)
+        text = f"GNSS after {len(run.seams)} outages {says} up to {worst.factor:.1f}"
+        place = f"largest at {time_s[worst.back]:.1f} s"
+        return [Finding("warn", "inertial.seam", text, compared.gnss_topic, place, len(run.seams))]
+    for seam in run.seams:
+        length_s = time_s[seam.first] - time_s[seam.last]
+        text = f"GNSS after {length_s:.0f} s without it {says} {seam.factor:.1f}"
+        found.append(Finding("warn", "inertial.seam", text, compared.gnss_topic, f"at {time_s[seam.back]:.1f} s"))
+    return found
 
 
 def _outage_findings(compared: Differences, result: InertialResult) -> list[Finding]:

@@ -1,10 +1,8 @@
 """Arrays behind the figures of system 2, thinned to what a page or a viewer can show."""
 
-from collections.abc import Mapping
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.geodesy import curvature_radii_m
@@ -12,18 +10,35 @@ from groundstation.base.records import BoolArray, Int64Array
 from groundstation.estimators.inertial.differences import Differences
 from groundstation.estimators.inertial.filter import FilterRun, Smoothed
 from groundstation.estimators.inertial.hindcast import Hindcast
-from groundstation.estimators.inertial.model import POSITION, STATES, VELOCITY, FloatArray
+from groundstation.estimators.inertial.model import POSITION, VELOCITY, FloatArray
 from groundstation.estimators.inertial.noise import RADPS2_PER_DPHPH, RADPS_PER_DPH
 from groundstation.estimators.inertial.skill import Claimed
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.forecast import (
+    FanOfChannel,
+    ForecastClassic,
+    ForecastFan,
+    ForecastGrowth,
+    ForecastMap,
+)
+from groundstation.results.arrays.inertial import (
+    DifferencesOfChannel,
+    InertialDifferences,
+    InertialObservability,
+    InertialOwnInnovations,
+    InertialStates,
+    InertialTrack,
+    ObservabilityOfChannel,
+    OwnInnovationsOfChannel,
+    StatesOfChannel,
+)
 from groundstation.tables.own_filter import OwnInnovations
 from groundstation.tables.table import Flight
 
-CHANNELS = ("north", "east")
 ROWS = 4000
 FAN_STARTS = 60
 ARCSEC_PER_RAD = 180.0 / np.pi * 3600.0
-# name of each state, its unit in the figures, and how many of it are one SI unit
+CHANNELS = ("north", "east")
+# Name of each state, its unit in the figures, and how many of it are one SI unit.
 SHOWN = (
     ("position", "m", 1.0),
     ("velocity", "mps", 1.0),
@@ -32,7 +47,7 @@ SHOWN = (
     ("drift_rate", "dphph", 1.0 / RADPS2_PER_DPHPH),
     ("random_drift", "dph", 1.0 / RADPS_PER_DPH),
 )
-DIGITS = {"time_s": 2, "start_s": 1, "lead_s": 1, "horizon_min": 2}
+PER_SI = np.array([factor for _, _, factor in SHOWN])
 
 
 def thinned(count: int) -> Int64Array:
@@ -40,26 +55,43 @@ def thinned(count: int) -> Int64Array:
     return np.unique(np.linspace(0, count - 1, min(count, ROWS)).round().astype(np.int64))
 
 
-def states_figure(run: FilterRun, smoothed: Smoothed) -> FigureData:
+def states_figure(run: FilterRun, smoothed: Smoothed) -> InertialStates:
     """States with sigma, what was measured, and the smoothed errors, over time."""
     rows = thinned(len(run.epochs))
     epochs = run.epochs
     has_gnss = epochs.has_gnss[rows]
-    columns: dict[str, NDArray[Any]] = {"time_s": epochs.time_s[rows], "is_forecast": ~has_gnss}
-    columns["gnss_used"] = (run.used[rows] == 1).any(axis=(1, 2))
-    digits = dict(DIGITS)
-    for channel, name in enumerate(CHANNELS):
-        sigma = run.sigma(channel)
-        columns[f"measured_{name}_position_m"] = epochs.position_m[rows, channel]
-        columns[f"measured_{name}_velocity_mps"] = epochs.velocity_mps[rows, channel]
-        for state, (title, unit, factor) in enumerate(SHOWN):
-            columns[f"{name}_{title}_{unit}"] = factor * run.x[rows, state, channel]
-            columns[f"{name}_{title}_sigma_{unit}"] = factor * sigma[rows, state]
-        columns[f"smoothed_{name}_position_m"] = smoothed.x[rows, POSITION, channel]
-        columns[f"smoothed_{name}_velocity_mps"] = smoothed.x[rows, VELOCITY, channel]
-        columns[f"{name}_normalised_innovation"] = _normalised(run, channel)[rows]
-    digits |= {name: 5 for name in columns if name.endswith(("_dph", "_dphph"))}
-    return FigureData("inertial_states", columns, digits)
+    return InertialStates(
+        time_s=epochs.time_s[rows],
+        is_forecast=~has_gnss,
+        is_gnss_used=(run.used[rows] == 1).any(axis=(1, 2)),
+        north=_states(run, smoothed, 0, rows),
+        east=_states(run, smoothed, 1, rows),
+    )
+
+
+def _states(run: FilterRun, smoothed: Smoothed, channel: int, rows: Int64Array) -> StatesOfChannel:
+    """Columns of one channel."""
+    position, velocity, tilt, drift, drift_rate, random_drift = (PER_SI * run.x[rows, :, channel]).T
+    sigmas = (PER_SI * run.sigma(channel)[rows]).T
+    return StatesOfChannel(
+        measured_position_m=run.epochs.position_m[rows, channel],
+        measured_velocity_mps=run.epochs.velocity_mps[rows, channel],
+        position_m=position,
+        position_sigma_m=sigmas[0],
+        velocity_mps=velocity,
+        velocity_sigma_mps=sigmas[1],
+        tilt_arcsec=tilt,
+        tilt_sigma_arcsec=sigmas[2],
+        drift_dph=drift,
+        drift_sigma_dph=sigmas[3],
+        drift_rate_dphph=drift_rate,
+        drift_rate_sigma_dphph=sigmas[4],
+        random_drift_dph=random_drift,
+        random_drift_sigma_dph=sigmas[5],
+        smoothed_position_m=smoothed.x[rows, POSITION, channel],
+        smoothed_velocity_mps=smoothed.x[rows, VELOCITY, channel],
+        normalised_innovation=_normalised(run, channel)[rows],
+    )
 
 
 def _normalised(run: FilterRun, channel: int) -> FloatArray:
@@ -68,65 +100,89 @@ def _normalised(run: FilterRun, channel: int) -> FloatArray:
     return np.where(np.isfinite(ratio[:, 0]), ratio[:, 0], ratio[:, 1])
 
 
-def observability_figure(run: FilterRun, observability: FloatArray) -> FigureData:
+def observability_figure(run: FilterRun, observability: FloatArray) -> InertialObservability:
     """How far each state's sigma is below what it would be without GNSS; ``observability`` has shape (n, 6, c)."""
     rows = thinned(len(run.epochs))
-    columns: dict[str, FloatArray] = {"time_s": run.epochs.time_s[rows]}
-    for channel, name in enumerate(CHANNELS):
-        columns |= {f"{name}_{state}": observability[rows, index, channel] for index, state in enumerate(STATES)}
-    return FigureData("inertial_observability", columns, DIGITS)
+    north, east = (_observability(observability[rows, :, channel]) for channel in (0, 1))
+    return InertialObservability(time_s=run.epochs.time_s[rows], north=north, east=east)
 
 
-def track_figure(compared: Differences, corrected_m: FloatArray, smoothed_m: FloatArray) -> FigureData:
+def _observability(values: FloatArray) -> ObservabilityOfChannel:
+    """Columns of one channel from shape (n, 6)."""
+    position, velocity, tilt, drift, drift_rate, random_drift = values.T
+    return ObservabilityOfChannel(
+        position=position,
+        velocity=velocity,
+        tilt=tilt,
+        drift=drift,
+        drift_rate=drift_rate,
+        random_drift=random_drift,
+    )
+
+
+def track_figure(compared: Differences, corrected_m: FloatArray, smoothed_m: FloatArray) -> InertialTrack:
     """Track of the INS, of GNSS, of the INS minus its estimated error, and minus its smoothed error."""
     measured = compared.epochs.position_m
     rows = thinned(len(measured))
-    errors_m = {"ins": np.zeros_like(measured), "gnss": measured, "corrected": corrected_m, "reference": smoothed_m}
-    columns = _tracks(compared, rows, errors_m)
-    columns["ins_error_m"] = np.hypot(*measured.T)[rows]
-    columns["corrected_error_m"] = np.hypot(*(measured - corrected_m).T)[rows]
-    return _track_figure(columns)
+    corrected, reference = _places(compared, corrected_m, rows), _places(compared, smoothed_m, rows)
+    return replace(
+        plain_track_figure(compared),
+        corrected_latitude_deg=corrected[0],
+        corrected_longitude_deg=corrected[1],
+        reference_latitude_deg=reference[0],
+        reference_longitude_deg=reference[1],
+        ins_error_m=np.hypot(*measured.T)[rows],
+        corrected_error_m=np.hypot(*(measured - corrected_m).T)[rows],
+    )
 
 
-def plain_track_figure(compared: Differences) -> FigureData:
+def plain_track_figure(compared: Differences) -> InertialTrack:
     """Track of the INS and of GNSS."""
     measured = compared.epochs.position_m
-    errors_m = {"ins": np.zeros_like(measured), "gnss": measured}
-    return _track_figure(_tracks(compared, thinned(len(measured)), errors_m))
+    rows = thinned(len(measured))
+    ins, gnss = _places(compared, np.zeros_like(measured), rows), _places(compared, measured, rows)
+    return InertialTrack(
+        time_s=compared.epochs.time_s[rows],
+        ins_latitude_deg=ins[0],
+        ins_longitude_deg=ins[1],
+        gnss_latitude_deg=gnss[0],
+        gnss_longitude_deg=gnss[1],
+    )
 
 
-def _track_figure(columns: dict[str, FloatArray]) -> FigureData:
-    return FigureData("inertial_track", columns, DIGITS | {name: 7 for name in columns if name.endswith("_deg")})
+def _places(compared: Differences, error_m: FloatArray, rows: Int64Array) -> tuple[FloatArray, FloatArray]:
+    """Latitude and longitude of the INS minus an error, of some rows."""
+    latitude, longitude = moved(compared, error_m)
+    return latitude[rows], longitude[rows]
 
 
-def _tracks(compared: Differences, rows: Int64Array, errors_m: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    columns: dict[str, FloatArray] = {"time_s": compared.epochs.time_s[rows]}
-    for name, error_m in errors_m.items():
-        latitude, longitude = moved(compared, error_m)
-        columns |= {f"{name}_latitude_deg": latitude[rows], f"{name}_longitude_deg": longitude[rows]}
-    return columns
-
-
-def differences_figure(compared: Differences) -> FigureData:
+def differences_figure(compared: Differences) -> InertialDifferences:
     """INS minus GNSS over time."""
     epochs = compared.epochs
     rows = thinned(len(epochs))
-    columns: dict[str, FloatArray] = {"time_s": epochs.time_s[rows]}
-    for channel, name in enumerate(CHANNELS):
-        columns[f"{name}_position_m"] = epochs.position_m[rows, channel]
-        columns[f"{name}_velocity_mps"] = epochs.velocity_mps[rows, channel]
-    return FigureData("inertial_differences", columns, DIGITS)
+    north, east = (
+        DifferencesOfChannel(
+            position_m=epochs.position_m[rows, channel], velocity_mps=epochs.velocity_mps[rows, channel]
+        )
+        for channel in (0, 1)
+    )
+    return InertialDifferences(time_s=epochs.time_s[rows], north=north, east=east)
 
 
-def own_innovations_figure(flight: Flight, own: OwnInnovations) -> FigureData:
+def own_innovations_figure(flight: Flight, own: OwnInnovations) -> InertialOwnInnovations:
     """Innovations of the INS's own filter over time, with its sigma where it logs one."""
     rows = thinned(len(own.time_ns))
-    columns: dict[str, FloatArray] = {"time_s": flight.seconds(own.time_ns[rows])}
-    for channel, name in enumerate(CHANNELS):
-        for place, (quantity, unit) in enumerate((("position", "m"), ("velocity", "mps"))):
-            columns[f"{name}_{quantity}_{unit}"] = own.innovation[rows, place, channel]
-            columns[f"{name}_{quantity}_sigma_{unit}"] = np.sqrt(own.variance[rows, place, channel])
-    return FigureData("inertial_own_innovations", columns, DIGITS)
+    sigma = np.sqrt(own.variance[rows])
+    north, east = (
+        OwnInnovationsOfChannel(
+            position_m=own.innovation[rows, 0, channel],
+            position_sigma_m=sigma[:, 0, channel],
+            velocity_mps=own.innovation[rows, 1, channel],
+            velocity_sigma_mps=sigma[:, 1, channel],
+        )
+        for channel in (0, 1)
+    )
+    return InertialOwnInnovations(time_s=flight.seconds(own.time_ns[rows]), north=north, east=east)
 
 
 def moved(compared: Differences, error_m: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -139,28 +195,29 @@ def moved(compared: Differences, error_m: FloatArray) -> tuple[FloatArray, Float
     return latitude, np.where(np.isfinite(longitude), wrap_180(np.nan_to_num(longitude)), np.nan)
 
 
-def map_figure(replay: Hindcast) -> FigureData:
+def map_figure(replay: Hindcast) -> ForecastMap:
     """Radial error by start and lead, one column per method."""
     starts, leads = len(replay.start_s), len(replay.lead_s)
-    columns: dict[str, FloatArray] = {
-        "start_s": np.repeat(replay.start_s, leads),
-        "horizon_min": np.tile(replay.lead_s / 60.0, starts),
-    }
-    columns |= {f"{method}_m": replay.radial_m(method).ravel() for method in replay.forecast_m}
-    return FigureData("forecast_map", columns, DIGITS | {name: 1 for name in columns if name.endswith("_m")})
+    return ForecastMap(
+        start_s=np.repeat(replay.start_s, leads),
+        horizon_min=np.tile(replay.lead_s / 60.0, starts),
+        radial_m={method: replay.radial_m(method).ravel() for method in replay.forecast_m},
+    )
 
 
-def growth_figure(replay: Hindcast, claimed: Claimed | None) -> FigureData:
+def growth_figure(replay: Hindcast, claimed: Claimed | None) -> ForecastGrowth:
     """RMS over the starts at every lead, one column per method, and what the default method claims."""
     known = np.asarray(np.isfinite(replay.actual_m).all(axis=2))
     starts = known.sum(axis=0)
-    columns: dict[str, FloatArray] = {"horizon_min": replay.lead_s / 60.0, "starts": starts}
-    for method in replay.forecast_m:
-        columns[f"{method}_rms_m"] = _rms(replay.radial_m(method), known)
+    sigma_m = None
     if claimed is not None:
-        radial = np.sqrt(np.sum(np.square(claimed.scaled_m), axis=2))
-        columns["sigma_m"] = _rms(radial, known)
-    return FigureData("forecast_growth", columns, DIGITS | {name: 1 for name in columns if name.endswith("_m")})
+        sigma_m = _rms(np.sqrt(np.sum(np.square(claimed.scaled_m), axis=2)), known)
+    return ForecastGrowth(
+        horizon_min=replay.lead_s / 60.0,
+        starts=starts,
+        rms_m={method: _rms(replay.radial_m(method), known) for method in replay.forecast_m},
+        sigma_m=sigma_m,
+    )
 
 
 def _rms(values: FloatArray, known: BoolArray) -> FloatArray:
@@ -169,38 +226,39 @@ def _rms(values: FloatArray, known: BoolArray) -> FloatArray:
     return np.asarray(np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan)))
 
 
-def fan_figure(replay: Hindcast, method: str, claimed: Claimed | None) -> FigureData:
+def fan_figure(replay: Hindcast, method: str, claimed: Claimed | None) -> ForecastFan:
     """Forecast, its sigma and what GNSS showed, of some starts."""
     step = max(1, -(-len(replay.at) // FAN_STARTS))
     picked, leads = np.arange(0, len(replay.at), step), len(replay.lead_s)
-    columns: dict[str, FloatArray] = {
-        "start_s": np.repeat(replay.start_s[picked], leads),
-        "lead_s": np.tile(replay.lead_s, len(picked)),
-    }
-    for channel, name in enumerate(CHANNELS):
-        columns[f"{name}_m"] = replay.forecast_m[method][picked, :, channel].ravel()
-        sigma = np.full_like(replay.actual_m, np.nan) if claimed is None else claimed.scaled_m
-        columns[f"{name}_sigma_m"] = sigma[picked, :, channel].ravel()
-        columns[f"actual_{name}_m"] = replay.actual_m[picked, :, channel].ravel()
-    return FigureData("forecast_fan", columns, DIGITS | {name: 1 for name in columns if name.endswith("_m")})
+    sigma = np.full_like(replay.actual_m, np.nan) if claimed is None else claimed.scaled_m
+    north, east = (
+        FanOfChannel(
+            forecast_m=replay.forecast_m[method][picked, :, channel].ravel(),
+            sigma_m=sigma[picked, :, channel].ravel(),
+            actual_m=replay.actual_m[picked, :, channel].ravel(),
+        )
+        for channel in (0, 1)
+    )
+    return ForecastFan(
+        start_s=np.repeat(replay.start_s[picked], leads),
+        lead_s=np.tile(replay.lead_s, len(picked)),
+        north=north,
+        east=east,
+    )
 
 
-def classic_figure(replay: Hindcast, known_m: FloatArray, default_method: str) -> FigureData:
+def classic_figure(replay: Hindcast, known_m: FloatArray, default_method: str) -> ForecastClassic:
     """The paper's figure 2: error east of the whole rest of the flight, measured and forecast, for its four starts.
 
     ``known_m`` is the measured position error at each start, shape (s, c): errors are shown, not their growth.
     """
     leads = len(replay.lead_s)
     east = known_m[:, 1][:, None]
-    shown: Mapping[str, FloatArray] = {
-        "measured": replay.actual_m[:, :, 1],
-        "last_estimate": replay.forecast_m["last_estimate"][:, :, 1],
-        "windows": replay.forecast_m["windows"][:, :, 1],
-        "default": replay.forecast_m[default_method][:, :, 1],
-    }
-    columns: dict[str, FloatArray] = {
-        "start_s": np.repeat(replay.start_s, leads),
-        "time_s": (replay.start_s[:, None] + replay.lead_s[None, :]).ravel(),
-    }
-    columns |= {f"{name}_east_m": (east + values).ravel() for name, values in shown.items()}
-    return FigureData("forecast_classic", columns, DIGITS | {name: 1 for name in columns if name.endswith("_m")})
+    return ForecastClassic(
+        start_s=np.repeat(replay.start_s, leads),
+        time_s=(replay.start_s[:, None] + replay.lead_s[None, :]).ravel(),
+        measured_east_m=(east + replay.actual_m[:, :, 1]).ravel(),
+        last_estimate_east_m=(east + replay.forecast_m["last_estimate"][:, :, 1]).ravel(),
+        windows_east_m=(east + replay.forecast_m["windows"][:, :, 1]).ravel(),
+        default_east_m=(east + replay.forecast_m[default_method][:, :, 1]).ravel(),
+    )

@@ -8,20 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Int64Array, frozen
+from groundstation.estimators.inertial.channel_group import ChannelGroup, Part
 from groundstation.estimators.inertial.model import POSITION, SIZE, VELOCITY, ChannelModel, FloatArray
 from groundstation.estimators.inertial.noise import InsNoise
+from groundstation.estimators.inertial.seams import PATIENCE_S, Seam
+from groundstation.estimators.inertial.steps import Steps
 from groundstation.estimators.kalman import filter as kalman
 from groundstation.estimators.kalman import smoother
-from groundstation.estimators.kalman.arrays import NO_STEP, REJECTED, Drive, Lines
-from groundstation.estimators.kalman.transition import Transition, distinct_steps
+from groundstation.estimators.kalman.arrays import REJECTED, Drive
 
-TIME_RESOLUTION_S = 1e-4  # intervals that agree to this share one transition
-MOST_TRANSITIONS = 4096  # distinct intervals kept exactly; jittered clocks are rounded more coarsely beyond
 FIRST_SAMPLES = 15
 ROOM_OF_THE_GATE = 3.0  # times the sigma of a single measurement
-PATIENCE_S = 60.0  # GNSS rejected for so long is believed again
 STANDARD_GATE = 25.0  # squared sigmas
-RESET_POSITION_M, RESET_VELOCITY_MPS = 2e4, 20.0  # what a reset of the INS may change; tilt and drift are kept
 
 
 @dataclass(frozen=True)
@@ -81,15 +79,6 @@ class Epochs:
 
 
 @dataclass(frozen=True)
-class Steps:
-    """Transitions between epochs: ``index`` (n,) into ``transitions`` and ``noises`` (m, 6, 6)."""
-
-    index: Int64Array
-    transitions: FloatArray
-    noises: FloatArray
-
-
-@dataclass(frozen=True)
 class Initial:
     """States (6, c) and covariances (g, 6, 6) before the first epoch, g = 1 where the channels share one."""
 
@@ -125,6 +114,8 @@ class FilterRun:
     gain : ndarray, shape (g, n, 2, 6)
     reopened : int
         How often GNSS was rejected for so long that the filter took it to be right after all.
+    seams_of_parts : tuple of tuples of Seam
+        Of each part the outages at whose end GNSS was used although it was beyond the gate.
     """
 
     epochs: Epochs
@@ -139,6 +130,12 @@ class FilterRun:
     used: NDArray[np.int8]
     gain: FloatArray
     reopened: int = 0
+    seams_of_parts: tuple[tuple[Seam, ...], ...] = ()
+
+    @property
+    def seams(self) -> tuple[Seam, ...]:
+        """Seams of all parts in the order of time."""
+        return tuple(sorted((seam for part in self.seams_of_parts for seam in part), key=lambda seam: seam.back))
 
     @property
     def groups(self) -> list[list[int]]:
@@ -155,12 +152,20 @@ class FilterRun:
         """Covariance of a channel, shape (n, 6, 6)."""
         return np.asarray(self.P[min(channel, len(self.P) - 1)])
 
+    def covariance_beforehand(self, channel: int) -> FloatArray:
+        """Covariance of a channel, shape (n, 6, 6), inside outages as it was claimed before GNSS came back."""
+        seams = self.seams_of_parts[min(channel, len(self.P) - 1)] if self.seams_of_parts else ()
+        out = np.array(self.covariance(channel)) if seams else self.covariance(channel)
+        for seam in seams:
+            out[seam.last + 1 : seam.back] /= seam.factor**2
+        return out
+
     @cached_property
     def covariance_without_data(self) -> FloatArray:
         """Covariance Pi of the true states at every epoch had nothing been measured, shape (n, 6, 6)."""
         nothing = np.full((len(self.epochs), 1), np.nan)
         blind = replace(Epochs.plain(self.epochs.time_s, nothing, nothing), is_reset=self.epochs.is_reset)
-        return frozen(run_filter(blind, self.model, self.noise).P[0])
+        return frozen(run_filter(blind, self.model, self.noise, steps=self.steps).P[0])
 
     def sigma(self, channel: int) -> FloatArray:
         """Standard deviations of a channel's states, shape (n, 6)."""
@@ -181,18 +186,6 @@ def initial_of(epochs: Epochs, noise: InsNoise) -> Initial:
     return Initial(x, np.diag(noise.initial_variances())[None])
 
 
-def steps_between(time_s: FloatArray, model: ChannelModel, noise: InsNoise) -> Steps:
-    """Transition and noise of every interval; intervals equal to 0.1 ms share one."""
-    interval = np.diff(time_s, prepend=time_s[:1])
-    seconds, index = distinct_steps(interval, TIME_RESOLUTION_S, MOST_TRANSITIONS)
-    density = noise.densities()
-    return Steps(
-        index,
-        np.stack([model.transition_over(float(part)) for part in seconds]),
-        np.stack([model.process_noise_over(float(part), density) for part in seconds]),
-    )
-
-
 def run_filter(
     epochs: Epochs,
     model: ChannelModel,
@@ -200,6 +193,7 @@ def run_filter(
     *,
     gate: float = STANDARD_GATE,
     initial: Initial | None = None,
+    steps: Steps | None = None,
 ) -> FilterRun:
     """Estimate the errors of both channels; where GNSS is absent the states are forecast.
 
@@ -212,6 +206,8 @@ def run_filter(
         Innovations with a larger squared ratio to their variance are rejected and counted.
     initial : Initial, optional
         Where an earlier run left off; default: nothing is known but the class.
+    steps : Steps, optional
+        Default: those of the model and the noise.
 
     Returns
     -------
@@ -219,39 +215,46 @@ def run_filter(
 
     Source: Neusypin et al., 2003; covariance update in Joseph's form (Bierman, 1977).
     """
-    steps = steps_between(epochs.time_s, model, noise)
+    steps = steps or Steps.between(epochs.time_s, model, noise)
     channels = epochs.position_m.shape[1]
     z = np.stack([epochs.position_m, epochs.velocity_mps], axis=1)
     together = bool((np.isfinite(z) == np.isfinite(z[:, :, :1])).all())
     groups = [list(range(channels))] if together else [[channel] for channel in range(channels)]
     drag = epochs.drag_per_s * np.diff(epochs.time_s, prepend=epochs.time_s[:1])[:, None, None]
     first = initial or Initial(np.zeros((SIZE, channels)), np.diag(noise.initial_variances())[None])
-    parts: list[kalman.FilterRun] = []
+    weighted, believed = measurement_variances(epochs, noise)
+    patience, parts = patience_of(epochs), list[Part]()
     for group in groups:  # the channel north comes first: it is not dragged by the other
         own, measured = (drag, z) if together else (np.ascontiguousarray(drag[:, group][:, :, group]), z[:, :, group])
-        drive = Drive(POSITION, own, _pushed(drag, group, [part.x for part in parts]))
-        parts.append(_run_group(measured, drive, epochs, steps, noise, gate, first, group))
-    records, n = [part.record for part in parts], len(epochs)
+        drive = Drive(POSITION, own, _pushed(drag, group, [part.run.x for part in parts]))
+        start = kalman.Start(first.of(group), first.covariance(group[0]))
+        alike = ChannelGroup(
+            *(epochs.time_s, measured, epochs.is_reset, drive, weighted, believed, patience, gate, start)
+        )
+        parts.append(alike.run_over_seams(steps))
+    records, n = [part.run.record for part in parts], len(epochs)
     shared = [(len(group), record) for group, record in zip(groups, records, strict=True)]
+    seams = tuple(part.seams for part in parts)
     return FilterRun(
         epochs=epochs,
         model=model,
         noise=noise,
-        steps=steps,
-        parts=tuple(parts),
+        steps=parts[0].steps,
+        parts=tuple(part.run for part in parts),
         x=_joined([record.x for record in records]),
         P=_stacked([record.P for record in records]),
         innovation=_joined([record.y.reshape(n, 2, -1) for record in records]),
         innovation_variance=_joined([_shared(record.S, count) for count, record in shared]),
-        used=_joined([_shared(record.mark, count) for count, record in shared]),
+        used=_joined([_shared(part.mark, len(group)) for part, group in zip(parts, groups, strict=True)]),
         gain=_stacked([record.K.reshape(n, 2, SIZE) for record in records]),
-        reopened=max(part.reopened for part in parts),
+        reopened=max(part.run.reopened for part in parts),
+        seams_of_parts=seams,
     )
 
 
 def _shared(values: NDArray[Any], count: int) -> NDArray[Any]:
-    """A figure that channels share, shape (2 n,), as one of each, shape (n, 2, c); read-only."""
-    return np.broadcast_to(values.reshape(-1, 2, 1), (len(values) // 2, 2, count))
+    """A figure that channels share, 2 n numbers, as one of each, shape (n, 2, c); read-only."""
+    return np.broadcast_to(values.reshape(-1, 2, 1), (values.size // 2, 2, count))
 
 
 def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
@@ -287,36 +290,6 @@ def _pushed(drag: FloatArray, group: list[int], earlier: list[FloatArray]) -> Fl
         north = earlier[0][:, POSITION, 0]
         push[1:, 0] = drag[1:, group[0], 0] * north[:-1]
     return push
-
-
-def _run_group(
-    z: FloatArray,
-    drive: Drive,
-    epochs: Epochs,
-    steps: Steps,
-    noise: InsNoise,
-    gate: float,
-    first: Initial,
-    group: list[int],
-) -> kalman.FilterRun:
-    """Run the channels of a group, which share a covariance: two rows, position and velocity, at every epoch."""
-    n, _, channels = z.shape
-    weighted, believed = measurement_variances(epochs, noise)
-    both, opened = np.arange(2), np.zeros((1, SIZE))
-    opened[0, [POSITION, VELOCITY]] = np.square([RESET_POSITION_M, RESET_VELOCITY_MPS])
-    lines = Lines(np.arange(3), np.array([POSITION, VELOCITY]), np.ones(2), weighted, believed, both)
-    step = steps.index.copy()
-    step[:1] = NO_STEP  # the start belongs to the first epoch
-    return kalman.run_filter(
-        Transition.dense(steps.transitions, steps.noises),
-        step,
-        kalman.Measurements(np.repeat(np.arange(n), 2), z.reshape(2 * n, channels), np.tile(both, n), lines),
-        kalman.Start(first.of(group), first.covariance(group[0])),
-        gate=kalman.Gate(float(np.sqrt(gate)), patience_of(epochs), is_by_innovation=True),
-        jump=np.where(epochs.is_reset, 0, NO_STEP),
-        jumps=opened,
-        drive=drive,
-    )
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,8 @@ from numpy.typing import NDArray
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.inertial import figures
 from groundstation.estimators.inertial.bank import NoiseBank, run_bank
-from groundstation.estimators.inertial.coupled import (
-    CoupledRun,
-    coupled_rows,
-    coupled_variance,
-    hindcast_coupled,
-    run_coupled,
-)
+from groundstation.estimators.inertial.coupled import CoupledRun, run_coupled
+from groundstation.estimators.inertial.coupled_forecast import coupled_rows, coupled_variance, hindcast_coupled
 from groundstation.estimators.inertial.estimate import Estimation
 from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.gaps import gap_rows

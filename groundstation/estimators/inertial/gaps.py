@@ -88,7 +88,7 @@ def _replay(
     near_s = np.minimum(lead_s, np.maximum(end_s - time_s[inside], 0.0))
     calibration, gnss = run.noise.calibration, run.noise.gnss
     judge_m2 = gnss.position_white_m**2 + gnss.position_correlated_m**2
-    own_m2 = np.stack([forward.covariance(channel)[:, POSITION, POSITION] for channel in channels], axis=1)
+    own_m2 = np.stack([forward.covariance_beforehand(channel)[:, POSITION, POSITION] for channel in channels], axis=1)
     claims = {
         "forward": (forward.x[:, POSITION], own_m2, calibration.at(lead_s)),
         "rts": (smoothed.x[:, POSITION], smoothed.variance[:, POSITION], calibration.at(near_s)),

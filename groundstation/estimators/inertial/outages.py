@@ -6,7 +6,8 @@ from itertools import pairwise
 import numpy as np
 
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.inertial.coupled import CoupledRun, coupled_variance, hindcast_coupled, run_coupled
+from groundstation.estimators.inertial.coupled import CoupledRun, run_coupled
+from groundstation.estimators.inertial.coupled_forecast import coupled_variance, hindcast_coupled
 from groundstation.estimators.inertial.differences import Differences
 from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.hindcast import hindcast

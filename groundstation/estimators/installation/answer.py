@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from groundstation.base.angles import wrap_180
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.units import ARCMIN_PER_DEG
-from groundstation.estimators.heading.interval import mixture_quantile
-from groundstation.estimators.heading.verdict import STEADY_GATE, round_to_step
+from groundstation.estimators.heading.posterior import mixture_quantile
+from groundstation.estimators.heading.verdict import WHOLE, round_to_step
 from groundstation.estimators.installation.model import Belief, Mixture, doubts, installed, predict
 from groundstation.estimators.installation.settings import InstallationSettings
 from groundstation.results.heading import IntervalPart
@@ -18,7 +18,6 @@ from groundstation.results.installation import InstallationResult, Lesson
 
 FloatArray = NDArray[np.float64]
 AIRFRAME, PLATFORM = 0, 1
-OF_THE_SUM = frozenset({"half_width", "precision", STEADY_GATE})  # gates on a part of what is judged as a whole
 
 
 @dataclass(frozen=True)
@@ -102,22 +101,22 @@ def _residual(lesson: Lesson, platform: LearnedNumber) -> tuple[float | None, fl
 
 
 def verdict_of(lesson: Lesson, half_width_deg: float) -> str:
-    """The verdict on a learned number: the gate is on the sum, so those on this taxi alone only inform.
+    """The verdict on a learned number: the gates of this taxi, and the whole half width with what was learned.
 
     Examples
     --------
-    >>> lesson = Lesson("", "", "", "", verdict="extend", failed=("precision", "whole_half_width"), limit_deg=1 / 3)
+    >>> lesson = Lesson("", "", "", "", verdict="advisory", failed=("whole_half_width",), limit_deg=1 / 3)
     >>> verdict_of(lesson, 0.3), verdict_of(lesson, 0.4)
-    ('accept', 'extend')
+    ('accept', 'advisory')
     """
     if lesson.verdict in ("reject", "undecided"):
         return lesson.verdict
-    left = set(lesson.failed) - OF_THE_SUM
-    if left:
+    if set(lesson.failed) - {WHOLE}:
         return "extend"
     if lesson.limit_deg is None or half_width_deg <= lesson.limit_deg:
         return "accept"
-    return "extend" if set(lesson.failed) - {STEADY_GATE} else "advisory"
+    is_mostly_steady = half_width_deg**2 >= 2.0 * (NORMAL_95 * lesson.taxi_sigma_deg) ** 2
+    return "advisory" if is_mostly_steady else "extend"
 
 
 def _reason(lesson: Lesson, verdict: str, number: LearnedNumber, correction_deg: float) -> str:

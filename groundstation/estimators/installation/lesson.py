@@ -172,9 +172,10 @@ def _of_heading(heading: HeadingResult) -> dict[str, Any]:
         wind_sigma = sideslip / math.hypot(factor, factor_sigma)
     steady, mounting = number("aircraft.steady_sideslip_sigma_deg"), number("aircraft.mounting_sigma_deg")
     steady = number("steady_sideslip_sigma_deg") if steady is None else steady
+    uneven = number("uneven_power_sigma_deg") if settings.get("aircraft.taxi_power") == "uneven" else 0.0
     return found | {
         "number_deg": float(wrap_180(heading.error_deg + (heading.sideslip_deg or 0.0))),
-        "taxi_sigma_deg": taxi.half_width_deg / NORMAL_95,
+        "taxi_sigma_deg": math.hypot(taxi.half_width_deg / NORMAL_95, uneven or 0.0),  # that of this flight alone
         "crosswind_mps": crosswind,
         "crosswind_sigma_mps": wind_sigma * math.hypot(north, east),
         "aircraft_class": kind,

@@ -8,7 +8,8 @@ import numpy as np
 from groundstation.estimators.known import Beacon, Runway
 from groundstation.estimators.landing_beacons.approach import WELL_KNOWN_M, Belief, Deviations, Sampled
 from groundstation.estimators.landing_beacons.settings import LandingBeaconsSettings
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.landing import BeaconsPath
+from groundstation.results.arrays.typed import joined
 from groundstation.results.landing_beacons import BeaconApproachRow, BeaconLanding, BeaconRow, DeviationRow
 from groundstation.results.landing_categories import ACCURACY_ONLY, LINEAR_95, axis_category_met
 
@@ -90,23 +91,22 @@ def _rows(number: int, flown: Flown) -> list[DeviationRow]:
     return rows
 
 
-def _figure(flown: Sequence[Flown]) -> FigureData:
-    parts: dict[str, list[np.ndarray]] = {}
+def _figure(flown: Sequence[Flown]) -> BeaconsPath:
+    parts = []
     for number, (part, found, told) in enumerate(flown, start=1):
-        columns = {
-            "time_s": part.time_s,
-            "approach": np.full(len(part.time_s), number),
-            "straight_before_threshold_m": told.speed_mps * (told.threshold_s - part.time_s),
-            "before_threshold_m": found.before_m,
-            "distance_sigma_m": found.distance_sigma_m,
-            "lateral_m": found.fix.right_m,
-            "lateral_sigma_m": found.lateral_sigma_m,
-            "glide_path_m": found.glide_path_m,
-            "glide_path_sigma_m": found.glide_path_sigma_m,
-            "height_m": part.height_m,
-            "off_course_deg": found.fix.off_course_deg,
-        }
-        for name, values in columns.items():
-            parts.setdefault(name, []).append(values)
-    joined = {name: np.concatenate(values) for name, values in parts.items()}
-    return FigureData("landing_beacons_path", joined, {name: 3 for name in joined if name != "approach"})
+        parts.append(
+            BeaconsPath(
+                time_s=part.time_s,
+                approach=np.full(len(part.time_s), number),
+                straight_before_threshold_m=told.speed_mps * (told.threshold_s - part.time_s),
+                before_threshold_m=found.before_m,
+                distance_sigma_m=found.distance_sigma_m,
+                lateral_m=found.fix.right_m,
+                lateral_sigma_m=found.lateral_sigma_m,
+                glide_path_m=found.glide_path_m,
+                glide_path_sigma_m=found.glide_path_sigma_m,
+                height_m=part.height_m,
+                off_course_deg=found.fix.off_course_deg,
+            )
+        )
+    return joined(parts)

@@ -11,7 +11,8 @@ from groundstation.estimators.landing_ranges.filter import ApproachTrack, covari
 from groundstation.estimators.landing_ranges.moving_point import MovingTrack, fly_moving_point, measure
 from groundstation.estimators.landing_ranges.scenario import RangeApproach
 from groundstation.estimators.landing_ranges.trials import Trials, fly_trials
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.landing import RangesErrors, RangesPath, RangesSpace
+from groundstation.results.arrays.typed import joined
 from groundstation.results.landing_categories import (
     ACCURACY_ONLY,
     CATEGORIES,
@@ -167,27 +168,26 @@ def _flat(scenario: RangeApproach) -> dict[str, float | str | bool]:
     return {f"{table}.{name}": value for table, part in tables.items() for name, value in part.items()}
 
 
-def _path_figure(scenario: RangeApproach, track: ApproachTrack, moving: MovingTrack | None) -> FigureData:
+def _path_figure(scenario: RangeApproach, track: ApproachTrack, moving: MovingTrack | None) -> RangesPath:
     points = np.broadcast_to(scenario.point_places_m, (len(track.time_s), len(scenario.points), 3))
     if moving is not None:
         kept = np.searchsorted(scenario.time_s, track.time_s - 1e-9)
         points = np.concatenate([points, moving.place_m[kept][:, None, :]], axis=1)
-    columns = {
-        "time_s": track.time_s,
-        "before_threshold_m": -track.true_m[:, 0],
-        "height_m": track.true_m[:, 2],
-        "sigma_along_m": track.sigma_m[:, 0],
-        "sigma_right_m": track.sigma_m[:, 1],
-        "sigma_up_m": track.sigma_m[:, 2],
-        "lateral_95_m": track.lateral_95_m,
-        "horizontal_95_m": track.horizontal_95_m,
-        "vertical_95_m": track.vertical_95_m,
-        "determinant": measure(track.true_m, points),
-    }
-    return FigureData("landing_ranges_path", columns, {name: 3 for name in columns if name.endswith(("_m", "_s"))})
+    return RangesPath(
+        time_s=track.time_s,
+        before_threshold_m=-track.true_m[:, 0],
+        height_m=track.true_m[:, 2],
+        sigma_along_m=track.sigma_m[:, 0],
+        sigma_right_m=track.sigma_m[:, 1],
+        sigma_up_m=track.sigma_m[:, 2],
+        lateral_95_m=track.lateral_95_m,
+        horizontal_95_m=track.horizontal_95_m,
+        vertical_95_m=track.vertical_95_m,
+        determinant=measure(track.true_m, points),
+    )
 
 
-def _space_figure(scenario: RangeApproach, track: ApproachTrack, moving: MovingTrack | None) -> FigureData:
+def _space_figure(scenario: RangeApproach, track: ApproachTrack, moving: MovingTrack | None) -> RangesSpace:
     """Where the aircraft, the ground points (once) and the moving point are."""
     n = len(track.time_s)
     parts = [("aircraft", track.time_s, track.true_m, np.full(n, scenario.path.speed_mps))]
@@ -197,33 +197,35 @@ def _space_figure(scenario: RangeApproach, track: ApproachTrack, moving: MovingT
     for point, place in zip(scenario.points, scenario.point_places_m, strict=True):
         parts.append((point.name, np.zeros(1), place[None], np.zeros(1)))
     place_m = np.concatenate([part[2] for part in parts])
-    columns = {
-        "time_s": np.concatenate([part[1] for part in parts]),
-        "name": np.concatenate([np.full(len(part[1]), part[0]) for part in parts]),
-        "along_m": place_m[:, 0],
-        "right_m": place_m[:, 1],
-        "up_m": place_m[:, 2],
-        "speed_mps": np.concatenate([part[3] for part in parts]),
-    }
-    return FigureData("landing_ranges_space", columns, {name: 3 for name in columns if name != "name"})
+    return RangesSpace(
+        time_s=np.concatenate([part[1] for part in parts]),
+        label=np.concatenate([np.full(len(part[1]), part[0]) for part in parts]),
+        along_m=place_m[:, 0],
+        right_m=place_m[:, 1],
+        up_m=place_m[:, 2],
+        speed_mps=np.concatenate([part[3] for part in parts]),
+    )
 
 
-def _errors(flown: Sequence[tuple[str, Trials]]) -> tuple[FigureData, ...]:
+def _errors(flown: Sequence[tuple[str, Trials]]) -> tuple[RangesErrors, ...]:
     """Errors and computed sigmas of every trial."""
     if not flown:
         return ()
-    parts: dict[str, list[np.ndarray]] = {}
+    parts = []
     for name, trials in flown:
         for number, (error, sigma) in enumerate(zip(trials.error_m, trials.sigma_m, strict=True), start=1):
-            columns = {
-                "time_s": trials.time_s,
-                "filter": np.full(len(trials.time_s), name),
-                "trial": np.full(len(trials.time_s), number),
-                "before_threshold_m": trials.before_threshold_m,
-            }
-            for axis, label in enumerate(("along", "right", "up")):
-                columns[f"error_{label}_m"], columns[f"sigma_{label}_m"] = error[:, axis], sigma[:, axis]
-            for column, values in columns.items():
-                parts.setdefault(column, []).append(values)
-    joined = {name: np.concatenate(values) for name, values in parts.items()}
-    return (FigureData("landing_ranges_errors", joined, {name: 3 for name in joined if name.endswith(("_m", "_s"))}),)
+            parts.append(
+                RangesErrors(
+                    time_s=trials.time_s,
+                    filter=np.full(len(trials.time_s), name),
+                    trial=np.full(len(trials.time_s), number),
+                    before_threshold_m=trials.before_threshold_m,
+                    error_along_m=error[:, 0],
+                    sigma_along_m=sigma[:, 0],
+                    error_right_m=error[:, 1],
+                    sigma_right_m=sigma[:, 1],
+                    error_up_m=error[:, 2],
+                    sigma_up_m=sigma[:, 2],
+                )
+            )
+    return (joined(parts),)

@@ -11,6 +11,7 @@ from groundstation.estimators.latency.fit import DelayFit, fit_delay
 from groundstation.estimators.latency.settings import BOUND95, LatencySettings
 from groundstation.estimators.latency.signals import NotComparableError, compare, pairs_of
 from groundstation.estimators.latency.windows import cut_windows, too_few_windows
+from groundstation.results.arrays.flight import LatencySearch
 from groundstation.results.figures import FigureData
 from groundstation.results.latency import Latencies, Latency, Quantity
 from groundstation.tables.table import Flight, Table
@@ -138,11 +139,11 @@ def _figure(fits: list[tuple[Latency, DelayFit]]) -> tuple[FigureData, ...]:
     """Residual against delay of every pair, in one table."""
     if not fits:
         return ()
-    columns = {
-        "reference": np.concatenate([np.full(len(fit.search_s), row.reference) for row, fit in fits]),
-        "other": np.concatenate([np.full(len(fit.search_s), row.other) for row, fit in fits]),
-        "quantity": np.concatenate([np.full(len(fit.search_s), row.quantity) for row, fit in fits]),
-        "latency_s": np.concatenate([fit.search_s for _, fit in fits]),
-        "residual": np.concatenate([fit.search_residual for _, fit in fits]),
-    }
-    return (FigureData("latency_search", columns, {"latency_s": 3, "residual": 6}),)
+    searched = LatencySearch(
+        reference=np.concatenate([np.full(len(fit.search_s), row.reference) for row, fit in fits]),
+        other=np.concatenate([np.full(len(fit.search_s), row.other) for row, fit in fits]),
+        quantity=np.concatenate([np.full(len(fit.search_s), row.quantity) for row, fit in fits]),
+        latency_s=np.concatenate([fit.search_s for _, fit in fits]),
+        residual=np.concatenate([fit.search_residual for _, fit in fits]),
+    )
+    return (searched,)

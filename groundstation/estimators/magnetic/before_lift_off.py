@@ -15,6 +15,8 @@ from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.entered import corrections_entered
 from groundstation.estimators.magnetic.gyros import GyroDrift, gyro_drift
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.results.arrays.heading import HeadingSamples
+from groundstation.results.arrays.typed import found_in
 from groundstation.results.heading import HeadingResult
 from groundstation.results.latency import Latencies
 from groundstation.tables.phases import Phases, ground_mask
@@ -204,11 +206,11 @@ def _fast_enough(
 
 def _fast_part(found: HeadingResult | None, speed_min_mps: float) -> tuple[int, float]:
     """How many of the used epochs are faster than a speed, and the seconds they stand for."""
-    samples = next((figure for figure in found.figures if figure.name == "heading_samples"), None) if found else None
+    samples = found_in(found.figures, HeadingSamples) if found else None
     if samples is None:
         return 0, 0.0
-    count = int(np.count_nonzero(samples["used"] & (samples["ground_speed_mps"] > speed_min_mps)))
-    return count, count * float(np.median(np.diff(samples["time_s"])))
+    count = int(np.count_nonzero(samples.is_used & (samples.ground_speed_mps > speed_min_mps)))
+    return count, count * float(np.median(np.diff(samples.time_s)))
 
 
 def _estimated(

@@ -14,12 +14,19 @@ from groundstation.estimators.magnetic.manoeuvre import Figure
 from groundstation.estimators.magnetic.methods import Fits
 from groundstation.estimators.magnetic.poisson import corrected_heading_deg
 from groundstation.estimators.magnetic.readings import Readings
+from groundstation.results.arrays.magnetic import (
+    BodyField,
+    MagneticCurves,
+    MagneticField,
+    MagneticModulus,
+    MagneticSamples,
+    MagneticTable,
+)
 from groundstation.results.figures import FigureData
 from groundstation.results.magnetic import LETTERS, Method, MethodName
 
 LARGEST = 20_000  # readings drawn: of more, every k-th
 MOST_VECTORS = 4_000  # of the field
-AXES = ("forward", "right", "down")
 
 
 def draw(
@@ -60,83 +67,88 @@ def _samples(
     part: NDArray[np.str_],
     fits: Fits,
     deviation_deg: FloatArray,
-) -> FigureData:
+) -> MagneticSamples:
     kept = slice(None, None, max(1, -(-len(readings) // LARGEST)))
     shown, drawn = readings.take(kept), part[kept]
     expected = shown.true_heading_deg - declination_deg[kept]
     heading = shown.magnetic_heading_deg
-    columns = {
-        "time_s": shown.time_s,
-        "part": drawn,
-        "bank_deg": shown.roll_deg,
-        "uncorrected_magnetic_heading_deg": heading,
-        "compass_error_deg": shown.compass_error_deg,
-        "error_before_deg": wrap_180(heading - expected),
-        "error_compass_table_deg": wrap_180(corrected_by_table(heading, deviation_deg) - expected),
-    }
-    for name, fit in (("poisson_attitude", fits.attitude), ("constant_modulus", fits.modulus)):
-        columns[f"error_{name}_deg"] = (
-            np.full(len(shown), np.nan) if fit.reason else wrap_180(corrected_heading_deg(fit.iron, shown) - expected)
-        )
-    return FigureData("magnetic_samples", columns, dict.fromkeys(columns, 4))
+    attitude, modulus = (
+        np.full(len(shown), np.nan) if fit.reason else wrap_180(corrected_heading_deg(fit.iron, shown) - expected)
+        for fit in (fits.attitude, fits.modulus)
+    )
+    return MagneticSamples(
+        time_s=shown.time_s,
+        part=drawn,
+        bank_deg=shown.roll_deg,
+        uncorrected_magnetic_heading_deg=heading,
+        compass_error_deg=shown.compass_error_deg,
+        error_before_deg=wrap_180(heading - expected),
+        error_compass_table_deg=wrap_180(corrected_by_table(heading, deviation_deg) - expected),
+        error_poisson_attitude_deg=attitude,
+        error_constant_modulus_deg=modulus,
+    )
 
 
-def _table(fits: Fits, deviation_deg: FloatArray) -> FigureData:
+def _table(fits: Fits, deviation_deg: FloatArray) -> MagneticTable:
     table = fits.table
-    columns = {
-        "uncorrected_magnetic_heading_deg": CENTRES_DEG,
-        "right_turn_deg": table.right_deg,
-        "left_turn_deg": table.left_deg,
-        "compass_error_deg": table.average_deg,
-        "is_interpolated": ~table.is_measured,
-        "fitted_error_deg": wrap_180(table.curve_deg),
-        "deviation_deg": deviation_deg,
-        "bank_bias_deg": fits.bias_deg,
-    }
-    return FigureData("magnetic_table", columns, dict.fromkeys(columns, 4))
+    return MagneticTable(
+        uncorrected_magnetic_heading_deg=CENTRES_DEG,
+        right_turn_deg=table.right_deg,
+        left_turn_deg=table.left_deg,
+        compass_error_deg=table.average_deg,
+        is_interpolated=~table.is_measured,
+        fitted_error_deg=wrap_180(table.curve_deg),
+        deviation_deg=deviation_deg,
+        bank_bias_deg=fits.bias_deg,
+    )
 
 
-def _curves(methods: Sequence[Method], recommended: MethodName, recommended_deg: FloatArray) -> FigureData:
+def _curves(methods: Sequence[Method], recommended: MethodName, recommended_deg: FloatArray) -> MagneticCurves:
     """Deviation in level flight and its sigma by A to E of each method, and by the recommended one as it is applied.
 
     The modulus is drawn without A.
     """
-    columns = {"uncorrected_magnetic_heading_deg": CENTRES_DEG}
+    deviation_deg, sigma_deg = dict[str, FloatArray](), dict[str, FloatArray]()
     design = harmonics.design(CENTRES_DEG)
     for row in methods:
         values, sigma = (
             np.array([of.get(letter, 0.0 if of else np.nan) for letter in LETTERS])
             for of in (row.coefficients_deg, row.coefficients_sigma_deg)
         )
-        columns[f"deviation_{row.name}_deg"] = -(design @ values)
-        columns[f"sigma_{row.name}_deg"] = np.sqrt(design**2 @ sigma**2)
-    columns |= {
-        "deviation_to_add_deg": recommended_deg,
-        "deviation_sigma_deg": columns[f"sigma_{recommended}_deg"],
-    }
-    return FigureData("magnetic_curves", columns, dict.fromkeys(columns, 4))
+        deviation_deg[row.name], sigma_deg[row.name] = -(design @ values), np.sqrt(design**2 @ sigma**2)
+    return MagneticCurves(
+        uncorrected_magnetic_heading_deg=CENTRES_DEG,
+        deviation_deg=deviation_deg,
+        sigma_deg=sigma_deg,
+        deviation_to_add_deg=recommended_deg,
+        deviation_sigma_deg=sigma_deg[recommended],
+    )
 
 
-def _modulus(readings: Readings, figures: list[Figure], fits: Fits) -> FigureData:
+def _modulus(readings: Readings, figures: list[Figure], fits: Fits) -> MagneticModulus:
     rows = np.unique(np.concatenate([figure.rows(right) for figure in figures for right in (True, False)]))
     rows = rows[:: max(1, -(-len(rows) // LARGEST))]
     shown = readings.take(rows)
-    columns = {"time_s": shown.time_s, "before_nt": np.linalg.norm(shown.field_nt, axis=1)}
-    for name, fit in (("poisson_attitude", fits.attitude), ("constant_modulus", fits.modulus)):
-        freed = (
-            fit.iron.field_nt(shown.field_nt, shown.current_a) if not fit.reason else np.full((len(shown), 3), np.nan)
-        )
-        columns[f"{name}_nt"] = np.linalg.norm(freed, axis=1)
-    return FigureData("magnetic_modulus", columns, dict.fromkeys(columns, 1) | {"time_s": 3})
+    attitude, modulus = (
+        np.full((len(shown), 3), np.nan) if fit.reason else fit.iron.field_nt(shown.field_nt, shown.current_a)
+        for fit in (fits.attitude, fits.modulus)
+    )
+    return MagneticModulus(
+        time_s=shown.time_s,
+        before_nt=np.linalg.norm(shown.field_nt, axis=1),
+        poisson_attitude_nt=np.linalg.norm(attitude, axis=1),
+        constant_modulus_nt=np.linalg.norm(modulus, axis=1),
+    )
 
 
-def _field(readings: Readings, part: NDArray[np.str_], fits: Fits) -> FigureData:
+def _field(readings: Readings, part: NDArray[np.str_], fits: Fits) -> MagneticField:
     """The field along the body axes in flight, as read and freed of the fitted iron (NaN where none is)."""
     rows = np.flatnonzero(part != "ground")
     rows = rows[:: max(1, -(-len(rows) // MOST_VECTORS))]
     shown, fit = readings.take(rows), fits.attitude
     freed = np.full((len(shown), 3), np.nan) if fit.reason else fit.iron.field_nt(shown.field_nt, shown.current_a)
-    columns = {"time_s": shown.time_s, "part": part[rows]}
-    for state, values in (("before", shown.field_nt), ("after", freed)):
-        columns |= {f"{state}_{axis}_nt": values[:, place] for place, axis in enumerate(AXES)}
-    return FigureData("magnetic_field", columns, dict.fromkeys(columns, 1) | {"time_s": 3})
+    before, after = (
+        BodyField(forward_nt=values[:, 0], right_nt=values[:, 1], down_nt=values[:, 2])
+        for values in (shown.field_nt, freed)
+    )
+    return MagneticField(time_s=shown.time_s, part=part[rows], before=before, after=after)

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, mean_heading, unwrap, wrap_180, wrap_360
 from groundstation.base.errors import NotAssessableError
@@ -38,6 +37,7 @@ from groundstation.estimators.magnetic.ground_fit import (
     widest_gap_deg,
 )
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
+from groundstation.results.arrays.magnetic import GroundRunCurve, GroundRunEpochs
 from groundstation.results.figures import FigureData
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import DeclinationUsed
@@ -295,20 +295,18 @@ def _figures(
 ) -> tuple[FigureData, ...]:
     samples = epochs.samples
     is_used = np.array([run.state == "used" for run in runs])[epochs.run]
-    points: Mapping[str, NDArray[np.generic]] = {
-        "time_s": samples.time_s,
-        "run": epochs.run + 1,
-        "is_used": is_used,
-        "magnetic_heading_deg": samples.heading_deg,
-        "track_deg": samples.track_deg,
-        "speed_mps": samples.speed_mps,
-        "error_deg": epochs.error_deg,
-    }
     error, sigma = curve(fit, CENTRES_DEG, declination_sigma_deg, settings)
-    line = {"magnetic_heading_deg": CENTRES_DEG, "error_deg": error, "sigma_deg": sigma}
     return (
-        FigureData("magnetic_ground_epochs", points, dict.fromkeys(points, 3)),
-        FigureData("magnetic_ground_curve", line, dict.fromkeys(line, 4)),
+        GroundRunEpochs(
+            time_s=samples.time_s,
+            run=epochs.run + 1,
+            is_used=is_used,
+            magnetic_heading_deg=samples.heading_deg,
+            track_deg=samples.track_deg,
+            speed_mps=samples.speed_mps,
+            heading_error_deg=epochs.error_deg,
+        ),
+        GroundRunCurve(magnetic_heading_deg=CENTRES_DEG, heading_error_deg=error, heading_error_sigma_deg=sigma),
     )
 
 

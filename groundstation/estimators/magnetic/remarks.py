@@ -8,6 +8,8 @@ from groundstation.base.angles import wrap_180
 from groundstation.estimators.inertial.kind import UNAIDED
 from groundstation.estimators.magnetic.entered import corrections_entered
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.results.arrays.magnetic import MagneticTable
+from groundstation.results.arrays.typed import found_in
 from groundstation.results.magnetic import MagneticResult
 from groundstation.tables.table import Flight
 
@@ -47,8 +49,10 @@ def _below(altitude_m: float | None, limit_m: float) -> bool:
 
 def _between_branches(result: MagneticResult) -> list[str]:
     """A constant difference of the branches: what a latency of the magnetometer would make."""
-    table = next(figure for figure in result.figures if figure.name == "magnetic_table")
-    half = 0.5 * wrap_180(table["right_turn_deg"] - table["left_turn_deg"])
+    table = found_in(result.figures, MagneticTable)
+    if table is None:
+        return []
+    half = 0.5 * wrap_180(table.right_turn_deg - table.left_turn_deg)
     half = half[np.isfinite(half)]
     used = [turn for turn in result.turns if turn.state == "used" and turn.end_s > turn.start_s]
     rate = float(np.mean([abs(turn.turned_deg) / (turn.end_s - turn.start_s) for turn in used]))

@@ -7,7 +7,9 @@ from groundstation.base.normal import NORMAL_95
 from groundstation.base.signals import kind_of
 from groundstation.estimators.reference.errors import Errors
 from groundstation.estimators.reference.statistics import share_of, spread_of
-from groundstation.results.figures import FigureData, flags, numbers
+from groundstation.results.arrays.forecast import ForecastFan
+from groundstation.results.arrays.heading import HeadingSamples
+from groundstation.results.arrays.typed import found_in
 from groundstation.results.forecast import HORIZONS_MIN, ForecastResult
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
@@ -23,10 +25,10 @@ def heading_check(heading: HeadingResult, errors: Errors) -> HeadingCheck | None
 
     ``errors`` are those of the INS as logged. Interval and reference are independent: their variances add.
     """
-    figure = next((one for one in heading.figures if one.name == SAMPLES), None)
+    figure = found_in(heading.figures, HeadingSamples)
     if figure is None or heading.ins_topic != errors.subject:
         return None
-    at = numbers(figure, "time_s")[flags(figure, "used")]
+    at = figure.time_s[figure.is_used]
     seen = _at(errors.time_s, errors.angles_deg[:, 2], at)
     seen = seen[np.isfinite(seen)]
     if len(seen) < LEAST_SAMPLES:
@@ -51,7 +53,7 @@ def heading_check(heading: HeadingResult, errors: Errors) -> HeadingCheck | None
 
 def forecast_checks(forecast: ForecastResult, inertial: InertialResult, errors: Errors) -> tuple[ForecastCheck, ...]:
     """The default method of the replay at the usual horizons, against how the INS error grew by the reference."""
-    fan = next((one for one in forecast.figures if one.name == "forecast_fan"), None)
+    fan = found_in(forecast.figures, ForecastFan)
     if fan is None or inertial.ins_topic != errors.subject or kind_of(errors.subject) != "ins":
         return ()
     rows = []
@@ -62,9 +64,9 @@ def forecast_checks(forecast: ForecastResult, inertial: InertialResult, errors: 
     return tuple(rows)
 
 
-def _forecast_row(fan: FigureData, method: str, horizon_min: float, errors: Errors) -> ForecastCheck | None:
-    rows = np.abs(numbers(fan, "lead_s") - 60.0 * horizon_min) < 1e-6
-    start_s = numbers(fan, "start_s")[rows]
+def _forecast_row(fan: ForecastFan, method: str, horizon_min: float, errors: Errors) -> ForecastCheck | None:
+    rows = np.abs(fan.lead_s - 60.0 * horizon_min) < 1e-6
+    start_s = fan.start_s[rows]
     if rows.sum() < LEAST_STARTS:
         return None
     grown = np.stack(
@@ -74,8 +76,8 @@ def _forecast_row(fan: FigureData, method: str, horizon_min: float, errors: Erro
         ],
         axis=1,
     )
-    forecast = np.stack([numbers(fan, f"{axis}_m")[rows] for axis in ("north", "east")], axis=1)
-    sigma = np.stack([numbers(fan, f"{axis}_sigma_m")[rows] for axis in ("north", "east")], axis=1)
+    forecast = np.stack([fan.north.forecast_m[rows], fan.east.forecast_m[rows]], axis=1)
+    sigma = np.stack([fan.north.sigma_m[rows], fan.east.sigma_m[rows]], axis=1)
     known = np.isfinite(grown).all(axis=1) & np.isfinite(forecast).all(axis=1)
     if known.sum() < LEAST_STARTS:
         return None

@@ -15,6 +15,7 @@ from groundstation.results.reference import ClaimRow, ErrorRow, Quantity
 ANGLE_AXES = ("roll", "pitch", "heading")
 ANGLE_SIGMAS = ("roll_sigma_deg", "pitch_sigma_deg", "true_heading_sigma_deg")
 SHARE = 0.95
+LEAST_SIGMA = 1e-9  # m, m/s or deg: no device measures so well, and a smaller one is a zero that arithmetic left over
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ def checked(errors: Errors, axis: Axis) -> Checked | None:
     own = errors.reference.get(axis.sigma)
     own = np.zeros(len(errors)) if own is None else np.nan_to_num(own)
     total = np.hypot(claimed, own)
-    known = np.isfinite(axis.values) & (total > 0.0)
+    known = np.isfinite(axis.values) & (total > LEAST_SIGMA)
     if known.sum() < 2:
         return None
     squares = axis.components * np.square(axis.values[known] / total[known])

@@ -15,6 +15,7 @@ from groundstation.estimators.known import Known
 from groundstation.estimators.two_clocks.channels import UNITS, side_of
 from groundstation.estimators.two_clocks.settings import TwoClocksSettings
 from groundstation.results.answer import Answers, answer_of
+from groundstation.results.arrays.together import JoinedDifference, JoinedMotion
 from groundstation.results.columns import AnswerColumn
 from groundstation.results.figures import FigureData
 from groundstation.results.together import ChosenSource, JoinedLog, Joining, MotionAgreement, Together
@@ -96,11 +97,11 @@ def _figures(
 ) -> list[FigureData]:
     label = log.label or "a"
     reference, other = (topic.replace(".", "_") for topic in (log.reference_topic, log.topic))
-    both = {"time_s": time_s, f"{reference}_{name}_{suffix}": values[0], f"{other}_{name}_{suffix}": values[1]}
-    left = {"time_s": time_s, f"{name}_difference_{suffix}": values[2]}
+    both = {f"{reference}_{name}_{suffix}": values[0], f"{other}_{name}_{suffix}": values[1]}
+    left = {f"{name}_difference_{suffix}": values[2]}
     return [
-        FigureData(f"together_{label}_motion", both, dict.fromkeys(both, 3)),
-        FigureData(f"together_{label}_difference", left, dict.fromkeys(left, 3)),
+        JoinedMotion(time_s=time_s, motion=both).of_one(label),
+        JoinedDifference(time_s=time_s, difference=left).of_one(label),
     ]
 
 

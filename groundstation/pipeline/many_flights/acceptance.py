@@ -30,7 +30,9 @@ from groundstation.pipeline.many_flights.inputs import saved_flights
 from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.reports.acceptance import write_acceptance_report
 from groundstation.results.acceptance import QUANTITIES, UNKNOWN_INS, Acceptance, FlightError, Standard
-from groundstation.results.figures import FigureData, numbers
+from groundstation.results.arrays.inertial import InertialStates, InertialTrack
+from groundstation.results.arrays.typed import MissingColumnError
+from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, csv_text, json_text, load, mapping, write_text
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
@@ -154,13 +156,15 @@ def _errors_of(saved: SavedFlight, standard: Standard) -> tuple[FlightError, Ins
     start = None if inertial is None or reason else inertial.navigation_start
     if inertial is None or start is None or start.time_s is None:
         return replace(flight, reason=reason), None, {}
-    states, track = saved.figure(STATES), saved.figure(TRACK)
+    states, track = _rows_of(saved)
     if states is None or track is None or len(states) != len(track):
         return replace(flight, reason="its arrays are of an older version: run the log again"), None, {}
     errors = ins_errors(
-        numbers(states, "time_s"),
-        *(numbers(states, f"measured_{channel}_position_m") for channel in ("north", "east")),
-        *(numbers(track, f"ins_{name}_deg") for name in ("latitude", "longitude")),
+        states.time_s,
+        states.north.measured_position_m,
+        states.east.measured_position_m,
+        track.ins_latitude_deg,
+        track.ins_longitude_deg,
         start_s=start.time_s,
     )
     if errors is None or np.ptp(errors.hours) * 60.0 < standard.minutes_min:
@@ -174,6 +178,14 @@ def _errors_of(saved: SavedFlight, standard: Standard) -> tuple[FlightError, Ins
     )
     flight = replace(flight, reference95=_reference95(inertial, heading, flight.hours))
     return _sure_enough(flight, standard), errors, inertial.settings | {"ins_class": inertial.ins_class}
+
+
+def _rows_of(saved: SavedFlight) -> tuple[InertialStates | None, InertialTrack | None]:
+    """Arrays of a flight that is judged; None where they are of an older version."""
+    try:
+        return saved.rows_of(InertialStates), saved.rows_of(InertialTrack)
+    except MissingColumnError:
+        return None, None
 
 
 def _not_judged(saved: SavedFlight, inertial: InertialResult | None) -> str:

@@ -19,9 +19,10 @@ from groundstation.estimators.heading.figures import IN_PAUSE
 from groundstation.estimators.heading.references import REFERENCE_SIGMA_DEG, logged_reference
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, answer_values
 from groundstation.reports.index import index_row, reasons_of
+from groundstation.results.arrays.heading import HeadingSamples
+from groundstation.results.arrays.reference import ReferenceChecks
 from groundstation.results.columns import Kind
 from groundstation.results.cooperative import CooperativeResult
-from groundstation.results.figures import FigureData, flags, numbers, texts
 from groundstation.results.files import SavedFlight, utf8_text
 from groundstation.results.fleet import SessionRow
 from groundstation.results.forecast import TOO_FEW, WITHIN, CalibrationRow, ForecastResult, honesty
@@ -50,7 +51,7 @@ class Check:
 
 
 @dataclass(frozen=True)
-class HeadingSamples:
+class FleetSamples:
     """The heading samples of a flight, without the rows that only break lines; ``error_deg`` is NaN below walking pace.
 
     ``moments`` and ``histogram`` are of the used ones, about the flight's estimate, so that none is cut at 180 deg.
@@ -74,7 +75,7 @@ def to_number(value: Any) -> float:
     return float(value) if abs(value) <= LARGEST else math.nan
 
 
-def flight_row(saved: SavedFlight, samples: HeadingSamples | None) -> dict[str, Any]:
+def flight_row(saved: SavedFlight, samples: FleetSamples | None) -> dict[str, Any]:
     """Build the row of a flight: a value for every one of :data:`FLIGHT_COLUMNS`, of the type its kind has."""
     results = saved.results
     start = results.start_utc_ns
@@ -101,7 +102,7 @@ def _typed(kind: Kind, value: Any) -> Any:
     return "" if value is None else utf8_text(value)[:MAX_TEXT_CHARACTERS]
 
 
-def heading_samples(saved: SavedFlight) -> HeadingSamples | None:
+def heading_samples(saved: SavedFlight) -> FleetSamples | None:
     """The heading samples a flight saved, None when it has none.
 
     Raises
@@ -109,18 +110,26 @@ def heading_samples(saved: SavedFlight) -> HeadingSamples | None:
     UnreadableLogError
         When their file is broken.
     """
-    figure = saved.figure("heading_samples")
+    figure = saved.rows_of(HeadingSamples)
     if figure is None:
         return None
-    is_epoch = texts(figure, "gate") != IN_PAUSE
-    difference, used = numbers(figure, "difference_deg")[is_epoch], flags(figure, "used")[is_epoch]
+    epochs = figure.where(figure.gate != IN_PAUSE)
+    difference, used = epochs.difference_deg, epochs.is_used
     heading = saved.results.answer(HeadingResult)
     centre = float(np.nan_to_num(wrap_180(to_number(heading.error_deg if heading else None))))
     about_estimate = centre + wrap_180(difference[used] - centre)
-    names = ("time_s", "segment", "heading_deg", "track_deg", "ground_speed_mps", "weight")
-    columns = {name: numbers(figure, name)[is_epoch] for name in names}
-    columns |= {"error_deg": difference, "used": used, "gate": texts(figure, "gate")[is_epoch]}
-    return HeadingSamples(columns, moments_of(about_estimate), histogram_of(about_estimate))
+    columns: dict[str, NDArray[Any]] = {
+        "time_s": epochs.time_s,
+        "segment": epochs.segment.astype(np.float64),
+        "heading_deg": epochs.heading_deg,
+        "track_deg": epochs.track_deg,
+        "ground_speed_mps": epochs.ground_speed_mps,
+        "weight": epochs.weight,
+        "error_deg": difference,
+        "used": used,
+        "gate": epochs.gate,
+    }
+    return FleetSamples(columns, moments_of(about_estimate), histogram_of(about_estimate))
 
 
 def session_row(saved: SavedFlight) -> SessionRow:
@@ -160,7 +169,7 @@ def checks_of(saved: SavedFlight) -> list[Check]:
     if reference is not None and reference.is_judge:
         verdict = "" if heading is None else heading.verdict
         found += [_check("truth_heading", one.difference_deg, one.sigma_deg, verdict) for one in reference.headings]
-        found += _position_checks(saved.figure("reference_checks"))
+        found += _position_checks(saved.rows_of(ReferenceChecks))
     return [check for check in found if check is not None]
 
 
@@ -175,12 +184,12 @@ def _heading_checks(saved: SavedFlight, heading: HeadingResult) -> list[Check | 
     return found
 
 
-def _position_checks(figure: FigureData | None) -> list[Check | None]:
+def _position_checks(checks: ReferenceChecks | None) -> list[Check | None]:
     """The independent samples of the horizontal positions that claimed something."""
-    if figure is None:
+    if checks is None:
         return []
-    columns = (texts(figure, "subject"), texts(figure, "quantity"), texts(figure, "axis"))
-    rows = zip(*(one.tolist() for one in columns), numbers(figure, "z"), flags(figure, "is_inside"), strict=True)
+    columns = (checks.subject, checks.quantity, checks.axis)
+    rows = zip(*(one.tolist() for one in columns), checks.z, checks.is_inside, strict=True)
     return [
         Check(f"truth_{subject}", float(z), bool(is_inside))
         for subject, quantity, axis, z, is_inside in rows

@@ -13,7 +13,7 @@ from urllib.parse import quote
 import numpy as np
 
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.many_flights.fleet_rows import HeadingSamples
+from groundstation.pipeline.many_flights.fleet_rows import FleetSamples
 from groundstation.results.files import write_bytes
 
 SAMPLES = "samples.parquet"
@@ -46,7 +46,7 @@ class SampleStore:
     def __init__(self, out: Path) -> None:
         self._root = out / SAMPLES
 
-    def put(self, row: Mapping[str, Any], samples: HeadingSamples) -> str:
+    def put(self, row: Mapping[str, Any], samples: FleetSamples) -> str:
         """Keep the samples of a flight; returns its file in the dataset. ``row`` is that of the table of flights.
 
         Raises
@@ -112,7 +112,7 @@ def partition(aircraft: str) -> str:
     return f"{kept}-{hashlib.sha256(aircraft.encode()).hexdigest()[:8]}"
 
 
-def _digest(row: Mapping[str, Any], samples: HeadingSamples) -> str:
+def _digest(row: Mapping[str, Any], samples: FleetSamples) -> str:
     told = hashlib.sha256(json.dumps([VERSION, row["flight_id"], row["start_utc"]]).encode())
     for name, values in samples.columns.items():
         told.update(f"{name} {values.dtype.str} {len(values)}".encode())
@@ -129,7 +129,7 @@ def _digest_in(path: Path) -> str:
         return ""
 
 
-def _encoded(row: Mapping[str, Any], samples: HeadingSamples, digest: str) -> bytes:
+def _encoded(row: Mapping[str, Any], samples: FleetSamples, digest: str) -> bytes:
     import pyarrow as pa
     import pyarrow.parquet as pq
 

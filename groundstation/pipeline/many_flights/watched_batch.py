@@ -123,7 +123,7 @@ def _outcomes(batch: Batch, listen: Listener) -> tuple[Outcome, ...]:
     from groundstation.pipeline.many_flights.batch import run_many
     from groundstation.pipeline.many_flights.publishing import rows_without_flight
 
-    strangers = [one for path in batch.paths if (one := _unclaimed(path, batch.configuration)) is not None]
+    strangers = [one for path in batch.paths if (one := _unclaimed(path, batch)) is not None]
     claimed = sorted({*map(str, batch.paths)} - {one.source for one in strangers})
     before = [] if batch.is_first else rows_without_flight(batch.out)
     outcomes: tuple[Outcome, ...] = ()
@@ -156,14 +156,21 @@ def _has_flights(out: Path) -> bool:
     return out.is_dir() and bool(flight_folders(out))
 
 
-def _unclaimed(path: Path, configuration: Configuration) -> Outcome | None:
-    """The outcome of a file that no reader claims, which in a folder is skipped; None for any other."""
-    from groundstation.readers.registry import identify
+def _unclaimed(path: Path, batch: Batch) -> Outcome | None:
+    """The outcome of a file that no reader claims, which in a folder is skipped; None for any other.
+
+    Isolated, only its first bytes are looked at: nothing of it is decompressed or read in this process.
+    """
+    from groundstation.readers.registry import identify, unclaimed
     from groundstation.store.recognition import is_groundstation_mcap
 
     try:
-        if not is_groundstation_mcap(path):
-            identify(path, configuration.profile_path)
+        if is_groundstation_mcap(path):
+            return None
+        if not batch.is_isolated:
+            identify(path, batch.configuration.profile_path)
+        elif batch.configuration.profile is None and (error := unclaimed(path)) is not None:
+            raise error
     except UnclaimedLogError as error:
         return Outcome(str(path), "skipped", str(error))
     except (GroundstationError, OSError):  # told when it is run

@@ -14,11 +14,11 @@ from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.one_flight.convert import census_of, recounted
 from groundstation.pipeline.one_flight.deviation_to_apply import Apply
+from groundstation.results.arrays.magnetic import CorrectedHeadingRows
 from groundstation.results.deviation import (
     Deviation,
     deviation_of,
 )
-from groundstation.results.figures import FigureData
 from groundstation.results.file_names import CORRECTED
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult
@@ -166,12 +166,17 @@ def _ins_error_deg(results: FlightResults, ins_topic: str) -> float:
     return error_deg if np.isfinite(error_deg) else 0.0
 
 
-def _figure(flight: Flight, corrected: "CorrectedHeading") -> FigureData:
+def _figure(flight: Flight, corrected: "CorrectedHeading") -> CorrectedHeadingRows:
     from groundstation.estimators.magnetic.corrected import thinned
 
     drawn = thinned(corrected, MOST_DRAWN)
-    columns = {"time_s": flight.seconds(drawn.at_ns), **_fields(drawn)}
-    return FigureData(TOPIC, columns, dict.fromkeys(columns, 4))
+    return CorrectedHeadingRows(
+        time_s=flight.seconds(drawn.at_ns),
+        magnetic_heading_deg=drawn.magnetic_heading_deg,
+        uncorrected_magnetic_heading_deg=drawn.uncorrected_deg,
+        deviation_deg=drawn.deviation_deg,
+        true_heading_deg=drawn.true_heading_deg,
+    )
 
 
 def _fields(corrected: "CorrectedHeading") -> dict[str, np.ndarray]:

@@ -7,8 +7,8 @@ from groundstation.base.errors import UsageError
 from groundstation.base.timescales import duration_text
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.verbs.clip import zero_s
+from groundstation.results.arrays.flight import GnssLanes, PhaseSpans
 from groundstation.results.comparison import Alignment, Event
-from groundstation.results.figures import numbers, texts
 from groundstation.results.files import SavedFlight
 from groundstation.results.inertial import InertialResult
 
@@ -57,9 +57,9 @@ def events_of(saved: SavedFlight) -> dict[Event, float]:
     later shows neither. An outage is the first interval without GNSS.
     """
     found: dict[Event, float] = {"start": 0.0}
-    phases = saved.figure("phases")
+    phases = saved.rows_of(PhaseSpans)
     if phases is not None:
-        start_s, names = numbers(phases, "start_s").tolist(), texts(phases, "phase").tolist()
+        start_s, names = phases.start_s.tolist(), phases.phase.tolist()
         moving = next((row for row, name in enumerate(names) if name not in (AT_REST, UNKNOWN)), 0)
         if moving and names[moving - 1] == AT_REST and math.isfinite(start_s[moving]):
             found["first-movement"] = start_s[moving]
@@ -75,9 +75,9 @@ def events_of(saved: SavedFlight) -> dict[Event, float]:
 def _first_outage_s(saved: SavedFlight) -> float | None:
     inertial = saved.results.answer(InertialResult)
     starts = [one.start_s for one in inertial.outages if one.missing in ("gnss", "both")] if inertial else []
-    lanes = saved.figure("gnss_lanes")
+    lanes = saved.rows_of(GnssLanes)
     if lanes is not None:
-        starts += numbers(lanes, "start_s")[texts(lanes, "state") == NO_GNSS].tolist()
+        starts += lanes.start_s[lanes.state == NO_GNSS].tolist()
     return min((start for start in starts if math.isfinite(start)), default=None)
 
 

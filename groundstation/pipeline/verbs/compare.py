@@ -20,9 +20,9 @@ from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.many_flights.inputs import COMPARISON_MARKS, COMPARISON_RECORDING, is_ours, is_session
 from groundstation.pipeline.verbs.alignment import align
 from groundstation.pipeline.verbs.clip import CUT_SHA256
+from groundstation.results.arrays.cooperative import CooperativeTracks, SessionErrors
 from groundstation.results.comparison import Comparison, Delta, Event, SettingPair, Side, Value
 from groundstation.results.cooperative import CooperativeResult
-from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.file_names import MANIFEST
 from groundstation.results.files import SavedFlight, csv_text, load, mapping, write_text
 from groundstation.results.flight import NotAssessable
@@ -46,7 +46,7 @@ MAIN = re.compile(
     r"status|flight\.duration_s"
     r"|heading\.(verdict|error_deg|standard_error_deg|confidence95_(low|high)_deg|precision_deg|correction_deg|samples"
     r"|taxi_seconds|drift_deg_per_h|lever_arm_m|parking_heading_deg|reference_residual_arcmin)"
-    r"|inertial\.(kind|radial_error_rate_\d\d_nmiph|velocity_error_rms_mps|azimuth\.error_deg)"
+    r"|inertial\.(kind|radial_error_rate_(fit|\d\d)_nmiph|velocity_error_rms_mps|azimuth\.error_deg)"
     r"|inertial\.(north|east)\.states\.[^.]+\.value"
     r"|(magnetic|landing)\.verdict|forecast\.default_method"
     r"|cooperative\.default_algorithm"
@@ -130,20 +130,20 @@ def _load(folder: Path) -> SavedFlight:
     return saved if errors is None else replace(saved, figures={**saved.figures, errors.name: errors})
 
 
-def session_errors(saved: SavedFlight) -> FigureData | None:
+def session_errors(saved: SavedFlight) -> SessionErrors | None:
     """Worst computed 2 sigma_r and RMS error of all aircraft with time, default algorithm; None for a flight."""
-    answer, tracks = saved.results.answer(CooperativeResult), saved.figure("cooperative_tracks")
+    answer, tracks = saved.results.answer(CooperativeResult), saved.rows_of(CooperativeTracks)
     if answer is None or tracks is None:
         return None
-    rows = texts(tracks, "algorithm") == answer.default_algorithm
-    time_s, epoch = np.unique(np.round(numbers(tracks, "time_s")[rows], 3), return_inverse=True)
-    worst_m, error_m = np.full(len(time_s), np.nan), numbers(tracks, "error_m")[rows]
-    np.fmax.at(worst_m, epoch, numbers(tracks, "two_sigma_r_m")[rows])
+    rows = tracks.algorithm == answer.default_algorithm
+    time_s, epoch = np.unique(np.round(tracks.time_s[rows], 3), return_inverse=True)
+    worst_m, error_m = np.full(len(time_s), np.nan), tracks.error_m[rows]
+    np.fmax.at(worst_m, epoch, tracks.two_sigma_r_m[rows])
     known = np.isfinite(error_m)
     counts = np.bincount(epoch[known], minlength=len(time_s))
     squares = np.bincount(epoch[known], error_m[known] ** 2, minlength=len(time_s))
     rms_m = np.sqrt(np.divide(squares, counts, out=np.full(len(time_s), np.nan), where=counts > 0))
-    return FigureData("session_errors", {"time_s": time_s, "two_sigma_r_m": worst_m, "rms_error_m": rms_m}, {})
+    return SessionErrors(time_s=time_s, two_sigma_r_m=worst_m, rms_error_m=rms_m)
 
 
 def _side(saved: SavedFlight) -> Side:

@@ -49,8 +49,8 @@ def export(
     require_suffix(target, (*WRITERS, *WRITERS_OF_ONE))
     require_place(path, target, force)
     flight, saved, has_lost = _read(path, configuration or Configuration())
-    figures, ins_topic = ({}, "") if saved is None else (saved.figures, _compared_ins(saved))
-    tracks = _wanted(tracks_of(flight, figures, ins_topic), names, path.name)
+    results, ins_topic = (None, "") if saved is None else (saved.results, _compared_ins(saved))
+    tracks = _wanted(tracks_of(flight, results, ins_topic), names, path.name)
     with told_in_a_line(str(target)):
         target.parent.mkdir(parents=True, exist_ok=True)
         if suffix in WRITERS:

@@ -1,7 +1,6 @@
 """``export --figure``: what figures show, as CSV with the units in the names of the columns."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -69,7 +68,7 @@ def _with_utc(figure: FigureData, start_utc_ns: int | None) -> FigureData:
     if start_utc_ns is None:
         return figure
     told = {UTC_OF[name]: _utc(numbers(figure, name), start_utc_ns) for name in UTC_OF if name in figure.columns}
-    return replace(figure, columns={**told, **figure.columns})
+    return FigureData(figure.name, {**told, **figure.columns}, figure.digits)
 
 
 def _utc(flight_s: np.ndarray, start_utc_ns: int) -> np.ndarray:

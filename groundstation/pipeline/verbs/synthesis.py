@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.many_flights.inputs import STUDY_MARK
@@ -12,9 +12,9 @@ from groundstation.pipeline.one_flight.progress import Event, Listener
 if TYPE_CHECKING:
     from groundstation.studies.page import StudyResult
 
-KEEPING = ("heading", "installation")  # studies whose runs are kept
 STUDIES = {
     "heading": "heading correction before take-off: errors, coverage of the interval, figures of the paper repeated",
+    "crew": "heading verdicts on taxi in the wind: accepted, advisory, refused; both numbers; what is no straight taxi",
     "installation": "what earlier flights teach of mounting and crab: coverage and verdicts on fleets of aircraft",
     "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
     "magnetic": "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
@@ -23,6 +23,8 @@ STUDIES = {
     "landing": "landing by reference points and by locators: every published figure with ours beside it",
     "approach": "recorded approaches: the localizer as a reference for positions, how honest its interval is",
 }
+
+RESUMED = ("heading", "crew", "installation")  # studies whose runs are kept
 
 
 def simulate_to(
@@ -124,9 +126,9 @@ def study_to(
 ) -> str:
     """Run a study into a folder: ``<name>.md`` and tables/*.csv; returns the page's text.
 
-    With ``recorded``, a folder with sets of recorded robots, the cooperative study runs on these instead. The study of
-    the heading, and that of the installation, keep their runs in ``runs/``: the same command goes on with them,
-    ``minutes`` ends it before all are made; ``force`` makes them afresh.
+    With ``recorded``, a folder with sets of recorded robots, the cooperative study runs on these. The studies of
+    the heading (heading, crew) and of the installation keep their runs in
+    ``runs/``: the same command goes on with them, ``minutes`` ends it before all are made; ``force`` makes them afresh.
 
     Raises
     ------
@@ -141,10 +143,10 @@ def study_to(
     kept = folder / "runs"
     if page.exists() and not force and not kept.is_dir():
         raise UsageError(str(page), "a file that exists", "a new folder", "-f overwrites it")
-    if name in KEEPING:
+    if name in RESUMED:
         study = _resumed(name, study, kept, minutes, afresh=force)
     elif minutes is not None:
-        raise UsageError("study", f"--minutes with {name}", " or ".join(KEEPING))
+        raise UsageError("study", f"--minutes with {name}", " or ".join(RESUMED))
     (folder / "tables").mkdir(parents=True, exist_ok=True)
     listen(Event("begin", total=1))
     result = study(runs=runs, seed=seed, progress=lambda text: listen(Event("stage", name, text)))
@@ -164,13 +166,15 @@ def _resumed(
     from shutil import rmtree
 
     from groundstation.pipeline.verbs.kept_runs import KeptRuns
+    from groundstation.studies.heading_crew import CrewOutcome
     from groundstation.studies.heading_family import RunOutcome
     from groundstation.studies.installation_pool import TaxiOfPool
 
     if afresh and folder.is_dir():
         rmtree(folder)
-    outcome: type = RunOutcome if name == "heading" else TaxiOfPool
-    return partial(study, kept=KeptRuns(folder, outcome), minutes=minutes)
+    outcomes: dict[str, type] = {"heading": RunOutcome, "crew": CrewOutcome, "installation": TaxiOfPool}
+    kept: KeptRuns[Any] = KeptRuns(folder, outcomes[name])
+    return partial(study, kept=kept, minutes=minutes)
 
 
 def _study_of(name: str, recorded: Path) -> "Callable[..., StudyResult]":
@@ -192,6 +196,10 @@ def _study(name: str) -> "Callable[..., StudyResult]":
         from groundstation.studies.heading import study_heading
 
         return study_heading
+    if name == "crew":
+        from groundstation.studies.heading_crew import study_crew
+
+        return study_crew
     if name == "installation":
         from groundstation.studies.installation import study_installation
 

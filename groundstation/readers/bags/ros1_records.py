@@ -182,7 +182,9 @@ class Records:
         return end
 
     def read(self, at: int, size: int) -> bytes:
-        """Bytes of the file."""
+        """Bytes of the file; none from a place beyond its end, which damaged bytes may name."""
+        if at >= self.size:
+            return b""
         self.stream.seek(at)
         return self.stream.read(size)
 
@@ -224,11 +226,12 @@ class Index:
             found.index_at = number_of(first.fields, b"index_pos")
             found.chunks = number_of(first.fields, b"chunk_count")
         head = records.head(found.index_at) if found.index_at else None
-        if head is not None and head.op in (CONNECTION, CHUNK_INFO):
-            while head is not None and head.op in (CONNECTION, CHUNK_INFO) and head.end <= size:
-                found.take(head, records.read(head.data_at, min(head.end - head.data_at, INDEX_BYTES)))
-                head = records.head(head.end)
+        while head is not None and head.op in (CONNECTION, CHUNK_INFO) and head.end <= size:
+            found.take(head, records.read(head.data_at, min(head.end - head.data_at, INDEX_BYTES)))
+            head = records.head(head.end)
+        if found.is_there and found.listed == found.chunks:
             return found
+        found = cls(found.index_at, found.chunks)  # not at its place, or not all of it
         for record in records:
             if record.head is not None and record.head.op in (CONNECTION, CHUNK_INFO) and not record.is_cut:
                 length = min(record.end - record.head.data_at, INDEX_BYTES)

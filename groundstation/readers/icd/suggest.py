@@ -11,6 +11,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.base.geodesy import continuous_longitude_deg
 from groundstation.base.signals import kind_of
 from groundstation.readers.icd.dump import to_yaml
 from groundstation.readers.icd.load import shipped
@@ -237,7 +238,7 @@ def _is_position(latitude_deg: FloatArray, longitude_deg: FloatArray) -> bool:
     if not len(latitude_deg) or not len(longitude_deg) or not latitude_deg.all():
         return False
     is_inside = np.abs(latitude_deg).max() <= 90.0 and np.abs(longitude_deg).max() <= 180.0
-    return bool(is_inside and np.ptp(latitude_deg) < 1.0 and np.ptp(longitude_deg) < 1.0)
+    return bool(is_inside and np.ptp(latitude_deg) < 1.0 and np.ptp(continuous_longitude_deg(longitude_deg)) < 1.0)
 
 
 def _fits_egi(data: Data1553) -> bool:

@@ -12,8 +12,9 @@ from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.reports.frames import TIME
+from groundstation.results.arrays.cooperative import ControlMeasures, ControlPaths, ControlPoints
+from groundstation.results.arrays.typed import T
 from groundstation.results.control import UNCONTROLLED, ControlPlan
-from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
 
 M_PER_KM = 1000.0
@@ -29,8 +30,8 @@ COLOURS = {
 WIDTHS = {"determinant": 3.2, "eigenvalue": 2.0, "dop": 1.0}  # laws that agree lie over each other and stay visible
 
 
-def _data(results: FlightResults, name: str) -> tuple[ControlPlan, FigureData] | None:
-    answer, data = results.answer(ControlPlan), results.figure_with_rows(name)
+def _data(results: FlightResults, kind: type[T]) -> tuple[ControlPlan, T] | None:
+    answer, data = results.answer(ControlPlan), results.rows_of(kind)
     return None if answer is None or data is None else (answer, data)
 
 
@@ -41,13 +42,13 @@ def _laws(answer: ControlPlan) -> list[tuple[str, str, float]]:
 
 def paths(results: FlightResults) -> Drawing | None:
     """Ways of all aircraft from above: under the recommended law, and without control."""
-    found = _data(results, "control_paths")
+    found = _data(results, ControlPaths)
     if found is None:
         return None
     answer, data = found
-    law, aircraft = texts(data, "law"), texts(data, "aircraft")
-    north, east = (numbers(data, f"{axis}_m") / M_PER_KM for axis in ("north", "east"))
-    points = results.figure_with_rows("control_points")
+    law, aircraft = data.law, data.aircraft
+    north, east = data.north_m / M_PER_KM, data.east_m / M_PER_KM
+    points = results.rows_of(ControlPoints)
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 18, 12, 174, 104)
@@ -62,11 +63,11 @@ def paths(results: FlightResults) -> Drawing | None:
             d.dots(axes, east[marks], north[marks], colour, 3.0)
             axes.plot(east[mine[-1:]], north[mine[-1:]], "o", color=colour, markersize=5.0)
         mine = law == answer.recommended
-        d.tell(axes, east[mine], north[mine], numbers(data, "time_s")[mine], TIME)
+        d.tell(axes, east[mine], north[mine], data.time_s[mine], TIME)
         if points is not None:
-            places = [numbers(points, f"{axis}_m") / M_PER_KM for axis in ("east", "north")]
+            places = points.east_m / M_PER_KM, points.north_m / M_PER_KM
             axes.plot(*places, "^", color=d.INK, markersize=4.5, linestyle="none")
-            for x, y, name in zip(*places, texts(points, "name"), strict=True):
+            for x, y, name in zip(*places, points.label, strict=True):
                 layout.beside(axes, x, y, d.label(str(name), 16), d.INK, axes.transData, "center")
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel("east, km")
@@ -84,26 +85,26 @@ def paths(results: FlightResults) -> Drawing | None:
 
 def measures(results: FlightResults) -> Drawing | None:
     """Accuracy and geometry of the judged aircraft with time, every law in its colour."""
-    found = _data(results, "control_measures")
+    found = _data(results, ControlMeasures)
     if found is None:
         return None
     answer, data = found
-    law, time_s = texts(data, "law"), numbers(data, "time_s")
+    law, time_s = data.law, data.time_s
     panels = (
-        ("two_sigma_north_m", "2σ north, m", True),
-        ("two_sigma_east_m", "2σ east, m", True),
-        ("determinant", "det(H'H)", False),
-        ("dop", "DOP", False),
+        (data.two_sigma_north_m, "2σ north, m", True),
+        (data.two_sigma_east_m, "2σ east, m", True),
+        (data.determinant, "det(H'H)", False),
+        (data.dop, "DOP", False),
     )
     height = (PANEL_MM + 4) * len(panels) + 14.0
 
     def paint(figure: Any) -> None:
-        for number, (column, title, is_log) in enumerate(panels):
+        for number, (values, title, is_log) in enumerate(panels):
             top = height - 8 - (PANEL_MM + 4) * number
             axes = layout.place(figure, 18, top - PANEL_MM + 4, 174, top)
             for name, colour, width in _laws(answer):
                 mine = law == name
-                d.line(axes, time_s[mine], numbers(data, column)[mine], colour, width, label=title_of(name))
+                d.line(axes, time_s[mine], values[mine], colour, width, label=title_of(name))
             axes.set_ylabel(title)
             if is_log:
                 axes.set_yscale("log")
@@ -122,11 +123,11 @@ def measures(results: FlightResults) -> Drawing | None:
 
 def law(results: FlightResults) -> Drawing | None:
     """Every control with time under every law, with its bounds."""
-    found = _data(results, "control_paths")
+    found = _data(results, ControlPaths)
     if found is None or not found[0].controls:
         return None
     answer, data = found
-    of, aircraft, time_s = texts(data, "law"), texts(data, "aircraft"), numbers(data, "time_s")
+    of, aircraft, time_s = data.law, data.aircraft, data.time_s
     height = (PANEL_MM + 4) * len(answer.controls) + 14.0
 
     def paint(figure: Any) -> None:
@@ -137,7 +138,7 @@ def law(results: FlightResults) -> Drawing | None:
             drawn = []
             for name, colour, width in _laws(answer):
                 mine = (of == name) & (aircraft == row.aircraft)
-                values = numbers(data, "speed_mps")[mine] if is_speed else _unwrapped(data, mine, row.start)
+                values = data.speed_mps[mine] if is_speed else _unwrapped(data, mine, row.start)
                 d.line(axes, time_s[mine], values, colour, width, label=title_of(name))
                 drawn.append(values)
             low, high = layout.padded(float(d.finite(*drawn).min()), float(d.finite(*drawn).max()), 0.1, 0.5)
@@ -155,7 +156,7 @@ def law(results: FlightResults) -> Drawing | None:
     return Drawing("Control laws", caption, "Controls with time.", svg, ("control_paths",))
 
 
-def _unwrapped(data: FigureData, rows: NDArray[np.bool_], start_deg: float) -> NDArray[np.float64]:
+def _unwrapped(data: ControlPaths, rows: NDArray[np.bool_], start_deg: float) -> NDArray[np.float64]:
     """Headings without jumps through north, beginning at the start."""
-    track = unwrap(numbers(data, "track_deg")[rows])
+    track = unwrap(data.track_deg[rows])
     return np.asarray(start_deg + track - track[0])

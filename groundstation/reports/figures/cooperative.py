@@ -14,8 +14,13 @@ from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.reports.frames import TIME
+from groundstation.results.arrays.cooperative import (
+    CooperativeGeometry,
+    CooperativeLinks,
+    CooperativeTracks,
+    SessionPoints,
+)
 from groundstation.results.cooperative import CooperativeResult
-from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
 
 ELLIPSES = 8  # of each track
@@ -25,14 +30,14 @@ M_PER_KM = 1000.0
 FloatArray = NDArray[np.float64]
 
 
-def _tracks(results: FlightResults) -> tuple[CooperativeResult, FigureData, str] | None:
+def _tracks(results: FlightResults) -> tuple[CooperativeResult, CooperativeTracks, str] | None:
     """The answer, its tracks and the algorithm that is drawn."""
-    answer, data = results.answer(CooperativeResult), results.figure_with_rows("cooperative_tracks")
+    answer, data = results.answer(CooperativeResult), results.rows_of(CooperativeTracks)
     return None if answer is None or data is None else (answer, data, trusted(answer).algorithm)
 
 
-def _places(data: FigureData) -> FloatArray:
-    return np.column_stack([numbers(data, f"{axis}_m") for axis in "xyz"])
+def _places(data: CooperativeTracks | SessionPoints) -> FloatArray:
+    return np.column_stack([data.x_m, data.y_m, data.z_m])
 
 
 def session_map(results: FlightResults) -> Drawing | None:
@@ -41,12 +46,12 @@ def session_map(results: FlightResults) -> Drawing | None:
     if found is None:
         return None
     answer, data, algorithm = found
-    rows = texts(data, "algorithm") == algorithm
-    place, vehicle = _places(data)[rows], texts(data, "vehicle")[rows]
+    rows = data.algorithm == algorithm
+    place, vehicle = _places(data)[rows], data.vehicle[rows]
     ellipses = _ellipses(data, rows)
     origin = plane_through(place) if answer.frame == "ecef" else None
     plane = place if origin is None else origin.from_ecef_m(place)
-    stations = results.figure_with_rows("session_points")
+    stations = results.rows_of(SessionPoints)
     larger = _magnified(plane, ellipses)
     when = "at the end" if _is_crowd(answer) else f"at {ELLIPSES} times"
 
@@ -67,10 +72,10 @@ def session_map(results: FlightResults) -> Drawing | None:
         if stations is not None:
             points = _places(stations) if origin is None else origin.from_ecef_m(_places(stations))
             axes.plot(points[:, 1] / M_PER_KM, points[:, 0] / M_PER_KM, "^", color=d.INK, markersize=4.0)
-            for point, name in zip(points, texts(stations, "name"), strict=True):
+            for point, name in zip(points, stations.label, strict=True):
                 text = d.label(str(name), 16)
                 layout.beside(axes, point[1] / M_PER_KM, point[0] / M_PER_KM, text, d.INK, axes.transData, "center")
-        d.tell(axes, plane[:, 1] / M_PER_KM, plane[:, 0] / M_PER_KM, numbers(data, "time_s")[rows], TIME)
+        d.tell(axes, plane[:, 1] / M_PER_KM, plane[:, 0] / M_PER_KM, data.time_s[rows], TIME)
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel("east, km")
         axes.set_ylabel("north, km")
@@ -85,10 +90,10 @@ def session_map(results: FlightResults) -> Drawing | None:
     return Drawing("Map", caption, "Tracks of the aircraft.", d.draw("cooperative-map", 112, paint), _numbers(results))
 
 
-def _ellipses(data: FigureData, rows: NDArray[np.bool_]) -> FloatArray:
+def _ellipses(data: CooperativeTracks, rows: NDArray[np.bool_]) -> FloatArray:
     """2 sigma ellipses about the origin, north and east, shape (n, 49, 2); upright where no correlation is saved."""
-    north, east = (numbers(data, f"sigma_{axis}_m")[rows] for axis in ("north", "east"))
-    return outlines(north, east, np.nan_to_num(numbers(data, "correlation_north_east")[rows]), 2.0)
+    north, east = data.sigma_north_m[rows], data.sigma_east_m[rows]
+    return outlines(north, east, np.nan_to_num(data.correlation_north_east[rows]), 2.0)
 
 
 def _magnified(plane: FloatArray, ellipses: FloatArray) -> int:
@@ -98,8 +103,8 @@ def _magnified(plane: FloatArray, ellipses: FloatArray) -> int:
 
 
 def _numbers(results: FlightResults) -> tuple[str, ...]:
-    names = ("cooperative_tracks", "session_points")
-    return tuple(name for name in names if results.figure_with_rows(name) is not None)
+    found = results.rows_of(CooperativeTracks), results.rows_of(SessionPoints)
+    return tuple(one.name for one in found if one is not None)
 
 
 def _is_crowd(answer: CooperativeResult) -> bool:
@@ -118,8 +123,8 @@ def errors(results: FlightResults) -> Drawing | None:
         return None
     answer, data, algorithm = found
     shown = _largest(answer, algorithm)
-    vehicle, of = texts(data, "vehicle"), texts(data, "algorithm")
-    time_s, error, bound = (numbers(data, name) for name in ("time_s", "error_m", "two_sigma_r_m"))
+    vehicle, of = data.vehicle, data.algorithm
+    time_s, error, bound = data.time_s, data.error_m, data.two_sigma_r_m
     lines = (len(shown) + 1) // 2
     height = PANEL_MM * lines + 14.0
 
@@ -172,12 +177,12 @@ def _styles(answer: CooperativeResult) -> dict[str, tuple[str, str]]:
 
 def geometry(results: FlightResults) -> Drawing | None:
     """HDOP, determinant and smallest eigenvalue of every aircraft with time."""
-    answer, data = results.answer(CooperativeResult), results.figure_with_rows("cooperative_geometry")
+    answer, data = results.answer(CooperativeResult), results.rows_of(CooperativeGeometry)
     if answer is None or data is None:
         return None
-    vehicle, time_s = texts(data, "vehicle"), numbers(data, "time_s")
-    measures = (("hdop", "HDOP"), ("determinant", "det(H'H)"), ("eigenvalue", "least eigenvalue"))
-    columns = [one for one in measures if np.isfinite(numbers(data, one[0])).any()]
+    vehicle, time_s = data.vehicle, data.time_s
+    measures = ((data.hdop, "HDOP"), (data.determinant, "det(H'H)"), (data.eigenvalue, "least eigenvalue"))
+    columns = [one for one in measures if np.isfinite(one[0]).any()]
     styles = _styles(answer)
     height = 42.0 * len(columns) + 12.0
 
@@ -187,11 +192,11 @@ def geometry(results: FlightResults) -> Drawing | None:
             axes = layout.place(figure, 18, top - 34, 174, top)
             for name, (colour, told) in styles.items():
                 mine = vehicle == name
-                when, values = d.broken_at_gaps(time_s[mine], numbers(data, column)[mine])
+                when, values = d.broken_at_gaps(time_s[mine], column[mine])
                 d.line(axes, when, values, colour, 1.0 if told else 0.5, label=told or None)
             axes.set_ylabel(title)
-            known = d.finite(numbers(data, column))
-            if column == "hdop" and known.size and known.max() > 20.0 * np.median(known):
+            known = d.finite(column)
+            if title == "HDOP" and known.size and known.max() > 20.0 * np.median(known):
                 axes.set_yscale("log")
                 plain_log(axes.yaxis, (1.0,))
             layout.time_axis(axes, float(time_s.min()), float(time_s.max()), title=number == len(columns) - 1)
@@ -209,12 +214,12 @@ def geometry(results: FlightResults) -> Drawing | None:
 
 def links(results: FlightResults) -> Drawing | None:
     """Residuals of every range over their own sigma; gated ones stand out."""
-    answer, data = results.answer(CooperativeResult), results.figure_with_rows("cooperative_links")
+    answer, data = results.answer(CooperativeResult), results.rows_of(CooperativeLinks)
     if answer is None or data is None:
         return None
-    time_s, mark, receiver = numbers(data, "time_s"), numbers(data, "mark"), texts(data, "receiver")
+    time_s, mark, receiver = data.time_s, data.mark, data.receiver
     with np.errstate(divide="ignore", invalid="ignore"):
-        normal = numbers(data, "innovation") / numbers(data, "sigma")
+        normal = data.innovation / data.sigma
     far = d.finite(np.abs(normal))
     ceiling = float(np.clip(1.1 * far.max(initial=3.0), 4.0, 12.0))
 

@@ -10,7 +10,7 @@ from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import has_values, plain_log
-from groundstation.results.figures import numbers
+from groundstation.results.arrays.forecast import ForecastGrowth, ForecastMap
 from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import FEWEST_STARTS, METHODS, CalibrationRow, ForecastResult
 
@@ -28,14 +28,14 @@ def _shipped(results: FlightResults) -> str:
 
 def growth(results: FlightResults) -> Drawing | None:
     """RMS error by horizon, a line for each method, the shipped one thick; logarithmic axes."""
-    data, default = results.figure_with_rows("forecast_growth"), _shipped(results)
-    known = [] if data is None else [name for name in METHODS if has_values(data, f"{name}_rms_m")]
-    if data is None or not known or not has_values(data, "horizon_min"):
+    data, default = results.rows_of(ForecastGrowth), _shipped(results)
+    known = [] if data is None else [name for name in METHODS if has_values(data.rms_m.get(name))]
+    if data is None or not known or not has_values(data.horizon_min):
         return None
-    horizon = numbers(data, "horizon_min")
+    horizon = data.horizon_min
     colours = dict(zip((name for name in METHODS if name not in ("raw_ins", default)), OTHERS, strict=False))
     colours |= {"raw_ins": d.INS, default: d.USED}
-    ordered = sorted(known, key=lambda name: -_last(numbers(data, f"{name}_rms_m")))
+    ordered = sorted(known, key=lambda name: -_last(data.rms_m[name]))
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 18, 12, 112, 82)
@@ -43,12 +43,12 @@ def growth(results: FlightResults) -> Drawing | None:
         axes.set_yscale("log")
         for name in ordered:
             text = f"{METHODS[name]}{' (shipped)' if name == default else ''}"
-            values = numbers(data, f"{name}_rms_m")
+            values = data.rms_m[name]
             width, order = (2.6, 4) if name == default else (1.0, 2)
             values = np.where(values > 0.0, values, np.nan)
             d.line(axes, horizon, values, colours[name], width, label=d.label(text), zorder=order)
-        sigma = numbers(data, "sigma_m")
-        if np.isfinite(sigma).any():
+        sigma = data.sigma_m
+        if sigma is not None and np.isfinite(sigma).any():
             d.line(axes, horizon, sigma, d.INK, 1.0, linestyle=(0, (2, 2)), label="σ claimed (shipped)")
         plain_log(axes.xaxis)
         plain_log(axes.yaxis)
@@ -120,15 +120,15 @@ def _paint_nees(axes: Any, rows: list[CalibrationRow]) -> None:
 
 def hindcast_map(results: FlightResults) -> Drawing | None:
     """Radial error by start and horizon, the shipped method beside the raw INS, on one scale of colour."""
-    data = results.figure_with_rows("forecast_map")
+    data = results.rows_of(ForecastMap)
     if data is None:
         return None
-    names = [name for name in dict.fromkeys((_shipped(results), "raw_ins")) if has_values(data, f"{name}_m")]
-    starts, horizons = (np.unique(d.finite(numbers(data, name))) for name in ("start_s", "horizon_min"))
+    names = [name for name in dict.fromkeys((_shipped(results), "raw_ins")) if has_values(data.radial_m.get(name))]
+    starts, horizons = np.unique(d.finite(data.start_s)), np.unique(d.finite(data.horizon_min))
     if not names or min(len(starts), len(horizons)) < 2 or len(starts) * len(horizons) != len(data):
         return None
     rows, columns = d.thin(len(starts), MAP_CELLS), d.thin(len(horizons), MAP_CELLS)
-    cubes = [numbers(data, f"{name}_m").reshape(len(starts), len(horizons))[np.ix_(rows, columns)].T for name in names]
+    cubes = [data.radial_m[name].reshape(len(starts), len(horizons))[np.ix_(rows, columns)].T for name in names]
     hours, minutes = starts[rows] / 3600.0, horizons[columns]
     top = float(np.quantile(d.finite(*cubes), MAP_QUANTILE))
 

@@ -1,6 +1,6 @@
 """Figures of the taxi stage: difference over time, density, convergence, heading and track, estimates by segment."""
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -9,33 +9,40 @@ from groundstation.chapters.wording import clock, is_number, number
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
-from groundstation.results.figures import FigureData, flags, numbers, texts
+from groundstation.results.arrays.heading import (
+    HeadingDistribution,
+    HeadingLanes,
+    HeadingNormal,
+    HeadingRunning,
+    HeadingSamples,
+    HeadingSpectrum,
+)
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult, TaxiSegment
+
+S = TypeVar("S", HeadingSamples, HeadingRunning)
 
 TAXI_SPEED_MARGIN = 1.6  # the take-off run leaves the figure, or the taxi would be a line at its foot
 SLOWEST_TRACK_MPS = 1.0  # below it the direction of motion is noise and is not drawn
 
 
-def taxi_windows(samples: FigureData) -> list[tuple[float, float]]:
+def taxi_windows(samples: HeadingSamples) -> list[tuple[float, float]]:
     """Spans of flight time that the taxi figures show, one for each ground run that was used; of all where none was."""
-    time, used = numbers(samples, "time_s"), flags(samples, "used")
+    time, used = samples.time_s, samples.is_used
     return layout.windows(time[used] if used.any() else time)
 
 
-def _within(samples: FigureData, span: tuple[float, float]) -> FigureData:
+def _within(samples: S, span: tuple[float, float]) -> S:
     """The samples of a span of flight time."""
-    time = numbers(samples, "time_s")
-    rows = (time >= span[0]) & (time <= span[1])
-    return FigureData(samples.name, {name: values[rows] for name, values in samples.columns.items()}, samples.digits)
+    return samples.where((samples.time_s >= span[0]) & (samples.time_s <= span[1]))
 
 
 def difference(results: FlightResults) -> Drawing | None:
     """Difference over time with the running mean, its honest interval and e."""
-    samples, running = results.figure_with_rows("heading_samples"), results.figure_with_rows("heading_running")
+    samples, running = results.rows_of(HeadingSamples), results.rows_of(HeadingRunning)
     if samples is None:
         return None
-    time, value, used = numbers(samples, "time_s"), numbers(samples, "difference_deg"), flags(samples, "used")
+    time, value, used = samples.time_s, samples.difference_deg, samples.is_used
     spans = taxi_windows(samples)
     count = int(np.count_nonzero(used & np.isfinite(value)))
 
@@ -58,11 +65,11 @@ def difference(results: FlightResults) -> Drawing | None:
     return Drawing("Heading minus track over time", caption, alt, d.draw("difference", 74, paint), names)
 
 
-def _running_band(axes: Any, running: FigureData) -> None:
-    time, mean = numbers(running, "time_s"), numbers(running, "mean_deg")
+def _running_band(axes: Any, running: HeadingRunning) -> None:
+    time, mean = running.time_s, running.mean_deg
     keep = d.thin(len(running), 2000)
     time, mean = time[keep], mean[keep]
-    honest, e = numbers(running, "honest_half_width_deg")[keep], numbers(running, "precision_deg")[keep]
+    honest, e = running.honest_half_width_deg[keep], running.precision_deg[keep]
     if np.isfinite(honest).any():
         axes.fill_between(
             time,
@@ -97,14 +104,14 @@ def _sample_range(value: Any, used: Any) -> tuple[float, float]:
 
 def convergence(results: FlightResults) -> Drawing | None:
     """Precision e, quality and honest half width as the samples come in, with their limits."""
-    running = results.figure_with_rows("heading_running")
+    running = results.rows_of(HeadingRunning)
     if running is None:
         return None
-    cycles = numbers(running, "cycles")
+    cycles = running.cycles
     curves = (
-        ("precision_deg", "precision e", d.INS, "precision"),
-        ("quality_deg", "quality", d.GNSS, "quality"),
-        ("honest_half_width_deg", "honest 95 % half width", d.INK, ""),
+        (running.precision_deg, "precision e", d.INS, "precision"),
+        (running.quality_deg, "quality", d.GNSS, "quality"),
+        (running.honest_half_width_deg, "honest 95 % half width", d.INK, ""),
     )
     answer = results.answer(HeadingResult)
     limits = {} if answer is None else {gate.name: gate.limit for gate in answer.gates}
@@ -113,9 +120,8 @@ def convergence(results: FlightResults) -> Drawing | None:
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 16, 12, 174, 52)
         axes.set_yscale("log")
-        for column, text, colour, gate in curves:
-            values = numbers(running, column)[keep]
-            values = np.where(values > 0.0, values, np.nan)
+        for shown, text, colour, gate in curves:
+            values = np.where(shown[keep] > 0.0, shown[keep], np.nan)
             axes.plot(cycles[keep], values, color=colour, linewidth=1.0, label=text)
             limit = next((value for name, value in limits.items() if gate and name.startswith(gate)), None)
             if is_number(limit):
@@ -142,11 +148,11 @@ def _plain_log_labels(axis: Any, marks: tuple[float, ...] = (1.0, 2.0, 5.0)) -> 
 
 def density(results: FlightResults) -> Drawing | None:
     """Density of the heading error with the fitted normal (figure 3 of the paper)."""
-    bars, normal = results.figure_with_rows("heading_distribution"), results.figure_with_rows("heading_normal")
+    bars, normal = results.rows_of(HeadingDistribution), results.rows_of(HeadingNormal)
     if bars is None:
         return None
     answer = results.answer(HeadingResult)
-    low, high, height = (numbers(bars, name) for name in ("bin_low_deg", "bin_high_deg", "density_per_deg"))
+    low, high, height = bars.bin_low_deg, bars.bin_high_deg, bars.density_per_deg
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 16, 12, 174, 62)
@@ -159,8 +165,8 @@ def density(results: FlightResults) -> Drawing | None:
         if normal is not None:
             d.line(
                 axes,
-                numbers(normal, "difference_deg"),
-                numbers(normal, "density_per_deg"),
+                normal.difference_deg,
+                normal.density_per_deg,
                 d.INK,
                 1.2,
                 label="fitted normal",
@@ -184,10 +190,10 @@ def density(results: FlightResults) -> Drawing | None:
 
 def taxi(results: FlightResults) -> Drawing | None:
     """Heading, track and speed during the taxi above the lanes that say which gate each epoch met."""
-    samples = results.figure_with_rows("heading_samples")
+    samples = results.rows_of(HeadingSamples)
     if samples is None:
         return None
-    lanes, answer = results.figure_with_rows("heading_lanes"), results.answer(HeadingResult)
+    lanes, answer = results.rows_of(HeadingLanes), results.answer(HeadingResult)
     speed_limit_mps = None if answer is None else answer.settings.get("taxi_speed_min_mps")
     spans = taxi_windows(samples)
     states = _lane_states(lanes, spans)
@@ -202,7 +208,7 @@ def taxi(results: FlightResults) -> Drawing | None:
         layout.legend_above(upper[-1])
         layout.legend_above(lower[-1])
         if states and lanes is not None:
-            start, end, state = numbers(lanes, "start_s"), numbers(lanes, "end_s"), texts(lanes, "state")
+            start, end, state = lanes.start_s, lanes.end_s, lanes.state
             strips = layout.time_panels(figure, (27, 12, 174, 12 + lane_mm), spans)
             for axes, (low, high) in zip(strips, spans, strict=True):
                 mine = (end >= low) & (start <= high)
@@ -216,11 +222,11 @@ def taxi(results: FlightResults) -> Drawing | None:
     return Drawing("Taxi: heading, track, speed and gates", caption, alt, d.draw("taxi", height, paint), names)
 
 
-def _paint_angles(panels: list[Any], samples: FigureData, spans: list[tuple[float, float]]) -> None:
+def _paint_angles(panels: list[Any], samples: HeadingSamples, spans: list[tuple[float, float]]) -> None:
     for axes, span in zip(panels, spans, strict=True):
         mine = _within(samples, span)
-        time, nose, speed = (numbers(mine, name) for name in ("time_s", "heading_deg", "ground_speed_mps"))
-        track = np.where(speed > SLOWEST_TRACK_MPS, numbers(mine, "track_deg"), np.nan)
+        time, nose, speed = mine.time_s, mine.heading_deg, mine.ground_speed_mps
+        track = np.where(speed > SLOWEST_TRACK_MPS, mine.track_deg, np.nan)
         d.line(axes, time, d.broken_at_wrap(track), d.GNSS, 0.8, 3000, label="GNSS track")
         d.line(axes, time, d.broken_at_wrap(nose), d.INS, 1.0, 3000, label="INS heading")
         angles = d.finite(nose, track)
@@ -229,21 +235,21 @@ def _paint_angles(panels: list[Any], samples: FigureData, spans: list[tuple[floa
     panels[0].set_ylabel("angle from true north, °")
 
 
-def _paint_speed(panels: list[Any], samples: FigureData, spans: list[tuple[float, float]], limit_mps: Any) -> None:
-    driven = d.finite(numbers(samples, "ground_speed_mps")[flags(samples, "used")])
+def _paint_speed(panels: list[Any], samples: HeadingSamples, spans: list[tuple[float, float]], limit_mps: Any) -> None:
+    driven = d.finite(samples.ground_speed_mps[samples.is_used])
     for axes, span in zip(panels, spans, strict=True):
         mine = _within(samples, span)
-        d.line(axes, numbers(mine, "time_s"), numbers(mine, "ground_speed_mps"), d.GNSS, 0.9, 3000)
+        d.line(axes, mine.time_s, mine.ground_speed_mps, d.GNSS, 0.9, 3000)
         if is_number(limit_mps):
             layout.limit_line(axes, limit_mps, f"used above {limit_mps:g} m/s")
     panels[0].set_ylabel("ground speed, m/s")
     panels[0].set_ylim(0.0, TAXI_SPEED_MARGIN * float(driven.max()) if driven.size else None)
 
 
-def _lane_states(lanes: FigureData | None, spans: list[tuple[float, float]]) -> list[str]:
+def _lane_states(lanes: HeadingLanes | None, spans: list[tuple[float, float]]) -> list[str]:
     if lanes is None:
         return []
-    start, end, state = numbers(lanes, "start_s"), numbers(lanes, "end_s"), texts(lanes, "state")
+    start, end, state = lanes.start_s, lanes.end_s, lanes.state
     shown = np.any([(end >= low) & (start <= high) for low, high in spans], axis=0)
     return sorted(set(state[shown].tolist()), key=lambda name: (name != "used", name))[:12]
 
@@ -301,18 +307,17 @@ def _overall(axes: Any, answer: HeadingResult, place: int) -> None:
 
 def spectrum(results: FlightResults) -> Drawing | None:
     """Spectral density of the residuals beside the noise model that the honest interval rests on."""
-    data = results.figure_with_rows("heading_spectrum")
+    data = results.rows_of(HeadingSpectrum)
     if data is None:
         return None
-    frequency = numbers(data, "frequency_hz")
-    columns = (("density_deg2_per_hz", "measured", d.USED), ("model_deg2_per_hz", "fitted model", d.INK))
+    frequency = data.frequency_hz
+    curves = ((data.density_deg2_per_hz, "measured", d.USED), (data.model_deg2_per_hz, "fitted model", d.INK))
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 16, 12, 174, 52)
         axes.set_xscale("log")
         axes.set_yscale("log")
-        for column, text, colour in columns:
-            values = numbers(data, column)
+        for values, text, colour in curves:
             d.line(axes, frequency, np.where(values > 0.0, values, np.nan), colour, 1.1, label=text)
         _plain_log_labels(axes.xaxis)
         _plain_log_labels(axes.yaxis, (1.0,))

@@ -9,7 +9,15 @@ from groundstation.base.normal import NORMAL_95
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
-from groundstation.results.figures import FigureData, flags, numbers
+from groundstation.results.arrays.inertial import (
+    InertialDifferences,
+    InertialObservability,
+    InertialOwnInnovations,
+    InertialStates,
+    InertialTrack,
+    StateSeries,
+)
+from groundstation.results.arrays.typed import Floats
 from groundstation.results.flight import FlightResults
 
 CHANNELS = ("north", "east")
@@ -30,16 +38,16 @@ MOST, MOST_DOTS = 500, 800  # points of a line and dots: more cannot be told apa
 
 def state(results: FlightResults, name: str) -> Drawing | None:
     """Position or velocity error of both channels: measured, estimated, smoothed, with the 95 % band."""
-    data = results.figure_with_rows("inertial_states")
-    if data is None or not has_values(data, *(f"{channel}_{name}_{SUFFIXES[name]}" for channel in CHANNELS)):
+    data = results.rows_of(InertialStates)
+    if data is None or not _are_known(data, name):
         return None
-    low, high = span(data)
+    low, high = span(data.time_s)
 
     def paint(figure: Any) -> None:
         upper, lower = layout.place(figure, 18, 58, 174, 98), layout.place(figure, 18, 12, 174, 52)
-        for axes, channel in ((upper, "north"), (lower, "east")):
+        for axes, channel, states in ((upper, "north", data.north), (lower, "east", data.east)):
             _outages(axes, data)
-            _paint_state(axes, data, channel, name)
+            _paint_state(axes, data.time_s, states.state(name))
             axes.set_ylabel(f"{channel} {name} error, {UNITS[name]}")
             layout.time_axis(axes, low, high, title=axes is lower)
         layout.legend_above(upper)
@@ -55,19 +63,19 @@ def state(results: FlightResults, name: str) -> Drawing | None:
 
 def tilt_and_drift(results: FlightResults) -> Drawing | None:
     """Platform tilt and constant gyro drift of both channels with their bands."""
-    data = results.figure_with_rows("inertial_states")
+    data = results.rows_of(InertialStates)
     names = ("tilt", "drift")
-    if data is None or not has_values(data, *(f"{c}_{name}_{SUFFIXES[name]}" for c in CHANNELS for name in names)):
+    if data is None or not all(_are_known(data, name) for name in names):
         return None
-    low, high = span(data)
+    low, high = span(data.time_s)
 
     def paint(figure: Any) -> None:
         for row, name in enumerate(names):
             bottom = 12.0 + 46.0 * (1 - row)
-            for column, channel in enumerate(CHANNELS):
+            for column, (channel, states) in enumerate((("north", data.north), ("east", data.east))):
                 axes = layout.place(figure, 18 + 90 * column, bottom, 84 + 90 * column, bottom + 38)
                 _outages(axes, data)
-                _paint_state(axes, data, channel, name)
+                _paint_state(axes, data.time_s, states.state(name))
                 axes.set_ylabel(f"{channel} {STATES[name]}, {UNITS[name]}")
                 layout.time_axis(axes, low, high, title=row == 1, most=5)
                 if row == 0 and column == 1:
@@ -82,11 +90,14 @@ def tilt_and_drift(results: FlightResults) -> Drawing | None:
     return Drawing("Platform tilt and gyro drift", caption, alt, svg, ("inertial_states",))
 
 
-def _paint_state(axes: Any, data: FigureData, channel: str, name: str) -> None:
-    column = f"{channel}_{name}_{SUFFIXES[name]}"
-    time, estimate = numbers(data, "time_s"), numbers(data, column)
-    measured, smoothed = numbers(data, f"measured_{column}"), numbers(data, f"smoothed_{column}")
-    half = NORMAL_95 * numbers(data, f"{channel}_{name}_sigma_{SUFFIXES[name]}")
+def _are_known(data: InertialStates, name: str) -> bool:
+    """Tell whether a state is known in both channels."""
+    return has_values(data.north.state(name).value, data.east.state(name).value)
+
+
+def _paint_state(axes: Any, time: Floats, state: StateSeries) -> None:
+    estimate, measured, smoothed = state.value, state.measured, state.smoothed
+    half = NORMAL_95 * state.sigma
     keep = d.thin(len(time), MOST)
     if np.isfinite(half).any():
         low, high = (estimate - half)[keep], (estimate + half)[keep]
@@ -103,20 +114,20 @@ def _paint_state(axes: Any, data: FigureData, channel: str, name: str) -> None:
         axes.set_ylim(*layout.padded(min(float(shown.min()), *ends), max(float(shown.max()), *ends), 0.08))
 
 
-def has_values(data: FigureData, *columns: str) -> bool:
-    """Whether each of the columns has a finite value."""
-    return all(bool(np.isfinite(numbers(data, column)).any()) for column in columns)
+def has_values(*columns: Floats | None) -> bool:
+    """Tell whether each of the columns is there and has a finite value."""
+    return all(column is not None and bool(np.isfinite(column).any()) for column in columns)
 
 
-def span(data: FigureData) -> tuple[float, float]:
+def span(time_s: Floats) -> tuple[float, float]:
     """First and last flight time of a figure."""
-    times = d.finite(numbers(data, "time_s"))
+    times = d.finite(time_s)
     return (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)
 
 
-def _outages(axes: Any, data: FigureData) -> None:
+def _outages(axes: Any, data: InertialStates) -> None:
     """Ground the times at which the filter forecast."""
-    gone, time = flags(data, "is_forecast"), numbers(data, "time_s")
+    gone, time = data.is_forecast, data.time_s
     edges = np.flatnonzero(np.diff(np.concatenate([[0], gone.astype(np.int8), [0]])))
     for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         axes.axvspan(time[start], time[min(end, len(time) - 1)], color=OUTAGE, linewidth=0, zorder=0)
@@ -124,23 +135,25 @@ def _outages(axes: Any, data: FigureData) -> None:
 
 def radial(results: FlightResults) -> Drawing | None:
     """Radial error of the track as flown by the INS and as corrected, on a logarithmic axis."""
-    data = results.figure_with_rows("inertial_track")
-    if data is None or not has_values(data, "ins_error_m", "corrected_error_m"):
+    data = results.rows_of(InertialTrack)
+    if data is None or data.ins_error_m is None or data.corrected_error_m is None:
         return None
-    low, high = span(data)
-    states = results.figure_with_rows("inertial_states")
+    errors = data.ins_error_m, data.corrected_error_m
+    if not has_values(*errors):
+        return None
+    low, high = span(data.time_s)
+    states = results.rows_of(InertialStates)
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 18, 12, 174, 58)
         axes.set_yscale("log")
         if states is not None:
             _outages(axes, states)
-        for column, text, colour in (
-            ("ins_error_m", "INS", d.INS),
-            ("corrected_error_m", "corrected: INS − estimated or forecast error", d.USED),
+        for values, text, colour in (
+            (errors[0], "INS", d.INS),
+            (errors[1], "corrected: INS − estimated or forecast error", d.USED),
         ):
-            values = numbers(data, column)
-            d.line(axes, numbers(data, "time_s"), np.where(values > 0.0, values, np.nan), colour, 1.0, label=text)
+            d.line(axes, data.time_s, np.where(values > 0.0, values, np.nan), colour, 1.0, label=text)
         plain_log(axes.yaxis, (1.0,))
         axes.set_ylabel("radial error against GNSS, m")
         layout.time_axis(axes, low, high)
@@ -167,16 +180,18 @@ def plain_log(axis: Any, marks: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
 
 def innovations(results: FlightResults) -> Drawing | None:
     """Innovations over their sigma, with the limits that 95 % should keep."""
-    data = results.figure_with_rows("inertial_states")
-    if data is None or not has_values(data, *(f"{channel}_normalised_innovation" for channel in CHANNELS)):
+    data = results.rows_of(InertialStates)
+    if data is None or not has_values(data.north.normalised_innovation, data.east.normalised_innovation):
         return None
-    low, high = span(data)
+    low, high = span(data.time_s)
 
     def paint(figure: Any) -> None:
-        for channel, bottom in (("north", 46.0), ("east", 12.0)):
+        for channel, values, bottom in (
+            ("north", data.north.normalised_innovation, 46.0),
+            ("east", data.east.normalised_innovation, 12.0),
+        ):
             axes = layout.place(figure, 18, bottom, 174, bottom + 28)
-            values = numbers(data, f"{channel}_normalised_innovation")
-            d.dots(axes, numbers(data, "time_s"), values, d.INS, 1.6, MOST_DOTS, zorder=2)
+            d.dots(axes, data.time_s, values, d.INS, 1.6, MOST_DOTS, zorder=2)
             for limit, text in ((NORMAL_95, "± 1.96 σ"), (-NORMAL_95, "")):
                 layout.limit_line(axes, limit, text)
             axes.set_ylim(*_symmetric(values))
@@ -202,17 +217,16 @@ def _symmetric(values: NDArray[np.float64]) -> tuple[float, float]:
 
 def observability(results: FlightResults) -> Drawing | None:
     """How well each state is seen as the flight goes on."""
-    data = results.figure_with_rows("inertial_observability")
-    if data is None or not any(has_values(data, f"north_{name}") for name in STATES):
+    data = results.rows_of(InertialObservability)
+    if data is None or not any(has_values(values) for values in data.north.states().values()):
         return None
-    low, high = span(data)
+    low, high = span(data.time_s)
 
     def paint(figure: Any) -> None:
-        for place, channel in enumerate(CHANNELS):
+        for place, (channel, part) in enumerate((("north", data.north), ("east", data.east))):
             axes = layout.place(figure, 18 + 66 * place, 12, 76 + 66 * place, 50)
-            for (name, text), colour in zip(STATES.items(), d.SERIES, strict=False):
-                values = numbers(data, f"{channel}_{name}")
-                d.line(axes, numbers(data, "time_s"), values, colour, 1.1, MOST, label=text)
+            for (name, values), colour in zip(part.states().items(), d.SERIES, strict=False):
+                d.line(axes, data.time_s, values, colour, 1.1, MOST, label=STATES[name])
             axes.set_ylim(-0.03, 1.03)
             axes.set_title(channel)
             axes.set_ylabel("observability" if place == 0 else "")
@@ -228,17 +242,19 @@ def observability(results: FlightResults) -> Drawing | None:
 
 def differences(results: FlightResults, quantity: str) -> Drawing | None:
     """INS minus GNSS of an INS that GNSS corrects, north and east."""
-    data = results.figure_with_rows("inertial_differences")
-    names = [f"{channel}_{quantity}_{SUFFIXES[quantity]}" for channel in CHANNELS]
-    if data is None or not has_values(data, *names):
+    data = results.rows_of(InertialDifferences)
+    if data is None:
         return None
-    low, high = span(data)
+    shown = [one.position_m if quantity == "position" else one.velocity_mps for one in (data.north, data.east)]
+    if not has_values(*shown):
+        return None
+    low, high = span(data.time_s)
 
     def paint(figure: Any) -> None:
-        for bottom, channel, name in ((46.0, "north", names[0]), (12.0, "east", names[1])):
+        for bottom, channel, values in ((46.0, "north", shown[0]), (12.0, "east", shown[1])):
             axes = layout.place(figure, 18, bottom, 174, bottom + 28)
             _zero(axes)
-            d.dots(axes, numbers(data, "time_s"), numbers(data, name), d.INS, 1.6, MOST_DOTS, zorder=2)
+            d.dots(axes, data.time_s, values, d.INS, 1.6, MOST_DOTS, zorder=2)
             axes.set_ylabel(f"{channel}, {UNITS[quantity]}")
             layout.time_axis(axes, low, high, title=channel == "east")
 
@@ -250,20 +266,20 @@ def differences(results: FlightResults, quantity: str) -> Drawing | None:
 
 def own_innovations(results: FlightResults) -> Drawing | None:
     """Innovations that the INS's own filter logged, with its band where it logged one."""
-    data = results.figure_with_rows("inertial_own_innovations")
+    data = results.rows_of(InertialOwnInnovations)
     if data is None:
         return None
-    low, high = span(data)
-    time = numbers(data, "time_s")
-    has_band = has_values(data, "north_position_sigma_m")
+    low, high = span(data.time_s)
+    time = data.time_s
+    has_band = has_values(data.north.position_sigma_m)
 
     def paint(figure: Any) -> None:
-        for row, (quantity, unit) in enumerate((("position", "m"), ("velocity", "mps"))):
-            for column, channel in enumerate(CHANNELS):
+        for row, quantity in enumerate(("position", "velocity")):
+            for column, (channel, own) in enumerate((("north", data.north), ("east", data.east))):
                 bottom = 12.0 + 40.0 * (1 - row)
                 axes = layout.place(figure, 18 + 90 * column, bottom, 84 + 90 * column, bottom + 32)
-                values = numbers(data, f"{channel}_{quantity}_{unit}")
-                half = NORMAL_95 * numbers(data, f"{channel}_{quantity}_sigma_{unit}")
+                values, sigma = own.of(quantity)
+                half = NORMAL_95 * sigma
                 if np.isfinite(half).any():
                     axes.fill_between(time, -half, half, color=d.USED, alpha=0.2, linewidth=0)
                 _zero(axes)

@@ -12,7 +12,7 @@ from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
-from groundstation.results.figures import FigureData, numbers
+from groundstation.results.arrays.landing import LandingPath, LandingProtection
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing import Approach, LandingResult
 from groundstation.results.landing_categories import CATEGORIES
@@ -23,13 +23,13 @@ LEAST_REACH_M, LINEAR_M = 30.0, 20.0
 MARKS_M = (10.0, 20.0, 100.0, 500.0, 2000.0)
 
 
-def _parts(results: FlightResults, of: str) -> tuple[Approach, FigureData, NDArray[np.intp]] | None:
+def _parts(results: FlightResults, of: str) -> tuple[Approach, LandingPath, NDArray[np.intp]] | None:
     """The approach, all samples, and which of them are its own."""
-    answer, data = results.answer(LandingResult), results.figure_with_rows("landing_path")
+    answer, data = results.answer(LandingResult), results.rows_of(LandingPath)
     one = None if answer is None else next((row for row in answer.approaches if str(row.number) == of), None)
     if one is None or data is None:
         return None
-    mine = np.flatnonzero(numbers(data, "approach") == one.number)
+    mine = np.flatnonzero(data.approach == one.number)
     return (one, data, mine) if len(mine) else None
 
 
@@ -39,13 +39,13 @@ def deviations(results: FlightResults, of: str) -> Drawing | None:
     if found is None:
         return None
     one, data, mine = found
-    distance = numbers(data, "distance_m")[mine]
+    own = data.where(mine)
+    distance = own.distance_m
     before = distance > 0.0
-    column = {name: numbers(data, name)[mine] for name in data.columns}
-    height = np.where(before, column["height_m"] - column["path_height_m"], np.nan)
+    height = np.where(before, own.height_m - own.path_height_m, np.nan)
     panels = (
-        ("right of the course", column["lateral_guidance_m"], column["across_m"], column["lateral_dot_m"]),
-        ("above the path", column["vertical_guidance_m"], height, column["vertical_dot_m"]),
+        ("right of the course", own.lateral_guidance_m, own.across_m, own.lateral_dot_m),
+        ("above the path", own.vertical_guidance_m, height, own.vertical_dot_m),
     )
 
     def paint(figure: Any) -> None:
@@ -106,12 +106,12 @@ def final(results: FlightResults, of: str) -> Drawing | None:
     if found is None:
         return None
     one, data, mine = found
-    distance, across = (numbers(data, name)[mine] / M_PER_KM for name in ("distance_m", "across_m"))
-    height, path = numbers(data, "height_m")[mine], numbers(data, "path_height_m")[mine]
+    distance, across = (values[mine] / M_PER_KM for values in (data.distance_m, data.across_m))
+    height, path = data.height_m[mine], data.path_height_m[mine]
 
     def paint(figure: Any) -> None:
         above = layout.place(figure, 18, 54, 174, 82)
-        _from_above(above, one, numbers(data, "time_s")[mine], distance, across, numbers(data, "lateral_dot_m")[mine])
+        _from_above(above, one, data.time_s[mine], distance, across, data.lateral_dot_m[mine])
         side = layout.place(figure, 18, 12, 174, 45)
         d.line(side, distance, path, d.LIMIT, 0.9, label="path")
         d.line(side, distance, height, d.INS, 1.2, label="flown")
@@ -158,19 +158,21 @@ def _from_above(
 
 def protection(results: FlightResults, of: str) -> Drawing | None:
     """Protection levels against alarm limits over time: the part of a Stanford plot that a log without truth has."""
-    found, data = _parts(results, of), results.figure_with_rows("landing_protection")
+    found, data = _parts(results, of), results.rows_of(LandingProtection)
     if found is None or data is None:
         return None
     one = found[0]
-    mine = numbers(data, "approach") == one.number
-    time_s = numbers(data, "time_s")[mine]
+    own = data.where(data.approach == one.number)
+    time_s = own.time_s
     if not time_s.size:
         return None
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 18, 12, 174, 56)
-        for axis, colour in (("horizontal", d.GNSS), ("vertical", d.USED)):
-            level, limit = (numbers(data, f"{axis}_{what}_m")[mine] for what in ("protection", "alarm_limit"))
+        for axis, colour, level, limit in (
+            ("horizontal", d.GNSS, own.horizontal_protection_m, own.horizontal_alarm_limit_m),
+            ("vertical", d.USED, own.vertical_protection_m, own.vertical_alarm_limit_m),
+        ):
             d.line(axes, time_s, level, colour, 1.3, label=f"{axis} protection level")
             if np.isfinite(limit).any():
                 d.line(axes, time_s, limit, colour, 0.9, linestyle=(0, (4, 2)), label=f"{axis} alarm limit")

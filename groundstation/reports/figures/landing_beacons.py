@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
-from groundstation.results.figures import numbers
+from groundstation.results.arrays.landing import BeaconsPath
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing_beacons import BeaconLanding
 from groundstation.results.landing_categories import CATEGORIES, LINEAR_95
@@ -20,21 +20,22 @@ M_PER_KM = 1000.0
 
 def deviations(results: FlightResults) -> Drawing | None:
     """Right of the course and above the glide path by distance, every approach."""
-    answer, data = results.answer(BeaconLanding), results.figure_with_rows("landing_beacons_path")
+    answer, data = results.answer(BeaconLanding), results.rows_of(BeaconsPath)
     if answer is None or data is None:
         return None
-    number, before = numbers(data, "approach"), numbers(data, "straight_before_threshold_m")
+    number, before = data.approach, data.straight_before_threshold_m
+    lateral, vertical = (data.lateral_m, data.lateral_sigma_m), (data.glide_path_m, data.glide_path_sigma_m)
 
     def paint(figure: Any) -> None:
-        for top, column, most, limits, title in (
-            (118, "lateral", LATERAL_M, [one.horizontal_m for one in CATEGORIES], "right of course, m"),
-            (60, "glide_path", VERTICAL_M, [one.vertical_m for one in CATEGORIES], "above glide path, m"),
+        for top, values, sigma, most, limits, title in (
+            (118, *lateral, LATERAL_M, [one.horizontal_m for one in CATEGORIES], "right of course, m"),
+            (60, *vertical, VERTICAL_M, [one.vertical_m for one in CATEGORIES], "above glide path, m"),
         ):
             axes = layout.place(figure, 18, top - 46, 174, top)
             for one, colour in zip(answer.approaches, d.SERIES, strict=False):
                 rows = np.flatnonzero((number == one.approach) & (before < FARTHEST_M) & (before > NEAREST_M))
-                x, y = before[rows] / M_PER_KM, numbers(data, f"{column}_m")[rows]
-                half = _running_median(LINEAR_95 * numbers(data, f"{column}_sigma_m")[rows])
+                x, y = before[rows] / M_PER_KM, values[rows]
+                half = _running_median(LINEAR_95 * sigma[rows])
                 name = "95 % of one position" if one.approach == 1 else None
                 axes.fill_between(x, -half, half, color=d.FILL, linewidth=0, label=name, zorder=0.5)
                 d.dots(axes, x, y, colour, 2.6, label=f"approach {one.approach}", zorder=4)
@@ -47,7 +48,7 @@ def deviations(results: FlightResults) -> Drawing | None:
             axes.set_ylim(-most, most)
             axes.set_xlim(FARTHEST_M / M_PER_KM, NEAREST_M / M_PER_KM)
             axes.set_ylabel(title)
-            if column == "glide_path":
+            if top == 60:
                 axes.set_xlabel("before the threshold, km")
             else:
                 layout.legend_above(axes, 4)

@@ -8,7 +8,8 @@ from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
-from groundstation.results.figures import FigureData, numbers, texts
+from groundstation.results.arrays.landing import RangesErrors, RangesPath, RangesSpace
+from groundstation.results.arrays.typed import T
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing_categories import CATEGORIES, LINEAR_95
 from groundstation.results.landing_ranges import HONEST, WHITE, RangeLanding
@@ -19,19 +20,19 @@ MOST_TRIALS = 30
 LEAST_SHOWN_M = 0.1
 
 
-def _data(results: FlightResults, name: str) -> tuple[RangeLanding, FigureData] | None:
-    answer, data = results.answer(RangeLanding), results.figure_with_rows(name)
+def _data(results: FlightResults, kind: type[T]) -> tuple[RangeLanding, T] | None:
+    answer, data = results.answer(RangeLanding), results.rows_of(kind)
     return None if answer is None or data is None else (answer, data)
 
 
 def space(results: FlightResults) -> Drawing | None:
     """Path and points from above and from the side."""
-    found = _data(results, "landing_ranges_space")
+    found = _data(results, RangesSpace)
     if found is None:
         return None
     answer, data = found
-    name = texts(data, "name")
-    along, right, up = (numbers(data, f"{axis}_m") / M_PER_KM for axis in ("along", "right", "up"))
+    name = data.label
+    along, right, up = (values / M_PER_KM for values in (data.along_m, data.right_m, data.up_m))
     length = float(answer.settings["path.runway_length_m"]) / M_PER_KM
 
     def paint(figure: Any) -> None:
@@ -67,23 +68,27 @@ def space(results: FlightResults) -> Drawing | None:
 
 def accuracy(results: FlightResults) -> Drawing | None:
     """Horizontal, lateral and vertical 95 % figures along the path, with the limits of the categories."""
-    found = _data(results, "landing_ranges_path")
+    found = _data(results, RangesPath)
     if found is None:
         return None
     _, data = found
-    before = numbers(data, "before_threshold_m") / M_PER_KM
+    before = data.before_threshold_m / M_PER_KM
     panels = (
-        ("horizontal, m", (("horizontal_95_m", d.INS, "radius"), ("lateral_95_m", d.GNSS, "lateral")), "horizontal_m"),
-        ("vertical, m", (("vertical_95_m", d.INS, "vertical"),), "vertical_m"),
+        (
+            "horizontal, m",
+            ((data.horizontal_95_m, d.INS, "radius"), (data.lateral_95_m, d.GNSS, "lateral")),
+            [one.horizontal_m for one in CATEGORIES],
+        ),
+        ("vertical, m", ((data.vertical_95_m, d.INS, "vertical"),), [one.vertical_m for one in CATEGORIES]),
     )
 
     def paint(figure: Any) -> None:
-        for (title, lines, limit), (bottom, top) in zip(panels, ((66, 112), (12, 58)), strict=True):
+        for (title, lines, limits), (bottom, top) in zip(panels, ((66, 112), (12, 58)), strict=True):
             axes = layout.place(figure, 18, bottom, 174, top)
-            for column, colour, label in lines:
-                d.line(axes, before, np.maximum(numbers(data, column), LEAST_SHOWN_M), colour, 1.4, label=label)
-            for value in sorted({getattr(one, limit) for one in CATEGORIES}, reverse=True):
-                named = [one.name for one in CATEGORIES if getattr(one, limit) == value]
+            for values, colour, label in lines:
+                d.line(axes, before, np.maximum(values, LEAST_SHOWN_M), colour, 1.4, label=label)
+            for value in sorted(set(limits), reverse=True):
+                named = [one.name for one, limit in zip(CATEGORIES, limits, strict=True) if limit == value]
                 text = "" if named == [CATEGORIES[-1].name] else f"{named[0]}: {value:g} m"  # too near for a text
                 layout.limit_line(axes, value, "")
                 layout.beside(axes, 0.66, value, text, d.LIMIT, axes.get_yaxis_transform(), "left")
@@ -108,11 +113,11 @@ def accuracy(results: FlightResults) -> Drawing | None:
 
 def trials(results: FlightResults) -> Drawing | None:
     """Errors to the right and up of simulated approaches in the band that the filter computes."""
-    found = _data(results, "landing_ranges_errors")
+    found = _data(results, RangesErrors)
     if found is None:
         return None
     answer, data = found
-    before, trial, of = numbers(data, "before_threshold_m") / M_PER_KM, numbers(data, "trial"), texts(data, "filter")
+    before, trial, of = data.before_threshold_m / M_PER_KM, data.trial, data.filter
     filters = [one for one in (HONEST, WHITE) if (of == one).any()]
     names = {HONEST: "range errors modelled", WHITE: "taken for white"}
     height = 14.0 + 54.0 * len(filters)
@@ -120,17 +125,20 @@ def trials(results: FlightResults) -> Drawing | None:
     def paint(figure: Any) -> None:
         for number, which in enumerate(filters):
             top = height - 8.0 - 54.0 * number
-            for left, axis in ((18, "right"), (104, "up")):
+            for left, axis, error, sigma in (
+                (18, "right", data.error_right_m, data.sigma_right_m),
+                (104, "up", data.error_up_m, data.sigma_up_m),
+            ):
                 axes = layout.place(figure, left, top - 38.0, left + 70, top)
                 mine = of == which
                 one = mine & (trial == 1)
-                band = LINEAR_95 * numbers(data, f"sigma_{axis}_m")
+                band = LINEAR_95 * sigma
                 axes.fill_between(before[one], -band[one], band[one], color=d.FILL, linewidth=0, label="95 %")
                 for count in range(1, min(answer.trial_count, MOST_TRIALS) + 1):
                     rows = mine & (trial == count)
-                    d.line(axes, before[rows], numbers(data, f"error_{axis}_m")[rows], d.INS, 0.5)
+                    d.line(axes, before[rows], error[rows], d.INS, 0.5)
                 near = mine & (before < 2.5)
-                most = 1.15 * float(np.nanquantile(np.abs(numbers(data, f"error_{axis}_m")[near]), 0.995))
+                most = 1.15 * float(np.nanquantile(np.abs(error[near]), 0.995))
                 axes.set_ylim(-max(most, 0.5), max(most, 0.5))
                 axes.set_xlim(float(before.max()), float(before.min()))
                 axes.set_ylabel(f"error {axis}, m")

@@ -8,7 +8,7 @@ from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
-from groundstation.results.figures import numbers, texts
+from groundstation.results.arrays.flight import LatencySearch
 from groundstation.results.flight import FlightResults
 from groundstation.results.latency import Latencies
 
@@ -17,11 +17,11 @@ MOST_PAIRS = len(d.SERIES)
 
 def search(results: FlightResults) -> Drawing | None:
     """The residual of every pair against the latency tried; None without the arrays."""
-    answer, data = results.answer(Latencies), results.figure_with_rows("latency_search")
+    answer, data = results.answer(Latencies), results.rows_of(LatencySearch)
     if answer is None or data is None:
         return None
-    delay, residual = numbers(data, "latency_s"), numbers(data, "residual")
-    other, quantity = texts(data, "other"), texts(data, "quantity")
+    delay, residual = data.latency_s, data.residual
+    other, quantity = data.other, data.quantity
     known = [row for row in answer.rows if np.any((other == row.other) & (quantity == row.quantity))]
 
     def paint(figure: Any) -> None:

@@ -11,7 +11,8 @@ from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.frames import TIME
-from groundstation.results.figures import flags, numbers, texts
+from groundstation.results.arrays.flight import Overview
+from groundstation.results.arrays.magnetic import MagneticCurves, MagneticModulus, MagneticSamples, MagneticTable
 from groundstation.results.flight import FlightResults
 from groundstation.results.magnetic import METHOD_TITLES, MagneticResult
 
@@ -28,18 +29,20 @@ def _heading_axis(axes: Any) -> None:
 
 def deviation(results: FlightResults) -> Drawing | None:
     """Deviation against heading by each method, with bands."""
-    curves, table = results.figure_with_rows("magnetic_curves"), results.figure_with_rows("magnetic_table")
+    curves, table = results.rows_of(MagneticCurves), results.rows_of(MagneticTable)
     if curves is None:
         return None
-    heading = numbers(curves, "uncorrected_magnetic_heading_deg")
+    heading = curves.uncorrected_magnetic_heading_deg
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 16, 12, 174, 74)
         if table is not None:
-            bins, values = numbers(table, "uncorrected_magnetic_heading_deg"), numbers(table, "deviation_deg")
+            bins, values = table.uncorrected_magnetic_heading_deg, table.deviation_deg
             d.dots(axes, bins, values, d.UNUSED, 3.0, label="table, bins of 1°")
         for name, title in METHOD_TITLES.items():
-            value, half = numbers(curves, f"deviation_{name}_deg"), NORMAL_95 * numbers(curves, f"sigma_{name}_deg")
+            if name not in curves.deviation_deg or name not in curves.sigma_deg:
+                continue
+            value, half = curves.deviation_deg[name], NORMAL_95 * curves.sigma_deg[name]
             if not np.isfinite(value).any():
                 continue
             colour = METHOD_COLOURS[name]
@@ -60,12 +63,12 @@ def deviation(results: FlightResults) -> Drawing | None:
 
 def held_out(results: FlightResults) -> Drawing | None:
     """Error of the magnetic heading where no fit has seen, before and after the recommended correction."""
-    answer, data = results.answer(MagneticResult), results.figure_with_rows("magnetic_samples")
-    if answer is None or data is None or not (mine := texts(data, "part") == "held out").any():
+    answer, data = results.answer(MagneticResult), results.rows_of(MagneticSamples)
+    if answer is None or data is None or not (mine := data.part == "held out").any():
         return None
     method = answer.recommended_method
-    time, heading = numbers(data, "time_s")[mine], numbers(data, "uncorrected_magnetic_heading_deg")[mine]
-    before, after = numbers(data, "error_before_deg")[mine], numbers(data, f"error_{method}_deg")[mine]
+    time, heading = data.time_s[mine], data.uncorrected_magnetic_heading_deg[mine]
+    before, after = data.error_before_deg[mine], data.error_after_deg(method)[mine]
     shown = ((before, d.UNUSED, "before"), (after, METHOD_COLOURS[method], "after"))
 
     def paint(figure: Any) -> None:
@@ -93,15 +96,15 @@ def held_out(results: FlightResults) -> Drawing | None:
 
 def track(results: FlightResults) -> Drawing | None:
     """The figures as flown, coloured by branch."""
-    answer, data = results.answer(MagneticResult), results.figure_with_rows("overview")
+    answer, data = results.answer(MagneticResult), results.rows_of(Overview)
     turns = [turn for turn in answer.turns if turn.state == "used"] if answer else []
     if data is None or not turns:
         return None
-    time = numbers(data, "time_s")
+    time = data.time_s
     near = (time >= min(turn.start_s for turn in turns) - MARGIN_S) & (
         time <= max(turn.end_s for turn in turns) + MARGIN_S
     )
-    latitude, longitude = on_earth(numbers(data, "latitude_deg")[near], numbers(data, "longitude_deg")[near])
+    latitude, longitude = on_earth(data.latitude_deg[near], data.longitude_deg[near])
     known = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
     if not known.size:
         return None
@@ -132,12 +135,12 @@ def track(results: FlightResults) -> Drawing | None:
 
 def branches(results: FlightResults) -> Drawing | None:
     """Compass error on either branch and their average, declination in it."""
-    samples, table = results.figure_with_rows("magnetic_samples"), results.figure_with_rows("magnetic_table")
+    samples, table = results.rows_of(MagneticSamples), results.rows_of(MagneticTable)
     if samples is None or table is None:
         return None
-    part, heading = texts(samples, "part"), numbers(samples, "uncorrected_magnetic_heading_deg")
-    error, bins = numbers(samples, "compass_error_deg"), numbers(table, "uncorrected_magnetic_heading_deg")
-    average, filled = numbers(table, "compass_error_deg"), flags(table, "is_interpolated")
+    part, heading = samples.part, samples.uncorrected_magnetic_heading_deg
+    error, bins = samples.compass_error_deg, table.uncorrected_magnetic_heading_deg
+    average, filled = table.compass_error_deg, table.is_interpolated
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 16, 12, 174, 70)
@@ -161,10 +164,10 @@ def branches(results: FlightResults) -> Drawing | None:
 
 def modulus(results: FlightResults) -> Drawing | None:
     """Modulus of the field on the figures before and after it is freed of the iron."""
-    answer, data = results.answer(MagneticResult), results.figure_with_rows("magnetic_modulus")
+    answer, data = results.answer(MagneticResult), results.rows_of(MagneticModulus)
     if answer is None or data is None:
         return None
-    time = numbers(data, "time_s")
+    time = data.time_s
     spans = layout.windows(time)
     horizontal, down = answer.declination.horizontal_nt, answer.declination.down_nt
 
@@ -172,11 +175,10 @@ def modulus(results: FlightResults) -> Drawing | None:
         panels = layout.time_panels(figure, (16, 12, 174, 62), spans)
         for axes, (low, high) in zip(panels, spans, strict=True):
             mine = (time >= low) & (time <= high)
-            for column, colour, name in (
-                ("before_nt", d.UNUSED, "as read"),
-                *((f"{name}_nt", METHOD_COLOURS[name], METHOD_TITLES[name]) for name in METHOD_TITLES),
+            for values, colour, name in (
+                (data.before_nt, d.UNUSED, "as read"),
+                *((after, METHOD_COLOURS[name], METHOD_TITLES[name]) for name, after in data.freed().items()),
             ):
-                values = numbers(data, column)
                 if np.isfinite(values).any():
                     broken_time, broken = d.broken_at_gaps(time[mine], values[mine] / 1e3)
                     d.line(axes, broken_time, broken, colour, 1.0, label=name)

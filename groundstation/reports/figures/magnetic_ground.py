@@ -8,7 +8,7 @@ from groundstation.base.normal import NORMAL_95
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
-from groundstation.results.figures import flags, numbers
+from groundstation.results.arrays.magnetic import GroundRunCurve, GroundRunEpochs
 from groundstation.results.flight import FlightResults
 from groundstation.results.magnetic_ground import GroundDeviation
 
@@ -24,20 +24,20 @@ def ground_runs(results: FlightResults) -> Drawing | None:
     heading = np.array([run.magnetic_heading_deg for run in used])
     error = np.array([run.error_deg for run in used], dtype=np.float64)
     half = NORMAL_95 * np.array([run.sigma_deg for run in used], dtype=np.float64)  # NaN where it is not known
-    curve = results.figure_with_rows("magnetic_ground_curve")
-    epochs = results.figure_with_rows("magnetic_ground_epochs")
+    curve = results.rows_of(GroundRunCurve)
+    epochs = results.rows_of(GroundRunEpochs)
     low, high = float(np.nanmin(error - half)), float(np.nanmax(error + half))
     middle, reach = 0.5 * (low + high), max(0.6 * (high - low), 0.5 * LEAST_SPAN_DEG)
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 16, 12, 174, 66)
         if epochs is not None:
-            mine = flags(epochs, "is_used")
-            x, y = numbers(epochs, "magnetic_heading_deg")[mine], numbers(epochs, "error_deg")[mine]
+            mine = epochs.is_used
+            x, y = epochs.magnetic_heading_deg[mine], epochs.heading_error_deg[mine]
             d.dots(axes, x, y, d.UNUSED, 2.4, 2500, label="epochs")
-        if curve is not None and np.isfinite(numbers(curve, "error_deg")).any():
-            x, y = numbers(curve, "magnetic_heading_deg"), numbers(curve, "error_deg")
-            band = NORMAL_95 * numbers(curve, "sigma_deg")
+        if curve is not None and np.isfinite(curve.heading_error_deg).any():
+            x, y = curve.magnetic_heading_deg, curve.heading_error_deg
+            band = NORMAL_95 * curve.heading_error_sigma_deg
             axes.fill_between(x, y - band, y + band, color=d.USED, alpha=0.15, linewidth=0)
             d.line(axes, x, y, d.USED, 1.2, label="A to E")
         bars: dict[str, Any] = {"color": d.INS, "markersize": 3.5, "elinewidth": 1.1, "capsize": 2.5, "zorder": 4}

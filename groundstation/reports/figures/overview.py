@@ -7,21 +7,19 @@ import numpy as np
 
 from groundstation.base.ellipse import ELLIPSE_95, outlines
 from groundstation.base.geodesy import on_earth, plan_north_east_m
-from groundstation.chapters.wording import number, words
+from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.frames import TIME
+from groundstation.results.arrays.flight import GnssLanes, Overview, PhaseSpans, StateLanes
+from groundstation.results.arrays.typed import Floats
 from groundstation.results.corrected_position import CorrectedPosition, corrected_position
-from groundstation.results.figures import FigureData, numbers, texts
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult, TaxiSegment
 
 SMALLEST_TAXI_M = 10.0  # less is no taxi worth enlarging: a receiver at rest, or a start by hand
 SMALLEST_MAP_M = 2.0  # side of the map of an aircraft that did not move
-ALTITUDES = ("altitude_m", "pressure_altitude_m", "height_above_airfield_m")
-SPEEDS = ("ground_speed_mps", "true_airspeed_mps")
-HEADINGS = ("heading_deg", "magnetic_heading_deg")
 MOST_MODES = 12
 STATE_COLOURS = {"armed": "#b3261e", "on the ground": "#3a86c8"}
 GNSS_COLOURS = {"good": d.USED, "integrity lost": "#b3261e", "no GNSS": "#b3261e"}
@@ -29,10 +27,10 @@ GNSS_COLOURS = {"good": d.USED, "integrity lost": "#b3261e", "no GNSS": "#b3261e
 
 def track_map(results: FlightResults) -> Drawing | None:
     """The track in local coordinates, with the taxi enlarged and the used stretches marked."""
-    data = results.figure_with_rows("overview")
+    data = results.rows_of(Overview)
     if data is None:
         return None
-    latitude, longitude = on_earth(numbers(data, "latitude_deg"), numbers(data, "longitude_deg"))
+    latitude, longitude = on_earth(data.latitude_deg, data.longitude_deg)
     known = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
     if not known.size:
         return None
@@ -40,9 +38,9 @@ def track_map(results: FlightResults) -> Drawing | None:
     north, east = plan_north_east_m(latitude, longitude, *origin)
     answer = results.answer(HeadingResult)
     segments = () if answer is None else answer.segments
-    time = numbers(data, "time_s")
+    time = data.time_s
     used = _used_rows(time, segments)
-    taxi = _taxi_rows(time, segments, results.figure_with_rows("phases"))
+    taxi = _taxi_rows(time, segments, results.rows_of(PhaseSpans))
     on_ground = _extent(north[taxi], east[taxi])
     zoom = on_ground > SMALLEST_TAXI_M and _extent(north, east) > 2.0 * on_ground
 
@@ -76,11 +74,11 @@ def _used_rows(time: Any, segments: Sequence[TaxiSegment]) -> Any:
     return used
 
 
-def _taxi_rows(time: Any, segments: Sequence[TaxiSegment], phases: FigureData | None) -> Any:
+def _taxi_rows(time: Any, segments: Sequence[TaxiSegment], phases: PhaseSpans | None) -> Any:
     if phases is not None:
-        airborne = np.flatnonzero(np.isin(texts(phases, "phase"), ("take-off run", "airborne")))
+        airborne = np.flatnonzero(np.isin(phases.phase, ("take-off run", "airborne")))
         if airborne.size:
-            return time < float(numbers(phases, "start_s")[airborne[0]])
+            return time < float(phases.start_s[airborne[0]])
     ends = [segment.end_s for segment in segments]
     return time <= max(ends) if ends else np.zeros(len(time), dtype=bool)
 
@@ -129,26 +127,29 @@ def _map(axes: Any, time: Any, north: Any, east: Any, used: Any, title: str) -> 
 
 def profile(results: FlightResults) -> Drawing | None:
     """Altitude and ground speed over time, shaded by phase, above the state of GNSS."""
-    data = results.figure_with_rows("overview")
+    data = results.rows_of(Overview)
     if data is None:
         return None
-    phases, gnss = results.figure_with_rows("phases"), results.figure_with_rows("gnss_lanes")
-    time = numbers(data, "time_s")
-    altitude, speed = _first_known(data, ALTITUDES), _first_known(data, SPEEDS)
+    phases, gnss = results.rows_of(PhaseSpans), results.rows_of(GnssLanes)
+    time = data.time_s
+    altitude, altitude_name = _first_known(
+        (data.altitude_m, "altitude"),
+        (data.pressure_altitude_m, "pressure altitude"),
+        (data.height_above_airfield_m, "height above airfield"),
+    )
+    speed, speed_name = _first_known((data.ground_speed_mps, "ground speed"), (data.true_airspeed_mps, "true airspeed"))
     times = d.finite(time)
     low, high = (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)
-    states = (
-        [] if gnss is None else sorted(set(texts(gnss, "state").tolist()), key=lambda name: (name != "good", name))[:8]
-    )
+    states = [] if gnss is None else sorted(set(gnss.state.tolist()), key=lambda name: (name != "good", name))[:8]
     lane_mm = 4.6 * len(states) + (3.0 if states else 0.0)
 
     panels = [
         panel
         for panel in (
-            (altitude, f"{words(altitude.removesuffix('_m'))}, m", d.INS),
-            (speed, f"{words(speed.removesuffix('_mps'))}, m/s", d.GNSS),
+            (altitude, f"{altitude_name}, m", d.INS),
+            (speed, f"{speed_name}, m/s", d.GNSS),
         )
-        if np.isfinite(numbers(data, panel[0])).any()
+        if np.isfinite(panel[0]).any()
     ]
     if not panels:
         return None
@@ -156,22 +157,19 @@ def profile(results: FlightResults) -> Drawing | None:
     def paint(figure: Any) -> None:
         base = 12.0 + lane_mm
         places = [layout.place(figure, 30, base + 35 * row, 174, base + 35 * row + 31) for row in range(len(panels))]
-        for axes, (column, text, colour) in zip(reversed(places), panels, strict=True):
+        for axes, (values, text, colour) in zip(reversed(places), panels, strict=True):
             if phases is not None:
-                d.spans(
-                    axes, numbers(phases, "start_s"), numbers(phases, "end_s"), texts(phases, "phase"), d.PHASE_COLOURS
-                )
-            values = numbers(data, column)
+                d.spans(axes, phases.start_s, phases.end_s, phases.phase, d.PHASE_COLOURS)
             d.line(axes, time, values, colour, 1.0)
             axes.set_ylabel(text)
             layout.time_axis(axes, low, high, title=axes is places[0] and not states)
         layout.legend_above(places[-1])
         if states and gnss is not None:
             strip = layout.place(figure, 30, 12, 174, 9 + lane_mm)
-            d.lanes(strip, numbers(gnss, "start_s"), numbers(gnss, "end_s"), texts(gnss, "state"), states, GNSS_COLOURS)
+            d.lanes(strip, gnss.start_s, gnss.end_s, gnss.state, states, GNSS_COLOURS)
             layout.time_axis(strip, low, high)
 
-    names = tuple(name for name in ("overview", "phases", "gnss_lanes") if results.figure_with_rows(name) is not None)
+    names = tuple(one.name for one in (data, phases, gnss) if one is not None)
     caption = "Ground: phase of flight." + (" Lanes: usability of GNSS." if states else "")
     alt = "Altitude and speed over flight time with phases shaded."
     return Drawing(
@@ -179,36 +177,42 @@ def profile(results: FlightResults) -> Drawing | None:
     )
 
 
-def _first_known(data: FigureData, names: Sequence[str]) -> str:
-    """The first of the columns that has a value, else the first."""
-    return next((name for name in names if np.isfinite(numbers(data, name)).any()), names[0])
+def _first_known(*listed: tuple[Floats | None, str]) -> tuple[Floats, str]:
+    """The first of some columns that has a value, else the first, and its name."""
+    there = [(values, name) for values, name in listed if values is not None]
+    return next(((values, name) for values, name in there if np.isfinite(values).any()), there[0])
 
 
 def attitude(results: FlightResults) -> Drawing | None:
     """Roll, pitch and heading over time, as far as they are known; None where none is."""
-    data = results.figure_with_rows("overview")
+    data = results.rows_of(Overview)
     if data is None:
         return None
-    heading = _first_known(data, HEADINGS)
+    heading = _first_known((data.heading_deg, "heading"), (data.magnetic_heading_deg, "magnetic heading"))
+    listed = (
+        (((data.roll_deg, "roll"), (data.pitch_deg, "pitch")), "attitude, °"),
+        (
+            (heading, (data.track_deg, "track")),
+            "direction, °",
+        ),
+    )
     panels = [
-        (names, unit)
-        for names, unit in ((("roll_deg", "pitch_deg"), "attitude, °"), ((heading, "track_deg"), "direction, °"))
-        if any(np.isfinite(numbers(data, name)).any() for name in names)
+        (curves, unit)
+        for curves, unit in listed
+        if any(values is not None and np.isfinite(values).any() for values, _ in curves)
     ]
-    times = d.finite(numbers(data, "time_s"))
+    times = d.finite(data.time_s)
     if not panels or not times.size:
         return None
     height = 14.0 + 36.0 * len(panels)
 
     def paint(figure: Any) -> None:
-        for place, (names, unit) in enumerate(reversed(panels)):
+        for place, (curves, unit) in enumerate(reversed(panels)):
             axes = layout.place(figure, 30, 12 + 36 * place, 174, 42 + 36 * place)
-            for name, colour in zip(names, (d.INS, d.GNSS), strict=True):
-                values = numbers(data, name)
-                if np.isfinite(values).any():
-                    shown = values if name in ("roll_deg", "pitch_deg") else d.broken_at_wrap(values)
-                    text = words(name.removesuffix("_deg"))
-                    d.line(axes, numbers(data, "time_s"), shown, colour, 0.9, label=text)
+            for (values, name), colour in zip(curves, (d.INS, d.GNSS), strict=True):
+                if values is not None and np.isfinite(values).any():
+                    shown = values if name in ("roll", "pitch") else d.broken_at_wrap(values)
+                    d.line(axes, data.time_s, shown, colour, 0.9, label=name)
             axes.set_ylabel(unit)
             layout.time_axis(axes, float(times.min()), float(times.max()), title=place == 0)
             layout.legend_above(axes)
@@ -219,16 +223,17 @@ def attitude(results: FlightResults) -> Drawing | None:
 
 def states(results: FlightResults) -> Drawing | None:
     """Flight modes, arming and ground contact as the log tells them, a row for each state; None when it tells none."""
-    data = results.figure_with_rows("state_lanes")
+    data = results.rows_of(StateLanes)
     if data is None:
         return None
-    lane, state = texts(data, "lane"), texts(data, "state")
-    start, end = numbers(data, "start_s"), numbers(data, "end_s")
+    lane, state = data.lane, data.state
+    start, end = data.start_s, data.end_s
     named = np.where(lane == "mode", np.char.add("mode ", state), state)
     shown = ~np.isin(state, ("disarmed", "in the air", ""))  # what is not drawn is the opposite
     modes = list(dict.fromkeys(named[shown & (lane == "mode")].tolist()))
     rows = [*dict.fromkeys(named[shown & (lane != "mode")].tolist()), *modes[:MOST_MODES]]
-    times = d.finite(numbers(results.figure_with_rows("overview") or data, "time_s"), start, end)
+    course = results.rows_of(Overview)
+    times = d.finite(start if course is None else course.time_s, start, end)
     if not rows or not times.size:
         return None
     height = 14.0 + 4.6 * len(rows)

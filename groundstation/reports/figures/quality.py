@@ -8,7 +8,7 @@ from groundstation.chapters.wording import number
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
-from groundstation.results.figures import FigureData, numbers, texts
+from groundstation.results.arrays.flight import GapRows, LedgerRows
 from groundstation.results.flight import FlightResults
 
 MOST_LANES = 24
@@ -16,11 +16,11 @@ MOST_LANES = 24
 
 def gaps(results: FlightResults) -> Drawing | None:
     """Strips of data and gaps over flight time; None without a ledger."""
-    ledger, holes = results.figure_with_rows("ledger"), results.figure_with_rows("gaps")
+    ledger, holes = results.rows_of(LedgerRows), results.rows_of(GapRows)
     if ledger is None:
         return None
-    topic, first, last = texts(ledger, "topic"), numbers(ledger, "first_s"), numbers(ledger, "last_s")
-    gap_topic = np.zeros(0, dtype=np.str_) if holes is None else texts(holes, "topic")
+    topic, first, last = ledger.topic, ledger.first_s, ledger.last_s
+    gap_topic = np.zeros(0, dtype=np.str_) if holes is None else holes.topic
     order = sorted(range(len(topic)), key=lambda row: (topic[row] not in gap_topic, row))[:MOST_LANES]
     order.sort()
     times = d.finite(first, last)
@@ -51,7 +51,7 @@ def gaps(results: FlightResults) -> Drawing | None:
     )
 
 
-def _gap_marks(axes: Any, gaps: FigureData, rows: Any, place: int, least: float) -> None:
-    start, length = numbers(gaps, "start_s")[rows], numbers(gaps, "length_s")[rows]
+def _gap_marks(axes: Any, gaps: GapRows, rows: Any, place: int, least: float) -> None:
+    start, length = gaps.start_s[rows], gaps.length_s[rows]
     largest = np.sort(np.argsort(-length, kind="stable")[:500])
     d.bars(axes, start[largest], start[largest] + np.maximum(length[largest], least), place, "#b3261e", 6.0)

@@ -1,5 +1,6 @@
 """Figures of the comparison with a reference: errors in the band claimed, plan view, claimed against seen."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,27 +11,11 @@ from groundstation.chapters.wording import MINUS
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
-from groundstation.results.figures import numbers, texts
+from groundstation.results.arrays.reference import ReferenceErrors, ReferenceTrack
 from groundstation.results.flight import FlightResults
 from groundstation.results.reference import ReferenceResult, title_of
 
 FloatArray = NDArray[np.float64]
-# Of each quantity: column, its axis, the sigma claimed on it, over how many components that is.
-PANELS = {
-    "position": (
-        *(("north_m", "north, m", "horizontal_sigma_m", 2), ("east_m", "east, m", "horizontal_sigma_m", 2)),
-        ("up_m", "up, m", "vertical_sigma_m", 1),
-    ),
-    "velocity": (
-        ("north_mps", "north, m/s", "velocity_sigma_mps", 2),
-        ("east_mps", "east, m/s", "velocity_sigma_mps", 2),
-    ),
-    "attitude": (
-        ("roll_deg", "roll, °", "roll_sigma_deg", 1),
-        ("pitch_deg", "pitch, °", "pitch_sigma_deg", 1),
-        ("heading_deg", "heading, °", "true_heading_sigma_deg", 1),
-    ),
-}
 COLOURS = {"reference": d.INK, "gnss": d.GNSS, "ins": d.INS, "corrected": d.USED, "smoothed": "#cc79a7"}
 PANEL_MM, GAP_MM = 26.0, 7.0
 BAND_SEEN = 3.0  # a band may make an axis so many times as long as its errors do
@@ -39,28 +24,26 @@ BAND_SEEN = 3.0  # a band may make an axis so many times as long as its errors d
 def errors(results: FlightResults, of: str) -> Drawing | None:
     """Errors of one subject and quantity over time, in the band of 95 % that it and the reference claim."""
     subject, _, quantity = of.partition(" ")
-    data = results.figure_with_rows("reference_errors")
+    data = results.rows_of(ReferenceErrors)
     if data is None:
         return None
-    mine = texts(data, "subject") == subject
-    columns = {name: numbers(data, name)[mine] for name in data.columns if name != "subject"}
-    panels = [panel for panel in PANELS[quantity] if np.isfinite(columns[panel[0]]).any()]
+    own = data.where(data.subject == subject)
+    panels = [panel for panel in _panels(own, quantity) if np.isfinite(panel.error).any()]
     if not panels:
         return None
-    time = columns["time_s"]
-    bands = {column: _half(columns, sigma, components) for column, _title, sigma, components in panels}
+    time = own.time_s
 
     def paint(figure: Any) -> None:
-        for place, (column, title, _sigma, _components) in enumerate(panels):
+        for place, panel in enumerate(panels):
             bottom = 12.0 + (len(panels) - 1 - place) * (PANEL_MM + GAP_MM)
             axes = layout.place(figure, 18, bottom, 174, bottom + PANEL_MM)
-            _paint(axes, time, columns[column], bands[column], COLOURS.get(subject.partition(".")[0], d.USED))
-            axes.set_ylabel(title)
+            _paint(axes, time, panel.error, panel.half, COLOURS.get(subject.partition(".")[0], d.USED))
+            axes.set_ylabel(panel.title)
             layout.time_axis(axes, float(time.min()), float(time.max()), title=place == len(panels) - 1)
             if place == 0:
                 layout.legend_above(axes)
 
-    has_band = any(np.isfinite(half).any() for half in bands.values())
+    has_band = any(np.isfinite(panel.half).any() for panel in panels)
     claimed = "Shaded: the 95 % that it and the reference claim together." if has_band else "It claims no σ."
     height = 12.0 + len(panels) * (PANEL_MM + GAP_MM)
     name = title_of(subject)
@@ -70,8 +53,32 @@ def errors(results: FlightResults, of: str) -> Drawing | None:
     return Drawing(f"{name}: {quantity} against the reference", caption, alt, svg, ("reference_errors",))
 
 
-def _half(columns: dict[str, FloatArray], sigma: str, components: int) -> FloatArray:
-    return np.asarray(NORMAL_95 * columns.get(sigma, np.full(len(columns["time_s"]), np.nan)) / np.sqrt(components))
+@dataclass(frozen=True)
+class _Panel:
+    """Errors along one axis, its title, and half of the 95 % that are claimed."""
+
+    title: str
+    error: FloatArray
+    half: FloatArray
+
+
+def _panels(data: ReferenceErrors, quantity: str) -> tuple[_Panel, ...]:
+    """Axes of a quantity; a sigma claimed of several axes together is shared out among them."""
+    if quantity == "position":
+        across = NORMAL_95 / np.sqrt(2.0) * data.horizontal_sigma_m
+        return (
+            _Panel("north, m", data.north_error_m, across),
+            _Panel("east, m", data.east_error_m, across),
+            _Panel("up, m", data.up_error_m, NORMAL_95 * data.vertical_sigma_m),
+        )
+    if quantity == "velocity":
+        across = NORMAL_95 / np.sqrt(2.0) * data.velocity_sigma_mps
+        return _Panel("north, m/s", data.north_error_mps, across), _Panel("east, m/s", data.east_error_mps, across)
+    return (
+        _Panel("roll, °", data.roll_error_deg, NORMAL_95 * data.roll_sigma_deg),
+        _Panel("pitch, °", data.pitch_error_deg, NORMAL_95 * data.pitch_sigma_deg),
+        _Panel("heading, °", data.heading_error_deg, NORMAL_95 * data.true_heading_sigma_deg),
+    )
 
 
 def _paint(axes: Any, time: FloatArray, values: FloatArray, half: FloatArray, colour: str) -> None:
@@ -91,10 +98,10 @@ def _paint(axes: Any, time: FloatArray, values: FloatArray, half: FloatArray, co
 
 def track(results: FlightResults) -> Drawing | None:
     """Plan view of the reference and of every subject."""
-    data = results.figure_with_rows("reference_track")
+    data = results.rows_of(ReferenceTrack)
     if data is None:
         return None
-    of, north, east = texts(data, "subject"), numbers(data, "place_north_m"), numbers(data, "place_east_m")
+    of, north, east = data.subject, data.place_north_m, data.place_east_m
     names = list(dict.fromkeys(of.tolist()))
     known = d.finite(north, east)
     if not known.size:

@@ -8,7 +8,7 @@ from groundstation.chapters.wording import is_number, number
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
-from groundstation.results.figures import flags, numbers
+from groundstation.results.arrays.heading import StandstillMeanSpeed, StandstillVelocity
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult, Standstill
 
@@ -23,11 +23,11 @@ def _assessed(results: FlightResults) -> Standstill | None:
 
 def components(results: FlightResults) -> Drawing | None:
     """Velocity components at standstill over time and against each other (figure 2a of the paper)."""
-    data = results.figure_with_rows("standstill_velocity")
+    data = results.rows_of(StandstillVelocity)
     if data is None:
         return None
-    time, inside = numbers(data, "time_s"), flags(data, "in_interval")
-    north, east = numbers(data, "velocity_north_mps"), numbers(data, "velocity_east_mps")
+    time, inside = data.time_s, data.is_in_interval
+    north, east = data.velocity_north_mps, data.velocity_east_mps
     still = _assessed(results)
     count = int(np.count_nonzero(inside & np.isfinite(north) & np.isfinite(east)))
     known = np.abs(d.finite(north[inside], east[inside]) if inside.any() else d.finite(north, east))
@@ -78,10 +78,10 @@ def _plane(axes: Any, north: Any, east: Any, reach: float, still: Standstill | N
 
 def mean_speed(results: FlightResults) -> Drawing | None:
     """Density of the mean speed over 10 s and 30 s with the limit (figure 2b of the paper)."""
-    data = results.figure_with_rows("standstill_mean_speed")
+    data = results.rows_of(StandstillMeanSpeed)
     if data is None:
         return None
-    window, speed, height = (numbers(data, name) for name in ("window_s", "speed_of_mean_mps", "density_per_mps"))
+    window, speed, height = data.window_s, data.speed_of_mean_mps, data.density_per_mps
     windows = sorted(set(d.finite(window).tolist()))
     still = _assessed(results)
     measured = None if still is None else still.speed_of_mean_mps

@@ -8,7 +8,7 @@ from groundstation.chapters.generic import quantity
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
-from groundstation.results.figures import numbers
+from groundstation.results.arrays.together import JoinedDifference, JoinedMotion
 from groundstation.results.flight import FlightResults
 from groundstation.results.together import Together
 
@@ -18,30 +18,30 @@ PANEL_MM, GAP_MM, BOTTOM_MM = 40.0, 8.0, 12.0
 def motion(results: FlightResults, label: str) -> Drawing | None:
     """Both motions over each other, and below what the joined log shows less the other; None without the arrays."""
     answer, name = results.answer(Together), label or "a"
-    both = results.figure_with_rows(f"together_{name}_motion")
-    left = results.figure_with_rows(f"together_{name}_difference")
+    both = results.rows_of(JoinedMotion, name)
+    left = results.rows_of(JoinedDifference, name)
     if answer is None or both is None or left is None:
         return None
     log = next(one for one in answer.logs if one.label == label)
     shown = next(one for one in answer.agreement if one.label == label)
-    time = numbers(both, "time_s")
-    reference, other = (column for column in both.columns if column != "time_s")
-    (difference,) = (column for column in left.columns if column != "time_s")
+    time = both.time_s
+    reference, other = both.motion.values()
+    (difference,) = left.difference.values()
     ends = layout.padded(float(np.nanmin(time)), float(np.nanmax(time)))
 
     def paint(figure: Any) -> None:
         above = layout.place(figure, 18, BOTTOM_MM + PANEL_MM + GAP_MM, 174, BOTTOM_MM + 2 * PANEL_MM + GAP_MM)
-        for column, topic, colour, width in (
+        for values, topic, colour, width in (
             (reference, log.reference_topic, d.SERIES[0], 2.2),
             (other, log.topic, d.SERIES[1], 0.9),
         ):
-            x, y = d.broken_at_gaps(time, numbers(both, column))
+            x, y = d.broken_at_gaps(time, values)
             d.line(above, x, y, colour, width, label=d.label(topic))
         above.set_ylabel(d.label(f"{shown.signal}, {shown.unit}"))
         layout.time_axis(above, *ends, title=False)
         layout.legend_above(above, 2)
         below = layout.place(figure, 18, BOTTOM_MM, 174, BOTTOM_MM + PANEL_MM)
-        x, y = d.broken_at_gaps(time, numbers(left, difference))
+        x, y = d.broken_at_gaps(time, difference)
         d.line(below, x, y, d.SERIES[2], 0.8)
         below.axhline(0.0, color="0.6", linewidth=0.6)
         below.set_ylabel(d.label(f"difference, {shown.unit}"))

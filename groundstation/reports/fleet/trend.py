@@ -19,7 +19,7 @@ from groundstation.results.fleet import FleetResults
 MOST_PANELS = 8
 MOST_DOTS = 600  # in a panel
 PANEL_MM = 33.0
-POSITIVE = "radial_error_rate_50_nmiph"
+POSITIVE = "radial_error_rate_fit_nmiph"
 
 
 def charts(fleet: FleetResults, quantity: str) -> Drawing | None:

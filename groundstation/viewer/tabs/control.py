@@ -1,6 +1,6 @@
 """Control of a session: the aircraft moving in space under the recommended law, the law, accuracy and geometry."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 import rerun as rr
@@ -11,30 +11,35 @@ from groundstation.base.records import BoolArray, Int64Array
 from groundstation.chapters.control import control as chapter
 from groundstation.chapters.control import title_of
 from groundstation.chapters.markdown import markdown
+from groundstation.results.arrays.cooperative import ControlMeasures, ControlPaths, ControlPoints
+from groundstation.results.arrays.typed import Texts
 from groundstation.results.control import UNCONTROLLED, ControlPlan
-from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
 from groundstation.viewer.names import clean_text, path_parts
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.views import document, figure_of, numbers, plot
+from groundstation.viewer.views import document, plot
 
 MARK, TRAIL, RANGE = 5.0, 1.2, 0.8  # radii in points of the screen
 THIN, BOLD = 1.0, 2.0
-MEASURES = (
-    ("two_sigma_north_m", "2σ north, m"),
-    ("two_sigma_east_m", "2σ east, m"),
-    ("determinant", "det(H'H)"),
-    ("dop", "DOP"),
+# Entity, title, values.
+MEASURES: tuple[tuple[str, str, Callable[[ControlMeasures], FloatArray]], ...] = (
+    ("two_sigma_north_m", "2σ north, m", lambda data: data.two_sigma_north_m),
+    ("two_sigma_east_m", "2σ east, m", lambda data: data.two_sigma_east_m),
+    ("determinant", "det(H'H)", lambda data: data.determinant),
+    ("dop", "DOP", lambda data: data.dop),
 )
-COLUMN = {"speed": "speed_mps", "heading": "track_deg"}
+FLOWN: Mapping[str, Callable[[ControlPaths], FloatArray]] = {
+    "speed": lambda paths: paths.speed_mps,
+    "heading": lambda paths: paths.track_deg,
+}
 
 
 def control(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the tab; None without an answer."""
     answer, section = results.answer(ControlPlan), chapter(results)
-    paths = figure_of(results, "control_paths", "time_s", "law", "aircraft", "north_m", "east_m", "up_m")
+    paths = results.rows_of(ControlPaths)
     if answer is None or section is None or paths is None:
         return None
     recorder.document("control/answer", markdown(section))
@@ -44,17 +49,17 @@ def control(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     return rrb.Horizontal(contents=shown, column_shares=[1.6, 1.0, 1.0][: len(shown)], name="Control")
 
 
-def _space(recorder: Recorder, answer: ControlPlan, paths: FigureData, results: FlightResults) -> rrb.View:
+def _space(recorder: Recorder, answer: ControlPlan, paths: ControlPaths, results: FlightResults) -> rrb.View:
     """Aircraft and points in space, with a line from the judged aircraft to every source."""
-    law, aircraft = paths["law"].astype(np.str_), paths["aircraft"].astype(np.str_)
-    place = np.column_stack([numbers(paths, f"{axis}_m") for axis in ("east", "north", "up")])
+    law, aircraft = paths.law, paths.aircraft
+    place = np.column_stack([paths.east_m, paths.north_m, paths.up_m])
     shades = colours.for_series(len(answer.aircraft))
     ways: dict[str, FloatArray] = {}
     for name, part, shade in zip(answer.aircraft, path_parts(answer.aircraft), shades, strict=True):
         rows = np.flatnonzero((law == answer.recommended) & (aircraft == name))
         nominal = place[(law == UNCONTROLLED) & (aircraft == name)]
         ways[name] = place[rows]
-        indexes = recorder.indexes(recorder.time_ns(numbers(paths, "time_s")[rows]))
+        indexes = recorder.indexes(recorder.time_ns(paths.time_s[rows]))
         path, trail = f"plan/{part}", rr.Radius.ui_points(TRAIL)
         recorder.static(f"{path}/way", rr.LineStrips3D([place[rows]], colors=[shade], radii=trail))
         recorder.static(f"{path}/uncontrolled", rr.LineStrips3D([nominal], colors=[colours.DIM], radii=trail))
@@ -62,16 +67,16 @@ def _space(recorder: Recorder, answer: ControlPlan, paths: FigureData, results: 
         recorder.static(f"{path}/now", told)
         columns = rr.Points3D.columns(positions=place[rows].astype(np.float32))
         recorder.stream.send_columns(f"{path}/now", indexes, columns)
-    points = figure_of(results, "control_points", "name", "north_m", "east_m", "up_m")
+    points = results.rows_of(ControlPoints)
     if points is not None:
-        stations = np.column_stack([numbers(points, f"{axis}_m") for axis in ("east", "north", "up")])
-        names = [clean_text(name) for name in points["name"].tolist()]
+        stations = np.column_stack([points.east_m, points.north_m, points.up_m])
+        names = [clean_text(name) for name in points.label.tolist()]
         marks = rr.Points3D(
             stations, labels=names, colors=[colours.LIGHT] * len(names), radii=rr.Radius.ui_points(MARK)
         )
         recorder.static("plan/points", marks)
         ways |= {f"point {number}": np.tile(one, (len(ways[answer.judged]), 1)) for number, one in enumerate(stations)}
-    _ranges(recorder, answer.judged, ways, np.unique(numbers(paths, "time_s")))
+    _ranges(recorder, answer.judged, ways, np.unique(paths.time_s))
     recorder.static("plan", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     name = f"East, north, up: {title_of(answer.recommended)}; grey: no control"
     return rrb.Spatial3DView(name=name, origin="/plan")
@@ -88,16 +93,16 @@ def _ranges(recorder: Recorder, judged: str, ways: dict[str, FloatArray], time_s
     recorder.stream.send_columns("plan/ranges", recorder.indexes(recorder.time_ns(time_s)), columns)
 
 
-def _laws(recorder: Recorder, answer: ControlPlan, paths: FigureData) -> list[rrb.View]:
+def _laws(recorder: Recorder, answer: ControlPlan, paths: ControlPaths) -> list[rrb.View]:
     """Every control with time, a view each, every law a line; headings do not jump at north."""
-    aircraft, views = paths["aircraft"].astype(np.str_), list[rrb.View]()
+    views = list[rrb.View]()
     for row in answer.controls:
         path = f"control/{row.control}/{path_parts([row.aircraft])[0]}"
-        for law, rows, line in _lines(answer, paths, aircraft == row.aircraft):
-            values = numbers(paths, COLUMN[row.control])[rows]
+        for law, rows, line in _lines(answer, paths.law, paths.aircraft == row.aircraft):
+            values = FLOWN[row.control](paths)[rows]
             if row.control == "heading":
                 values = row.start + unwrap(values) - values[0]
-            recorder.lines(f"{path}/{law}", recorder.time_ns(numbers(paths, "time_s")[rows]), values[:, None], [line])
+            recorder.lines(f"{path}/{law}", recorder.time_ns(paths.time_s[rows]), values[:, None], [line])
         unit = "m/s" if row.control == "speed" else "deg"
         views.append(plot(f"{clean_text(row.aircraft)}: {row.control}, {unit}", path, legend=False))
     return views
@@ -105,22 +110,21 @@ def _laws(recorder: Recorder, answer: ControlPlan, paths: FigureData) -> list[rr
 
 def _measures(recorder: Recorder, answer: ControlPlan, results: FlightResults) -> list[rrb.View]:
     """Accuracy and geometry with time, every law a line; from the first ranges on, or the scale would hide the rest."""
-    data = figure_of(results, "control_measures", "time_s", "law", *(column for column, _ in MEASURES))
+    data = results.rows_of(ControlMeasures)
     if data is None:
         return []
-    views, time_s = list[rrb.View](), numbers(data, "time_s")
-    for column, title in MEASURES:
-        path = f"control/measures/{column}"
-        for law, rows, line in _lines(answer, data, time_s > 0.0):
-            values = numbers(data, column)[rows][:, None]
+    views, time_s = list[rrb.View](), data.time_s
+    for part, title, values_of in MEASURES:
+        path = f"control/measures/{part}"
+        for law, rows, line in _lines(answer, data.law, time_s > 0.0):
+            values = values_of(data)[rows][:, None]
             recorder.lines(f"{path}/{law}", recorder.time_ns(time_s[rows]), values, [line])
         views.append(plot(f"{clean_text(answer.judged)}: {title}", path, legend=not views))
     return views
 
 
-def _lines(answer: ControlPlan, data: FigureData, used: BoolArray) -> Iterator[tuple[str, Int64Array, Line]]:
+def _lines(answer: ControlPlan, laws: Texts, used: BoolArray) -> Iterator[tuple[str, Int64Array, Line]]:
     """Rows of each law, and how its line looks."""
-    of, shades = data["law"].astype(np.str_), colours.for_series(len(answer.laws))
-    for row, shade in zip(answer.laws, shades, strict=True):
+    for row, shade in zip(answer.laws, colours.for_series(len(answer.laws)), strict=True):
         width = BOLD if row.law == answer.recommended else THIN
-        yield row.law, np.flatnonzero(used & (of == row.law)), Line(title_of(row.law), shade, width)
+        yield row.law, np.flatnonzero(used & (laws == row.law)), Line(title_of(row.law), shade, width)

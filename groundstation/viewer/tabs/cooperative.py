@@ -1,15 +1,16 @@
 """Cooperative: the aircraft of a session in space with their ellipsoids and links, errors, geometry, links in time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import rerun.blueprint as rrb
-from numpy.typing import NDArray
 
 from groundstation.chapters.cooperative import cooperative as chapter
 from groundstation.chapters.cooperative import trusted, worst_first
 from groundstation.chapters.front import front
 from groundstation.chapters.markdown import front_markdown, markdown
+from groundstation.results.arrays.cooperative import CooperativeGeometry, CooperativeLinks, CooperativeTracks
+from groundstation.results.arrays.typed import Counts, Texts
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.flight import FlightResults
 from groundstation.tables.session import GroundPoint
@@ -18,15 +19,16 @@ from groundstation.viewer.names import clean_text, path_parts
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after
 from groundstation.viewer.tabs.session_space import space
-from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
+from groundstation.viewer.views import document, lanes, plot
 
 MOST_PLOTS, MOST_LANES = 6, 24
 THIN, BOLD, ROOM = 1.0, 2.0, 1.1
-GEOMETRY = (
-    ("sources", "Sources heard"),
-    ("hdop", "HDOP"),
-    ("determinant", "det(H'H)"),
-    ("eigenvalue", "least eigenvalue"),
+# Entity, title, values.
+GEOMETRY: tuple[tuple[str, str, Callable[[CooperativeGeometry], FloatArray]], ...] = (
+    ("sources", "Sources heard", lambda data: data.sources),
+    ("hdop", "HDOP", lambda data: data.hdop),
+    ("determinant", "det(H'H)", lambda data: data.determinant),
+    ("eigenvalue", "least eigenvalue", lambda data: data.eigenvalue),
 )
 LINK_STATES = {"ranging": colours.ANSWER, "gated": colours.LIMIT, "silent": colours.DIM}
 SILENT_FRAMES = 3.0  # so many ordinary steps without a range are silence
@@ -49,19 +51,18 @@ def cooperative(recorder: Recorder, points: Sequence[GroundPoint], results: Flig
 
 def _errors(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
     """Error of each aircraft on the band of its computed 2 sigma_r, a view each."""
-    tracks = figure_of(results, "cooperative_tracks", "time_s", "vehicle", "algorithm")
+    tracks = results.rows_of(CooperativeTracks)
     if tracks is None:
         return []
     best, views = trusted(answer).algorithm, list[rrb.View]()
-    used = tracks["algorithm"].astype(np.str_) == best
-    vehicle = tracks["vehicle"].astype(np.str_)
+    used = tracks.algorithm == best
     for name, part in zip(answer.vehicle_names, path_parts(answer.vehicle_names), strict=True):
-        rows = used & (vehicle == name)
+        rows = used & (tracks.vehicle == name)
         if not rows.any():
             continue
         path = f"cooperative/errors/{part}"
-        time_ns = recorder.time_ns(numbers(tracks, "time_s")[rows])
-        bound, error = (numbers(tracks, column)[rows] for column in ("two_sigma_r_m", "error_m"))
+        time_ns = recorder.time_ns(tracks.time_s[rows])
+        bound, error = tracks.two_sigma_r_m[rows], tracks.error_m[rows]
         line = Line("2σ_r as computed, m", colours.HONEST, THIN)
         recorder.band(f"{path}/a_band", time_ns, np.zeros(len(bound)), bound, line)
         if np.isfinite(error).any():
@@ -80,57 +81,57 @@ def _ceiling(*series: FloatArray) -> float:
 
 def _geometry(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
     """Measures of geometry with time, one line an aircraft."""
-    data = figure_of(results, "cooperative_geometry", "time_s", "vehicle")
+    data = results.rows_of(CooperativeGeometry)
     if data is None:
         return []
-    vehicle, views = data["vehicle"].astype(np.str_), list[rrb.View]()
+    views = list[rrb.View]()
     shades = colours.for_series(len(answer.vehicle_names))
-    for column, title in GEOMETRY:
-        if column not in data.columns or not np.isfinite(numbers(data, column)).any():
+    for measure, title, values_of in GEOMETRY:
+        values = values_of(data)
+        if not np.isfinite(values).any():
             continue
-        path = f"cooperative/geometry/{column}"
+        path = f"cooperative/geometry/{measure}"
         names = zip(answer.vehicle_names, path_parts(answer.vehicle_names), shades, strict=True)
         for name, part, shade in names:
-            rows = vehicle == name
+            rows = data.vehicle == name
             if not rows.any():
                 continue
-            time_ns = recorder.time_ns(numbers(data, "time_s")[rows])
-            values = numbers(data, column)[rows][:, None]
+            time_ns = recorder.time_ns(data.time_s[rows])
             line = Line(clean_text(name), shade, THIN)
-            recorder.lines(f"{path}/{part}", time_ns, values, [line], gap_after(time_ns))
+            recorder.lines(f"{path}/{part}", time_ns, values[rows][:, None], [line], gap_after(time_ns))
         views.append(plot(title, path, legend=not views))
     return views
 
 
 def _links(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
     """A lane each for the worst links: ranging, gated, silent."""
-    data = figure_of(results, "cooperative_links", "time_s", "receiver", "source", "mark")
+    data = results.rows_of(CooperativeLinks)
     if data is None:
         return []
     ordered = [row for row in worst_first(answer.links) if row.kind != "satellite"]
     shown = ordered[:MOST_LANES]
     parts = path_parts([f"{row.receiver} from {row.source}" for row in shown])
-    end_s = float(numbers(data, "time_s").max())
+    end_s = float(data.time_s.max())
     paths = []
     for row, part in zip(shown, parts, strict=True):
-        mine = (data["receiver"] == row.receiver) & (data["source"] == row.source)
+        mine = (data.receiver == row.receiver) & (data.source == row.source)
         if not mine.any():
             continue
         path = f"cooperative/links/{part}"
-        start, end, state = link_spans(numbers(data, "time_s")[mine], numbers(data, "mark")[mine], end_s)
+        start, end, state = link_spans(data.time_s[mine], data.mark[mine], end_s)
         recorder.spans(path, start, end, state, LINK_STATES)
         paths.append(path)
     more = f", the worst {len(shown)} of {len(ordered)}" if len(shown) < len(ordered) else ""
     return [lanes(f"Links{more}", paths)] if paths else []
 
 
-def link_spans(time_s: FloatArray, mark: FloatArray, end_s: float) -> tuple[FloatArray, FloatArray, NDArray[np.str_]]:
+def link_spans(time_s: FloatArray, mark: Counts, end_s: float) -> tuple[FloatArray, FloatArray, Texts]:
     """Stretches in which a link ranges, is gated, or is silent, until the end of the session.
 
     Examples
     --------
     >>> time_s = np.array([0.0, 1.0, 2.0, 3.0, 20.0, 21.0])
-    >>> start, end, state = link_spans(time_s, np.array([1.0, 1.0, -1.0, 1.0, 1.0, 1.0]), 30.0)
+    >>> start, end, state = link_spans(time_s, np.array([1, 1, -1, 1, 1, 1]), 30.0)
     >>> list(zip(start.tolist(), end.tolist(), state.tolist()))
     ... # doctest: +NORMALIZE_WHITESPACE
     [(0.0, 2.0, 'ranging'), (2.0, 3.0, 'gated'), (3.0, 4.0, 'ranging'), (4.0, 20.0, 'silent'),

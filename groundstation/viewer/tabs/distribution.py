@@ -11,13 +11,12 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.heading import HeadingDistribution, HeadingGrowth, HeadingNormal, StandstillMeanSpeed
 from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour
 from groundstation.viewer.recorder import FLIGHT_TIME, UTC, Recorder
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.views import figure_of, numbers
 
 PATH = "distribution"
 HAIRLINE = 1.0  # of the distance between two points of the fitted normal
@@ -30,20 +29,20 @@ UNSEEN: Colour = (0, 0, 0, 1)  # wholly transparent means "choose a colour" to R
 
 def heading_error(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Log the density of the differences d: growing with time, over the final one and the fitted normal."""
-    final = figure_of(results, "heading_distribution", "bin_low_deg", "bin_high_deg", "density_per_deg")
+    final = results.rows_of(HeadingDistribution)
     if final is None:
         return []
-    low, high = numbers(final, "bin_low_deg"), numbers(final, "bin_high_deg")
+    low, high = final.bin_low_deg, final.bin_high_deg
     width = high - low
-    density = numbers(final, "density_per_deg")
+    density = final.density_per_deg
     peak = float(np.nanmax(density))
-    normal = figure_of(results, "heading_normal", "difference_deg", "density_per_deg")
+    normal = results.rows_of(HeadingNormal)
     if normal is not None:
-        x, y = numbers(normal, "difference_deg"), numbers(normal, "density_per_deg")
+        x, y = normal.difference_deg, normal.density_per_deg
         _hairlines(recorder, "fitted_normal", x, y)
         peak = max(peak, float(np.nanmax(y)))
     _bars(recorder, "samples_all", density, low, width, (*colours.GREY[:3], MIDDLE))
-    growth = figure_of(results, "heading_growth", "step", "time_s", "bin_center_deg", "density_per_deg")
+    growth = results.rows_of(HeadingGrowth)
     if growth is not None:
         highest = _growing(recorder, growth, float(np.median(width)), CEILING * peak)
         middle = np.array([0.5 * float(np.mean(low + high))])
@@ -55,13 +54,13 @@ def heading_error(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
 
 def mean_speed(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Log the densities of the mean speed at standstill over windows of 10 s and 30 s."""
-    figure = figure_of(results, "standstill_mean_speed", "window_s", "speed_of_mean_mps", "density_per_mps")
+    figure = results.rows_of(StandstillMeanSpeed)
     if figure is None:
         return []
-    windows = numbers(figure, "window_s")
+    windows = figure.window_s
     for window, colour in zip(np.unique(windows).tolist(), (colours.INS, colours.GNSS, colours.HONEST), strict=False):
         chosen = windows == window
-        x, y = numbers(figure, "speed_of_mean_mps")[chosen], numbers(figure, "density_per_mps")[chosen]
+        x, y = figure.speed_of_mean_mps[chosen], figure.density_per_mps[chosen]
         width = np.full(len(x), float(np.median(np.diff(x))) if len(x) > 1 else 1e-3)
         bar = rr.BarChart(y, abscissa=x - 0.5 * width, widths=width, color=(*colour[:3], 140))
         recorder.static(f"mean_speed/{window:g}s", bar)
@@ -69,19 +68,15 @@ def mean_speed(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     return [rrb.BarChartView(name=name, origin="/mean_speed", plot_legend=rrb.PlotLegend(visible=False))]
 
 
-def _steps(growth: FigureData) -> Iterator[tuple[float, FloatArray, FloatArray]]:
-    step = growth["step"]
+def _steps(growth: HeadingGrowth) -> Iterator[tuple[float, FloatArray, FloatArray]]:
+    step = growth.step
     starts = [0, *(np.flatnonzero(step[1:] != step[:-1]) + 1).tolist(), len(step)]
     for start, end in pairwise(starts):
         part = slice(start, end)
-        yield (
-            float(growth["time_s"][start]),
-            numbers(growth, "bin_center_deg")[part],
-            numbers(growth, "density_per_deg")[part],
-        )
+        yield float(growth.time_s[start]), growth.bin_center_deg[part], growth.density_per_deg[part]
 
 
-def _growing(recorder: Recorder, growth: FigureData, bin_width: float, ceiling: float) -> float:
+def _growing(recorder: Recorder, growth: HeadingGrowth, bin_width: float, ceiling: float) -> float:
     """Log one bar chart a step (the SDK drops bar charts sent as columns); the highest bar logged.
 
     The first few steps are left out while a bar of some later one rises above the ceiling: of ten samples three may

@@ -6,13 +6,12 @@ import rerun.blueprint as rrb
 
 from groundstation.base.attitude import quaternion_enu_from_flu_xyzw
 from groundstation.base.records import BoolArray
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.flight import Overview
 from groundstation.viewer import colours
 from groundstation.viewer.chart import screen_radius, unbroken
 from groundstation.viewer.colours import Colour
 from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.views import numbers
 
 LINE, SHADOW, MARK = 1.4, 0.5, 5.0  # radii in points of the screen
 SHARE = 0.06  # length of the aircraft, of the longer side of its track: at its own size it would not be seen
@@ -32,7 +31,7 @@ SIDES = np.array([colours.ANSWER, colours.ANSWER, colours.INS, colours.INS, colo
 
 
 def flight_space(
-    recorder: Recorder, figure: FigureData, points_m: FloatArray | None, pieces: list[slice], shades: list[Colour]
+    recorder: Recorder, figure: Overview, points_m: FloatArray | None, pieces: list[slice], shades: list[Colour]
 ) -> rrb.Spatial3DView | None:
     """Log track and aircraft; None for a flight with neither a height along a track nor an attitude.
 
@@ -53,7 +52,7 @@ def flight_space(
     recorder.static("space", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     if points_m is not None:
         _track(recorder, place, pieces, shades)
-    _aircraft(recorder, recorder.time_ns(numbers(figure, "time_s")), place, known, attitude, size_m)
+    _aircraft(recorder, recorder.time_ns(figure.time_s), place, known, attitude, size_m)
     name = "Aircraft, not to scale" if attitude is not None else "In space, attitude not logged"
     return rrb.Spatial3DView(name=name, origin="/space", eye_controls=_eye(place[known], size_m))
 
@@ -65,24 +64,23 @@ def _eye(place: FloatArray, size_m: float) -> rrb.EyeControls3D:
     return rrb.EyeControls3D(position=middle + across * EYE, look_target=middle, eye_up=(0.0, 0.0, 1.0))
 
 
-def _height_m(figure: FigureData) -> FloatArray:
+def _height_m(figure: Overview) -> FloatArray:
     """Height above the lowest place; 0 where none is logged."""
-    for name in ("altitude_m", "pressure_altitude_m", "height_above_airfield_m"):
-        if name in figure.columns and np.isfinite(numbers(figure, name)).any():
-            height = np.where(np.abs(numbers(figure, name)) < MOST_HEIGHT_M, numbers(figure, name), np.nan)
+    for logged in (figure.altitude_m, figure.pressure_altitude_m, figure.height_above_airfield_m):
+        if logged is not None and np.isfinite(logged).any():
+            height = np.where(np.abs(logged) < MOST_HEIGHT_M, logged, np.nan)
             return np.asarray(height - np.nanmin(height))
     return np.zeros(len(figure))
 
 
-def _attitude(figure: FigureData) -> FloatArray | None:
+def _attitude(figure: Overview) -> FloatArray | None:
     """Quaternions x y z w; without a true heading along the track, else by the compass, else to the north."""
-    if not {"roll_deg", "pitch_deg"} <= set(figure.columns):
+    roll, pitch = figure.roll_deg, figure.pitch_deg
+    if roll is None or pitch is None:
         return None
-    roll, pitch = numbers(figure, "roll_deg"), numbers(figure, "pitch_deg")
-    directions = (
-        numbers(figure, name) for name in ("heading_deg", "track_deg", "magnetic_heading_deg") if name in figure.columns
-    )
-    heading = next((one for one in directions if np.isfinite(one).any()), np.zeros(len(roll)))
+    directions = (figure.heading_deg, figure.track_deg, figure.magnetic_heading_deg)
+    known = (one for one in directions if one is not None and np.isfinite(one).any())
+    heading = next(known, np.zeros(len(roll)))
     turn = quaternion_enu_from_flu_xyzw(roll, pitch, heading)
     return turn if np.isfinite(turn).any() else None
 

@@ -8,7 +8,8 @@ from groundstation.base.normal import NORMAL_95
 from groundstation.base.timescales import duration_text
 from groundstation.chapters.forecast import forecast as chapter
 from groundstation.chapters.markdown import markdown
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.forecast import ForecastFan, ForecastGrowth, ForecastMap
+from groundstation.results.arrays.inertial import InertialStates
 from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import METHODS, ForecastResult
 from groundstation.viewer import colours
@@ -16,7 +17,7 @@ from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.names import words
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.views import document, figure_of, numbers, plot
+from groundstation.viewer.views import document, plot
 
 THIN, BOLD = 0.8, 1.8
 MARGIN = 1.08
@@ -43,7 +44,7 @@ def forecast(recorder: Recorder, results: FlightResults) -> rrb.Container | None
     if not rows:
         return rrb.Horizontal(contents=[text], name="Forecast")
     left: list[rrb.View | rrb.Container] = [*rows]
-    states = figure_of(results, "inertial_states", "time_s", "north_position_m", "east_position_m")
+    states = results.rows_of(InertialStates)
     if states is not None:  # somewhere to drag the playhead along
         paths = [f"inertial/{channel}/position" for channel in ("north", "east")]
         left.append(plot("INS position error, north and east, m: drag the playhead here", paths, legend=False))
@@ -57,17 +58,14 @@ def forecast(recorder: Recorder, results: FlightResults) -> rrb.Container | None
 
 def _fan(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Log the forecast from each start at its time: the latest start at the playhead is the one shown."""
-    names = [f"{column}_m" for channel in ("north", "east") for column in (channel, f"actual_{channel}")]
-    sigmas = [f"{channel}_sigma_m" for channel in ("north", "east")]
-    fan = figure_of(results, "forecast_fan", "start_s", "lead_s", *names, *sigmas)
-    if fan is None or not np.isfinite(numbers(fan, "lead_s")).any():
+    fan = results.rows_of(ForecastFan)
+    if fan is None or not np.isfinite(fan.lead_s).any():
         return []
-    minutes = numbers(fan, "lead_s") / 60.0
+    minutes = fan.lead_s / 60.0
     x = Axis("lead, min", 0.0, max(float(np.nanmax(minutes)), 1.0))
     views: list[rrb.View] = []
-    for channel in ("north", "east"):
-        expected, actual = numbers(fan, f"{channel}_m"), numbers(fan, f"actual_{channel}_m")
-        half = NORMAL_95 * numbers(fan, f"{channel}_sigma_m")
+    for channel, one in (("north", fan.north), ("east", fan.east)):
+        expected, actual, half = one.forecast_m, one.actual_m, NORMAL_95 * one.sigma_m
         size = _largest(expected, actual, np.abs(expected) + half)
         axis = Axis(f"{channel.capitalize()} error, m,", -size, size)
         chart = Chart(recorder, f"forecast/fan_{channel}", x, axis, FAN_HEIGHT)
@@ -77,11 +75,12 @@ def _fan(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     return [*views, _radial(recorder, fan, minutes, x)]
 
 
-def _radial(recorder: Recorder, fan: FigureData, minutes: FloatArray, x: Axis) -> rrb.View:
+def _radial(recorder: Recorder, fan: ForecastFan, minutes: FloatArray, x: Axis) -> rrb.View:
     """Distance between forecast and GNSS, what the forecast claimed, and the error of the INS without it."""
-    east, north = ((numbers(fan, f"actual_{c}_m"), numbers(fan, f"{c}_m")) for c in ("east", "north"))
-    raw, left = np.hypot(east[0], north[0]), np.hypot(east[0] - east[1], north[0] - north[1])
-    claim = np.hypot(numbers(fan, "east_sigma_m"), numbers(fan, "north_sigma_m"))
+    east, north = fan.east, fan.north
+    raw = np.hypot(east.actual_m, north.actual_m)
+    left = np.hypot(east.actual_m - east.forecast_m, north.actual_m - north.forecast_m)
+    claim = np.hypot(east.sigma_m, north.sigma_m)
     lines = (
         (raw, Line("raw INS", colours.INS, BOLD)),
         (claim, Line("radial σ claimed", colours.HONEST, THIN)),
@@ -105,13 +104,13 @@ def _largest(*values: FloatArray) -> float:
 
 def _starts(
     chart: Chart,
-    fan: FigureData,
+    fan: ForecastFan,
     minutes: FloatArray,
     curves: list[tuple[FloatArray, Line]],
     band: tuple[FloatArray, FloatArray] | None = None,
 ) -> None:
     """Log the curves of each start from its time on; before the first one they are its own."""
-    starts = numbers(fan, "start_s")
+    starts = fan.start_s
     each = np.unique(starts[np.isfinite(starts)])
     for place, start in enumerate(each.tolist()):
         rows, at_s = starts == start, start if place else min(start, 0.0)
@@ -127,12 +126,11 @@ def _starts(
 
 def _growth(recorder: Recorder, results: FlightResults, answer: ForecastResult) -> list[rrb.View]:
     """RMS by horizon over methods, the shipped one bold; both axes logarithmic."""
-    growth = figure_of(results, "forecast_growth", "horizon_min")
+    growth = results.rows_of(ForecastGrowth)
     if growth is None:
         return []
-    horizon = numbers(growth, "horizon_min")
-    known = [name for name in METHODS if f"{name}_rms_m" in growth.columns]
-    curves = {name: numbers(growth, f"{name}_rms_m") for name in known}
+    horizon = growth.horizon_min
+    curves = {name: growth.rms_m[name] for name in METHODS if name in growth.rms_m}
     values = np.concatenate([*curves.values(), horizon * np.nan])
     values = values[np.isfinite(values) & (values > 0.0)]
     times = horizon[np.isfinite(horizon) & (horizon > 0.0)]
@@ -143,12 +141,13 @@ def _growth(recorder: Recorder, results: FlightResults, answer: ForecastResult) 
     y = Axis("RMS radial error over all starts, m,", float(values.min()) / 1.3, float(values.max()) * 1.3, True)
     chart = Chart(recorder, "forecast/growth", x, y, GROWTH_HEIGHT)
     shades = method_colours(default)
-    drawn = [(horizon, curves[name], Line(name, shades[name], BOLD if name == default else THIN)) for name in known]
-    if "sigma_m" in growth.columns:
-        drawn.append((horizon, numbers(growth, "sigma_m"), CLAIMED))
+    widths = {name: BOLD if name == default else THIN for name in curves}
+    drawn = [(horizon, rms_m, Line(name, shades[name], widths[name])) for name, rms_m in curves.items()]
+    if growth.sigma_m is not None:
+        drawn.append((horizon, growth.sigma_m, CLAIMED))
     chart.curves("methods", drawn)
-    names = [Line(words(name), shades[name], BOLD if name == default else THIN) for name in known]
-    if "sigma_m" in growth.columns:
+    names = [Line(words(name), shades[name], widths[name]) for name in curves]
+    if growth.sigma_m is not None:
         names.append(Line("σ claimed", colours.HONEST, THIN))
     chart.key(names)
     return [chart.view()]
@@ -174,15 +173,15 @@ def method_colours(default: str) -> dict[str, colours.Colour]:
 
 def _map(recorder: Recorder, results: FlightResults, answer: ForecastResult) -> list[rrb.View | rrb.Container]:
     """The hindcast map, one tensor a method: radial error by start and horizon, all on one colour scale."""
-    figure = figure_of(results, "forecast_map", "start_s", "horizon_min")
+    figure = results.rows_of(ForecastMap)
     if figure is None:
         return []
-    starts, horizons = np.unique(numbers(figure, "start_s")), np.unique(numbers(figure, "horizon_min"))
+    starts, horizons = np.unique(figure.start_s), np.unique(figure.horizon_min)
     shape = (len(starts), len(horizons))
-    known = [name for name in METHODS if f"{name}_m" in figure.columns]
+    known = [name for name in METHODS if name in figure.radial_m]
     if shape[0] * shape[1] != len(figure) or not known:
         return []
-    cubes = {name: numbers(figure, f"{name}_m").reshape(shape) for name in known}
+    cubes = {name: figure.radial_m[name].reshape(shape) for name in known}
     reference = cubes.get("raw_ins", cubes[known[0]])
     top = float(np.nanmax(reference)) if np.isfinite(reference).any() else 1.0
     default = answer.default_method

@@ -5,7 +5,7 @@ import rerun.blueprint as rrb
 
 from groundstation.chapters.heading import heading as heading_chapter
 from groundstation.chapters.markdown import markdown
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.heading import HeadingLanes, HeadingRunning, HeadingSamples, StandstillVelocity
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult
 from groundstation.viewer import colours
@@ -14,7 +14,7 @@ from groundstation.viewer.series import FloatArray, gap_after, wraps_after
 from groundstation.viewer.tabs import distribution
 from groundstation.viewer.tabs.heading_runs import AFTER_TAXI, heading_runs, range_of_used, speed_limit_mps
 from groundstation.viewer.tabs.overview import log_lane
-from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
+from groundstation.viewer.views import document, lanes, plot
 
 THIN, BOLD, DOT = 1.0, 2.5, 1.6
 
@@ -47,14 +47,13 @@ def heading(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
 def _difference(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Differences d as dots, the running mean, and two filled bands about it: the honest one and the paper's."""
     path = "heading/difference"
-    samples = figure_of(results, "heading_samples", "time_s", "difference_deg", "used")
-    running = figure_of(results, "heading_running", "time_s", "mean_deg")
-    if samples is not None and samples["used"].any():
-        used = samples["used"].astype(bool)
+    samples = results.rows_of(HeadingSamples)
+    running = results.rows_of(HeadingRunning)
+    if samples is not None and samples.is_used.any():
         recorder.dots(
             f"{path}/samples",
-            recorder.time_ns(numbers(samples, "time_s")[used]),
-            numbers(samples, "difference_deg")[used],
+            recorder.time_ns(samples.time_s[samples.is_used]),
+            samples.difference_deg[samples.is_used],
             Line("INS heading − GNSS track, deg", colours.SAMPLES, DOT),
         )
     if running is not None:
@@ -65,27 +64,24 @@ def _difference(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     return [plot(name, path, axis_range=None if samples is None else range_of_used(samples), legend=False)]
 
 
-def _running(recorder: Recorder, path: str, running: FigureData) -> None:
-    time_ns, mean = recorder.time_ns(numbers(running, "time_s")), numbers(running, "mean_deg")
+def _running(recorder: Recorder, path: str, running: HeadingRunning) -> None:
+    time_ns, mean = recorder.time_ns(running.time_s), running.mean_deg
     gaps = gap_after(time_ns)
-    for column, part, line in (
-        ("precision_deg", "a_precision", Line("mean ± e (the paper's precision), deg", colours.PAPER, THIN)),
-        ("honest_half_width_deg", "b_honest", Line("mean ± honest 95 % interval, deg", colours.ANSWER, BOLD)),
-    ):
-        if column in running.columns:
-            recorder.band(f"{path}/{part}", time_ns, mean, numbers(running, column), line, gaps)
+    line = Line("mean ± e (the paper's precision), deg", colours.PAPER, THIN)
+    recorder.band(f"{path}/a_precision", time_ns, mean, running.precision_deg, line, gaps)
+    line = Line("mean ± honest 95 % interval, deg", colours.ANSWER, BOLD)
+    recorder.band(f"{path}/b_honest", time_ns, mean, running.honest_half_width_deg, line, gaps)
 
 
 def _taxi(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Heading and track while the aircraft moved, and the ground speed with its threshold."""
-    samples = figure_of(results, "heading_samples", "time_s", "heading_deg", "track_deg", "ground_speed_mps")
+    samples = results.rows_of(HeadingSamples)
     if samples is None:
         return []
-    gate = samples["gate"] if "gate" in samples.columns else np.full(len(samples), "")
-    ground = ~np.isin(gate, AFTER_TAXI)  # the axes should show the taxi, not what comes after it
-    time_ns = recorder.time_ns(numbers(samples, "time_s"))[ground]
-    speed, heading_deg = numbers(samples, "ground_speed_mps")[ground], numbers(samples, "heading_deg")[ground]
-    track_deg = np.where(gate == "too slow", np.nan, numbers(samples, "track_deg"))[ground]  # noise at standstill
+    ground = ~np.isin(samples.gate, AFTER_TAXI)  # the axes should show the taxi, not what comes after it
+    time_ns = recorder.time_ns(samples.time_s)[ground]
+    speed, heading_deg = samples.ground_speed_mps[ground], samples.heading_deg[ground]
+    track_deg = np.where(samples.gate == "too slow", np.nan, samples.track_deg)[ground]  # noise at standstill
     gaps = gap_after(time_ns)
     for name, values, line in (
         ("heading", heading_deg, Line("INS true heading, deg", colours.INS)),
@@ -103,16 +99,16 @@ def _taxi(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
 
 
 def _lanes(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    paths = log_lane(recorder, results, "heading_lanes", "state", "heading/gate", colours.GATES)
+    paths = log_lane(recorder, "heading/gate", results.rows_of(HeadingLanes), colours.GATES)
     return [lanes("Why samples were used or not", paths)] if paths else []
 
 
 def _standstill(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    figure = figure_of(results, "standstill_velocity", "time_s", "velocity_north_mps", "velocity_east_mps")
+    figure = results.rows_of(StandstillVelocity)
     if figure is None:
         return []
-    time_ns = recorder.time_ns(numbers(figure, "time_s"))
-    values: FloatArray = np.column_stack([numbers(figure, "velocity_north_mps"), numbers(figure, "velocity_east_mps")])
+    time_ns = recorder.time_ns(figure.time_s)
+    values: FloatArray = np.column_stack([figure.velocity_north_mps, figure.velocity_east_mps])
     lines = [Line("GNSS velocity north, m/s", colours.BLUE), Line("GNSS velocity east, m/s", colours.GNSS)]
     recorder.lines("heading/standstill", time_ns, values, lines, gap_after(time_ns))
     return [plot("GNSS velocity at standstill, m/s: north dark blue, east orange", "heading/standstill", legend=False)]

@@ -3,13 +3,12 @@
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.heading import HeadingRunning, HeadingSamples
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult
 from groundstation.viewer import colours
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.run_chart import Run, RunChart, runs_of
-from groundstation.viewer.views import figure_of, numbers
 
 AFTER_TAXI = ("too fast", "take-off run", "landing roll", "airborne")
 SPEED_LIMIT_MPS = 6.0  # the paper's; the result's own settings stand above it
@@ -26,12 +25,12 @@ SAMPLES, MEAN, HONEST = (
 
 def heading_runs(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the ground runs with used samples, the longest few in order of time; None where one fills the flight."""
-    samples = figure_of(results, "heading_samples", "time_s", "difference_deg", "used", "ground_speed_mps", "gate")
+    samples = results.rows_of(HeadingSamples)
     if samples is None or range_of_used(samples) is None:
         return None
-    time_s, used = numbers(samples, "time_s"), samples["used"].astype(bool)
-    ground = ~np.isin(samples["gate"], AFTER_TAXI)
-    runs = [run for run in runs_of(time_s[ground], LONGEST_GAP_S) if used[run.rows(time_s)].any()]
+    time_s = samples.time_s
+    ground = ~np.isin(samples.gate, AFTER_TAXI)
+    runs = [run for run in runs_of(time_s[ground], LONGEST_GAP_S) if samples.is_used[run.rows(time_s)].any()]
     longest = sorted(runs, key=lambda run: run.start_s - run.end_s)[:MOST_RUNS]
     if not longest or longest[0].end_s - longest[0].start_s > WHOLE * results.duration_s:
         return None
@@ -43,31 +42,31 @@ def heading_runs(recorder: Recorder, results: FlightResults) -> rrb.Container | 
     return rrb.Vertical(contents=panels, name="Each ground run")
 
 
-def _views(recorder: Recorder, results: FlightResults, samples: FigureData, run: Run, path: str) -> list[rrb.View]:
-    rows = run.rows(numbers(samples, "time_s"))
-    rows = rows[samples["used"][rows].astype(bool)]
-    time_s = numbers(samples, "time_s")
+def _views(recorder: Recorder, results: FlightResults, samples: HeadingSamples, run: Run, path: str) -> list[rrb.View]:
+    rows = run.rows(samples.time_s)
+    rows = rows[samples.is_used[rows]]
+    time_s = samples.time_s
     ends = range_of_used(samples)
     difference = RunChart(recorder, f"{path}/difference", "INS heading − GNSS track, deg,", run, [], ends)
-    difference.dots("samples", time_s[rows], numbers(samples, "difference_deg")[rows], SAMPLES)
-    running = figure_of(results, "heading_running", "time_s", "mean_deg", "honest_half_width_deg")
+    difference.dots("samples", time_s[rows], samples.difference_deg[rows], SAMPLES)
+    running = results.rows_of(HeadingRunning)
     if running is not None:
-        mine = run.rows(numbers(running, "time_s"))
-        at_s, mean, half = (numbers(running, name)[mine] for name in ("time_s", "mean_deg", "honest_half_width_deg"))
+        mine = run.rows(running.time_s)
+        at_s, mean, half = running.time_s[mine], running.mean_deg[mine], running.honest_half_width_deg[mine]
         difference.band("honest", at_s, mean - half, mean + half, HONEST)
         difference.line("mean", at_s, mean, MEAN)
     limit, every = speed_limit_mps(results), run.rows(time_s)
     lines = Line("GNSS ground speed", colours.GNSS), Line(f"threshold {limit:g} m/s", colours.LIMIT, 1.0)
-    speed_mps = numbers(samples, "ground_speed_mps")[every]
+    speed_mps = samples.ground_speed_mps[every]
     speed = RunChart(recorder, f"{path}/speed", "Ground speed, m/s,", run, [speed_mps, np.array([0.0, limit])])
     speed.line("speed", time_s[every], speed_mps, lines[0])
     speed.line("threshold", np.array([run.start_s, run.end_s]), np.full(2, limit), lines[1])
     return [difference.view((SAMPLES, MEAN, HONEST)), speed.view(lines)]
 
 
-def range_of_used(samples: FigureData) -> tuple[float, float] | None:
+def range_of_used(samples: HeadingSamples) -> tuple[float, float] | None:
     """Axis on which all samples used are seen: the bands of the first few samples are far wider than anything else."""
-    values = numbers(samples, "difference_deg")[samples["used"].astype(bool)]
+    values = samples.difference_deg[samples.is_used]
     values = values[np.isfinite(values)]
     if not len(values):
         return None

@@ -1,40 +1,100 @@
 """INS errors: what the filter says of position, velocity, tilt and drift of each channel, and how far to trust it."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 import rerun.blueprint as rrb
 
 from groundstation.base.normal import NORMAL_95
+from groundstation.base.records import Int64Array
 from groundstation.chapters.inertial import inertial as chapter
 from groundstation.chapters.markdown import markdown
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.flight import PhaseSpans
+from groundstation.results.arrays.inertial import (
+    InertialObservability,
+    InertialStates,
+    InertialTrack,
+    ObservabilityOfChannel,
+    StatesOfChannel,
+)
 from groundstation.results.flight import FlightResults
 from groundstation.results.inertial import InertialResult
 from groundstation.viewer import colours
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after, runs
 from groundstation.viewer.tabs.aided_ins import aided_pages
-from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
+from groundstation.viewer.views import document, lanes, plot
 
-CHANNELS = ("north", "east")
 THIN, BOLD, DOT = 1.0, 2.0, 1.6
 ESTIMATE = Line("estimate ± 95 %", colours.ANSWER, BOLD)
 MARGIN = 0.12
 BAND_QUANTILES = (10.0, 90.0)  # the band of the first minutes and of long outages may leave the picture
-FAST = (  # state, unit, whether GNSS measures it and the smoother is drawn
-    ("position", "m", "m", True),
-    ("velocity", "mps", "m/s", True),
-    ("tilt", "arcsec", "arcsec", False),
-    ("drift", "dph", "deg/h", False),
+
+
+@dataclass(frozen=True)
+class StateLine:
+    """A state of a channel: name, title, unit and columns, of which GNSS measures only some."""
+
+    name: str
+    title: str
+    unit: str
+    estimate: Callable[[StatesOfChannel], FloatArray]
+    sigma: Callable[[StatesOfChannel], FloatArray]
+    measured: Callable[[StatesOfChannel], FloatArray] | None = None
+    smoothed: Callable[[StatesOfChannel], FloatArray] | None = None
+
+
+FAST = (
+    StateLine(
+        "position",
+        "position error",
+        "m",
+        estimate=lambda states: states.position_m,
+        sigma=lambda states: states.position_sigma_m,
+        measured=lambda states: states.measured_position_m,
+        smoothed=lambda states: states.smoothed_position_m,
+    ),
+    StateLine(
+        "velocity",
+        "velocity error",
+        "m/s",
+        estimate=lambda states: states.velocity_mps,
+        sigma=lambda states: states.velocity_sigma_mps,
+        measured=lambda states: states.measured_velocity_mps,
+        smoothed=lambda states: states.smoothed_velocity_mps,
+    ),
+    StateLine(
+        "tilt",
+        "platform tilt",
+        "arcsec",
+        estimate=lambda states: states.tilt_arcsec,
+        sigma=lambda states: states.tilt_sigma_arcsec,
+    ),
+    StateLine(
+        "drift",
+        "constant gyro drift",
+        "deg/h",
+        estimate=lambda states: states.drift_dph,
+        sigma=lambda states: states.drift_sigma_dph,
+    ),
 )
-SLOW = (("drift_rate", "dphph", "deg/h per h", False), ("random_drift", "dph", "deg/h", False))
-TITLES = {
-    "position": "position error",
-    "velocity": "velocity error",
-    "tilt": "platform tilt",
-    "drift": "constant gyro drift",
-    "drift_rate": "drift rate",
-    "random_drift": "random gyro drift",
-}
+SLOW = (
+    StateLine(
+        "drift_rate",
+        "drift rate",
+        "deg/h per h",
+        estimate=lambda states: states.drift_rate_dphph,
+        sigma=lambda states: states.drift_rate_sigma_dphph,
+    ),
+    StateLine(
+        "random_drift",
+        "random gyro drift",
+        "deg/h",
+        estimate=lambda states: states.random_drift_dph,
+        sigma=lambda states: states.random_drift_sigma_dph,
+    ),
+)
 
 
 def inertial(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
@@ -44,7 +104,7 @@ def inertial(recorder: Recorder, results: FlightResults) -> rrb.Container | None
         return None
     recorder.document("inertial/answer", markdown(section))
     right: list[rrb.View] = [document("Errors of this INS against GNSS", "inertial/answer")]
-    states = figure_of(results, "inertial_states", "time_s", "north_position_m", "east_position_m")
+    states = results.rows_of(InertialStates)
     pages = aided_pages(recorder, results)
     if states is not None:
         pages = _pages(recorder, results, states)
@@ -59,16 +119,20 @@ def inertial(recorder: Recorder, results: FlightResults) -> rrb.Container | None
     return rrb.Horizontal(contents=[column_left, column], column_shares=[2.6, 1.0], name="INS errors")
 
 
-def _pages(recorder: Recorder, results: FlightResults, states: FigureData) -> list[rrb.Container]:
+def _pages(recorder: Recorder, results: FlightResults, states: InertialStates) -> list[rrb.Container]:
     """Two pages of plots, north on the left and east on the right."""
     first, second = [], []
-    observability = figure_of(results, "inertial_observability", "time_s")
-    for channel in CHANNELS:
-        fast = [_state(recorder, states, channel, *row) for row in FAST]
-        slow = [_state(recorder, states, channel, *row) for row in SLOW]
-        slow += [_innovation(recorder, states, channel), _observability(recorder, observability, channel)]
-        first.append(rrb.Vertical(contents=[view for view in fast if view is not None]))
-        second.append(rrb.Vertical(contents=[view for view in slow if view is not None]))
+    observed = results.rows_of(InertialObservability)
+    time_ns = recorder.time_ns(states.time_s)
+    for channel, one in (("north", states.north), ("east", states.east)):
+        fast = [_state(recorder, time_ns, channel, one, state) for state in FAST]
+        slow = [_state(recorder, time_ns, channel, one, state) for state in SLOW]
+        slow.append(_innovation(recorder, time_ns, channel, one))
+        if observed is not None:
+            of_channel = observed.north if channel == "north" else observed.east
+            slow.append(_observability(recorder, recorder.time_ns(observed.time_s), channel, of_channel))
+        first.append(rrb.Vertical(contents=fast))
+        second.append(rrb.Vertical(contents=slow))
     return [
         rrb.Horizontal(
             contents=first,
@@ -79,39 +143,26 @@ def _pages(recorder: Recorder, results: FlightResults, states: FigureData) -> li
 
 
 def _state(
-    recorder: Recorder, states: FigureData, channel: str, name: str, suffix: str, unit: str, is_measured: bool
-) -> rrb.View | None:
+    recorder: Recorder, time_ns: Int64Array, channel: str, states: StatesOfChannel, state: StateLine
+) -> rrb.View:
     """One state: measured where GNSS shows it, smoothed, estimate, and its filled 95 % band."""
-    column = f"{channel}_{name}_{suffix}"
-    if column not in states.columns:
-        return None
-    path = f"inertial/{channel}/{name}"
-    time_ns = recorder.time_ns(numbers(states, "time_s"))
-    gaps = gap_after(time_ns)
-    estimate = numbers(states, column)
-    shown, series, lines = [estimate], [], []
-    measured = f"measured_{column}"
-    if is_measured and measured in states.columns and np.isfinite(numbers(states, measured)).any():
-        series.append(numbers(states, measured))  # a line, not dots: Rerun would draw those over the estimate
-        lines.append(Line(f"INS − GNSS, {unit}", colours.SAMPLES, THIN))
-        shown.append(series[0])
-    smoothed = f"smoothed_{column}"
-    if smoothed in states.columns and np.isfinite(numbers(states, smoothed)).any():
-        series.append(numbers(states, smoothed))
-        lines.append(Line(f"smoothed (RTS), {unit}", colours.PAPER, THIN))
-    band: list[FloatArray] = []
-    sigma = f"{channel}_{name}_sigma_{suffix}"
-    if sigma in states.columns:
-        half = NORMAL_95 * numbers(states, sigma)
-        band = [estimate + half, estimate - half]
-        recorder.band(f"{path}/b_band", time_ns, estimate, half, ESTIMATE, gaps)  # over the others
-    else:
-        series.append(estimate)
-        lines.append(ESTIMATE)
+    path, gaps = f"inertial/{channel}/{state.name}", gap_after(time_ns)
+    estimate, half = state.estimate(states), NORMAL_95 * state.sigma(states)
+    shown, series, lines = [estimate], list[FloatArray](), list[Line]()
+    measured = None if state.measured is None else state.measured(states)
+    if measured is not None and np.isfinite(measured).any():
+        series.append(measured)  # a line, not dots: Rerun would draw those over the estimate
+        lines.append(Line(f"INS − GNSS, {state.unit}", colours.SAMPLES, THIN))
+        shown.append(measured)
+    smoothed = None if state.smoothed is None else state.smoothed(states)
+    if smoothed is not None and np.isfinite(smoothed).any():
+        series.append(smoothed)
+        lines.append(Line(f"smoothed (RTS), {state.unit}", colours.PAPER, THIN))
+    recorder.band(f"{path}/b_band", time_ns, estimate, half, ESTIMATE, gaps)  # over the others
     if series:
         recorder.lines(f"{path}/a_lines", time_ns, np.column_stack(series), lines, gaps)
-    title = f"{channel.capitalize()} {TITLES[name]}, {unit}"
-    return plot(title, path, axis_range=_range(shown, band), legend=False)
+    title = f"{channel.capitalize()} {state.title}, {state.unit}"
+    return plot(title, path, axis_range=_range(shown, [estimate + half, estimate - half]), legend=False)
 
 
 def _range(shown: list[FloatArray], band: list[FloatArray]) -> tuple[float, float] | None:
@@ -126,13 +177,9 @@ def _range(shown: list[FloatArray], band: list[FloatArray]) -> tuple[float, floa
     return low - margin, high + margin
 
 
-def _innovation(recorder: Recorder, states: FigureData, channel: str) -> rrb.View | None:
+def _innovation(recorder: Recorder, time_ns: Int64Array, channel: str, states: StatesOfChannel) -> rrb.View:
     """Innovations over their own sigma with the 95 % limits."""
-    column = f"{channel}_normalised_innovation"
-    if column not in states.columns:
-        return None
-    path = f"inertial/{channel}/innovation"
-    time_ns, values = recorder.time_ns(numbers(states, "time_s")), numbers(states, column)
+    path, values = f"inertial/{channel}/innovation", states.normalised_innovation
     known = np.isfinite(values)
     recorder.dots(f"{path}/a_samples", time_ns[known], values[known], Line("innovation / σ", colours.SAMPLES, DOT))
     ends = np.array([[NORMAL_95, -NORMAL_95], [NORMAL_95, -NORMAL_95]])
@@ -144,48 +191,47 @@ def _innovation(recorder: Recorder, states: FigureData, channel: str) -> rrb.Vie
     return plot(title, path, axis_range=(-high, high), legend=False)
 
 
-def _observability(recorder: Recorder, figure: FigureData | None, channel: str) -> rrb.View | None:
+def _observability(recorder: Recorder, time_ns: Int64Array, channel: str, states: ObservabilityOfChannel) -> rrb.View:
     """Observability of the six states, 0 to 1."""
-    known = [] if figure is None else [name for name in TITLES if f"{channel}_{name}" in figure.columns]
-    if figure is None or not known:
-        return None
     path = f"inertial/{channel}/observability"
-    time_ns = recorder.time_ns(numbers(figure, "time_s"))
-    values = np.column_stack([numbers(figure, f"{channel}_{name}") for name in known])
-    shades = colours.for_series(len(known))
-    lines = [Line(TITLES[name], colour) for name, colour in zip(known, shades, strict=True)]
+    values = np.column_stack(
+        [states.position, states.velocity, states.tilt, states.drift, states.drift_rate, states.random_drift]
+    )
+    titles = [state.title for state in (*FAST, *SLOW)]
+    lines = [Line(title, colour) for title, colour in zip(titles, colours.for_series(len(titles)), strict=True)]
     recorder.lines(path, time_ns, values, lines, gap_after(time_ns))
     title = f"{channel.capitalize()} observability (0 no, 1 full)"
-    return plot(title, path, axis_range=(-0.05, 1.05), legend=channel == CHANNELS[-1])
+    return plot(title, path, axis_range=(-0.05, 1.05), legend=channel == "east")
 
 
 def _radial(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Radial error against GNSS of the INS and of the corrected track; their sizes differ too much for one plot."""
-    figure = figure_of(results, "inertial_track", "time_s", "ins_error_m", "corrected_error_m")
+    figure = results.rows_of(InertialTrack)
     if figure is None:
         return []
-    time_ns = recorder.time_ns(numbers(figure, "time_s"))
+    time_ns = recorder.time_ns(figure.time_s)
     views: list[rrb.View] = []
-    for column, title, colour in (
-        ("ins_error_m", "Radial error of the INS against GNSS, m", colours.INS),
-        ("corrected_error_m", "Radial error of the corrected track against GNSS, m", colours.ANSWER),
+    if figure.ins_error_m is None or figure.corrected_error_m is None:
+        return []
+    for part, values, subject, colour in (
+        ("ins_error", figure.ins_error_m, "INS", colours.INS),
+        ("corrected_error", figure.corrected_error_m, "corrected track", colours.ANSWER),
     ):
-        values = numbers(figure, column)
         if np.isfinite(values).any():
-            path = f"inertial/radial/{column.removesuffix('_m')}"
+            path, title = f"inertial/radial/{part}", f"Radial error of the {subject} against GNSS, m"
             recorder.lines(path, time_ns, values[:, None], [Line(title, colour)], gap_after(time_ns))
             views.append(plot(title, path, legend=False))
     return views
 
 
-def _lanes(recorder: Recorder, results: FlightResults, states: FigureData | None) -> list[rrb.View]:
+def _lanes(recorder: Recorder, results: FlightResults, states: InertialStates | None) -> list[rrb.View]:
     """When the filter had GNSS and when it forecast, under the flight phase that the overview logged."""
-    if states is None or not {"is_forecast", "gnss_used"} <= set(states.columns):
+    if states is None:
         return []
-    state = np.where(states["gnss_used"].astype(bool), "GNSS used", "GNSS not used")
-    state = np.where(states["is_forecast"].astype(bool), "forecast", state)
+    state = np.where(states.is_gnss_used, "GNSS used", "GNSS not used")
+    state = np.where(states.is_forecast, "forecast", state)
     answer = results.answer(InertialResult)
-    time_s, outages = numbers(states, "time_s"), () if answer is None else answer.outages
+    time_s, outages = states.time_s, () if answer is None else answer.outages
     ends = [end for outage in outages for end in (outage.start_s, outage.end_s)]
     every = np.unique(np.concatenate([time_s, ends]))  # a short outage may lie between two rows
     state = state[np.clip(np.searchsorted(time_s, every, side="right") - 1, 0, len(time_s) - 1)]
@@ -194,5 +240,5 @@ def _lanes(recorder: Recorder, results: FlightResults, states: FigureData | None
     rows = runs(state)
     time_ns = recorder.time_ns(every[rows])
     recorder.lane("inertial/filter", time_ns, state[rows].tolist(), colours.FILTER_STATES)
-    phases = ["flight/phase"] if figure_of(results, "phases", "start_s", "end_s", "phase") is not None else []
+    phases = ["flight/phase"] if results.rows_of(PhaseSpans) is not None else []
     return [lanes("Filter and flight phase", ["inertial/filter", *phases])]

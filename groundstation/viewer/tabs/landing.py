@@ -6,7 +6,7 @@ import rerun.blueprint as rrb
 
 from groundstation.chapters.landing import landing as chapter
 from groundstation.chapters.markdown import markdown
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.landing import LandingPath, LandingProtection
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing import Approach, LandingResult
 from groundstation.results.landing_categories import CATEGORIES
@@ -15,7 +15,7 @@ from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.run_chart import RunChart, runs_of
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.views import document, figure_of, numbers
+from groundstation.viewer.views import document
 
 SEEN_M = 6_000.0  # of the final, before the threshold
 ENLARGED = 10.0  # across and up against along: corridors of metres along kilometres
@@ -33,7 +33,7 @@ SPACE_NAME = (
 def landing(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the tab of the approaches; None where there are none."""
     answer, section = results.answer(LandingResult), chapter(results)
-    data = figure_of(results, "landing_path", "approach", "time_s", "distance_m", "across_m", "height_m")
+    data = results.rows_of(LandingPath)
     if answer is None or section is None or data is None:
         return None
     recorder.document("landing/answer", markdown(section))
@@ -43,15 +43,13 @@ def landing(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     return rrb.Horizontal(contents=[approaches, text], column_shares=[3.0, 1.5], name="Landing")
 
 
-def _approach(recorder: Recorder, results: FlightResults, one: Approach, data: FigureData) -> rrb.Container:
-    mine = np.flatnonzero(numbers(data, "approach") == one.number)
-    column = {name: numbers(data, name)[mine] for name in data.columns}
-    path = f"landing/{one.number}"
-    left = _space(recorder, f"{path}/space", column)
-    left += _motion(recorder, f"{path}/motion", column)
+def _approach(recorder: Recorder, results: FlightResults, one: Approach, data: LandingPath) -> rrb.Container:
+    flown, path = data.where(data.approach == one.number), f"landing/{one.number}"
+    left = _space(recorder, f"{path}/space", flown)
+    left += _motion(recorder, f"{path}/motion", flown)
     left += _protection(recorder, f"{path}/protection", results, one)
-    right = _deviation(recorder, f"{path}/lateral", "Right of the course, m", column, "lateral")
-    right += _deviation(recorder, f"{path}/vertical", "Above the path, m", column, "vertical")
+    right = _deviation(recorder, f"{path}/lateral", "Right of the course, m", flown, "lateral")
+    right += _deviation(recorder, f"{path}/vertical", "Above the path, m", flown, "vertical")
     shares = [2.0, *[1.0] * (len(left) - 1)]
     columns = [rrb.Vertical(contents=left, row_shares=shares), rrb.Vertical(contents=right)]
     contents = [view for view, has in zip(columns, (left, right), strict=True) if has]
@@ -63,28 +61,28 @@ def _place(along_m: FloatArray, across_m: FloatArray, height_m: FloatArray) -> F
     return np.column_stack([along_m, -ENLARGED * across_m, ENLARGED * height_m]).astype(np.float32)
 
 
-def _space(recorder: Recorder, path: str, column: dict[str, FloatArray]) -> list[rrb.View]:
+def _space(recorder: Recorder, path: str, flown: LandingPath) -> list[rrb.View]:
     """The end of the final between the frames of the categories, by positions (grey) and by the guidance.
 
     The aircraft moves where the guidance has it, else along the positions.
     """
-    distance = column["distance_m"]
-    seen = (distance < SEEN_M) & np.isfinite(column["height_m"]) & np.isfinite(column["across_m"])
+    distance = flown.distance_m
+    seen = (distance < SEEN_M) & np.isfinite(flown.height_m) & np.isfinite(flown.across_m)
     if seen.sum() < 2:
         return []
-    place = _place(-distance[seen], column["across_m"][seen], column["height_m"][seen])
+    place = _place(-distance[seen], flown.across_m[seen], flown.height_m[seen])
     track = rr.LineStrips3D([place], colors=[colours.SAMPLES], radii=rr.Radius.ui_points(EDGE))
     recorder.static(f"{path}/positions", track)
-    guided_height = column["path_height_m"] + column["vertical_guidance_m"]
-    guided = (distance < SEEN_M) & np.isfinite(guided_height) & np.isfinite(column["lateral_guidance_m"])
+    guided_height = flown.path_height_m + flown.vertical_guidance_m
+    guided = (distance < SEEN_M) & np.isfinite(guided_height) & np.isfinite(flown.lateral_guidance_m)
     if guided.sum() > 1:
         seen = guided
-        place = _place(-distance[seen], column["lateral_guidance_m"][seen], guided_height[seen])
+        place = _place(-distance[seen], flown.lateral_guidance_m[seen], guided_height[seen])
         track = rr.LineStrips3D([place], colors=[colours.INS], radii=rr.Radius.ui_points(TRAIL))
         recorder.static(f"{path}/guidance", track)
     before = (distance < SEEN_M) & (distance > 0.0)
     for category in CATEGORIES:
-        along, height = -distance[before], column["path_height_m"][before]
+        along, height = -distance[before], flown.path_height_m[before]
         edges = [
             _place(along, np.full(len(along), side * category.horizontal_m), height + up * category.vertical_m)
             for side in (-1.0, 1.0)
@@ -101,16 +99,19 @@ def _space(recorder: Recorder, path: str, column: dict[str, FloatArray]) -> list
     )
     mark = rr.Points3D.from_fields(colors=[colours.ANSWER], radii=rr.Radius.ui_points(MARK))
     recorder.static(f"{path}/aircraft", mark)
-    indexes = recorder.indexes(recorder.time_ns(column["time_s"][seen]))
+    indexes = recorder.indexes(recorder.time_ns(flown.time_s[seen]))
     recorder.stream.send_columns(f"{path}/aircraft", indexes, rr.Points3D.columns(positions=place))
     recorder.static(path, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     return [rrb.Spatial3DView(name=SPACE_NAME, origin=f"/{path}")]
 
 
-def _deviation(recorder: Recorder, path: str, title: str, column: dict[str, FloatArray], axis: str) -> list[rrb.View]:
+def _deviation(recorder: Recorder, path: str, title: str, flown: LandingPath, axis: str) -> list[rrb.View]:
     """Deviation over the end of the final, in a dot of the guidance and the figures of the categories."""
-    distance, guided, dot = column["distance_m"], column[f"{axis}_guidance_m"], column[f"{axis}_dot_m"]
-    placed = column["across_m"] if axis == "lateral" else column["height_m"] - column["path_height_m"]
+    distance = flown.distance_m
+    if axis == "lateral":
+        guided, dot, placed = flown.lateral_guidance_m, flown.lateral_dot_m, flown.across_m
+    else:
+        guided, dot, placed = flown.vertical_guidance_m, flown.vertical_dot_m, flown.height_m - flown.path_height_m
     placed = np.where(distance > 0.0, placed, np.nan)
     shown = guided if np.isfinite(guided).any() else placed
     seen = (distance < SEEN_M) & np.isfinite(shown)
@@ -132,49 +133,45 @@ def _deviation(recorder: Recorder, path: str, title: str, column: dict[str, Floa
     recorder.static(
         f"{path}/aircraft", rr.Points2D.from_fields(colors=[colours.ANSWER], radii=rr.Radius.ui_points(MARK))
     )
-    indexes = recorder.indexes(recorder.time_ns(column["time_s"][seen]))
+    indexes = recorder.indexes(recorder.time_ns(flown.time_s[seen]))
     points = np.nan_to_num(chart.points(along[seen], shown[seen])).astype(np.float32)
     recorder.stream.send_columns(f"{path}/aircraft", indexes, rr.Points2D.columns(positions=points))
     return [chart.view()]
 
 
-def _motion(recorder: Recorder, path: str, column: dict[str, FloatArray]) -> list[rrb.View]:
+def _motion(recorder: Recorder, path: str, flown: LandingPath) -> list[rrb.View]:
     """Sink rate and bank."""
-    lines = {"sink_rate_mps": Line("sink rate, m/s", colours.INS), "bank_deg": Line("bank, deg", colours.GNSS)}
-    known = [name for name in lines if np.isfinite(column[name]).any()]
-    if not known:
-        return []
-    series = {lines[name]: column[name] for name in known}
-    return _over_time(recorder, path, "Sink rate, m/s, and bank, deg,", column["time_s"], series)
+    series = {
+        Line("sink rate, m/s", colours.INS): flown.sink_rate_mps,
+        Line("bank, deg", colours.GNSS): flown.bank_deg,
+    }
+    return _over_time(recorder, path, "Sink rate, m/s, and bank, deg,", flown.time_s, series)
 
 
 def _over_time(
     recorder: Recorder, path: str, title: str, time_s: FloatArray, series: dict[Line, FloatArray]
 ) -> list[rrb.View]:
-    """Lines over the time since the approach began; none without two samples."""
+    """Lines that have values over the time since the approach began; none without two samples."""
     runs = runs_of(time_s, np.inf)
-    if not runs:
+    known = {line: values for line, values in series.items() if np.isfinite(values).any()}
+    if not runs or not known:
         return []
-    chart = RunChart(recorder, path, title, runs[0], list(series.values()))
-    for number, (line, values) in enumerate(series.items()):
+    chart = RunChart(recorder, path, title, runs[0], list(known.values()))
+    for number, (line, values) in enumerate(known.items()):
         chart.line(f"line/{number}", time_s, values, line)
-    return [chart.view(list(series))]
+    return [chart.view(list(known))]
 
 
 def _protection(recorder: Recorder, path: str, results: FlightResults, one: Approach) -> list[rrb.View]:
     """Protection levels and alarm limits."""
-    data = figure_of(results, "landing_protection", "approach", "time_s")
+    data = results.rows_of(LandingProtection)
     if one.protection is None or data is None:
         return []
-    mine = np.flatnonzero(numbers(data, "approach") == one.number)
-    lines = {
-        "horizontal_protection_m": Line("horizontal level", colours.GNSS, BOLD),
-        "vertical_protection_m": Line("vertical level", colours.ANSWER, BOLD),
-        "horizontal_alarm_limit_m": Line("horizontal limit", colours.LIMIT, THIN),
-        "vertical_alarm_limit_m": Line("vertical limit", colours.HONEST, THIN),
+    mine = data.where(data.approach == one.number)
+    series = {
+        Line("horizontal level", colours.GNSS, BOLD): mine.horizontal_protection_m,
+        Line("vertical level", colours.ANSWER, BOLD): mine.vertical_protection_m,
+        Line("horizontal limit", colours.LIMIT, THIN): mine.horizontal_alarm_limit_m,
+        Line("vertical limit", colours.HONEST, THIN): mine.vertical_alarm_limit_m,
     }
-    known = [name for name in lines if np.isfinite(numbers(data, name)[mine]).any()]
-    if not known:
-        return []
-    series = {lines[name]: numbers(data, name)[mine] for name in known}
-    return _over_time(recorder, path, "Protection levels, m,", numbers(data, "time_s")[mine], series)
+    return _over_time(recorder, path, "Protection levels, m,", mine.time_s, series)

@@ -6,7 +6,7 @@ import rerun.blueprint as rrb
 
 from groundstation.chapters.landing_ranges import landing_ranges as chapter
 from groundstation.chapters.markdown import markdown
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.landing import RangesErrors, RangesPath, RangesSpace
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing_categories import CATEGORIES, LINEAR_95
 from groundstation.results.landing_ranges import HONEST, RangeLanding
@@ -14,7 +14,7 @@ from groundstation.viewer import colours
 from groundstation.viewer.names import clean_text, path_parts
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.views import document, figure_of, numbers, plot
+from groundstation.viewer.views import document, plot
 
 MARK, TRAIL, RANGE = 5.0, 1.2, 0.8  # radii in points of the screen
 BOLD, THIN = 1.6, 1.0
@@ -27,8 +27,8 @@ VIEW_NAME = f"Along, left, up, m; frames: corridors of CAT I, II, III and ellips
 def landing_ranges(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the tab; None without an answer."""
     answer, section = results.answer(RangeLanding), chapter(results)
-    space = figure_of(results, "landing_ranges_space", "time_s", "name", "along_m", "right_m", "up_m", "speed_mps")
-    path = figure_of(results, "landing_ranges_path", "time_s", "sigma_along_m", "vertical_95_m", "determinant")
+    space = results.rows_of(RangesSpace)
+    path = results.rows_of(RangesPath)
     if answer is None or section is None or space is None or path is None:
         return None
     recorder.document("landing_ranges/answer", markdown(section))
@@ -38,10 +38,10 @@ def landing_ranges(recorder: Recorder, results: FlightResults) -> rrb.Container 
     return rrb.Horizontal(contents=columns, column_shares=[1.4, 1.0], name="Landing")
 
 
-def _space(recorder: Recorder, answer: RangeLanding, space: FigureData, path: FigureData) -> rrb.View:
+def _space(recorder: Recorder, answer: RangeLanding, space: RangesSpace, path: RangesPath) -> rrb.View:
     """Aircraft and points in space, ranges as lines, corridor frames every half kilometre."""
-    name, time_s = space["name"].astype(np.str_), numbers(space, "time_s")
-    place = np.column_stack([numbers(space, "along_m"), -numbers(space, "right_m"), numbers(space, "up_m")])
+    name, time_s = space.label, space.time_s
+    place = np.column_stack([space.along_m, -space.right_m, space.up_m])
     flown = place[name == "aircraft"]
     ways = [("aircraft", colours.ANSWER)] + ([("moving", colours.GNSS)] if (name == "moving").any() else [])
     for which, shade in ways:
@@ -87,7 +87,7 @@ def _corridors(recorder: Recorder, flown: FloatArray) -> None:
 
 def _ranges(
     recorder: Recorder,
-    path: FigureData,
+    path: RangesPath,
     flown: FloatArray,
     ground: list[tuple[str, FloatArray]],
     moving: FloatArray,
@@ -99,37 +99,33 @@ def _ranges(
     recorder.static("landing/ranges", drawn)
     flat = list(strips.reshape(-1, 2, 3).astype(np.float32))
     columns = rr.LineStrips3D.columns(strips=flat).partition([len(ends)] * len(strips))
-    recorder.stream.send_columns("landing/ranges", recorder.indexes(_time_ns(recorder, path)), columns)
+    recorder.stream.send_columns("landing/ranges", recorder.indexes(recorder.time_ns(path.time_s)), columns)
 
 
-def _ellipsoid(recorder: Recorder, path: FigureData, flown: FloatArray) -> None:
-    half = TIMES_LARGER * LINEAR_95 * np.column_stack([numbers(path, f"sigma_{axis}_m") for axis in _AXES])
+def _ellipsoid(recorder: Recorder, path: RangesPath, flown: FloatArray) -> None:
+    half = TIMES_LARGER * LINEAR_95 * np.column_stack([path.sigma_along_m, path.sigma_right_m, path.sigma_up_m])
     recorder.static(
         "landing/aircraft/ellipsoid", rr.Ellipsoids3D.from_fields(colors=[(*colours.ANSWER[:3], 90)], fill_mode="solid")
     )
     columns = rr.Ellipsoids3D.columns(half_sizes=half.astype(np.float32), centers=flown.astype(np.float32))
-    recorder.stream.send_columns("landing/aircraft/ellipsoid", recorder.indexes(_time_ns(recorder, path)), columns)
+    recorder.stream.send_columns("landing/aircraft/ellipsoid", recorder.indexes(recorder.time_ns(path.time_s)), columns)
 
 
-_AXES = ("along", "right", "up")
-
-
-def _time_ns(recorder: Recorder, figure: FigureData) -> np.ndarray:
-    return recorder.time_ns(numbers(figure, "time_s"))
-
-
-def _accuracy(recorder: Recorder, path: FigureData) -> list[rrb.View]:
+def _accuracy(recorder: Recorder, path: RangesPath) -> list[rrb.View]:
     """95 % figures with the limits of the categories as level lines, and the measure of observability."""
-    time_ns, views = _time_ns(recorder, path), list[rrb.View]()
+    time_ns, views = recorder.time_ns(path.time_s), list[rrb.View]()
     panels = (
-        ("horizontal", ("horizontal_95_m", "lateral_95_m"), [one.horizontal_m for one in CATEGORIES]),
-        ("vertical", ("vertical_95_m",), [one.vertical_m for one in CATEGORIES]),
+        (
+            "horizontal",
+            {"horizontal": path.horizontal_95_m, "lateral": path.lateral_95_m},
+            [one.horizontal_m for one in CATEGORIES],
+        ),
+        ("vertical", {"vertical": path.vertical_95_m}, [one.vertical_m for one in CATEGORIES]),
     )
-    for title, columns, limits in panels:
-        values = [numbers(path, column) for column in columns] + [np.full(len(path), limit) for limit in limits]
-        shades = colours.for_series(len(columns))
-        titles = [f"{column.removesuffix('_95_m')} 95 %, m" for column in columns]
-        lines = [Line(name, shade, BOLD) for name, shade in zip(titles, shades, strict=True)]
+    for title, reached, limits in panels:
+        values = [*reached.values(), *(np.full(len(path), limit) for limit in limits)]
+        shades = colours.for_series(len(reached))
+        lines = [Line(f"{name} 95 %, m", shade, BOLD) for name, shade in zip(reached, shades, strict=True)]
         lines += [Line(one.name, colours.LIMIT, THIN) for one in CATEGORIES]
         entity, most = f"landing_ranges/{title}", 4.0 * max(limits)
         recorder.lines(entity, time_ns, np.column_stack(values), lines)
@@ -139,18 +135,21 @@ def _accuracy(recorder: Recorder, path: FigureData) -> list[rrb.View]:
 
 def _errors(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Errors of the first simulated approaches in the computed 95 % band."""
-    data = figure_of(results, "landing_ranges_errors", "time_s", "filter", "trial", "error_up_m", "sigma_up_m")
+    data = results.rows_of(RangesErrors)
     if data is None:
         return []
-    honest, trial, views = data["filter"].astype(np.str_) == HONEST, numbers(data, "trial"), list[rrb.View]()
+    honest, trial, views = data.filter == HONEST, data.trial, list[rrb.View]()
     count = min(int(trial.max()), MOST_TRIALS)
-    for axis in _AXES[1:]:
+    for axis, error, sigma, most in (
+        ("right", data.error_right_m, data.sigma_right_m, 6.0),
+        ("up", data.error_up_m, data.sigma_up_m, 20.0),
+    ):
         first = honest & (trial == 1)
-        band = LINEAR_95 * numbers(data, f"sigma_{axis}_m")[first]
-        rows = [numbers(data, f"error_{axis}_m")[honest & (trial == one)] for one in range(1, count + 1)]
+        band = LINEAR_95 * sigma[first]
+        rows = [error[honest & (trial == one)] for one in range(1, count + 1)]
         lines = [Line(f"approach {one}", colours.LIGHT, THIN) for one in range(1, count + 1)]
-        entity, most = f"landing_ranges/error_{axis}", 6.0 if axis == "right" else 20.0
-        time_ns = recorder.time_ns(numbers(data, "time_s")[first])
+        entity = f"landing_ranges/error_{axis}"
+        time_ns = recorder.time_ns(data.time_s[first])
         half, name = np.clip(band, 0.0, most), Line("95 % as computed, m", colours.HONEST, THIN)
         recorder.band(f"{entity}/a_band", time_ns, np.zeros(len(band)), half, name)
         recorder.lines(f"{entity}/b_errors", time_ns, np.clip(np.column_stack(rows), -most, most), lines)
@@ -159,12 +158,12 @@ def _errors(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     return views
 
 
-def _moving(recorder: Recorder, space: FigureData) -> list[rrb.View]:
+def _moving(recorder: Recorder, space: RangesSpace) -> list[rrb.View]:
     """Speed of the moving point."""
-    rows = space["name"].astype(np.str_) == "moving"
+    rows = space.label == "moving"
     if not rows.any():
         return []
-    speed = numbers(space, "speed_mps")[rows][:, None]
+    speed = space.speed_mps[rows][:, None]
     entity = "landing_ranges/speed"
-    recorder.lines(entity, recorder.time_ns(numbers(space, "time_s")[rows]), speed, [Line("speed", colours.GNSS, BOLD)])
+    recorder.lines(entity, recorder.time_ns(space.time_s[rows]), speed, [Line("speed", colours.GNSS, BOLD)])
     return [plot("Speed of the moving point, m/s", entity)]

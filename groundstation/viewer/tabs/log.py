@@ -8,12 +8,13 @@ from groundstation.base.signals import RAW_PREFIX, topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.chapters.findings import findings
 from groundstation.chapters.markdown import markdown
+from groundstation.results.arrays.flight import GapRows
 from groundstation.results.flight import FlightResults
 from groundstation.results.grouped_findings import grouped
 from groundstation.tables.table import Flight
 from groundstation.viewer.names import topic_label
 from groundstation.viewer.recorder import Recorder
-from groundstation.viewer.views import document, figure_of, numbers
+from groundstation.viewer.views import document
 
 MAX_GAPS = 2_000  # of all topics; the lanes of the data quality tab show every one
 
@@ -82,16 +83,16 @@ def _events(recorder: Recorder, flight: Flight) -> None:
 
 def _gaps(recorder: Recorder, results: FlightResults) -> bool:
     """Log the longest gaps; False where there are none."""
-    gaps = figure_of(results, "gaps", "topic", "start_s", "length_s")
+    gaps = results.rows_of(GapRows)
     if gaps is None:
         return False
-    start, length = numbers(gaps, "start_s"), numbers(gaps, "length_s")
+    start, length = gaps.start_s, gaps.length_s
     # One drop-out hits everything: a hundred raw topics would only repeat it. Theirs are findings and lanes.
-    ours = np.flatnonzero([not topic.startswith(RAW_PREFIX) for topic in gaps["topic"].tolist()])
+    ours = np.flatnonzero([not topic.startswith(RAW_PREFIX) for topic in gaps.topic.tolist()])
     rows = np.sort(ours[np.argsort(-length[ours], kind="stable")[:MAX_GAPS]])
     if not rows.size:
         return False
-    texts = [f"gap of {length[row]:.3f} s in {gaps['topic'][row]}" for row in rows]
+    texts = [f"gap of {length[row]:.3f} s in {gaps.topic[row]}" for row in rows]
     if len(rows) < len(gaps):
         texts[0] += f" ({len(rows)} of {len(gaps)} gaps are listed here; the tab Data quality shows every one)"
     recorder.texts("log/gaps", recorder.time_ns(start[rows]), texts, ["info"] * len(texts))

@@ -1,6 +1,6 @@
 """Magnetic: the deviation by each method against heading, the branches, the errors and the field over time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import rerun.blueprint as rrb
@@ -8,18 +8,31 @@ import rerun.blueprint as rrb
 from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.magnetic import magnetic as chapter
 from groundstation.chapters.markdown import markdown
+from groundstation.results.arrays.magnetic import (
+    CorrectedHeadingRows,
+    GroundRunCurve,
+    MagneticCurves,
+    MagneticModulus,
+    MagneticSamples,
+    MagneticTable,
+)
 from groundstation.results.flight import FlightResults
-from groundstation.results.magnetic import METHOD_TITLES, MagneticResult
+from groundstation.results.magnetic import METHOD_TITLES, MagneticResult, MethodName
 from groundstation.results.magnetic_ground import GroundDeviation
 from groundstation.viewer import colours
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after
 from groundstation.viewer.tabs.magnetic_field import eight, sphere
-from groundstation.viewer.views import document, figure_of, numbers, plot
+from groundstation.viewer.views import document, plot
 
 THIN, BOLD, DOT = 1.0, 2.0, 1.6
 SHADES = dict(zip(METHOD_TITLES, (colours.INS, colours.ANSWER, colours.HONEST), strict=True))
+AFTER: Mapping[MethodName, Callable[[MagneticSamples], FloatArray]] = {  # error after the correction by each method
+    "compass_table": lambda samples: samples.error_compass_table_deg,
+    "poisson_attitude": lambda samples: samples.error_poisson_attitude_deg,
+    "constant_modulus": lambda samples: samples.error_constant_modulus_deg,
+}
 MARGIN = 0.08
 RUN, FITTED = Line("ground runs", colours.INS, BOLD), Line("A to E", colours.ANSWER, THIN)
 
@@ -69,37 +82,32 @@ def _chart(
 
 def _deviation(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Deviation to be added, by each method, with its filled 95 % band."""
-    figure = figure_of(results, "magnetic_curves", "uncorrected_magnetic_heading_deg")
+    figure = results.rows_of(MagneticCurves)
     if figure is None:
         return []
     curves, bands = [], []
     for name, title in METHOD_TITLES.items():
-        columns = f"deviation_{name}_deg", f"sigma_{name}_deg"
-        if not set(columns) <= set(figure.columns):
-            continue
-        value, sigma = (numbers(figure, column) for column in columns)
-        if np.isfinite(value).any():
+        value, sigma = figure.deviation_deg.get(name), figure.sigma_deg.get(name)
+        if value is not None and sigma is not None and np.isfinite(value).any():
             shade = SHADES[name]
             bands.append((value - NORMAL_95 * sigma, value + NORMAL_95 * sigma, shade))
             curves.append((value, Line(title, shade, BOLD)))
-    heading = numbers(figure, "uncorrected_magnetic_heading_deg")
+    heading = figure.uncorrected_magnetic_heading_deg
     title = "Deviation to be added and 95 %, deg"
     return _chart(recorder, "magnetic/deviation", title, heading, curves, bands)
 
 
 def _branches(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Magnetic minus true heading on right and left turns and in the average."""
-    columns = ("right_turn_deg", "left_turn_deg", "compass_error_deg")
-    figure = figure_of(results, "magnetic_table", "uncorrected_magnetic_heading_deg", *columns)
+    figure = results.rows_of(MagneticTable)
     if figure is None:
         return []
-    lines = (
-        Line("right turn", colours.GNSS, THIN),
-        Line("left turn", colours.INS, THIN),
-        Line("average", colours.LIGHT, BOLD),
-    )
-    curves = [(numbers(figure, column), line) for column, line in zip(columns, lines, strict=True)]
-    heading = numbers(figure, "uncorrected_magnetic_heading_deg")
+    curves = [
+        (figure.right_turn_deg, Line("right turn", colours.GNSS, THIN)),
+        (figure.left_turn_deg, Line("left turn", colours.INS, THIN)),
+        (figure.compass_error_deg, Line("average", colours.LIGHT, BOLD)),
+    ]
+    heading = figure.uncorrected_magnetic_heading_deg
     return _chart(recorder, "magnetic/branches", "Magnetic minus true heading, deg", heading, curves)
 
 
@@ -118,9 +126,9 @@ def _ground_runs(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     y = _axis("Error on ground runs, deg", [values for _, values, _ in curves])
     if y is None:
         return []
-    figure = figure_of(results, "magnetic_ground_curve", "magnetic_heading_deg", "error_deg")
+    figure = results.rows_of(GroundRunCurve)
     if figure is not None:
-        curves.append((numbers(figure, "magnetic_heading_deg"), numbers(figure, "error_deg"), FITTED))
+        curves.append((figure.magnetic_heading_deg, figure.heading_error_deg, FITTED))
     chart = Chart(recorder, "magnetic/ground", Axis("magnetic heading as read, deg", 0.0, 360.0), y)
     chart.curves("curves", curves)
     chart.legend([RUN, FITTED] if figure is not None else [RUN])
@@ -130,49 +138,52 @@ def _ground_runs(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
 def _errors(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Error of the magnetic heading where no fit has seen, before and after the recommended correction."""
     in_flight = results.answer(MagneticResult)
-    method = in_flight.recommended_method if in_flight else "compass_table"
-    column = f"error_{method}_deg"
-    figure = figure_of(results, "magnetic_samples", "time_s", "part", "error_before_deg", column)
+    method: MethodName = in_flight.recommended_method if in_flight else "compass_table"
+    figure = results.rows_of(MagneticSamples)
     if figure is None:
         return []
-    mine = np.asarray(figure["part"].astype(np.str_) == "held out")
+    mine = figure.part == "held out"
     if not mine.any():
         return []
-    time_ns = recorder.time_ns(numbers(figure, "time_s")[mine])
-    for name, title, shade in (("error_before_deg", "before", colours.SAMPLES), (column, "after", colours.ANSWER)):
-        values = numbers(figure, name)[mine]
-        recorder.dots(f"magnetic/error/{title}", time_ns, values, Line(f"{title}, deg", shade, DOT))
+    time_ns = recorder.time_ns(figure.time_s[mine])
+    for title, values, shade in (
+        ("before", figure.error_before_deg, colours.SAMPLES),
+        ("after", AFTER[method](figure), colours.ANSWER),
+    ):
+        recorder.dots(f"magnetic/error/{title}", time_ns, values[mine], Line(f"{title}, deg", shade, DOT))
     title = "Error of magnetic heading on data that no fit used, deg: before grey, after green"
     return [plot(title, "magnetic/error", legend=False)]
 
 
 def _applied(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Magnetic heading before and after a deviation was applied to the log."""
-    shown = {
-        "uncorrected_magnetic_heading_deg": ("uncorrected", colours.SAMPLES),
-        "magnetic_heading_deg": ("corrected", colours.ANSWER),
-    }
-    figure = figure_of(results, "corrected_heading", "time_s", *shown)
+    figure = results.rows_of(CorrectedHeadingRows)
     if figure is None:
         return []
-    time_ns = recorder.time_ns(numbers(figure, "time_s"))
-    for column, (title, shade) in shown.items():
-        recorder.dots(f"magnetic/heading/{title}", time_ns, numbers(figure, column), Line(f"{title}, deg", shade, DOT))
+    time_ns = recorder.time_ns(figure.time_s)
+    for title, values, shade in (
+        ("uncorrected", figure.uncorrected_magnetic_heading_deg, colours.SAMPLES),
+        ("corrected", figure.magnetic_heading_deg, colours.ANSWER),
+    ):
+        recorder.dots(f"magnetic/heading/{title}", time_ns, values, Line(f"{title}, deg", shade, DOT))
     title = "Magnetic heading, deg: as read grey, with the deviation applied green"
     return [plot(title, "magnetic/heading", legend=False)]
 
 
 def _modulus(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Modulus of the field on the figures, as read and freed of the iron."""
-    figure = figure_of(results, "magnetic_modulus", "time_s", "before_nt")
+    figure = results.rows_of(MagneticModulus)
     if figure is None:
         return []
-    shown = {"before_nt": Line("as read, nT", colours.SAMPLES, THIN)}
-    shown |= {f"{name}_nt": Line(f"{title}, nT", SHADES[name]) for name, title in METHOD_TITLES.items()}
-    known = [name for name in shown if name in figure.columns and np.isfinite(numbers(figure, name)).any()]
+    shown = [(figure.before_nt, Line("as read, nT", colours.SAMPLES, THIN))]
+    freed: tuple[tuple[MethodName, FloatArray], ...] = (
+        ("poisson_attitude", figure.poisson_attitude_nt),
+        ("constant_modulus", figure.constant_modulus_nt),
+    )
+    shown += [(values, Line(f"{METHOD_TITLES[name]}, nT", SHADES[name])) for name, values in freed]
+    known = [(values, line) for values, line in shown if np.isfinite(values).any()]
     if not known:
         return []
-    time_ns = recorder.time_ns(numbers(figure, "time_s"))
-    values = np.column_stack([numbers(figure, name) for name in known])
-    recorder.lines("magnetic/modulus", time_ns, values, [shown[name] for name in known], gap_after(time_ns))
+    time_ns, series = recorder.time_ns(figure.time_s), np.column_stack([values for values, _ in known])
+    recorder.lines("magnetic/modulus", time_ns, series, [line for _, line in known], gap_after(time_ns))
     return [plot("Modulus of the field on the figures, nT", "magnetic/modulus")]

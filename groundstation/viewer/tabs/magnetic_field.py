@@ -5,6 +5,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.base.geodesy import on_earth, plan_north_east_m
+from groundstation.results.arrays.flight import Overview
+from groundstation.results.arrays.magnetic import BodyField, MagneticField
 from groundstation.results.flight import FlightResults
 from groundstation.results.magnetic import MagneticResult, Turn
 from groundstation.viewer import colours
@@ -12,9 +14,7 @@ from groundstation.viewer.chart import round_step, screen_radius
 from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.series import FloatArray
 from groundstation.viewer.tabs.track import bounds_of, grid, grid_unit
-from groundstation.viewer.views import figure_of, numbers
 
-AXES = ("forward", "right", "down")
 NT_PER_UT = 1000.0
 EXAGGERATED_TO = 0.15  # of the radius: what the modulus differs by from the model's, as read
 MARGIN_S = 30.0
@@ -28,15 +28,10 @@ def sphere(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
 
     What the modulus differs by from the model's is drawn many times larger: iron of one per cent would not be seen.
     """
-    columns = [f"{state}_{axis}_nt" for state in ("before", "after") for axis in AXES]
-    figure = figure_of(results, "magnetic_field", *columns)
+    figure = results.rows_of(MagneticField)
     if figure is None:
         return []
-    before, after = (
-        np.column_stack([numbers(figure, f"{state}_{axis}_nt") for axis in AXES]) / NT_PER_UT
-        for state in ("before", "after")
-    )
-    before, after = (values[np.isfinite(values).all(axis=1)] for values in (before, after))
+    before, after = _known_ut(figure.before), _known_ut(figure.after)
     if not len(before):
         return []
     radius = _radius_ut(results, after if len(after) else before)
@@ -55,6 +50,12 @@ def sphere(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
             )
     name = f"Field, uT forward, right, down: grey as read, green freed of iron; off the sphere x {factor:g}"
     return [rrb.Spatial3DView(name=name, origin="/magnetic/field")]
+
+
+def _known_ut(field: BodyField) -> FloatArray:
+    """The rows that have a field, shape (n, 3)."""
+    values = np.column_stack([field.forward_nt, field.right_nt, field.down_nt]) / NT_PER_UT
+    return values[np.isfinite(values).all(axis=1)]
 
 
 def _radius_ut(results: FlightResults, field_ut: FloatArray) -> float:
@@ -86,13 +87,13 @@ def _circles(radius: float) -> list[FloatArray]:
 
 def eight(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """The used turns on the ground track, right and left in two colours."""
-    figure = figure_of(results, "overview", "time_s", "latitude_deg", "longitude_deg")
+    figure = results.rows_of(Overview)
     answer = results.answer(MagneticResult)
     turns = [turn for turn in (answer.turns if answer else ()) if turn.state == "used"]
     if figure is None or not turns:
         return []
-    time_s = numbers(figure, "time_s")
-    latitude, longitude = on_earth(numbers(figure, "latitude_deg"), numbers(figure, "longitude_deg"))
+    time_s = figure.time_s
+    latitude, longitude = on_earth(figure.latitude_deg, figure.longitude_deg)
     start_s, end_s = min(turn.start_s for turn in turns) - MARGIN_S, max(turn.end_s for turn in turns) + MARGIN_S
     shown = np.flatnonzero((time_s >= start_s) & (time_s <= end_s) & np.isfinite(latitude) & np.isfinite(longitude))
     if len(shown) < 2:

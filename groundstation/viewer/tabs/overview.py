@@ -1,72 +1,120 @@
 """Overview: where the aircraft went, how high, how fast, its attitude and state, and a row for each answer."""
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
 import numpy as np
 import rerun.blueprint as rrb
 
 from groundstation.chapters.front import front
 from groundstation.chapters.markdown import front_markdown
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.flight import GnssLanes, Overview, PhaseSpans, StateLanes
+from groundstation.results.arrays.heading import HeadingLanes
 from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour
 from groundstation.viewer.names import path_parts
 from groundstation.viewer.recorder import Line, Recorder
-from groundstation.viewer.series import gap_after, wraps_after
+from groundstation.viewer.series import FloatArray, gap_after, wraps_after
 from groundstation.viewer.tabs.track import track
-from groundstation.viewer.views import document, figure_of, lanes, numbers, plot, told_by_colour
+from groundstation.viewer.views import document, lanes, plot, told_by_colour
 
 LANE_SHARE = 0.45  # height of a lane, of that of a plot
 MARGIN_DEG = 10.0  # beyond 0 and 360: a nose that points north would be drawn on the frame
-CIRCULAR = ("heading_deg", "magnetic_heading_deg", "track_deg")
-# Rows of plots: entity, unit, columns of the figure with their names, range of the axis.
-PLOTS: tuple[tuple[str, str, dict[str, str], tuple[float, float] | None], ...] = (
-    (
+
+
+@dataclass(frozen=True)
+class OverviewLine:
+    """A line of a plot: end of its path, name, colour, and values, None where none is logged."""
+
+    part: str
+    name: str
+    colour: Colour
+    values_of: Callable[[Overview], FloatArray | None]
+
+
+@dataclass(frozen=True)
+class OverviewRow:
+    """A plot: path, unit, lines, range of the axis, and whether its lines wrap at 360."""
+
+    path: str
+    unit: str
+    lines: tuple[OverviewLine, ...]
+    axis_range: tuple[float, float] | None = None
+    is_circular: bool = False
+
+
+PLOTS = (
+    OverviewRow(
         "height",
         "m",
-        {
-            "altitude_m": "altitude",
-            "pressure_altitude_m": "pressure altitude",
-            "height_above_airfield_m": "height above the airfield",
-        },
-        None,
+        (
+            OverviewLine("altitude_m", "altitude", colours.INS, lambda data: data.altitude_m),
+            OverviewLine(
+                "pressure_altitude_m", "pressure altitude", colours.HONEST, lambda data: data.pressure_altitude_m
+            ),
+            OverviewLine(
+                "height_above_airfield_m",
+                "height above the airfield",
+                colours.HONEST,
+                lambda data: data.height_above_airfield_m,
+            ),
+        ),
     ),
-    (
-        *("speed", "m/s"),
-        {
-            "ground_speed_mps": "ground speed",
-            "true_airspeed_mps": "true airspeed",
-            "indicated_airspeed_mps": "indicated airspeed",
-        },
-        None,
+    OverviewRow(
+        "speed",
+        "m/s",
+        (
+            OverviewLine("ground_speed_mps", "ground speed", colours.GNSS, lambda data: data.ground_speed_mps),
+            OverviewLine("true_airspeed_mps", "true airspeed", colours.ANSWER, lambda data: data.true_airspeed_mps),
+            OverviewLine(
+                "indicated_airspeed_mps",
+                "indicated airspeed",
+                colours.ANSWER,
+                lambda data: data.indicated_airspeed_mps,
+            ),
+        ),
     ),
-    ("climb", "m/s", {"climb_mps": "climb"}, None),
-    (
-        *("directions", "deg"),
-        {"heading_deg": "INS true heading", "magnetic_heading_deg": "INS magnetic heading", "track_deg": "GNSS track"},
+    OverviewRow("climb", "m/s", (OverviewLine("climb_mps", "climb", colours.INS, lambda data: data.climb_mps),)),
+    OverviewRow(
+        "directions",
+        "deg",
+        (
+            OverviewLine("heading_deg", "INS true heading", colours.INS, lambda data: data.heading_deg),
+            OverviewLine(
+                "magnetic_heading_deg",
+                "INS magnetic heading",
+                colours.HONEST,
+                lambda data: data.magnetic_heading_deg,
+            ),
+            OverviewLine("track_deg", "GNSS track", colours.GNSS, lambda data: data.track_deg),
+        ),
         (-MARGIN_DEG, 360.0 + MARGIN_DEG),
+        is_circular=True,
     ),
-    ("attitude", "deg", {"roll_deg": "roll, right wing down", "pitch_deg": "pitch, nose up"}, None),
+    OverviewRow(
+        "attitude",
+        "deg",
+        (
+            OverviewLine("roll_deg", "roll, right wing down", colours.INS, lambda data: data.roll_deg),
+            OverviewLine("pitch_deg", "pitch, nose up", colours.GNSS, lambda data: data.pitch_deg),
+        ),
+    ),
 )
-SHADES = {
-    **dict.fromkeys(("altitude_m", "heading_deg", "climb_mps", "roll_deg"), colours.INS),
-    **dict.fromkeys(("ground_speed_mps", "track_deg", "pitch_deg"), colours.GNSS),
-    **dict.fromkeys(("pressure_altitude_m", "height_above_airfield_m", "magnetic_heading_deg"), colours.HONEST),
-    **dict.fromkeys(("true_airspeed_mps", "indicated_airspeed_mps"), colours.ANSWER),
-}
 
 
 def overview(recorder: Recorder, results: FlightResults) -> rrb.Container:
     """Log the overview: whatever there is of track, plots and lanes, and always the summary."""
     recorder.document("summary", front_markdown(front(results)))
     summary = document("Flight", "summary")
-    figure = figure_of(results, "overview", "time_s")
+    figure = results.rows_of(Overview)
     ground = None if figure is None else track(recorder, results, figure)
     left = summary if ground is None else rrb.Vertical(contents=[ground, summary], row_shares=[1.5, 1.0])
     right: list[rrb.View] = [] if figure is None else _plots(recorder, figure)
     shares = [1.0] * len(right)
     lane_paths = [
-        *log_lane(recorder, results, "phases", "phase", "flight/phase", colours.PHASES),
-        *log_lane(recorder, results, "gnss_lanes", "state", "flight/GNSS", colours.GNSS_STATES),
+        *log_lane(recorder, "flight/phase", results.rows_of(PhaseSpans), colours.PHASES),
+        *log_lane(recorder, "flight/GNSS", results.rows_of(GnssLanes), colours.GNSS_STATES),
     ]
     lane_paths += _state_lanes(recorder, results)
     if lane_paths:
@@ -77,46 +125,45 @@ def overview(recorder: Recorder, results: FlightResults) -> rrb.Container:
 
 
 def log_lane(
-    recorder: Recorder, results: FlightResults, name: str, column: str, path: str, palette: dict[str, Colour]
+    recorder: Recorder, path: str, spans: PhaseSpans | GnssLanes | HeadingLanes | None, palette: Mapping[str, Colour]
 ) -> list[str]:
-    """Log the spans of a figure as one lane; the path logged, or nothing when the flight has no such figure."""
-    figure = figure_of(results, name, "start_s", "end_s", column)
-    if figure is None:
+    """Log spans as one lane; the path logged, or nothing when the flight has none."""
+    if spans is None:
         return []
-    states = figure[column].astype(np.str_)
+    states = spans.phase if isinstance(spans, PhaseSpans) else spans.state
     over_limit = {state: colours.OVER_LIMIT for state in states.tolist() if ">" in state}  # "gdop > 2"
-    recorder.spans(path, numbers(figure, "start_s"), numbers(figure, "end_s"), states, palette | over_limit)
+    recorder.spans(path, spans.start_s, spans.end_s, states, {**palette, **over_limit})
     return [path]
 
 
 def _state_lanes(recorder: Recorder, results: FlightResults) -> list[str]:
     """Log flight mode, arming and ground contact, a lane each; the paths logged."""
-    figure = figure_of(results, "state_lanes", "lane", "start_s", "end_s", "state")
+    figure = results.rows_of(StateLanes)
     if figure is None:
         return []
-    names = figure["lane"].astype(np.str_)
-    found = list(dict.fromkeys(names.tolist()))
+    found = list(dict.fromkeys(figure.lane.tolist()))
     paths = [f"flight/{part}" for part in path_parts(["phase", "GNSS", *found])[2:]]
     for lane, path in zip(found, paths, strict=True):
-        rows = names == lane
-        states = figure["state"].astype(np.str_)[rows]
-        start, end = numbers(figure, "start_s")[rows], numbers(figure, "end_s")[rows]
-        recorder.spans(path, start, end, states, colours.STATES)
+        rows = figure.lane == lane
+        recorder.spans(path, figure.start_s[rows], figure.end_s[rows], figure.state[rows], colours.STATES)
     return paths
 
 
-def _plots(recorder: Recorder, figure: FigureData) -> list[rrb.View]:
+def _plots(recorder: Recorder, figure: Overview) -> list[rrb.View]:
     """A view for each row of PLOTS that the flight has; its title names the lines, for a legend would cover them."""
     views: list[rrb.View] = []
-    time_ns = recorder.time_ns(numbers(figure, "time_s"))
-    for path, unit, columns, axis_range in PLOTS:
-        known = [name for name in columns if name in figure.columns and np.isfinite(numbers(figure, name)).any()]
-        for name in known:
-            values, line = numbers(figure, name), Line(f"{columns[name]}, {unit}", SHADES[name])
-            breaks = gap_after(time_ns) | wraps_after(values) if name in CIRCULAR else gap_after(time_ns)
-            recorder.lines(f"overview/{path}/{name}", time_ns, values[:, None], [line], breaks)
-        if known:
-            title = told_by_colour([Line(columns[name], SHADES[name]) for name in known], unit)
-            paths = [f"overview/{path}/{name}" for name in known]
-            views.append(plot(title, paths, axis_range=axis_range, legend=False))
+    time_ns = recorder.time_ns(figure.time_s)
+    for row in PLOTS:
+        paths, told = [], []
+        for shown in row.lines:
+            values = shown.values_of(figure)
+            if values is None or not np.isfinite(values).any():
+                continue
+            line = Line(f"{shown.name}, {row.unit}", shown.colour)
+            breaks = gap_after(time_ns) | wraps_after(values) if row.is_circular else gap_after(time_ns)
+            recorder.lines(f"overview/{row.path}/{shown.part}", time_ns, values[:, None], [line], breaks)
+            paths.append(f"overview/{row.path}/{shown.part}")
+            told.append(Line(shown.name, shown.colour))
+        if paths:
+            views.append(plot(told_by_colour(told, row.unit), paths, axis_range=row.axis_range, legend=False))
     return views

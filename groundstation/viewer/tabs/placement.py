@@ -1,5 +1,7 @@
 """Placement of ground points: the way in space over a map of accuracy, points, and accuracy along the way."""
 
+from collections.abc import Callable
+
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
@@ -7,54 +9,59 @@ import rerun.blueprint as rrb
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.placement import design_title
 from groundstation.chapters.placement import placement as chapter
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.cooperative import PlacementAccuracy, PlacementKeepOut, PlacementMap, PlacementPoints
 from groundstation.results.flight import FlightResults
 from groundstation.results.placement import PlacementPlan
 from groundstation.viewer import colours
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.views import document, figure_of, numbers, plot
+from groundstation.viewer.views import document, plot
 
 MARK, TRAIL, EDGE = 5.0, 1.2, 0.8  # radii in points of the screen
 THIN, BOLD = 1.0, 2.0
 WORST_SHARE = 90.0  # per cent of the map's values that keep their own colour
 GOOD, BAD = np.array([70.0, 190.0, 140.0]), np.array([80.0, 40.0, 90.0])
-MEASURES = (("two_sigma_north_m", "2σ north, m"), ("two_sigma_east_m", "2σ east, m"), ("two_sigma_up_m", "2σ up, m"))
+# Entity, title, values.
+MEASURES: tuple[tuple[str, str, Callable[[PlacementAccuracy], FloatArray]], ...] = (
+    ("two_sigma_north_m", "2σ north, m", lambda way: way.two_sigma_north_m),
+    ("two_sigma_east_m", "2σ east, m", lambda way: way.two_sigma_east_m),
+    ("two_sigma_up_m", "2σ up, m", lambda way: way.two_sigma_up_m),
+)
 
 
 def placement(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the tab; None without an answer."""
     answer, section = results.answer(PlacementPlan), chapter(results)
-    way = figure_of(results, "placement_accuracy", "time_s", "design", "north_m", "east_m", "up_m")
+    way = results.rows_of(PlacementAccuracy)
     if answer is None or section is None or way is None:
         return None
     recorder.document("placement/answer", markdown(section))
     left = [_space(recorder, answer, way, results), document("Designs and places", "placement/answer")]
-    right = [_along(recorder, answer, way, column, title) for column, title in MEASURES]
+    right = [_along(recorder, answer, way, *measure) for measure in MEASURES]
     columns = [rrb.Vertical(contents=left), rrb.Vertical(contents=right)]
     return rrb.Horizontal(contents=columns, column_shares=[1.6, 1.0], name="Placement")
 
 
-def _east_north_up(figure: FigureData) -> FloatArray:
-    return np.column_stack([numbers(figure, f"{axis}_m") for axis in ("east", "north", "up")])
+def _east_north_up(rows: PlacementAccuracy | PlacementPoints) -> FloatArray:
+    return np.column_stack([rows.east_m, rows.north_m, rows.up_m])
 
 
-def _space(recorder: Recorder, answer: PlacementPlan, way: FigureData, results: FlightResults) -> rrb.View:
-    rows = way["design"].astype(np.str_) == answer.recommended
+def _space(recorder: Recorder, answer: PlacementPlan, way: PlacementAccuracy, results: FlightResults) -> rrb.View:
+    rows = way.design == answer.recommended
     place = _east_north_up(way)[rows]
     recorder.static("site/way", rr.LineStrips3D([place], colors=[colours.ANSWER], radii=rr.Radius.ui_points(TRAIL)))
     mark = rr.Radius.ui_points(MARK)
     name = clean_text(answer.judged)
     recorder.static("site/now", rr.Points3D.from_fields(colors=[colours.ANSWER], radii=mark, labels=[name]))
-    indexes = recorder.indexes(recorder.time_ns(numbers(way, "time_s")[rows]))
+    indexes = recorder.indexes(recorder.time_ns(way.time_s[rows]))
     recorder.stream.send_columns("site/now", indexes, rr.Points3D.columns(positions=place.astype(np.float32)))
     fixed = [[answer.fixed_east_m, answer.fixed_north_m, answer.fixed_height_m]]
     recorder.static("site/fixed", rr.Points3D(fixed, labels=["fixed point"], colors=[colours.LIMIT], radii=mark))
-    points = figure_of(results, "placement_points", "design", "name", "north_m", "east_m", "up_m")
+    points = results.rows_of(PlacementPoints)
     if points is not None:
-        mine = points["design"].astype(np.str_) == answer.recommended
-        names = [clean_text(one) for one in points["name"][mine].tolist()]
+        mine = points.design == answer.recommended
+        names = [clean_text(one) for one in points.label[mine].tolist()]
         stand = rr.Points3D(_east_north_up(points)[mine], labels=names, colors=[colours.LIGHT] * len(names), radii=mark)
         recorder.static("site/points", stand)
     _keep_out(recorder, results)
@@ -67,13 +74,12 @@ def _space(recorder: Recorder, answer: PlacementPlan, way: FigureData, results: 
 
 
 def _keep_out(recorder: Recorder, results: FlightResults) -> None:
-    rings = figure_of(results, "placement_keep_out", "name", "north_m", "east_m")
+    rings = results.rows_of(PlacementKeepOut)
     if rings is None:
         return
-    names = rings["name"].astype(np.str_)
-    corners = np.column_stack([numbers(rings, "east_m"), numbers(rings, "north_m"), np.zeros(len(rings))])
-    order = list(dict.fromkeys(names.tolist()))
-    strips = [corners[names == name] for name in order]
+    corners = np.column_stack([rings.east_m, rings.north_m, np.zeros(len(rings))])
+    order = list(dict.fromkeys(rings.label.tolist()))
+    strips = [corners[rings.label == name] for name in order]
     drawn = rr.LineStrips3D(
         strips, colors=[colours.LIMIT] * len(strips), labels=[clean_text(name) for name in order],
         radii=rr.Radius.ui_points(EDGE),
@@ -83,11 +89,11 @@ def _keep_out(recorder: Recorder, results: FlightResults) -> None:
 
 def _ground(recorder: Recorder, results: FlightResults) -> None:
     """The map as a mesh on the ground, a colour for each place; where nothing may stand there is none."""
-    data = figure_of(results, "placement_map", "north_m", "east_m", "sigma_m")
+    data = results.rows_of(PlacementMap)
     if data is None:
         return
-    sigma = numbers(data, "sigma_m")
-    side = len(np.unique(numbers(data, "east_m")))
+    sigma = data.sigma_m
+    side = len(np.unique(data.east_m))
     known = np.isfinite(sigma)
     if not known.any():
         return
@@ -98,19 +104,26 @@ def _ground(recorder: Recorder, results: FlightResults) -> None:
     squares = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1).reshape(-1, 4)
     squares = squares[known[squares].all(axis=1)]
     mesh = rr.Mesh3D(
-        vertex_positions=np.column_stack([numbers(data, "east_m"), numbers(data, "north_m"), np.zeros(len(sigma))]),
+        vertex_positions=np.column_stack([data.east_m, data.north_m, np.zeros(len(sigma))]),
         triangle_indices=np.concatenate([squares[:, [0, 1, 2]], squares[:, [0, 2, 3]]]),
         vertex_colors=shades,
     )
     recorder.static("site/ground", mesh)
 
 
-def _along(recorder: Recorder, answer: PlacementPlan, way: FigureData, column: str, title: str) -> rrb.View:
-    design, path = way["design"].astype(np.str_), f"placement/{column}"
+def _along(
+    recorder: Recorder,
+    answer: PlacementPlan,
+    way: PlacementAccuracy,
+    measure: str,
+    title: str,
+    values_of: Callable[[PlacementAccuracy], FloatArray],
+) -> rrb.View:
+    path, values = f"placement/{measure}", values_of(way)
     shades = colours.for_series(len(answer.designs))
     for row, shade in zip(answer.designs, shades, strict=True):
-        mine = np.flatnonzero(design == row.design)[1:]  # before the first range the scale would hide the rest
+        mine = np.flatnonzero(way.design == row.design)[1:]  # before the first range the scale would hide the rest
         line = Line(design_title(row.design), shade, BOLD if row.design == answer.recommended else THIN)
-        time_ns = recorder.time_ns(numbers(way, "time_s")[mine])
-        recorder.lines(f"{path}/{row.design}", time_ns, numbers(way, column)[mine][:, None], [line])
-    return plot(f"{clean_text(answer.judged)}: {title}", path, legend=column == MEASURES[0][0])
+        time_ns = recorder.time_ns(way.time_s[mine])
+        recorder.lines(f"{path}/{row.design}", time_ns, values[mine][:, None], [line])
+    return plot(f"{clean_text(answer.judged)}: {title}", path, legend=measure == MEASURES[0][0])

@@ -7,7 +7,7 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.chapters.latency import latency
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.quality import quality as quality_chapter
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.flight import GapRows, LedgerRows
 from groundstation.results.flight import FlightResults
 from groundstation.results.latency import Latencies
 from groundstation.tables.table import Flight, Table
@@ -15,7 +15,7 @@ from groundstation.viewer import colours
 from groundstation.viewer.names import label, path_parts, topic_label
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after
-from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
+from groundstation.viewer.views import document, lanes, plot
 
 PLOTS = {
     "GNSS dilution of precision": ("gdop", "pdop", "hdop"),
@@ -46,13 +46,13 @@ def quality(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.C
 
 def _coverage(recorder: Recorder, results: FlightResults) -> list[str]:
     """One lane a topic: data from its first to its last sample, interrupted by its gaps."""
-    ledger = figure_of(results, "ledger", "topic", "first_s", "last_s")
+    ledger = results.rows_of(LedgerRows)
     if ledger is None:
         return []
-    gaps = figure_of(results, "gaps", "topic", "start_s", "length_s")
-    topics = [str(topic) for topic in ledger["topic"]]
+    gaps = results.rows_of(GapRows)
+    topics = ledger.topic.tolist()
     paths = []
-    rows = zip(topics, path_parts(topics), numbers(ledger, "first_s"), numbers(ledger, "last_s"), strict=True)
+    rows = zip(topics, path_parts(topics), ledger.first_s, ledger.last_s, strict=True)
     for topic, part, first, last in rows:
         if not last > first:  # nothing, or a single sample: no stretch of time to draw
             continue
@@ -63,11 +63,11 @@ def _coverage(recorder: Recorder, results: FlightResults) -> list[str]:
     return paths
 
 
-def _spans(topic: str, first: float, last: float, gaps: FigureData | None) -> tuple[FloatArray, FloatArray, np.ndarray]:
+def _spans(topic: str, first: float, last: float, gaps: GapRows | None) -> tuple[FloatArray, FloatArray, np.ndarray]:
     begins, ends, states = [first], [], ["data"]
     if gaps is not None:
-        mine = gaps["topic"] == topic
-        for start, length in zip(numbers(gaps, "start_s")[mine], numbers(gaps, "length_s")[mine], strict=True):
+        mine = gaps.topic == topic
+        for start, length in zip(gaps.start_s[mine], gaps.length_s[mine], strict=True):
             ends += [float(start), float(start + length)]
             begins += [float(start), float(start + length)]
             states += ["gap", "data"]

@@ -14,6 +14,7 @@ from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.signals import RAW_PREFIX, TOPICS, field_of, kind_of
 from groundstation.base.source_units import source_units
 from groundstation.chapters.markdown import table
+from groundstation.results.arrays.flight import GapRows
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer import colours
@@ -30,7 +31,7 @@ from groundstation.viewer.names import (
 )
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, covers_gap, gap_after, rows_that_fit, runs, thin, wraps_after
-from groundstation.viewer.views import document, figure_of, lanes, numbers, plot
+from groundstation.viewer.views import document, lanes, plot
 
 SCALARS = 1_200_000  # numbers in this tab: about 25 MB, an hour at 100 Hz
 VIEWS_OF_A_COLUMN, FEWEST_COLUMNS, MOST_COLUMNS = 6, 2, 4  # more views in a column are too low to be read
@@ -81,7 +82,7 @@ class Family:
 
 def raw(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Container | None:
     """Log every topic; None for a flight without samples."""
-    gaps = figure_of(results, "gaps", "topic", "start_s")
+    gaps = results.rows_of(GapRows)
     filled = sorted((topic for topic in flight.topics() if len(flight[topic])), key=_reading_order)
     topics, without_page = filled[:MAX_TOPICS], filled[MAX_TOPICS:]
     most_views = min(MAX_VIEWS, max(MAX_ALL_VIEWS // max(len(topics), 1), 1))
@@ -91,7 +92,7 @@ def raw(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Conta
         if topic in listed:
             families[topic] = []
             continue
-        starts = np.zeros(0) if gaps is None else numbers(gaps, "start_s")[gaps["topic"] == topic]
+        starts = np.zeros(0) if gaps is None else gaps.start_s[gaps.topic == topic]
         units = source_units(flight.metadata, topic, flight[topic].columns)
         families[topic] = _families(flight[topic], recorder.time_ns(starts), units)
     everyone = [family for own in families.values() for family in own]

@@ -10,8 +10,9 @@ from groundstation.base.ellipse import principal_axes
 from groundstation.base.local_frame import LocalFrame, plane_through
 from groundstation.base.records import Int64Array
 from groundstation.chapters.cooperative import trusted
+from groundstation.results.arrays.cooperative import CooperativeLinks, CooperativeTracks
+from groundstation.results.arrays.typed import Texts
 from groundstation.results.cooperative import CooperativeResult
-from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.tables.session import GroundPoint
 from groundstation.viewer import colours
@@ -19,11 +20,9 @@ from groundstation.viewer.colours import Colour
 from groundstation.viewer.names import clean_text, path_parts
 from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.views import figure_of, numbers
 
 MARK, TRAIL, LINK = 5.0, 1.0, 1.2  # radii in points of the screen
 FLAT_M = 0.01  # half height of an ellipsoid where the height is not known: a disc
-SIGMAS = "sigma_north_m", "sigma_east_m", "correlation_north_east", "sigma_up_m"
 FRAME_S = 1.0  # links of one such step are drawn together
 MOST_STRIPS = 60_000
 STEPS: tuple[tuple[float, Colour], ...] = ((1.0, colours.ANSWER), (2.0, colours.PAPER), (3.0, colours.OVER_LIMIT))
@@ -34,22 +33,21 @@ def space(
     recorder: Recorder, answer: CooperativeResult, points: Sequence[GroundPoint], results: FlightResults
 ) -> list[rrb.View]:
     """Log the aircraft, their tracks, the ground points and the links; the view, none without a position."""
-    tracks = figure_of(results, "cooperative_tracks", "time_s", "vehicle", "algorithm", "x_m", "y_m", "z_m", *SIGMAS)
+    tracks = results.rows_of(CooperativeTracks)
     if tracks is None:
         return []
-    rows = tracks["algorithm"].astype(np.str_) == trusted(answer).algorithm
-    place = np.column_stack([numbers(tracks, f"{axis}_m") for axis in "xyz"])
+    rows = tracks.algorithm == trusted(answer).algorithm
+    place = np.column_stack([tracks.x_m, tracks.y_m, tracks.z_m])
     origin = plane_through(place[rows]) if answer.frame == "ecef" else None
     shown, stations = _seen(place, origin), _stations(recorder, points, origin)
     ways: dict[str, tuple[FloatArray, FloatArray]] = {}
-    vehicle, shades = tracks["vehicle"].astype(np.str_), colours.for_series(len(answer.vehicle_names))
-    parts = path_parts(answer.vehicle_names)
+    shades, parts = colours.for_series(len(answer.vehicle_names)), path_parts(answer.vehicle_names)
     for name, part, shade in zip(answer.vehicle_names, parts, shades, strict=True):
-        mine = np.flatnonzero(rows & (vehicle == name) & np.isfinite(shown).all(axis=1))
+        mine = np.flatnonzero(rows & (tracks.vehicle == name) & np.isfinite(shown).all(axis=1))
         if len(mine):
-            _aircraft(recorder, f"space/{part}", name, tracks, mine, shown[mine], shade)
-            ways[name] = numbers(tracks, "time_s")[mine], shown[mine]
-    links = figure_of(results, "cooperative_links", "time_s", "receiver", "source", "innovation", "sigma", "mark")
+            _aircraft(recorder, f"space/{part}", name, tracks.where(mine), shown[mine], shade)
+            ways[name] = tracks.time_s[mine], shown[mine]
+    links = results.rows_of(CooperativeLinks)
     if links is not None:
         _links(recorder, links, ways, stations)
     recorder.static("space", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
@@ -77,16 +75,16 @@ def _stations(recorder: Recorder, points: Sequence[GroundPoint], origin: LocalFr
 
 
 def _aircraft(
-    recorder: Recorder, path: str, name: str, tracks: FigureData, rows: Int64Array, place: FloatArray, shade: Colour
+    recorder: Recorder, path: str, name: str, track: CooperativeTracks, place: FloatArray, shade: Colour
 ) -> None:
-    indexes = recorder.indexes(recorder.time_ns(numbers(tracks, "time_s")[rows]))
+    indexes = recorder.indexes(recorder.time_ns(track.time_s))
     strip = rr.LineStrips3D([place], colors=[shade], radii=rr.Radius.ui_points(TRAIL))
     recorder.static(f"{path}/track", strip)
     mark = rr.Points3D.from_fields(colors=[shade], radii=rr.Radius.ui_points(MARK), labels=[clean_text(name)])
     recorder.static(f"{path}/now", mark)
     where = place.astype(np.float32)
     recorder.stream.send_columns(f"{path}/now", indexes, rr.Points3D.columns(positions=where))
-    half_m, turn = ellipsoids(*(numbers(tracks, name)[rows] for name in SIGMAS))
+    half_m, turn = ellipsoids(track.sigma_north_m, track.sigma_east_m, track.correlation_north_east, track.sigma_up_m)
     recorder.static(f"{path}/ellipsoid", rr.Ellipsoids3D.from_fields(colors=[(*shade[:3], 90)], fill_mode="solid"))
     columns = rr.Ellipsoids3D.columns(half_sizes=half_m.astype(np.float32), centers=where, quaternions=turn)
     recorder.stream.send_columns(f"{path}/ellipsoid", indexes, columns)
@@ -116,17 +114,17 @@ def ellipsoids(
 
 def _links(
     recorder: Recorder,
-    links: FigureData,
+    links: CooperativeLinks,
     ways: dict[str, tuple[FloatArray, FloatArray]],
     stations: dict[str, FloatArray],
 ) -> None:
     """Log the links of every frame as strips from source to receiver; a frame without any clears them."""
-    receiver, source = links["receiver"].astype(np.str_), links["source"].astype(np.str_)
+    receiver, source = links.receiver, links.source
     known = np.isin(receiver, list(ways)) & np.isin(source, [*ways, *stations])
     rows = np.flatnonzero(known)
     if not len(rows):
         return
-    time_s = numbers(links, "time_s")[rows]
+    time_s = links.time_s[rows]
     frame_s = FRAME_S * np.ceil(len(rows) / MOST_STRIPS)  # of many links fewer frames
     frame = np.floor(time_s / frame_s).astype(np.int64)
     rows, frame, time_s = _one_a_frame(rows, frame, time_s, receiver, source)
@@ -140,7 +138,7 @@ def _links(
 
 
 def _one_a_frame(
-    rows: Int64Array, frame: Int64Array, time_s: FloatArray, receiver: np.ndarray, source: np.ndarray
+    rows: Int64Array, frame: Int64Array, time_s: FloatArray, receiver: Texts, source: Texts
 ) -> tuple[Int64Array, Int64Array, FloatArray]:
     """The last range of each link in each frame, in order of frames."""
     names = np.char.add(np.char.add(receiver[rows], "\n"), source[rows])
@@ -152,7 +150,7 @@ def _one_a_frame(
 
 
 def _places(
-    names: np.ndarray,
+    names: Texts,
     rows: Int64Array,
     time_s: FloatArray,
     ways: dict[str, tuple[FloatArray, FloatArray]],
@@ -170,10 +168,10 @@ def _places(
     return found
 
 
-def _residuals(links: FigureData, rows: Int64Array) -> list[tuple[float, bool]]:
+def _residuals(links: CooperativeLinks, rows: Int64Array) -> list[tuple[float, bool]]:
     with np.errstate(divide="ignore", invalid="ignore"):
-        normal = np.abs(numbers(links, "innovation")[rows] / numbers(links, "sigma")[rows])
-    return list(zip(normal.tolist(), (numbers(links, "mark")[rows] > 0).tolist(), strict=True))
+        normal = np.abs(links.innovation[rows] / links.sigma[rows])
+    return list(zip(normal.tolist(), (links.mark[rows] > 0).tolist(), strict=True))
 
 
 def shade_of(normal: float, is_used: bool) -> Colour:

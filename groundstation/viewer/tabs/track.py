@@ -11,15 +11,14 @@ import rerun.blueprint as rrb
 from groundstation.base.ellipse import ELLIPSE_95
 from groundstation.base.geodesy import continuous_longitude_deg, on_earth, plan_north_east_m
 from groundstation.base.records import BoolArray
+from groundstation.results.arrays.flight import Overview, PhaseSpans
 from groundstation.results.corrected_position import corrected_position
-from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour
 from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.series import FloatArray
 from groundstation.viewer.tabs.flight_space import flight_space
-from groundstation.viewer.views import figure_of, numbers
 
 LINE, MARK, GRID_LINE = 1.6, 5.0, 0.5  # widths and radii in points of the screen
 TILE_PIXELS, MAP_PIXELS, MAX_ZOOM = 256.0, 500.0, 18.0
@@ -30,12 +29,10 @@ LARGEST_IN_M = 3000.0  # a plan no larger is labelled in metres, as in the repor
 SMALLEST_M = 20.0  # side of the plan of an aircraft that never moved
 
 
-def track(recorder: Recorder, results: FlightResults, figure: FigureData) -> rrb.Container | None:
+def track(recorder: Recorder, results: FlightResults, figure: Overview) -> rrb.Container | None:
     """Log the track by flight phase with the aircraft at the cursor; None without positions on Earth and attitude."""
-    time_s, positions, known = numbers(figure, "time_s"), np.zeros((len(figure), 2)), np.zeros(len(figure), dtype=bool)
-    if {"latitude_deg", "longitude_deg"} <= set(figure.columns):
-        positions = np.column_stack(on_earth(numbers(figure, "latitude_deg"), numbers(figure, "longitude_deg")))
-        known = np.asarray(np.isfinite(positions).all(axis=1), dtype=bool)
+    time_s, positions = figure.time_s, np.column_stack(on_earth(figure.latitude_deg, figure.longitude_deg))
+    known = np.asarray(np.isfinite(positions).all(axis=1), dtype=bool)
     if not known.any():
         space = flight_space(recorder, figure, None, [], [])
         return None if space is None else rrb.Tabs(contents=[space])
@@ -207,9 +204,9 @@ def zoom_of(positions_deg: FloatArray, pixels: float = MAP_PIXELS) -> float:
 def _pieces(results: FlightResults, time_s: FloatArray, known: BoolArray) -> tuple[list[slice], list[Colour]]:
     """Cut the track at gaps and where the phase changes; neighbouring pieces share their joint."""
     phase = np.full(len(time_s), "unknown", dtype="U32")
-    spans = figure_of(results, "phases", "start_s", "end_s", "phase")
+    spans = results.rows_of(PhaseSpans)
     if spans is not None:
-        for start, end, name in zip(spans["start_s"], spans["end_s"], spans["phase"].tolist(), strict=True):
+        for start, end, name in zip(spans.start_s, spans.end_s, spans.phase.tolist(), strict=True):
             phase[(time_s >= start) & (time_s <= end)] = name
     cuts = (np.flatnonzero((phase[1:] != phase[:-1]) | ~known[1:] | ~known[:-1]) + 1).tolist()
     pieces, shades = [], []

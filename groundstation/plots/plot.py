@@ -1,0 +1,112 @@
+"""A plot: panels in rows, each with two axes and what stands on them; sizes on paper in millimetres."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from groundstation.plots.marks import AnyMark
+
+WIDTH_MM = 178.0  # the printable width of A4
+
+# A scale of time is written as minutes and seconds; of an angle in steps of 30; a symlog one is linear about zero.
+Scale = Literal["linear", "log", "symlog", "time", "angle"]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of a panel.
+
+    Parameters
+    ----------
+    title : str
+        With its unit.
+    scale : Scale
+    low, high : float, optional
+        The range; None: that of what is drawn, a little around it. A range that runs backwards has the greater first.
+    names : tuple of (float, str)
+        Places that have a name instead of a number: lanes, rows.
+    linear_to : float
+        Of a symlog axis: linear up to here.
+    windows : tuple of (float, float)
+        Spans of time that are shown, each in a frame of its own: the axis is broken between them.
+    """
+
+    title: str = ""
+    scale: Scale = "linear"
+    low: float | None = None
+    high: float | None = None
+    names: tuple[tuple[float, str], ...] = ()
+    linear_to: float = 1.0
+    windows: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A pair of axes with what stands on it, the first mark behind.
+
+    Parameters
+    ----------
+    marks : sequence of marks
+    x, y : Axis
+    title : str
+        Above it, at the left.
+    legend : {'above', 'beside', ''}
+    is_map : bool
+        One metre is as long upright as it is across; the range of one axis grows to fit.
+    nothing : str
+        Why the panel is empty, where it is: written in its middle.
+    share : float
+        Of the width of its row.
+    """
+
+    marks: Sequence[AnyMark]
+    x: Axis = Axis()
+    y: Axis = Axis()
+    title: str = ""
+    legend: Literal["above", "beside", ""] = "above"
+    is_map: bool = False
+    nothing: str = ""
+    share: float = 1.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """Panels side by side, of one height; ``shares_x``: their axis is that of the row below, where it is written."""
+
+    panels: tuple[Panel, ...]
+    height_mm: float = 40.0
+    shares_x: bool = False
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure of a chapter.
+
+    Parameters
+    ----------
+    name : str
+        What the chapter calls it; unique on a page.
+    title, caption, alt : str
+        The caption says what one sees, how many samples, what the lines are; alt is for those who cannot see it.
+    rows : tuple of Row
+        From the top.
+    numbers : tuple of str
+        Names of the arrays behind it; the readable copies are tables/<name>.csv.
+    """
+
+    name: str
+    title: str
+    caption: str
+    alt: str
+    rows: tuple[Row, ...]
+    numbers: tuple[str, ...] = ()
+
+    @property
+    def panels(self) -> tuple[Panel, ...]:
+        """All panels, row by row."""
+        return tuple(panel for row in self.rows for panel in row.panels)
+
+
+def one_panel(panel: Panel, height_mm: float) -> tuple[Row, ...]:
+    """The rows of a plot of one panel."""
+    return (Row((panel,), height_mm),)

@@ -1,0 +1,1 @@
+"""Typed arrays behind the figures of each analysis, the columns of arrays/*.parquet."""
