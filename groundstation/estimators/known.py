@@ -51,8 +51,8 @@ class AircraftData:
     ins_kind : str
         Whether GNSS corrects the INS already, ``gnss_aided`` or ``unaided``; empty: the log shows it.
     ins_serial, ins_alignment : str
-        Which unit is installed and how it is aligned ("gyrocompass", "stored heading"): for the acceptance of many
-        flights; no estimator looks at them.
+        Which unit is installed and how it is aligned ("gyrocompass", "stored heading"): by them earlier flights
+        teach how the unit sits, and the acceptance groups flights.
     nav_start_utc : str
         When the INS began to navigate, ISO 8601, where the log does not show it; it may lie before the log.
     always_on_ground : bool
