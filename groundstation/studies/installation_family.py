@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.normal import NORMAL_95
 from groundstation.estimators.heading.steady import FACTORS
-from groundstation.estimators.heading.verdict import CURED_BY_MORE_DATA
+from groundstation.estimators.heading.verdict import CURED_BY_MORE_DATA, WHOLE
 from groundstation.estimators.installation.settings import (
     MOUNTING_DEG,
     ORDINARY_WIND_MPS,
@@ -98,6 +98,7 @@ def _aircraft(number: int, seed: int, place: int, pool: Sequence[TaxiOfPool]) ->
         azimuth = alignment + float(rng.normal(0.0, azimuth_sigma))
         has_turns, stand = bool(rng.random() >= 0.2), float(rng.normal(0.0, 0.05))
         airframe = alignment + float(mountings[unit])
+        half_width = _alone_half_width(taxi, stated, told, family.has_metar)
         shown = airframe + steady + factor * crosswind + taxi.error_deg
         is_after = (family.change in ("told", "not told", "turned") and unit == 1) or since > 0
         since += family.change != "" and (is_after or unit == 1)
@@ -123,10 +124,10 @@ def _aircraft(number: int, seed: int, place: int, pool: Sequence[TaxiOfPool]) ->
                     factor_sigma=stated[1],
                     steady_sigma_deg=STEADY_DEG,
                     mounting_sigma_deg=MOUNTING_DEG,
-                    verdict=_verdict(taxi),
-                    failed=taxi.failed,
+                    verdict=_verdict(taxi, half_width),
+                    failed=(*taxi.failed, *([WHOLE] if half_width > LIMIT_DEG else [])),
                     error_deg=shown - stated[0] * (told if family.has_metar else 0.0),
-                    half_width_deg=_alone_half_width(taxi, stated, told, family.has_metar),
+                    half_width_deg=half_width,
                     platform_error_deg=shown - stated[0] * (told if family.has_metar else 0.0),
                     limit_deg=LIMIT_DEG,
                 ),
@@ -144,11 +145,13 @@ def taxi_sigma(taxi: TaxiOfPool) -> float:
     return taxi.half_width_deg / NORMAL_95
 
 
-def _verdict(taxi: TaxiOfPool) -> str:
-    """Verdict by the gates on the taxi."""
+def _verdict(taxi: TaxiOfPool, half_width_deg: float) -> str:
+    """Verdict by this taxi alone."""
     if set(taxi.failed) - CURED_BY_MORE_DATA:
         return "reject"
-    return "extend" if taxi.failed else "accept"
+    if taxi.failed:
+        return "extend"
+    return "accept" if half_width_deg <= LIMIT_DEG else "advisory"
 
 
 def _alone_half_width(taxi: TaxiOfPool, stated: tuple[float, float], told_mps: float, has_metar: bool) -> float:

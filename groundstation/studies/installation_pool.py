@@ -8,6 +8,7 @@ import numpy as np
 
 from groundstation.base.angles import wrap_180
 from groundstation.estimators.heading.estimate import estimate_heading_error
+from groundstation.estimators.heading.verdict import STANDSTILL_GATE, WHOLE
 from groundstation.estimators.known import AircraftData
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult
@@ -15,7 +16,6 @@ from groundstation.simulation.taxi import draw_case, simulate_taxi, taxi_flight
 from groundstation.tables.phases import flight_phases
 
 Progress = Callable[[str], None]
-STANDSTILL, WHOLE = "standstill_speed_of_mean", "whole_half_width"
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class TaxiOfPool:
     @property
     def passes_standstill(self) -> bool:
         """Whether the mean velocity at standstill is within the limit."""
-        return STANDSTILL not in self.failed
+        return STANDSTILL_GATE not in self.failed
 
 
 def draw_taxi(seed: int, number: int) -> TaxiOfPool:
