@@ -1,6 +1,7 @@
 """What stands beside the flight folders of an OUT: the index and what the flights say together."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
@@ -75,7 +76,9 @@ def write_beside(
                     found, unwritten = refresh(out)
                     problems += unwritten
                 try:
-                    restamp(out, refresh_installations(out, found, remade))
+                    learn = partial(refresh_installations, out, found, remade)
+                    shown = attempt("installations", "fleet", learn, unless=(OSError, GroundstationError))
+                    restamp(out, shown or ())
                     problems += _write_beside(out, outcomes, kept_rows, found, with_pdf, only_results, painters)
                     problems += [_beside(out, "failed", f"{out}: {one.text}", one.trace) for one in failures()]
                     break
