@@ -123,7 +123,7 @@ def test_flight_without_heading_says_why_on_the_front() -> None:
 
 def test_the_best_answer_stands_first_and_the_others_beside_it() -> None:
     told = front(example(latency_result(), inertial_result(), forecast_result()))
-    assert told.subject == "INS errors" and "0.41" in told.headline
+    assert told.subject == "INS errors" and "0.37" in told.headline
     assert [tile.title for tile in told.others] == ["Forecast without GNSS", "Latency between sensors"]
     decided = front(example(inertial_result(), heading_result(verdict="reject")))
     assert decided.subject == "Heading correction" and decided.others[0].title == "INS errors"
