@@ -43,7 +43,9 @@ def inertial_of(azimuth_deg: float | None) -> InertialResult:
     if azimuth_deg is None:
         return inertial_result(figures=(), azimuth=AzimuthEstimate(False, None, None, 0, 0.0, "straight"))
     early = EarlyAzimuth(azimuth_deg, 0.03, 1800.0, 0.0, 0.01, 0.0, 4)
-    return inertial_result(figures=(), azimuth=AzimuthEstimate(True, azimuth_deg, 0.03, 4, 200.0, "turns", early))
+    return inertial_result(
+        figures=(), azimuth=AzimuthEstimate(True, azimuth_deg, 0.03, 4, 200.0, "turns", 1800.0, early)
+    )
 
 
 def save_installed(

@@ -112,7 +112,8 @@ class AzimuthEstimate:
     """Azimuth (heading) error of the INS from what turns do to its velocity error; offered only where they allow it.
 
     ``observable`` says whether ``sigma_deg`` is below the limit of the settings; if not, ``error_deg`` is None. The
-    error is that at the last turn; ``early`` is for the time of the taxi, None where the first hour shows too little.
+    error is that at ``time_s``, flight seconds: the last turn; ``early`` is for the time of the taxi, None where the
+    first hour shows too little.
     """
 
     observable: bool
@@ -121,6 +122,7 @@ class AzimuthEstimate:
     turns: int
     velocity_change_mps: float
     reason: str
+    time_s: float | None = None
     early: EarlyAzimuth | None = None
 
 

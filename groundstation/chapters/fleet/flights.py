@@ -24,7 +24,7 @@ HEADS = (
 )
 CAPTION = (
     "Error: INS heading − true heading; ± 95 %: half of its interval; reference: corrected parking heading minus "
-    "reference; INS: radial error rate, half of the time below; 60 min: RMS error of the forecast after 60 min "
+    "reference; INS: radial error rate, time-position fit; 60 min: RMS error of the forecast after 60 min "
     "without GNSS."
 )
 LINKED = (("recording", "rrd"), ("mcap", "mcap"))

@@ -200,7 +200,7 @@ def estimate_azimuth(
         return AzimuthEstimate(False, None, sigma_deg, len(changes), largest, text)
     text = f"{len(changes)} changes of velocity of up to {largest:.0f} m/s"
     early = _early(differences, run, settings, changes, known, limits, fit)
-    return AzimuthEstimate(True, error_deg, sigma_deg, len(changes), largest, text, early)
+    return AzimuthEstimate(True, error_deg, sigma_deg, len(changes), largest, text, changes.reference_s, early)
 
 
 def _early(
