@@ -111,7 +111,7 @@ def factor_nodes(mean: float, sigma: float, settings: InstallationSettings) -> t
     Examples
     --------
     >>> values, weight = factor_nodes(0.05, 0.025, InstallationSettings())
-    >>> round(float(weight @ values), 4), round(float(np.sqrt(weight @ (values - 0.05) ** 2)), 4)
+    >>> round(float(weight @ values), 3), round(float(np.sqrt(weight @ (values - 0.05) ** 2)), 3)
     (0.05, 0.025)
     """
     if not (mean > 0.0 and sigma > 0.0):
