@@ -1,6 +1,7 @@
 """installations.json of a folder of flights: a function of the flights alone, told in their reports."""
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.installation.lesson import Stored, lesson_of
 from groundstation.estimators.installation.series import answer_from
 from groundstation.estimators.installation.settings import InstallationSettings
+from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.many_flights.fleet_store import refresh, scan
 from groundstation.pipeline.many_flights.installations import (
     INSTALLATIONS,
@@ -23,11 +25,13 @@ from groundstation.pipeline.many_flights.installations import (
     show_installation,
 )
 from groundstation.pipeline.many_flights.publishing import write_beside
+from groundstation.pipeline.one_flight.configuration import Configuration, installed_as
 from groundstation.pipeline.verbs.rules import RulesTest, rules_test
 from groundstation.reports.flight_report import REPORT, write_flight_report
+from groundstation.results.files import load
 from groundstation.results.heading import judged_gate
 from groundstation.results.inertial import InertialResult
-from groundstation.results.installation import Installations, read_installations
+from groundstation.results.installation import InstallationResult, Installations, read_installations
 from groundstation.results.schema import installations_schema
 from tests.installation_example import heading_of, inertial_of, save_installed
 
@@ -318,3 +322,34 @@ def test_other_limits_show_both_answers(tmp_path: Path) -> None:
     mine = [row for row in stricter.rows if row.subject == "heading, installation learned"]
     assert [(row.verdict_before, row.verdict_after) for row in mine] == [("accept", "advisory")] * 2
     assert {row.gate for row in mine} == {"whole_half_width_learned"}
+
+
+# From logs
+
+
+def logs_in(folder: Path, days: tuple[int, ...]) -> list[Path]:
+    """The shipped taxi log as flown on several days with one INS."""
+    text = (Path(__file__).parents[1] / "sample_logs" / "taxi-good.csv").read_text(encoding="utf-8")
+    folder.mkdir()
+    found = []
+    for day in days:
+        dated = re.sub(r"# start_utc: \S+", f"# start_utc: 2026-05-{day:02d}T06:00:00Z", text, count=1)
+        assert f"2026-05-{day:02d}" in dated
+        found.append(folder / f"day{day}.csv")
+        found[-1].write_text(f"# ins_serial: S1\n{dated}", encoding="utf-8")
+    return found
+
+
+def test_logs_of_one_ins_learn_in_any_order_and_one_log_learns_from_the_file(tmp_path: Path) -> None:
+    logs = logs_in(tmp_path / "logs", (1, 2, 3))
+    once, twice = tmp_path / "once", tmp_path / "twice"
+    outcomes = run_many(logs, once, Configuration(), jobs=1, only_results=True)
+    run_many(logs[2:], twice, Configuration(), jobs=1, only_results=True)
+    run_many(logs, twice, Configuration(), jobs=2, only_results=True)
+    assert (once / INSTALLATIONS).read_bytes() == (twice / INSTALLATIONS).read_bytes()
+    assert "nothing learned" in outcomes[0].text and "installation of S1 from 2 flights" in outcomes[2].text
+    by_file = installed_as(Configuration(), once / INSTALLATIONS)
+    (alone,) = run_many(logs[2:], tmp_path / "now", by_file, jobs=1, only_results=True)
+    assert alone.text.count("installation of S1 from 2 flights") == 1 and "nothing learned" not in alone.text
+    stored = load(Path(alone.folder), ANSWER_TYPES).results.answer(InstallationResult)
+    assert to_json(stored) == to_json(read(once).installations[0].flights[2].answer)
