@@ -6,7 +6,7 @@ between marks that nothing from a log can write, and only what stands between th
 
 import re
 
-from groundstation.chapters.installation import not_learned, parts, sentence
+from groundstation.chapters.installation import parts, sentence
 from groundstation.reports.page import render
 from groundstation.results.installation import InstallationResult
 
@@ -17,7 +17,7 @@ def with_installation(page: str, answer: InstallationResult | None) -> str:
     """The page of a flight with a learned answer in its places; with none, they are empty."""
     top = chapter = ""
     if answer is not None:
-        top = render("installation-top.html.j2", text=not_learned(answer) if answer.why_not else sentence(answer))
+        top = "" if answer.why_not else render("installation-top.html.j2", text=sentence(answer))
         chapter = render("installation.html.j2", told=parts(answer))
     return _filled(_filled(page, TOP, top), CHAPTER, chapter)
 
