@@ -1,0 +1,216 @@
+"""Plots of a comparison: what two flights have in common over each other."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Generic, Protocol
+
+import numpy as np
+
+from groundstation.base.geodesy import north_east_m, on_earth, plan_north_east_m
+from groundstation.base.normal import NORMAL_95
+from groundstation.chapters.plots.common import M_PER_KM, has_values, label, positive
+from groundstation.plots.axes import time_axis
+from groundstation.plots.marks import AnyMark, Curve, Dash, Emphasis, Floats, Role
+from groundstation.plots.plot import Axis, Panel, Plot, one_panel
+from groundstation.plots.ranges import broken_at_gaps, broken_at_wrap, finite, padded
+from groundstation.results.arrays.cooperative import SessionErrors
+from groundstation.results.arrays.flight import Overview
+from groundstation.results.arrays.forecast import ForecastGrowth
+from groundstation.results.arrays.heading import HeadingRunning
+from groundstation.results.arrays.inertial import InertialStates, InertialTrack
+from groundstation.results.arrays.typed import T
+
+NEAR_M = 200_000.0  # flights that begin no further apart share one map
+
+
+class HasRows(Protocol):
+    """A flight with its arrays."""
+
+    def rows_of(self, kind: type[T]) -> T | None:
+        """The typed arrays of a figure, None when the flight has none."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """One of two flights: its letter, A or B, its forecast method, and its start after that of A."""
+
+    letter: str
+    flight: HasRows
+    default_method: str = ""
+    offset_s: float = 0.0
+
+    @property
+    def role(self) -> Role:
+        """Of its lines."""
+        return "ins" if self.letter == "A" else "gnss"
+
+    @property
+    def emphasis(self) -> Emphasis:
+        """Of its lines: where both agree, A is seen behind B."""
+        return "bold" if self.letter == "A" else "usual"
+
+
+@dataclass(frozen=True)
+class TimeLine:
+    """What is drawn of a flight over its time, with half of its 95 % band; None where there is no band."""
+
+    time_s: Floats
+    values: Floats | None
+    half: Floats | None = None
+
+
+class Overlay(Generic[T]):
+    """A line of both flights: its figure, what is read of it, its axis and title."""
+
+    def __init__(self, kind: type[T], key: str, read: Callable[[T], TimeLine], axis: str, title: str) -> None:
+        self.name, self.axis, self.title = f"{kind.figure}-{key}", axis, title
+        self._kind, self._read = kind, read
+
+    def of(self, flight: HasRows) -> TimeLine | None:
+        """The line of a flight, None where it has no number."""
+        rows = flight.rows_of(self._kind)
+        line = None if rows is None else self._read(rows)
+        return line if line is not None and has_values(line.values) else None
+
+
+def _altitude(data: Overview) -> TimeLine:
+    return TimeLine(data.time_s, data.altitude_m)
+
+
+def _speed(data: Overview) -> TimeLine:
+    return TimeLine(data.time_s, data.ground_speed_mps)
+
+
+def _heading(data: Overview) -> TimeLine:
+    return TimeLine(data.time_s, broken_at_wrap(data.heading_deg))
+
+
+def _mean(data: HeadingRunning) -> TimeLine:
+    return TimeLine(data.time_s, data.mean_deg, data.honest_half_width_deg)
+
+
+def _radial(data: InertialTrack) -> TimeLine:
+    return TimeLine(data.time_s, data.ins_error_m)
+
+
+def _north(data: InertialStates) -> TimeLine:
+    return TimeLine(data.time_s, data.north.position_m, NORMAL_95 * data.north.position_sigma_m)
+
+
+def _east(data: InertialStates) -> TimeLine:
+    return TimeLine(data.time_s, data.east.position_m, NORMAL_95 * data.east.position_sigma_m)
+
+
+def _computed(data: SessionErrors) -> TimeLine:
+    return TimeLine(data.time_s, data.two_sigma_r_m)
+
+
+def _error(data: SessionErrors) -> TimeLine:
+    return TimeLine(data.time_s, data.rms_error_m)
+
+
+OVERLAYS: tuple[Overlay[Any], ...] = (
+    Overlay(Overview, "altitude_m", _altitude, "altitude, m", "Altitude"),
+    Overlay(Overview, "ground_speed_mps", _speed, "ground speed, m/s", "Ground speed"),
+    Overlay(Overview, "heading_deg", _heading, "true heading, °", "INS heading"),
+    Overlay(HeadingRunning, "mean_deg", _mean, "heading error, °", "Heading error, running mean"),
+    Overlay(InertialTrack, "ins_error_m", _radial, "radial error, m", "Radial error of the INS against GNSS"),
+    Overlay(InertialStates, "north_position_m", _north, "north, m", "North position error"),
+    Overlay(InertialStates, "east_position_m", _east, "east, m", "East position error"),
+    Overlay(SessionErrors, "two_sigma_r_m", _computed, "m", "2σ_r as computed, worst aircraft"),
+    Overlay(SessionErrors, "rms_error_m", _error, "m", "Horizontal error against the truth, RMS of all aircraft"),
+)
+
+
+def tracks(sides: Sequence[Side]) -> Plot | None:
+    """Tracks of both flights on one map, or each from its own origin where they are far from each other."""
+    drawn = []
+    for side in sides:
+        data = side.flight.rows_of(Overview)
+        if data is not None:
+            latitude, longitude = on_earth(data.latitude_deg, data.longitude_deg)
+            known = np.flatnonzero(np.isfinite(latitude))
+            if known.size:
+                first = float(latitude[known[0]]), float(longitude[known[0]])
+                drawn.append((side, latitude, longitude, first))
+    if not drawn:
+        return None
+    shared = drawn[0][-1]
+    is_shared = bool(np.hypot(*north_east_m(*drawn[-1][-1], *shared)) <= NEAR_M)
+    marks = []
+    for side, latitude, longitude, own in drawn:
+        north, east = plan_north_east_m(latitude, longitude, *(shared if is_shared else own))
+        x, y = east / M_PER_KM, north / M_PER_KM
+        marks.append(Curve(x=x, y=y, role=side.role, name=side.letter, emphasis=side.emphasis))
+    origin = "the first position of A" if is_shared else "the first position of each"
+    return Plot(
+        "comparison.tracks",
+        "Tracks",
+        f"Distances north and east of {origin}, equal scales.",
+        "Map of the tracks of A and B.",
+        one_panel(Panel(marks, Axis("east, km"), Axis("north, km"), is_map=True), 84.0),
+    )
+
+
+def overlay(sides: Sequence[Side], told: Overlay[Any]) -> Plot | None:
+    """A line of both flights over the flight time of A, with its band."""
+    drawn = [(side, line) for side in sides if (line := told.of(side.flight)) is not None]
+    if not drawn:
+        return None
+    edges: list[AnyMark] = []
+    lines: list[AnyMark] = []
+    times, shown = [], []
+    for side, line in drawn:
+        unknown = np.full(len(line.time_s), np.nan)
+        known = (unknown if one is None else one for one in (line.values, line.half))
+        time, values, half = broken_at_gaps(line.time_s + side.offset_s, *known)
+        for edge in (values - half, values + half):
+            edges.append(Curve(x=time, y=edge, role=side.role, emphasis="faint"))
+            shown.append(edge)
+        lines.append(Curve(x=time, y=values, role=side.role, name=side.letter, emphasis=side.emphasis))
+        times.append(time)
+        shown.append(values)
+    has_band = any(line.half is not None for _, line in drawn)
+    # The bands of the first samples may leave the picture.
+    low, high = np.percentile(finite(*shown), (0.5, 99.5) if has_band else (0.0, 100.0)).tolist()
+    ends, every = padded(low, high), finite(*times)
+    x = time_axis(float(every.min()), float(every.max()))
+    title = told.title
+    return Plot(
+        f"comparison.{told.name}",
+        title,
+        f"{title} of both flights." if len(drawn) == len(sides) else f"{title}: only {drawn[0][0].letter} has it.",
+        f"{title} of A and B over flight time.",
+        one_panel(Panel((*edges, *lines), x, Axis(told.axis, low=ends[0], high=ends[1])), 42.0),
+    )
+
+
+def growth(sides: Sequence[Side]) -> Plot | None:
+    """RMS of the forecast by horizon, the shipped method and the INS without one."""
+    marks = []
+    for side in sides:
+        data = side.flight.rows_of(ForecastGrowth)
+        for method in (side.default_method, "raw_ins"):
+            rms_m = None if data is None else data.rms_m.get(method)
+            if data is None or rms_m is None or not has_values(rms_m):
+                continue
+            name = f"{side.letter}: {label(method.replace('_', ' '))}"
+            dotted: Dash = "dotted" if method == "raw_ins" else ""
+            marks.append(Curve(x=data.horizon_min, y=positive(rms_m), role=side.role, name=name, dash=dotted))
+    if not marks:
+        return None
+    return Plot(
+        "comparison.growth",
+        "Forecast",
+        "Root mean square of the radial error over all replayed starts; dotted: the INS without a forecast.",
+        "RMS of the forecast error of A and B by horizon.",
+        one_panel(Panel(marks, Axis("horizon, min", "log"), Axis("RMS radial error, m", "log")), 52.0),
+    )
+
+
+COMPARED: dict[str, Callable[[Sequence[Side]], Plot | None]] = {
+    "tracks": tracks,
+    **{one.name: partial(overlay, told=one) for one in OVERLAYS},
+    "growth": growth,
+}
