@@ -15,7 +15,7 @@ from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights, FleetTrend
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import row_fields, rows_frame
-from groundstation.results.installation import Pooled
+from groundstation.results.installation import InstallationRow
 from groundstation.results.magnetic import LETTERS
 
 if TYPE_CHECKING:
@@ -266,32 +266,6 @@ class SessionRow:
     reason: str = ""
     report: str = ""
     recording: str = ""
-
-
-@dataclass(frozen=True)
-class InstallationRow:
-    """One unit in one aircraft: what its flights say together; :class:`groundstation.results.installation.Installed`.
-
-    ``place`` counts the installations of the fleet from 1. ``odd`` and ``changed`` name flights taken for another
-    unit's, and those from which on it sits otherwise, joined by ", ". ``pooled`` are figures of other sensors.
-    """
-
-    place: int
-    ins_serial: str
-    aircraft: str
-    first_flight: str
-    last_flight: str
-    flights: int
-    taught: int
-    mounting_deg: float | None = None
-    mounting_sigma_deg: float | None = None
-    sum_deg: float | None = None
-    sum_sigma_deg: float | None = None
-    factor: float | None = None
-    factor_sigma: float | None = None
-    odd: str = ""
-    changed: str = ""
-    pooled: tuple[Pooled, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -276,6 +276,32 @@ class Installations:
         return tuple(lesson for one in self.installations for lesson in one.lessons)
 
 
+@dataclass(frozen=True)
+class InstallationRow:
+    """One unit in one aircraft: what its flights say together; :class:`Installed`.
+
+    ``place`` counts the installations of the fleet from 1. ``odd`` and ``changed`` name flights taken for another
+    unit's, and those from which on it sits otherwise, joined by ", ". ``pooled`` are figures of other sensors.
+    """
+
+    place: int
+    ins_serial: str
+    aircraft: str
+    first_flight: str
+    last_flight: str
+    flights: int
+    taught: int
+    mounting_deg: float | None = None
+    mounting_sigma_deg: float | None = None
+    sum_deg: float | None = None
+    sum_sigma_deg: float | None = None
+    factor: float | None = None
+    factor_sigma: float | None = None
+    odd: str = ""
+    changed: str = ""
+    pooled: tuple[Pooled, ...] = ()
+
+
 def as_stored(lesson: Lesson) -> Lesson:
     """A lesson with its numbers rounded as the file has them: whoever reads the file computes the same."""
     return from_json(Lesson, to_json(lesson))

@@ -11,7 +11,8 @@ from groundstation.chapters.fleet.common import aircraft_name, bounded, day, plu
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Note, Part, Section
 from groundstation.chapters.verdict import VERDICTS
 from groundstation.chapters.wording import ABSENT, clean, is_number, number
-from groundstation.results.fleet import FleetResults, InstallationRow
+from groundstation.results.fleet import FleetResults
+from groundstation.results.installation import InstallationRow
 
 TITLE = "Installations"
 LEAD = (

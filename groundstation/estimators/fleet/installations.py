@@ -7,8 +7,7 @@ import numpy as np
 
 from groundstation.estimators.installation.settings import InstallationSettings
 from groundstation.results.figures import FigureData
-from groundstation.results.fleet import InstallationRow
-from groundstation.results.installation import Installation, InstalledFlight
+from groundstation.results.installation import Installation, InstallationRow, InstalledFlight
 
 NUMBERS = (
     *("error_deg", "half_width_deg", "alone_error_deg", "alone_half_width_deg"),
