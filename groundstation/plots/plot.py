@@ -71,7 +71,10 @@ class Panel:
 
 @dataclass(frozen=True)
 class Row:
-    """Panels side by side, of one height; ``shares_x``: their axis is that of the row below, where it is written."""
+    """Panels side by side, of one height; ``shares_x``: their axis is that of the row below, where it is written.
+
+    The height is that of the frames; titles, legends and numbers stand around them.
+    """
 
     panels: tuple[Panel, ...]
     height_mm: float = 40.0
