@@ -129,7 +129,11 @@ class Lanes(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Spans(Mark):
-    """Shaded ground between places of the horizontal axis; ``kind`` of each, its shade by the painter (a phase)."""
+    """Shaded ground between places of the horizontal axis.
+
+    A phase of flight as ``kind`` has a shade of its own, any other a faint one of the role. With a name each kind
+    stands in the legend once, as itself; where it is empty, by the name.
+    """
 
     start: Floats
     end: Floats
@@ -138,12 +142,16 @@ class Spans(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Limit(Mark):
-    """A dashed line across the panel at a value; upright at a place of the horizontal axis."""
+    """A dashed line across the panel at a value; upright at a place of the horizontal axis.
+
+    A ``label`` stands beside the line, where the name stands in the legend.
+    """
 
     value: float
     is_upright: bool = False
     role: Role = "limit"
     dash: Dash = "dashed"
+    label: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,6 +208,7 @@ class Outlines(Mark):
     magnified: float = 1.0
     is_filled: bool = False
     labels: tuple[str, ...] = ()
+    dash: Dash = ""
 
 
 @dataclass(frozen=True, kw_only=True)

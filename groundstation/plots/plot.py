@@ -29,6 +29,10 @@ class Axis:
         Of a symlog axis: linear up to here.
     windows : tuple of (float, float)
         Spans of time that are shown, each in a frame of its own: the axis is broken between them.
+    ranges : tuple of (float, float)
+        Of an upright axis: its own range in each window of the other axis; none: ``low`` to ``high`` in all.
+    ticks : tuple of float
+        Places of numbers, where they are not at the usual steps.
     """
 
     title: str = ""
@@ -38,6 +42,8 @@ class Axis:
     names: tuple[tuple[float, str], ...] = ()
     linear_to: float = 1.0
     windows: tuple[tuple[float, float], ...] = ()
+    ranges: tuple[tuple[float, float], ...] = ()
+    ticks: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,238 @@
+"""Results whose plots are compared with what the drawers paint, each made once."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from groundstation.base.clock import Clock
+from groundstation.base.ledger import Ledger
+from groundstation.chapters.generic import SERIES, columns_by_unit
+from groundstation.estimators.control.plan import plan_session
+from groundstation.estimators.control.scenario import KeepOut
+from groundstation.estimators.cooperative.analysis import COOPERATIVE, SessionKnown
+from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
+from groundstation.estimators.plan import Planned
+from groundstation.pipeline.one_flight.analyse import Given, analyse, run_analyses
+from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.flight import read_flight
+from groundstation.pipeline.one_flight.join import join_logs
+from groundstation.pipeline.one_flight.log import open_log
+from groundstation.results.answer import Answer, by_analysis
+from groundstation.results.arrays.landing import LandingPath, LandingProtection
+from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults, Source
+from groundstation.results.landing import LandingResult
+from groundstation.results.reference import ReferenceResult
+from groundstation.results.together import Together
+from groundstation.tables.table import Flight
+from tests import report_example, viewer_example
+from tests.inertial_example import aided_figures, forecast_result, inertial_result
+
+MOST_GENERIC = 3  # figures of an answer without a chapter: all are told alike
+LAKE = KeepOut("lake", ((-1800.0, 500.0), (-1800.0, 1400.0), (-1000.0, 1400.0)))
+
+
+@cache
+def report() -> FlightResults:
+    """Taxi, standstill and the whole flight, and an INS with its forecast."""
+    return report_example.example(report_example.heading_result(), inertial_result(), forecast_result())
+
+
+@cache
+def viewer() -> FlightResults:
+    """A short flight with UTC."""
+    return viewer_example.make_results(viewer_example.make_flight())
+
+
+@cache
+def aided() -> FlightResults:
+    """An INS that GNSS corrects, and no heading."""
+    results = report_example.example()
+    return replace(results, figures=(*results.figures, *aided_figures(results.duration_s)))
+
+
+@cache
+def bare() -> FlightResults:
+    """Nothing at all."""
+    return replace(report_example.example(), figures=())
+
+
+@cache
+def flown() -> FlightResults:
+    """A whole simulated flight with everything that is asked of one: latency, spectrum, reference."""
+    from tests.test_latency import flown
+
+    return analysed(flown(0.2))
+
+
+@cache
+def joined() -> FlightResults:
+    """Two logs as one flight."""
+    from tests.test_formats_agree import as_ubx, as_ulog
+
+    with TemporaryDirectory() as folder:
+        place = Path(folder)
+        as_ulog(place / "a.ulg")
+        as_ubx(place / "b.ubx")
+        target = place / "joined.mcap"
+        converted = join_logs([open_log(place / name) for name in ("a.ulg", "b.ubx")], target)
+        return analysed(read_flight(target, converted))
+
+
+@cache
+def magnetic() -> FlightResults:
+    """A figure of eight."""
+    from tests.test_magnetic_run import figure_eight
+
+    return figure_eight()
+
+
+@cache
+def ground() -> FlightResults:
+    """Ground runs on many headings."""
+    from tests.test_magnetic_ground import whole
+
+    return whole()
+
+
+@cache
+def landing() -> FlightResults:
+    """Approaches by an ILS, the threshold given; its receiver tells protection levels."""
+    from tests.test_viewer_landing import results
+
+    found = results(True)
+    path = found.rows_of(LandingPath)
+    assert path is not None
+    wave = 5.0 + np.sin(path.time_s)
+    protection = LandingProtection(
+        time_s=path.time_s,
+        horizontal_protection_m=wave,
+        horizontal_alarm_limit_m=np.full(len(path), 40.0),
+        vertical_protection_m=2.0 * wave,
+        vertical_alarm_limit_m=np.full(len(path), np.nan),
+        approach=path.approach,
+    )
+    return replace(found, figures=(*found.figures, protection))
+
+
+@cache
+def landing_without_site() -> FlightResults:
+    """Approaches by an ILS whose threshold is found."""
+    from tests.test_viewer_landing import results
+
+    return results(False)
+
+
+@cache
+def beacons() -> FlightResults:
+    """An approach by locators."""
+    from tests.landing_example import approach_scenario
+    from tests.test_landing_beacons import analysed
+
+    return of_answers(analysed(approach_scenario()).answer)
+
+
+@cache
+def ranges() -> FlightResults:
+    """A landing by ranges as planned."""
+    from tests.test_landing_ranges import FOUR
+
+    return of_answers(*LANDING_PLAN.run(replace(FOUR, trials=12)).answers.values())
+
+
+@cache
+def control() -> FlightResults:
+    """A planned session."""
+    from tests.test_control import mixed
+
+    planned = plan_session(mixed())
+    return replace(of_answers(*planned.answers.values()), figures=figures_of(planned))
+
+
+@cache
+def placement() -> FlightResults:
+    """Points placed for an approach, one area kept out."""
+    from tests.test_placement_of_points import approach
+
+    planned = plan_session(approach(keep_out=(LAKE,), iterations=10))
+    return replace(of_answers(*planned.answers.values()), figures=figures_of(planned))
+
+
+@cache
+def session() -> FlightResults:
+    """A session of three aircraft."""
+    from tests.cooperative_example import believed
+    from tests.session_example import SHORT, simulated
+
+    given = SessionKnown(settings={"cooperative": believed(SHORT)})
+    return of_answers(*run_analyses((COOPERATIVE,), simulated(SHORT).session, given).answers.values())
+
+
+def analysed(flight: Flight) -> FlightResults:
+    """Results of all analyses of a flight."""
+    source = Source("made.csv", "ab" * 32, 1, "flat-csv")
+    given = Given("NOTIME_abababab", source, Ledger(), Clock(), (), has_lost_data=False)
+    return analyse(flight, given, Configuration())
+
+
+def of_answers(*answers: Answer) -> FlightResults:
+    """Results that are nothing but some answers with their arrays."""
+    figures = tuple(figure for answer in answers for figure in answer.figures)
+    source = Source("made.csv", "ab" * 32, 1, "flat-csv")
+    return FlightResults(
+        *("NOTIME_abababab", source, {}, None, 600.0, "ok"), answers=by_analysis(*answers), figures=figures
+    )
+
+
+def figures_of(planned: Planned) -> tuple[FigureData, ...]:
+    """Arrays of a plan and of its answers."""
+    return (*planned.figures, *(figure for answer in planned.answers.values() for figure in answer.figures))
+
+
+CASES: dict[str, Callable[[], FlightResults]] = {
+    "report": report,
+    "viewer": viewer,
+    "aided": aided,
+    "bare": bare,
+    "flown": flown,
+    "joined": joined,
+    "magnetic": magnetic,
+    "ground": ground,
+    "landing": landing,
+    "landing_without_site": landing_without_site,
+    "beacons": beacons,
+    "ranges": ranges,
+    "control": control,
+    "placement": placement,
+    "session": session,
+}
+
+
+def names_of(name: str, results: FlightResults) -> list[tuple[str, ...]]:
+    """Of which a figure can be, where it is one of several alike."""
+    if name == SERIES:
+        known = (
+            one
+            for one in results.figure_names
+            if (found := results.figure_with_rows(one)) is not None
+            and "time_s" in found.columns
+            and columns_by_unit(found)
+        )
+        return [(one,) for one in list(known)[:MOST_GENERIC]]
+    if name in ("inertial.state", "inertial.differences"):
+        return [("position",), ("velocity",)]
+    if name.startswith("landing."):
+        answer = results.answer(LandingResult)
+        return [(str(one.number),) for one in answer.approaches] if answer else [("1",)]
+    if name == "reference.errors":
+        reference = results.answer(ReferenceResult)
+        subjects = sorted({row.subject for row in reference.errors}) if reference else ["gnss"]
+        return [(f"{one} {what}",) for one in subjects for what in ("position", "velocity", "attitude")]
+    if name == "together.motion":
+        joined = results.answer(Together)
+        return [(one.label,) for one in joined.agreement] if joined else [("b",)]
+    return [()]

@@ -1,0 +1,214 @@
+"""A plot that is described shows what its matplotlib drawer shows: every series, band, limit, range and word."""
+
+import dataclasses
+import inspect
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from groundstation.chapters.plots import PLOTS
+from groundstation.plots.marks import Floats
+from groundstation.plots.plot import Plot
+from groundstation.reports.drawing import Drawing, Sketch, sketching
+from groundstation.reports.figures import DRAWERS
+from groundstation.results.flight import FlightResults
+from tests.painted_axes import Shown, Thing, described, painted
+from tests.plot_cases import CASES, names_of
+
+THINNED = 400  # a drawer thins no series of fewer samples
+ROUNDING = {"rtol": 1e-9, "atol": 1e-9}
+MILLIMETRE = 0.51
+BESIDE_KM = 0.3
+
+# Differences that are allowed, beside thinning:
+# the title of the time axis under the upper right panel of an odd number: each panel of its row has one now
+WRITTEN_TWICE = {("cooperative.errors", "A, m"), ("cooperative.errors", "B, m")}
+SHARED = "up, m"  # of landing_ranges.space: its horizontal axis is that of the panel above
+# FIRST_OF_A_WINDOW: a heading that jumped through north just before a window begins has its break there, too
+
+
+def drawn(name: str, results: FlightResults, of: tuple[str, ...]) -> tuple[Drawing, Sketch] | None:
+    """What the drawer tells and would paint."""
+    with sketching() as sketches:
+        found: Any = DRAWERS[name](results, *of)
+    return None if found is None else (found, sketches[found.svg])
+
+
+def every() -> Iterator[Any]:
+    for case in CASES:
+        for name in PLOTS:
+            yield pytest.param(case, name, id=f"{case}-{name}")
+
+
+@pytest.mark.parametrize(("case", "name"), list(every()))
+def test_the_description_shows_what_the_drawer_paints(case: str, name: str) -> None:
+    results = CASES[case]()
+    for of in names_of(name, results):
+        old, new = drawn(name, results, of), PLOTS[name](results, *of)
+        assert (old is None) == (new is None), of
+        if old is None or new is None:
+            continue
+        drawing, sketch = old
+        assert new.name == ".".join((name, *of))
+        assert (new.title, new.caption, new.alt) == (drawing.title, drawing.caption, drawing.alt)
+        assert tuple(new.numbers) == tuple(drawing.numbers)
+        compare(painted(sketch), new)
+
+
+def compare(old: list[Shown], plot: Plot) -> None:
+    panels = described(plot)
+    assert len(old) == sum(map(len, panels))
+    left = iter(old)
+    for panel, windows in zip(plot.panels, panels, strict=True):
+        group = [next(left) for _ in windows]
+        new = windows[0]
+        assert new.y_title == group[0].y_title
+        if (plot.name, new.y_title) not in WRITTEN_TWICE:
+            assert {one.x_title for one in group} - {""} == {new.x_title} - {""}
+        assert {one.title for one in group} - {""} == {new.title} - {""}
+        assert any(one.has_legend for one in group) == any(one.has_legend for one in windows), new.y_title
+        for before, after in zip(group, windows, strict=True):
+            compare_panel(before, after, is_window=bool(panel.x.windows))
+
+
+def compare_panel(old: Shown, new: Shown, *, is_window: bool) -> None:
+    where = new.y_title or new.title
+    assert (new.scales, new.is_map, new.nothing) == (old.scales, old.is_map, old.nothing), where
+    assert abs(new.height_mm - old.height_mm) < MILLIMETRE, (where, old.height_mm)
+    for axis in ("x_range", "y_range"):
+        mine, its = getattr(new, axis), getattr(old, axis)
+        if old.is_map and old.nothing == "" and mine != (None, None) and its == (None, None):
+            continue  # a map of an aircraft at rest: matplotlib only knows what is to be seen
+        for one, other in zip(mine, its, strict=True):
+            if one is not None:
+                assert other is not None, (where, axis, mine)
+                np.testing.assert_allclose(one, other, err_msg=f"{where} {axis}", **ROUNDING)
+        assert mine != (None, None) or its == (None, None) or where == SHARED, (where, axis, its)
+    assert names(new) == names(old), where
+    compare_told(old, new)
+    compare_things(list(old.things), list(new.things), where, is_window=is_window)
+
+
+def names(shown: Shown) -> list[tuple[float, str]]:
+    """Names beside the axis as far as they are written."""
+    return [(place, text[:20]) for place, text in shown.names]
+
+
+def compare_told(old: Shown, new: Shown) -> None:
+    assert (old.told is None) == (new.told is None)
+    if old.told is not None and new.told is not None:
+        assert new.told.title == old.told.title
+        rows = [points(one.told.x, one.told.y, one.told.value) for one in (old, new) if one.told is not None]
+        contained(rows[0], rows[1], "told")
+
+
+def compare_things(old: list[Thing], new: list[Thing], where: str, *, is_window: bool) -> None:
+    """Each thing of the one is one of the other, and none is left over."""
+    old, new = with_dots_joined(old), with_dots_joined(new)
+    for thing in old:
+        candidates = [
+            one
+            for one in new
+            if (one.kind, one.name, one.text, one.is_dashed) == (thing.kind, thing.name, thing.text, thing.is_dashed)
+            and (thing.colours <= one.colours or not thing.colours)
+        ]
+        fits = [one for one in candidates if is_same(thing, one, is_window=is_window)]
+        assert fits, (where, brief(thing), [brief(one) for one in new])
+        new.remove(fits[0])
+    assert not new, (where, [brief(one) for one in new])
+
+
+def with_dots_joined(things: list[Thing]) -> list[Thing]:
+    """Things with a point; dots of one colour without a name are one: a drawer had a call each, or one over another."""
+    kept = [one for one in things if has_points(one)]
+    loose: dict[frozenset[str], list[Thing]] = {}
+    for one in kept:
+        if one.kind == "dots" and not one.name:
+            loose.setdefault(one.colours, []).append(one)
+    joined = []
+    for colours, dots in loose.items():
+        rows = np.unique(np.concatenate([finite_rows(one) for one in dots]), axis=0)
+        joined.append(Thing("dots", "", colours, x=rows[:, 0], y=rows[:, 1]))
+    return [*(one for one in kept if one.kind != "dots" or one.name), *joined]
+
+
+def brief(thing: Thing) -> tuple[Any, ...]:
+    known = finite_rows(thing)
+    return thing.kind, thing.name, thing.text, sorted(thing.colours), thing.is_dashed, known.shape, known[:2].tolist()
+
+
+def has_points(thing: Thing) -> bool:
+    return thing.kind == "cells" or len(finite_rows(thing)) > 0
+
+
+def finite_rows(thing: Thing) -> Floats:
+    return points(*(values for values in (thing.x, thing.y, thing.upper) if len(values)))
+
+
+def points(*columns: Floats) -> Floats:
+    """Rows of columns of one length, those without a value left out."""
+    if len({len(values) for values in columns}) != 1:
+        columns = tuple(np.asarray(values, dtype=float)[: min(map(len, columns))] for values in columns)
+    rows = (
+        np.column_stack([np.asarray(values, dtype=np.float64).ravel() for values in columns])
+        if columns
+        else np.zeros((0, 1))
+    )
+    return rows[np.isfinite(rows).all(axis=1)] if len(rows) else rows
+
+
+def is_same(old: Thing, new: Thing, *, is_window: bool) -> bool:
+    if new.kind == "text":  # beside its place
+        return bool(np.abs(finite_rows(old) - finite_rows(new)).max() < BESIDE_KM)
+    if new.kind == "stepped band":
+        return is_same_steps(old, new)
+    rows, others = finite_rows(old), finite_rows(new)
+    is_cut = is_window and len(rows) == len(others) + 1  # FIRST_OF_A_WINDOW
+    try:
+        contained(rows[1:] if is_cut else rows, others, new.kind)
+    except AssertionError:
+        return False
+    return True
+
+
+def is_same_steps(old: Thing, new: Thing) -> bool:
+    """Tell whether the corners of a stepped band have the heights of its steps, and all of them."""
+    first, second = ({*np.round(one.y, 9).tolist(), *np.round(one.upper, 9).tolist()} for one in (old, new))
+    return first == second
+
+
+def contained(old: Floats, new: Floats, what: str) -> None:
+    """Samples drawn are those described: all of them or, of very many, some."""
+    if len(old) == len(new):
+        order_old, order_new = (np.lexsort(np.round(rows, 6).T) for rows in (old, new))
+        np.testing.assert_allclose(old[order_old], new[order_new], err_msg=what, **ROUNDING)
+        return
+    assert THINNED <= len(old) < len(new), what
+    known = {tuple(row) for row in np.round(new, 9).tolist()}
+    assert all(tuple(row) in known for row in np.round(old, 9).tolist()), what
+
+
+def test_every_described_plot_has_a_drawer_and_takes_the_same() -> None:
+    assert set(PLOTS) <= set(DRAWERS)
+    for name, told in PLOTS.items():
+        assert len(inspect.signature(told).parameters) == len(inspect.signature(DRAWERS[name]).parameters), name
+
+
+@pytest.mark.parametrize("name", PLOTS)
+def test_every_plot_is_told_in_some_case(name: str) -> None:
+    assert any(
+        PLOTS[name](results, *of) for case in CASES.values() for results in (case(),) for of in names_of(name, results)
+    )
+
+
+def test_arrays_of_a_description_are_read_only() -> None:
+    results = CASES["report"]()
+    plot = PLOTS["heading.difference"](results)  # type: ignore[call-arg]
+    assert plot is not None
+    for panel in plot.panels:
+        for mark in panel.marks:
+            for part in dataclasses.fields(mark):
+                values = getattr(mark, part.name)
+                assert not isinstance(values, np.ndarray) or not values.flags.writeable
