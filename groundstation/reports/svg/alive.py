@@ -25,12 +25,14 @@ from groundstation.reports.svg import colours
 from groundstation.reports.svg.boxes import PT_PER_MM, Box, Placed
 from groundstation.reports.svg.extents import has_rows, names_of
 from groundstation.reports.svg.font import label
+from groundstation.reports.svg.legend import MOST_OF_A_NAME, ground
 from groundstation.reports.svg.scales import Span
 from groundstation.reports.svg.shapes import stepped
 from groundstation.reports.svg.thinning import shown_rows
 
 MOST_SAMPLES = 5000
 NONE: Floats = np.zeros(0)
+LARGEST = float(np.finfo(np.float32).max)  # that the page holds
 JUST_BELOW = np.nextafter(np.float32(1.0), np.float32(0.0))
 
 
@@ -51,7 +53,7 @@ def panels_of(panels: Sequence[Placed], height_pt: float) -> tuple[live.Panel, .
             found.append(
                 live.Panel(
                     **vars(_frame(box, height_pt)),
-                    grounds=_grounds(one, box),
+                    grounds=_grounds(box),
                     marks=_uprights(box),
                     curves=tuple(curves),
                 )
@@ -72,13 +74,18 @@ def can_live(one: Placed) -> bool:
 
 def _is_known(mark: AnyMark) -> bool:
     if isinstance(mark, Curve):
-        steps = np.diff(mark.x[np.isfinite(mark.x)])
-        return bool(np.all(steps >= 0.0) or np.all(steps <= 0.0))
+        return _goes_one_way(mark.x)
     if isinstance(mark, Points):
         return not any(mark.labels) and mark.symbol in ("dot", "circle", "ring")
     if isinstance(mark, Band):
-        return bool(np.all(np.diff(mark.x[np.isfinite(mark.x)]) >= 0.0))
+        return _goes_one_way(mark.x)
     return isinstance(mark, Dots | Histogram | Lanes | Spans | Limit | Told)
+
+
+def _goes_one_way(x: Floats) -> bool:
+    known = x[np.isfinite(x)]
+    steps = np.sign(known[1:] - known[:-1]) if np.all(np.abs(known) <= LARGEST) else np.array([1.0, -1.0])
+    return bool(np.all(steps >= 0.0) or np.all(steps <= 0.0))
 
 
 def _frame(box: Box, height_pt: float) -> Frame:
@@ -97,8 +104,7 @@ def _frame(box: Box, height_pt: float) -> Frame:
 
 def _single(span: Span) -> tuple[float, float]:
     """Ends of a scale as numbers that float32 holds."""
-    largest = float(np.finfo(np.float32).max)
-    low, high = (float(np.float32(min(max(end, -largest), largest))) for end in (span.low, span.high))
+    low, high = (float(np.float32(min(max(end, -LARGEST), LARGEST))) for end in (span.low, span.high))
     return low, high
 
 
@@ -119,16 +125,16 @@ def _samples(box: Box) -> Samples | None:
     return Samples(title, *(column[rows] for column in columns))
 
 
-def _grounds(one: Placed, box: Box) -> tuple[tuple[float, float, str, str], ...]:
+def _grounds(box: Box) -> tuple[tuple[float, float, str, str], ...]:
     """Shaded spans; a kind has its name where the legend has it."""
-    named = {entry.name for entry in one.entries if entry.shade}
     found = []
     for mark in box.panel.marks:
         if isinstance(mark, Spans):
             for low, high, kind in zip(mark.start.tolist(), mark.end.tolist(), mark.kind.tolist(), strict=True):
                 if np.isfinite(low) and np.isfinite(high):
-                    name = label(kind, 44)
-                    found.append((low, high, colours.shade_of(kind), name if name in named else ""))
+                    colour, opacity = colours.shade_of(kind, mark.role, mark.emphasis)
+                    shade = colour if opacity == 1.0 else colours.with_alpha(colour, opacity)
+                    found.append((low, high, shade, ground(mark, kind).name if mark.name else ""))
     return tuple(found)
 
 
@@ -138,7 +144,7 @@ def _uprights(box: Box) -> tuple[tuple[float, str], ...]:
 
 
 def _curves(mark: AnyMark, box: Box) -> list[live.Curve]:
-    colour, name = colours.COLOURS[mark.role], label(mark.name, 44)
+    colour, name = colours.COLOURS[mark.role], label(mark.name, MOST_OF_A_NAME)
     width = colours.LINE_PT[mark.emphasis]
     if isinstance(mark, Curve):
         return [live.Curve("line", name, colour, width, bool(mark.dash), *_line(mark, box), NONE)]
@@ -155,21 +161,31 @@ def _curves(mark: AnyMark, box: Box) -> list[live.Curve]:
         return [live.Curve("band", name, colours.with_alpha(colour, 0.19), 0.0, False, *_bars(mark))]
     if isinstance(mark, Limit) and not mark.is_upright and np.isfinite(mark.value):
         ends = np.sort(np.array([box.x.low, box.x.high]))
-        return [live.Curve("line", name, colour, 0.9, bool(mark.dash), ends, np.full(2, mark.value), NONE)]
+        return [
+            live.Curve(
+                "line",
+                name or label(mark.label, MOST_OF_A_NAME),
+                colour,
+                colours.LIMIT_PT[mark.emphasis],
+                bool(mark.dash),
+                ends,
+                np.full(2, mark.value),
+                NONE,
+            )
+        ]
     return _lanes(mark) if isinstance(mark, Lanes) else []
 
 
 def _has_place(values: Floats, scale: str) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
     with np.errstate(invalid="ignore"):
-        return np.isfinite(values) & ((values > 0.0) | (scale != "log"))
+        return (np.abs(values) <= LARGEST) & ((values > 0.0) | (scale != "log"))
 
 
 def _line(mark: Curve, box: Box) -> tuple[Floats, Floats]:
     """Samples of a curve from left to right; a gap has a place of its own, where there is none."""
     x = np.where(_has_place(mark.x, box.x.scale), mark.x, np.nan)
     y = np.where(_has_place(mark.y, box.y.scale), mark.y, np.nan)
-    known = x[np.isfinite(x)]
-    if known.size > 1 and known[0] > known[-1]:
+    if _is_backwards(x):
         x, y = x[::-1], y[::-1]
     rows, starts = shown_rows(x, y, MOST_SAMPLES)
     x, y = x[rows], y[rows]
@@ -180,10 +196,18 @@ def _line(mark: Curve, box: Box) -> tuple[Floats, Floats]:
     return np.insert(x, breaks, 0.5 * (x[breaks - 1] + x[breaks])), np.insert(y, breaks, np.nan)
 
 
+def _is_backwards(x: Floats) -> bool:
+    known = x[np.isfinite(x)]
+    return bool(known.size > 1 and known[0] > known[-1])
+
+
 def _band(mark: Band, box: Box) -> tuple[Floats, Floats, Floats]:
     known = _has_place(mark.x, box.x.scale) & _has_place(mark.low, box.y.scale) & _has_place(mark.high, box.y.scale)
-    rows, starts = shown_rows(np.where(known, mark.x, np.nan), mark.low, MOST_SAMPLES)
-    x, low, high = mark.x[rows], mark.low[rows], mark.high[rows]
+    x, low, high = np.where(known, mark.x, np.nan), mark.low, mark.high
+    if _is_backwards(x):
+        x, low, high = x[::-1], low[::-1], high[::-1]
+    rows, starts = shown_rows(x, low, MOST_SAMPLES)
+    x, low, high = x[rows], low[rows], high[rows]
     if mark.steps:
         (x, low, starts), high = stepped(x, low, starts), stepped(x, high, starts)[1]
         x = _one_after_another(x)
@@ -194,10 +218,12 @@ def _band(mark: Band, box: Box) -> tuple[Floats, Floats, Floats]:
 
 def _one_after_another(x: Floats) -> Floats:
     """Places of steps: of two at one place the first stands just before."""
+    if not x.size:
+        return x
     inner = x.copy()
     is_double = np.append(x[1:] == x[:-1], False)
     inner[is_double] -= (1.0 - JUST_BELOW) * np.maximum(np.abs(x[is_double]), 1e-30)
-    return np.maximum.accumulate(inner) if inner.size else inner
+    return np.asarray(np.maximum.accumulate(inner))
 
 
 def _bars(mark: Histogram) -> tuple[Floats, Floats, Floats]:

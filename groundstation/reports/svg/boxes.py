@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.plots.marks import Cells, Floats
-from groundstation.plots.plot import WIDTH_MM, Panel, Plot
+from groundstation.plots.plot import WIDTH_MM, Panel, Plot, Row
 from groundstation.reports.frames import MM_PER_INCH, TIME
 from groundstation.reports.svg import extents
 from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, label, lines_of, width_pt
 from groundstation.reports.svg.legend import LINE_PT, Entry, above, beside_pt, entries_of
 from groundstation.reports.svg.scales import Span
-from groundstation.reports.svg.ticks import Tick, ticks_of
+from groundstation.reports.svg.ticks import Tick, own_ticks, ticks_of
 
 PT_PER_MM = 72.0 / MM_PER_INCH
 WIDTH_PT = WIDTH_MM * PT_PER_MM
@@ -20,6 +20,7 @@ TICK_PT, TO_TEXT_PT, TO_TITLE_PT = 3.0, 2.5, 3.5
 EDGE_PT, BETWEEN_PT, ROWS_PT = 11.0, 14.0, 11.0  # right of the last frame, between frames, between rows
 LEAST_PT, WINDOWS_PT, LEAST_WINDOW_PT = 24.0, 9.0 * PT_PER_MM, 20.0 * PT_PER_MM
 BAR_PT, TO_BAR_PT = 4.0 * PT_PER_MM, 10.0  # the scale of cells
+SCALE_PT = TO_BAR_PT + BAR_PT + 46.0
 MOST_OF_A_NAME, MOST_OF_A_TITLE = 44, 90
 
 
@@ -70,6 +71,7 @@ class Placed:
     entries: tuple[Entry, ...]
     lines: tuple[tuple[Entry, ...], ...]  # of the legend above, from the top
     has_own_line: bool  # the title stands above the legend
+    has_scale: bool  # of cells, beside it
 
     @property
     def right(self) -> float:
@@ -83,10 +85,11 @@ class _Told:
 
     panel: Panel
     x: Span
-    y: Span
-    y_ticks: tuple[Tick, ...]
+    y: tuple[Span, ...]  # in each window of the other axis
+    y_ticks: tuple[tuple[Tick, ...], ...]
     entries: tuple[Entry, ...]
     has_x_texts: bool
+    has_scale: bool
     left_pt: float
     right_pt: float
 
@@ -115,21 +118,22 @@ def placed(plot: Plot) -> tuple[tuple[Placed, ...], float]:
 
 
 def _told(plot: Plot) -> list[list[_Told]]:
-    seen: set[str] = set()
     rows: list[list[_Told]] = []
     for number, row in enumerate(plot.rows):
         line = []
         for column, panel in enumerate(row.panels):
-            y = extents.y_span(panel)
-            ticks = _y_ticks(panel, y, row.height_mm * PT_PER_MM)
-            entries = entries_of(panel, seen)
-            left = TICK_PT + TO_TEXT_PT + max((width_pt(text) for _, text in ticks), default=0.0)
-            left += _title_pt(panel, row.height_mm * PT_PER_MM)
-            right = beside_pt(entries) if panel.legend == "beside" else 0.0
             chain = [plot.rows[place].panels[column] for place in _chain(plot, number, column)]
             drawn = np.concatenate([extents.x_extent(one.marks) for one in chain])
             x = extents.x_span(chain[-1], drawn)
-            line.append(_Told(panel, x, y, ticks, entries, not row.shares_x, left, right + scale_pt(panel)))
+            y = extents.y_spans(panel, len(extents.windows_of(panel, x)))
+            ticks = tuple(_y_ticks(panel, span, row.height_mm * PT_PER_MM) for span in y)
+            entries = entries_of(panel)
+            left = TICK_PT + TO_TEXT_PT + widest(ticks[0])
+            left += _title_pt(panel, row.height_mm * PT_PER_MM)
+            right = beside_pt(entries) if panel.legend == "beside" else 0.0
+            has_scale = _has_scale(row, column)
+            right += SCALE_PT if has_scale else 0.0
+            line.append(_Told(panel, x, y, ticks, entries, not row.shares_x, has_scale, left, right))
         rows.append(line)
     return rows
 
@@ -148,7 +152,14 @@ def _y_ticks(panel: Panel, span: Span, length_pt: float) -> tuple[Tick, ...]:
     names = extents.names_of(panel)
     if names:
         return tuple((place, label(name, MOST_OF_A_NAME)) for place, name in names if np.isfinite(place))
+    if panel.y.ticks:
+        return own_ticks(panel.y.ticks)
     return () if panel.nothing and not panel.marks else ticks_of(span, length_pt, is_upright=True)
+
+
+def widest(ticks: Sequence[Tick]) -> float:
+    """Width of the longest text among ticks, points."""
+    return max((width_pt(text) for _, text in ticks), default=0.0)
 
 
 def title_lines(title: str, room_pt: float) -> list[str]:
@@ -161,10 +172,16 @@ def _title_pt(panel: Panel, height_pt: float) -> float:
     return TO_TITLE_PT + LINE_SHARE * SIZE_PT * lines if lines else 0.0
 
 
-def scale_pt(panel: Panel) -> float:
-    """Room right of a panel for the scale of its cells."""
-    cells = next((mark for mark in panel.marks if isinstance(mark, Cells)), None)
-    return 0.0 if cells is None else TO_BAR_PT + BAR_PT + 46.0
+def scale_of(panel: Panel) -> Cells | None:
+    """The cells whose scale stands beside a panel, None without any."""
+    return next((mark for mark in panel.marks if isinstance(mark, Cells)), None)
+
+
+def _has_scale(row: Row, column: int) -> bool:
+    """Whether the scale of cells stands beside a panel: of several alike in a row beside the last."""
+    here = [scale_of(panel) for panel in row.panels[column : column + 2]]
+    alike = [(one.low, one.high, one.title, one.is_log) for one in here if one is not None]
+    return here[0] is not None and (len(alike) < 2 or alike[0] != alike[1])
 
 
 def _columns(plot: Plot, rows: list[list[_Told]]) -> tuple[list[list[float]], list[list[float]]]:
@@ -202,9 +219,9 @@ def _maps(plot: Plot, rows: list[list[_Told]], widths: list[list[float]]) -> lis
         for column, told in enumerate(rows[number]):
             if not told.panel.is_map:
                 continue
-            x, y = extents.equal(told.x, told.y, widths[number][column], row.height_mm * PT_PER_MM)
+            x, y = extents.equal(told.x, told.y[0], widths[number][column], row.height_mm * PT_PER_MM)
             ticks = _y_ticks(told.panel, y, row.height_mm * PT_PER_MM)
-            rows[number][column] = replace(told, x=x, y=y, y_ticks=ticks)
+            rows[number][column] = replace(told, x=x, y=(y,), y_ticks=(ticks,))
             for place in _chain(plot, number, column):
                 rows[place][column] = replace(rows[place][column], x=x)
     return rows
@@ -214,35 +231,38 @@ def _placed(told: _Told, left: float, width: float, height: float) -> Placed:
     panel = told.panel
     windows = extents.windows_of(panel, told.x)
     lengths = np.array([window.high - window.low for window in windows])
-    room = width - WINDOWS_PT * (len(windows) - 1)
+    has_own = len(set(told.y)) > 1
+    gap = max(WINDOWS_PT, max(map(widest, told.y_ticks[1:])) + 10.0) if has_own else WINDOWS_PT
+    room = width - gap * (len(windows) - 1)
     widths = np.maximum(np.abs(lengths) / np.abs(lengths).sum() * room, min(LEAST_WINDOW_PT, room / len(windows)))
     widths *= room / widths.sum()
     boxes = []
-    for place, (window, wide) in enumerate(zip(windows, widths.tolist(), strict=True)):
+    columns = zip(windows, widths.tolist(), told.y, told.y_ticks, strict=True)
+    for place, (window, wide, upright, ticks) in enumerate(columns):
         is_widest = place == int(np.argmax(widths))
         boxes.append(
             Box(
-                *(panel, left, 0.0, wide, height, window, told.y),
+                *(panel, left, 0.0, wide, height, window, upright),
                 x_ticks=_x_ticks(panel, window, wide),
-                y_ticks=told.y_ticks,
+                y_ticks=ticks,
                 has_x_texts=told.has_x_texts,
-                has_y_texts=not place,
+                has_y_texts=has_own or not place,
                 x_title=x_title(panel, window) if told.has_x_texts and is_widest else "",
                 y_title="" if place else label(panel.y.title, MOST_OF_A_TITLE),
             )
         )
-        left += wide + WINDOWS_PT
+        left += wide + gap
     title = label(panel.title, MOST_OF_A_TITLE)
     lines = above(told.entries, width) if panel.legend == "above" else ()
     taken = sum(entry.width_pt for entry in lines[0]) if lines else 0.0
     has_own_line = bool(title and lines) and (len(lines) > 1 or width_pt(title, 8.5, True) + taken + 10.0 > width)
-    return Placed(panel, tuple(boxes), title, told.entries, lines, has_own_line)
+    return Placed(panel, tuple(boxes), title, told.entries, lines, has_own_line, told.has_scale)
 
 
 def _x_ticks(panel: Panel, span: Span, width: float) -> tuple[Tick, ...]:
     if panel.x.names:
         return tuple((place, label(name, 24)) for place, name in panel.x.names if np.isfinite(place))
-    return ticks_of(span, width, is_upright=False)
+    return own_ticks(panel.x.ticks) if panel.x.ticks else ticks_of(span, width, is_upright=False)
 
 
 def x_title(panel: Panel, span: Span) -> str:

@@ -37,7 +37,9 @@ SHADES = {
     "airborne": "#d3e7f5",
     "landing roll": "#e3cfe6",
 }
-OTHER_SHADE = "#eef0f2"
+LANE: dict[Emphasis, float] = {"faint": 0.3, "thin": 0.6, "usual": 1.0, "bold": 1.0}  # of a lane
+DOT: dict[Emphasis, float] = {"faint": 0.75, "thin": 0.75, "usual": 0.75, "bold": 1.0}  # of dots, which are many
+LIMIT_PT: dict[Emphasis, float] = {"faint": 0.6, "thin": 0.6, "usual": 0.9, "bold": 1.5}
 LINE_PT: dict[Emphasis, float] = {"faint": 0.5, "thin": 0.8, "usual": 1.1, "bold": 2.2}
 DOT_PT: dict[Emphasis, float] = {"faint": 1.3, "thin": 1.6, "usual": 1.8, "bold": 3.0}
 SHADE: dict[Emphasis, float] = {"faint": 0.10, "thin": 0.15, "usual": 0.19, "bold": 0.35}  # opacity of a band
@@ -67,6 +69,17 @@ def with_alpha(colour: str, alpha: float) -> str:
     return f"{colour}{round(255.0 * alpha):02x}"
 
 
+def opacity(of: str, share: float) -> str:
+    """The attribute of an opacity, none of what is opaque.
+
+    Examples
+    --------
+    >>> opacity("fill", 0.5), opacity("fill", 1.0)
+    (' fill-opacity="0.5"', '')
+    """
+    return "" if share == 1.0 else f' {of}-opacity="{share:g}"'
+
+
 def viridis(share: float) -> str:
     """The colour at a share of the scale from 0 to 1.
 
@@ -82,6 +95,12 @@ def viridis(share: float) -> str:
     return "#" + "".join(f"{part:02x}" for part in mixed)
 
 
-def shade_of(kind: str) -> str:
-    """The shade of a span of a kind."""
-    return SHADES.get(kind, OTHER_SHADE)
+def shade_of(kind: str, role: Role, emphasis: Emphasis = "usual") -> tuple[str, float]:
+    """Colour and opacity of shaded ground: a phase of flight has its own, all else a faint one of its role.
+
+    Examples
+    --------
+    >>> shade_of("taxi", "ink"), shade_of("95 %", "answer", "faint")
+    (('#f6e3b4', 1.0), ('#007f5f', 0.1))
+    """
+    return (SHADES[kind], 1.0) if kind in SHADES else (COLOURS[role], SHADE[emphasis])

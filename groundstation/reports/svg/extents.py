@@ -24,6 +24,7 @@ from groundstation.plots.plot import Panel
 from groundstation.plots.ranges import finite
 from groundstation.reports.svg.scales import Span, span_of
 
+NOTHING: Floats = np.zeros(0)
 ABOVE_ROWS, BELOW_ROWS = 0.6, 0.6  # of a row, before the first and behind the last
 
 
@@ -98,6 +99,13 @@ def names_of(panel: Panel) -> tuple[tuple[float, str], ...]:
 def has_rows(panel: Panel) -> bool:
     """Whether the vertical axis counts rows from the top."""
     return any(isinstance(mark, Lanes | Intervals) for mark in panel.marks)
+
+
+def y_spans(panel: Panel, count: int) -> tuple[Span, ...]:
+    """Ends of the vertical axis in each of so many windows."""
+    whole = y_span(panel)
+    own = panel.y.ranges if len(panel.y.ranges) == count else ()
+    return tuple(span_of(whole.scale, *ends, NOTHING, whole.linear_to) for ends in own) or (whole,) * count
 
 
 def y_span(panel: Panel) -> Span:

@@ -25,16 +25,16 @@ from groundstation.reports.svg.font import label, middle, width_pt, written
 from groundstation.reports.svg.symbols import symbol
 
 LINE_PT, SIGN_PT, GAP_PT, BETWEEN_PT = 11.5, 13.0, 4.0, 11.0
-MOST_ENTRIES, MOST_OF_A_NAME = 30, 44
+MOST_ENTRIES, MOST_OF_A_NAME = 30, 60
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One line of a legend: the mark whose sign it has, its name and shade (of a phase)."""
+    """One line of a legend: the mark whose sign it has, its name, of shaded ground its kind."""
 
     mark: AnyMark
     name: str
-    shade: str = ""
+    kind: str = ""
 
     @property
     def width_pt(self) -> float:
@@ -42,25 +42,29 @@ class Entry:
         return SIGN_PT + GAP_PT + width_pt(self.name) + BETWEEN_PT
 
 
-def entries_of(panel: Panel, seen: set[str]) -> tuple[Entry, ...]:
-    """Entries of a panel, none twice; kinds of ground that are in ``seen`` are told already."""
+def entries_of(panel: Panel) -> tuple[Entry, ...]:
+    """Entries of a panel, none twice; of shaded ground each kind."""
     if not panel.legend:
         return ()
     found: dict[tuple[str, str], Entry] = {}
     for mark in panel.marks:
+        if not mark.name or isinstance(mark, Told | Cells | Lanes):
+            continue
         if isinstance(mark, Spans):
             for kind in dict.fromkeys(mark.kind.tolist()):
-                if kind not in seen:
-                    shade = colours.shade_of(kind)
-                    found[shade, kind] = Entry(mark, label(kind, MOST_OF_A_NAME), shade)
-                    seen.add(kind)
-        elif mark.name and not isinstance(mark, Told | Cells | Lanes):
+                found.setdefault((mark.role, kind or mark.name), ground(mark, kind))
+        else:
             found.setdefault((mark.role, mark.name), Entry(mark, label(mark.name, MOST_OF_A_NAME)))
     entries = tuple(found.values())
     if len(entries) <= MOST_ENTRIES:
         return entries
     more = f"… {len(entries) - MOST_ENTRIES + 1} more"
     return (*entries[: MOST_ENTRIES - 1], Entry(_MORE, more))
+
+
+def ground(mark: Spans, kind: str) -> Entry:
+    """Shaded ground by its kind, where that is empty by its name."""
+    return Entry(mark, label(kind or mark.name, MOST_OF_A_NAME), kind)
 
 
 _MORE = Told(x=colours.NO_PLACES, y=colours.NO_PLACES, value=colours.NO_PLACES, title="")
@@ -102,8 +106,9 @@ def _sign(entry: Entry, x: float, y: float) -> str:
     colour = colours.COLOURS[mark.role]
     box = f'<path d="M{x:.2f} {y - 3.0:.2f}h{SIGN_PT:g}v6h-{SIGN_PT:g}z" '
     half = x + 0.5 * SIGN_PT
-    if entry.shade:
-        return f'{box}fill="{entry.shade}"/>'
+    if isinstance(mark, Spans):
+        shade, opacity = colours.shade_of(entry.kind, mark.role, mark.emphasis)
+        return f'{box}fill="{shade}"{colours.opacity("fill", opacity)}/>'
     if isinstance(mark, Band):
         return f'{box}fill="{colour}" fill-opacity="{colours.SHADE[mark.emphasis]:g}"/>'
     if isinstance(mark, Histogram):
@@ -116,9 +121,8 @@ def _sign(entry: Entry, x: float, y: float) -> str:
         line = f'<path d="M{half:.2f} {y - 4.0:.2f}v8" stroke="{colour}" stroke-width="1"/>'
         return line + symbol("dot", half, y, 3.6, colour)
     if isinstance(mark, Curve | Limit | Outlines):
-        dash = "" if isinstance(mark, Outlines) else mark.dash
-        pattern = f' stroke-dasharray="{colours.DASHES[dash]}"' if dash else ""
-        width = 0.9 if isinstance(mark, Limit) else colours.LINE_PT[mark.emphasis]
+        pattern = f' stroke-dasharray="{colours.DASHES[mark.dash]}"' if mark.dash else ""
+        width = (colours.LIMIT_PT if isinstance(mark, Limit) else colours.LINE_PT)[mark.emphasis]
         return (
             f'<path d="M{x:.2f} {y:.2f}h{SIGN_PT:g}" fill="none" stroke="{colour}" stroke-width="{width:g}"{pattern}/>'
         )

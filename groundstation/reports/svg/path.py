@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from groundstation.plots.marks import Floats
 
 FAR_PT = 20_000.0  # what lies farther away is moved there: it is outside of every picture
+NO_LENGTH = "h0"  # a stroke to where it begins: a dot if its ends are round
 _KEPT = 4_000
 Steps = NDArray[np.int64]
 
@@ -66,7 +67,7 @@ def polyline(x: Floats, y: Floats, starts: NDArray[np.bool_], *, is_closed: bool
     ends = np.append(begins[1:], len(places))
     parts = []
     for first, last in zip(begins.tolist(), ends.tolist(), strict=True):
-        rest = "l" + words(steps[first + 1 : last]).lstrip() if last - first > 1 else "h0"
+        rest = "l" + words(steps[first + 1 : last]).lstrip() if last - first > 1 else NO_LENGTH
         parts.append("m" + words(steps[first : first + 1]).lstrip() + rest)
         if is_closed:
             parts.append("z")

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from groundstation.plots.marks import AnyMark, Cells, Floats, Outlines, Points, Spans
+from groundstation.plots.marks import AnyMark, Cells, Floats, Limit, Outlines, Points, Spans
 from groundstation.plots.plot import Plot
 from groundstation.reports.live import Svg
 from groundstation.reports.svg import boxes as b
@@ -25,6 +25,7 @@ from groundstation.reports.svg.shapes import is_within, shape
 from groundstation.reports.svg.ticks import Tick
 
 MOST_LABELS, MOST_OF_A_LABEL = 60, 24
+LABEL_SHARE = 0.66  # of the width: where the label of a line across begins
 HALO = f' stroke="{PAPER}" stroke-width="2.4" paint-order="stroke"'
 _NOT_IN_AN_ID = re.compile(r"[^A-Za-z0-9_-]+")
 
@@ -119,8 +120,7 @@ def _axes(box: Box) -> str:
 
 def _upright_title(box: Box) -> Iterator[str]:
     lines = b.title_lines(box.y_title, box.height + 16.0)
-    widest = max((width_pt(text) for _, text in box.y_ticks), default=0.0)
-    x = box.left - b.TICK_PT - b.TO_TEXT_PT - widest - b.TO_TITLE_PT
+    x = box.left - b.TICK_PT - b.TO_TEXT_PT - b.widest(box.y_ticks) - b.TO_TITLE_PT
     for place, line in enumerate(reversed(lines)):
         at = x - LINE_SHARE * SIZE_PT * place - 0.2 * SIZE_PT
         yield written(line, at, box.top + 0.5 * box.height, "middle", is_upright=True)
@@ -154,13 +154,25 @@ def _labels(box: Box) -> str:
                     middle_x, middle_y = corners.mean(axis=0).tolist()
                     wanted.append((middle_x, middle_y, text, FAINT, True))
     taken: list[tuple[float, float, float, float]] = []
-    parts = []
+    parts = [_beside(mark, box) for mark in box.panel.marks if isinstance(mark, Limit) and mark.label]
     inside = [one for one in wanted if box.left <= one[0] <= box.right and box.top <= one[1] <= box.bottom and one[2]]
     for x, y, text, colour, is_middle in inside[:MOST_LABELS]:
         shown = label(text, MOST_OF_A_LABEL)
         left, base = _free(x, y, width_pt(shown), taken, box, is_middle)
         parts.append(written(shown, left, base, look=f' fill="{colour}"{HALO}'))
     return "".join(parts)
+
+
+def _beside(mark: Limit, box: Box) -> str:
+    """The label of a line across the frame: above it, or right of an upright one."""
+    shown = label(mark.label, MOST_OF_A_LABEL)
+    place = float((box.across if mark.is_upright else box.down)(np.array([mark.value]))[0])
+    low, high = (box.left, box.right) if mark.is_upright else (box.top, box.bottom)
+    if not low <= place <= high:
+        return ""
+    along = box.left + min(LABEL_SHARE * box.width, max(box.width - width_pt(shown) - 2.0, 0.0))
+    x, y = (place + 2.0, box.top + SIZE_PT) if mark.is_upright else (along, place - 2.0)
+    return written(shown, x, y, look=f' fill="{COLOURS[mark.role]}"{HALO}')
 
 
 def _free(
@@ -182,12 +194,7 @@ def _free(
 
 
 def _inside(one: tuple[float, float, float, float], box: Box) -> bool:
-    return (
-        one[0] >= box.left - 20.0
-        and one[2] <= box.right + b.EDGE_PT
-        and one[1] >= box.top - 8.0
-        and one[3] <= box.bottom
-    )
+    return one[0] >= box.left - 20.0 and one[2] <= box.right + b.EDGE_PT and one[1] >= box.top and one[3] <= box.bottom
 
 
 def _meet(one: tuple[float, float, float, float], other: tuple[float, float, float, float]) -> bool:
@@ -206,11 +213,11 @@ def _around(one: Placed) -> str:
         at = y if one.has_own_line or not one.lines else first.top - 3.0 - 0.5 * legend.LINE_PT
         bold = ' font-weight="bold"'
         parts.append(written(one.title, first.left, at + middle(TITLE_PT), size_pt=TITLE_PT, look=bold))
-    cells = next((mark for mark in one.panel.marks if isinstance(mark, Cells)), None)
-    if cells is not None:
+    cells = b.scale_of(one.panel)
+    if cells is not None and one.has_scale:
         parts.append(scale_beside(cells, one.boxes[-1]))
     if one.panel.legend == "beside":
-        right = one.right + 8.0 + (b.scale_pt(one.panel) if cells is not None else 0.0)
+        right = one.right + 8.0 + (b.SCALE_PT if one.has_scale else 0.0)
         parts += [
             legend.drawn(entry, right, first.top + 6.0 + legend.LINE_PT * 1.1 * place)
             for place, entry in enumerate(one.entries)

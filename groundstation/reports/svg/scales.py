@@ -12,6 +12,7 @@ from groundstation.plots.ranges import finite
 LINEAR_SHARE = 10.0 / 9.0  # of a decade: the room of a symlog scale from zero to where it becomes logarithmic
 MARGIN = 0.05  # of what is drawn, on either side
 LEAST_SPAN = 1e-9  # of the greater end: ends nearer to each other are moved apart
+SMALLEST = 1e-200  # ends nearer to each other are one, and nothing smaller stands on a logarithmic scale
 LARGEST = 1e200  # what is beyond is as good as infinite, and its squares are not
 
 
@@ -37,7 +38,7 @@ class Span:
     def _drawn(self, values: Floats) -> Floats:
         values = np.where(np.isfinite(values), np.clip(values, -LARGEST, LARGEST), np.nan)
         if self.scale == "log":
-            return np.asarray(np.log10(np.where(values > 0.0, values, np.nan)))
+            return np.asarray(np.log10(np.where(values >= SMALLEST, values, np.nan)))
         if self.scale == "symlog":
             size = np.abs(values) / self.linear_to
             with np.errstate(divide="ignore"):
@@ -67,8 +68,8 @@ def span_of(
     linear_to = linear_to if math.isfinite(linear_to) and linear_to > 0.0 else 1.0
     known = np.clip(finite(drawn), -LARGEST, LARGEST)
     if scale == "log":
-        known = known[known > 0.0]
-        low, high = (end if end is None or end > 0.0 else None for end in (low, high))
+        known = known[known >= SMALLEST]
+        low, high = (end if end is None or end >= SMALLEST else None for end in (low, high))
     ends = [float(known.min()), float(known.max())] if known.size else [1.0, 10.0] if scale == "log" else [0.0, 1.0]
     given = [None if end is None or not math.isfinite(end) else min(max(end, -LARGEST), LARGEST) for end in (low, high)]
     is_reversed = all(end is not None for end in given) and given[0] > given[1]  # type: ignore[operator]
@@ -90,11 +91,11 @@ def span_of(
 def _apart(scale: Scale, first: float, last: float) -> tuple[float, float]:
     """Ends that are not one, nor so near that no number lies between them."""
     first, last = min(first, last), max(first, last)
-    least = LEAST_SPAN * max(abs(first), abs(last))
+    least = max(LEAST_SPAN * max(abs(first), abs(last)), SMALLEST)
+    if scale == "log":
+        return (first, last) if last > first * (1.0 + LEAST_SPAN) else (first / 2.0, last * 2.0)
     if last - first > least:
         return first, last
-    if scale == "log":
-        return first / 2.0, last * 2.0
     margin = 1.0 if scale in ("time", "angle") else max(0.05 * abs(first), 1e-6)
     return first - margin, last + margin
 

@@ -31,7 +31,7 @@ from groundstation.reports.svg.symbols import look, outline, symbol
 from groundstation.reports.svg.thinning import shown_rows
 
 MOST_POINTS, MOST_DOTS, MOST_SYMBOLS, MOST_RINGS, MOST_STROKES = 1000, 2500, 600, 400, 2000
-LANE_PT, ROUND = 7.0, ' style="stroke-linecap:round"'
+LANE_PT, LEAST_LANE_PT, ROUND = 7.0, 0.25, ' style="stroke-linecap:round"'
 
 
 def shape(mark: AnyMark, box: Box) -> str:
@@ -55,9 +55,9 @@ def _curve(mark: Curve, box: Box) -> str:
         x, y, starts = stepped(x, y, starts)
     width = colours.LINE_PT[mark.emphasis]
     dash = f' stroke-dasharray="{colours.DASHES[mark.dash]}"' if mark.dash else ""
-    is_alone = starts & np.append(starts[1:], True)
-    ends = ROUND if is_alone.any() else ""
-    return _stroked(path.polyline(x, y, starts), colours.COLOURS[mark.role], width, dash + ends)
+    told = path.polyline(x, y, starts)
+    ends = ROUND if path.NO_LENGTH in told else ""  # a sample between gaps is a dot
+    return _stroked(told, colours.COLOURS[mark.role], width, dash + ends)
 
 
 def stepped(x: Floats, y: Floats, starts: Any) -> tuple[Floats, Floats, Any]:
@@ -79,8 +79,8 @@ def _dots(mark: Dots, box: Box) -> str:
     x, y = box.across(mark.x), box.down(mark.y)
     rows = np.flatnonzero(_seen(x, y, box))
     rows = rows[thin(len(rows), MOST_DOTS)]
-    colour = colours.COLOURS[mark.role]
-    return _stroked(path.dots(x[rows], y[rows]), colour, colours.DOT_PT[mark.emphasis], ROUND)
+    colour, look = colours.COLOURS[mark.role], colours.opacity("stroke", colours.DOT[mark.emphasis]) + ROUND
+    return _stroked(path.dots(x[rows], y[rows]), colour, colours.DOT_PT[mark.emphasis], look)
 
 
 def _seen(x: Floats, y: Floats, box: Box, beyond: float = 2.0) -> Any:
@@ -153,8 +153,9 @@ def _lanes(mark: Lanes, box: Box) -> str:
         left, right = (np.clip(box.across(ends[rows]), box.left, box.right) for ends in (mark.start, mark.end))
         seen = right >= left
         y = box.down(np.full(int(seen.sum()), float(place)))
-        colour = colours.COLOURS[mark.roles.get(name, mark.role)]
-        parts.append(_stroked(path.strokes(left[seen], np.maximum(right, left + 0.25)[seen], y), colour, LANE_PT))
+        told = path.strokes(left[seen], np.maximum(right, left + LEAST_LANE_PT)[seen], y)
+        shade = colours.opacity("stroke", colours.LANE[mark.emphasis])
+        parts.append(_stroked(told, colours.COLOURS[mark.roles.get(name, mark.role)], LANE_PT, shade))
     return "".join(parts)
 
 
@@ -166,7 +167,8 @@ def _spans(mark: Spans, box: Box) -> str:
         rows = np.flatnonzero((mark.kind == kind) & (right > left))
         rows = rows[thin(len(rows), MOST_STROKES)]
         told = path.strokes(left[rows], right[rows], np.full(len(rows), middle))
-        parts.append(_stroked(told, colours.shade_of(kind), round(box.height, 2)))
+        shade, share = colours.shade_of(kind, mark.role, mark.emphasis)
+        parts.append(_stroked(told, shade, round(box.height, 2), colours.opacity("stroke", share)))
     return "".join(parts)
 
 
@@ -181,8 +183,7 @@ def _limit(mark: Limit, box: Box) -> str:
         else f"M{box.left:.2f} {place:g}H{box.right:.2f}"
     )
     dash = f' stroke-dasharray="{colours.DASHES[mark.dash]}"' if mark.dash else ""
-    width = 0.6 if mark.emphasis in ("faint", "thin") else 0.9
-    return _stroked(told, colours.COLOURS[mark.role], width, dash)
+    return _stroked(told, colours.COLOURS[mark.role], colours.LIMIT_PT[mark.emphasis], dash)
 
 
 def _bars(mark: Bars, box: Box) -> str:
@@ -232,9 +233,11 @@ def _outlines(mark: Outlines, box: Box) -> str:
         parts.append(path.polyline(x[rows], y[rows], starts))
     colour, told = colours.COLOURS[mark.role], "".join(parts)
     if mark.is_filled and told:
+        under = f'<path d="{told}" fill="{colours.PAPER}" fill-opacity=".75"/>'  # legible over cells
         shade = f'fill="{colour}" fill-opacity=".12" stroke="{colour}"'
-        return f'<path d="{told}" {shade} stroke-width="{colours.LINE_PT[mark.emphasis]:g}"/>'
-    return _stroked(told, colour, colours.LINE_PT[mark.emphasis])
+        return f'{under}<path d="{told}" {shade} stroke-width="{colours.LINE_PT[mark.emphasis]:g}"/>'
+    dash = f' stroke-dasharray="{colours.DASHES[mark.dash]}"' if mark.dash else ""
+    return _stroked(told, colour, colours.LINE_PT[mark.emphasis], dash)
 
 
 _SHAPES: dict[type, Callable[[Any, Box], str]] = {

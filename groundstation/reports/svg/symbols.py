@@ -39,7 +39,7 @@ def outline(kind: Symbol, x: float, y: float, half: float) -> str:
         half *= 1.25
         return f"M{x:.2f} {y - half:.2f}l{0.87 * half:.2f} {1.5 * half:.2f}h-{1.74 * half:.2f}z"
     if kind == "diamond":
-        half *= 1.25
+        half *= 1.45
         return f"M{x:.2f} {y - half:.2f}l{half:.2f} {half:.2f}-{half:.2f} {half:.2f}-{half:.2f}-{half:.2f}z"
     half *= 1.7
     return "M" + " ".join(f"{x + half * r * across:.2f} {y + half * r * up:.2f}" for across, up, r in _STAR) + "z"

@@ -1,7 +1,7 @@
 """Ticks of axes: round places and what is written there."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from groundstation.chapters.wording import MINUS, NARROW_SPACE, clock
 from groundstation.reports.svg.font import width_pt
@@ -11,8 +11,9 @@ TIME_STEPS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 144
 WEEK_S = 604_800
 ANGLE_STEPS = (1, 2, 5, 10, 15, 30, 60, 90, 180)
 ANGLE_FROM = 5  # degrees: of an axis with smaller steps the decimals are those of any number
-TIME_ROOM_PT, ROOM_PT, UPRIGHT_PT = 45.0, 24.0, 14.0  # least room between ticks
+TIME_ROOM_PT, ROOM_PT, UPRIGHT_PT = 40.0, 24.0, 16.0  # least room between ticks
 MOST = 9  # spaces between ticks
+POWERS = "⁰¹²³⁴⁵⁶⁷⁸⁹"
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 Tick = tuple[float, str]
 
@@ -40,6 +41,17 @@ def ticks_of(span: Span, length_pt: float, *, is_upright: bool) -> tuple[Tick, .
         if step >= ANGLE_FROM:
             return tuple((place, _plain(place, 0)) for place in _multiples(step, low, high))
     return _linear(low, high, length_pt, is_upright)
+
+
+def own_ticks(places: Sequence[float]) -> tuple[Tick, ...]:
+    """Numbers at given places, with as many decimals as they need.
+
+    Examples
+    --------
+    >>> own_ticks([-0.5, 0.0, 25.0])
+    ((-0.5, '−0.5'), (0.0, '0'), (25.0, '25'))
+    """
+    return tuple((float(place), of_decade(place)) for place in places if math.isfinite(place))
 
 
 def _multiples(step: float, low: float, high: float) -> list[float]:
@@ -130,11 +142,14 @@ def _log(span: Span, low: float, high: float, length_pt: float, is_upright: bool
     ]
     if len(places) < 2:
         return _linear(low, high, length_pt / 2.0, is_upright)
-    return tuple((place, of_decade(place)) for place in places)
+    texts = [of_decade(place) for place in places]
+    if any(text[-1] in POWERS for text in texts):  # all as powers, or none
+        texts = [of_decade(place, as_power=True) for place in places]
+    return tuple(zip(places, texts, strict=True))
 
 
-def of_decade(value: float) -> str:
-    """A round number of any size.
+def of_decade(value: float, *, as_power: bool = False) -> str:
+    """A round number of any size, its decade as a power of ten where that is far from one or ``as_power``.
 
     Examples
     --------
@@ -145,7 +160,7 @@ def of_decade(value: float) -> str:
         return "0"
     exponent = math.floor(math.log10(abs(value)) + 1e-9)
     sign = MINUS if value < 0.0 else ""
-    if -4 <= exponent <= 5:
+    if 0 <= exponent <= 1 or (-4 <= exponent <= 5 and not as_power):
         return sign + f"{abs(value):.{max(-exponent, 0) + 3}f}".rstrip("0").rstrip(".")
     part = f"{abs(value) / 10.0**exponent:g}"
     power = f"10{str(exponent).translate(RAISED)}"
