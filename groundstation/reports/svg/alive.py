@@ -193,6 +193,8 @@ def _line(mark: Curve, box: Box) -> tuple[Floats, Floats]:
         x, y, starts = stepped(x, y, starts)
         x = _one_after_another(x)
     breaks = np.flatnonzero(starts)[1:]
+    if not len(breaks):
+        return x, y
     return np.insert(x, breaks, 0.5 * (x[breaks - 1] + x[breaks])), np.insert(y, breaks, np.nan)
 
 

@@ -29,7 +29,9 @@ def cells_shape(mark: Cells, box: Box) -> str:
     parts = []
     for step in np.unique(levels[levels >= 0]).tolist():
         left, right, low, high = _blocks(levels >= step)
-        parts.append(f'<path d="{_boxes(across[left], across[right], down[low], down[high])}" fill="{_colour(step)}"/>')
+        parts.append(
+            f'<path d="{path.boxes(across[left], across[right], down[low], down[high])}" fill="{_colour(step)}"/>'
+        )
     return f'<g shape-rendering="crispEdges">{"".join(parts)}</g>'
 
 
@@ -70,19 +72,6 @@ def _blocks(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:
     return left[first], right[first], row[first], row[last] + 1
 
 
-def _boxes(left: Floats, right: Floats, upper: Floats, lower: Floats) -> str:
-    """Path of boxes between places of their edges, whichever of two comes first."""
-    x, y = path.hundredths(np.minimum(left, right)), path.hundredths(np.minimum(upper, lower))
-    wide, high = path.hundredths(np.maximum(left, right)) - x, path.hundredths(np.maximum(upper, lower)) - y
-    moves = np.column_stack([np.diff(x, prepend=0), np.diff(y, prepend=0), wide, high, -wide])
-    told = path.each(moves)
-    parts = [
-        f"m{one.lstrip()}{two}h{three.lstrip()}v{four.lstrip()}h{five}z"
-        for one, two, three, four, five in zip(*(told[place::5] for place in range(5)), strict=True)
-    ]
-    return "M" + "".join(parts)[1:]
-
-
 def scale_beside(mark: Cells, box: Box) -> str:
     """The scale of colours right of a frame, with its ticks and title."""
     span = _scale(mark)
@@ -90,7 +79,7 @@ def scale_beside(mark: Cells, box: Box) -> str:
     parts = []
     for place in range(STEPS):  # each over the one before
         edge = np.array([left]), np.array([left + BAR_PT]), np.array([box.top]), np.array([box.bottom - place * step])
-        parts.append(f'<path d="{_boxes(*edge)}" fill="{_colour(place)}"/>')
+        parts.append(f'<path d="{path.boxes(*edge)}" fill="{_colour(place)}"/>')
     right, widest, marks = left + BAR_PT, 0.0, []
     for value, text in ticks_of(span, box.height, is_upright=True):
         y = box.bottom - box.height * span.share(value)

@@ -62,7 +62,8 @@ def polyline(x: Floats, y: Floats, starts: NDArray[np.bool_], *, is_closed: bool
     starts[0] = True
     keep = _corners(places, starts)
     places, starts = places[keep], starts[keep]
-    steps = np.diff(places, axis=0, prepend=np.zeros((1, 2), dtype=np.int64))
+    steps = places.copy()
+    steps[1:] -= places[:-1]
     begins = np.flatnonzero(starts)
     ends = np.append(begins[1:], len(places))
     parts = []
@@ -103,6 +104,19 @@ def strokes(start: Floats, end: Floats, y: Floats) -> str:
     parts = [
         f"m{across.lstrip()}{up}h{length.lstrip()}"
         for across, up, length in zip(told[::3], told[1::3], told[2::3], strict=True)
+    ]
+    return "M" + "".join(parts)[1:]
+
+
+def boxes(left: Floats, right: Floats, upper: Floats, lower: Floats) -> str:
+    """Path of boxes between places of their edges, whichever of two comes first."""
+    x, y = hundredths(np.minimum(left, right)), hundredths(np.minimum(upper, lower))
+    wide, high = hundredths(np.maximum(left, right)) - x, hundredths(np.maximum(upper, lower)) - y
+    moves = np.column_stack([np.diff(x, prepend=0), np.diff(y, prepend=0), wide, high, -wide])
+    told = each(moves)
+    parts = [
+        f"m{one.lstrip()}{two}h{three.lstrip()}v{four.lstrip()}h{five}z"
+        for one, two, three, four, five in zip(*(told[place::5] for place in range(5)), strict=True)
     ]
     return "M" + "".join(parts)[1:]
 

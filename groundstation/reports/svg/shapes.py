@@ -162,13 +162,14 @@ def _lanes(mark: Lanes, box: Box) -> str:
 def _spans(mark: Spans, box: Box) -> str:
     left, right = (np.clip(box.across(ends), box.left, box.right) for ends in (mark.start, mark.end))
     parts = []
-    middle = 0.5 * (box.top + box.bottom)
     for kind in dict.fromkeys(mark.kind.tolist()):
         rows = np.flatnonzero((mark.kind == kind) & (right > left))
         rows = rows[thin(len(rows), MOST_STROKES)]
-        told = path.strokes(left[rows], right[rows], np.full(len(rows), middle))
         shade, share = colours.shade_of(kind, mark.role, mark.emphasis)
-        parts.append(_stroked(told, shade, round(box.height, 2), colours.opacity("stroke", share)))
+        if len(rows):
+            edge = np.full(len(rows), box.top), np.full(len(rows), box.bottom)
+            told = path.boxes(left[rows], right[rows], *edge)
+            parts.append(f'<path d="{told}" fill="{shade}"{colours.opacity("fill", share)}/>')
     return "".join(parts)
 
 

@@ -21,13 +21,14 @@ def shown_rows(x: Floats, y: Floats, most: int) -> tuple[Rows, NDArray[np.bool_]
     >>> rows.tolist(), starts.tolist()
     ([0, 1, 3, 4, 5], [True, False, True, False, False])
     """
-    known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    is_known = np.isfinite(x) & np.isfinite(y)
+    known = np.flatnonzero(is_known)
     if len(known) > most:
         known = known[_extremes(known, y[known], most)]
-        gone = np.cumsum(~(np.isfinite(x) & np.isfinite(y)))
-        starts = np.diff(gone[known], prepend=-1) > 0
-    else:
-        starts = np.diff(known, prepend=-2) > 1
+    starts = np.zeros(len(known), dtype=bool)
+    if not is_known.all():
+        gone = np.cumsum(~is_known)[known]
+        starts[1:] = gone[1:] > gone[:-1]
     if len(starts):
         starts[0] = True
     return known, starts
