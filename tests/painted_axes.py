@@ -19,6 +19,7 @@ from groundstation.reports.frames import MM_PER_INCH, TIME
 from groundstation.reports.frames import _names as names_beside
 
 EMPTY = np.zeros(0)
+BOLD_PT, FAINT_PT = 1.6, 0.6  # widths of lines from and up to which they are so
 # What each role was before there were roles.
 COLOURS: dict[str, set[str]] = {
     "ins": {d.INS, "#b9d3e6"},
@@ -31,7 +32,7 @@ COLOURS: dict[str, set[str]] = {
     "warn": {"#e69f00", "#fbe9c6"},
     "bad": {"#b3261e"},
     "truth": {"#c3c9d0"},
-    "other": {d.LIMIT},
+    "other": {"#cc79a7"},
     "paper": {"white", "#ffffff"},
     **{role: {colour} for role, colour in zip(marks.SERIES, d.SERIES, strict=True)},
 }
@@ -40,7 +41,7 @@ COLOURS["series 6"] |= {"#3a86c8"}
 
 @dataclass(frozen=True, eq=False)
 class Thing:
-    """One thing on axes: kind, name in the legend, colours it may have, coordinates."""
+    """One thing on axes: kind, name in the legend, colours it may have, coordinates, weight."""
 
     kind: str
     name: str
@@ -50,6 +51,7 @@ class Thing:
     y: Floats = field(default_factory=lambda: EMPTY)
     upper: Floats = field(default_factory=lambda: EMPTY)
     text: str = ""
+    weight: str = ""  # of a line: bold, faint, or neither
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class Shown:
     y_range: tuple[float | None, float | None]
     names: tuple[tuple[float, str], ...]
     is_map: bool
-    has_legend: bool
+    legend: frozenset[str]
     height_mm: float
     things: tuple[Thing, ...]
     told: marks.Told | None
@@ -96,7 +98,7 @@ def _painted(axes: Any, figure_mm: float) -> Shown:
         (None, None) if axes.get_autoscaley_on() else axes.get_ylim(),
         names_beside(axes),
         axes.get_aspect() != "auto",
-        axes.get_legend() is not None,
+        frozenset() if axes.get_legend() is None else frozenset(axes.get_legend_handles_labels()[1]),
         axes.get_position().height * figure_mm,
         tuple(_things_on(axes)),
         None if told is None else marks.Told(x=told.x, y=told.y, value=told.value, title=told.title),
@@ -129,7 +131,8 @@ def _things_on(axes: Any) -> Iterator[Thing]:
         if isinstance(band, PolyCollection):
             yield from _band(band)
         elif isinstance(band, QuadContourSet):
-            yield Thing("cells", "", frozenset())
+            levels = np.asarray(band.levels, dtype=np.float64)
+            yield Thing("cells", "", frozenset(), x=levels[:1], y=levels[-2:-1], upper=levels[-1:])
     for patch in axes.patches:
         yield _patch(patch, in_legend)
     for text in axes.texts:
@@ -144,14 +147,17 @@ def _line(axes: Any, line: Any) -> Iterator[Thing]:
     x, y = (np.asarray(values, dtype=np.float64) for values in line.get_data(orig=False))
     colour = _one(line.get_color())
     is_dashed = line.get_linestyle() not in ("-", "None")
+    width = line.get_linewidth()
+    weight = "bold" if width >= BOLD_PT else "faint" if width <= FAINT_PT else ""
     if line.get_transform() == axes.get_xaxis_transform(which="grid"):
-        yield Thing("upright", _name(line), colour, is_dashed, x=x[:1])
+        yield Thing("upright", _name(line), colour, is_dashed, x=x[:1], weight=weight)
     elif line.get_transform() == axes.get_yaxis_transform(which="grid"):
-        yield Thing("level", _name(line), colour, is_dashed, y=y[:1])
+        yield Thing("level", _name(line), colour, is_dashed, y=y[:1], weight=weight)
     else:
         name = _name(line)
         if line.get_linestyle() not in ("None", "none", ""):
-            yield Thing("steps" if "steps" in line.get_drawstyle() else "line", name, colour, is_dashed, x, y)
+            kind = "steps" if "steps" in line.get_drawstyle() else "line"
+            yield Thing(kind, name, colour, is_dashed, x, y, weight=weight)
             name = ""
         if line.get_marker() not in ("None", "none", "", None):
             edge = line.get_markeredgecolor() if line.get_color() == "white" else line.get_color()
@@ -234,12 +240,20 @@ def _described(panel: Panel, height_mm: float, shares_x: bool, place: int, windo
         y_range,
         names,
         panel.is_map,
-        bool(panel.legend and any(thing.name for thing in things)),
+        frozenset(_legend(panel)) if panel.legend else frozenset(),
         height_mm,
         tuple(things),
         told,
         panel.nothing,
     )
+
+
+def _legend(panel: Panel) -> Iterator[str]:
+    for mark in panel.marks:
+        if isinstance(mark, marks.Spans) and mark.name:
+            yield from (kind or mark.name for kind in mark.kind.tolist())
+        elif mark.name:
+            yield mark.name
 
 
 def _scale(axis: Axis) -> str:
@@ -249,9 +263,10 @@ def _scale(axis: Axis) -> str:
 def _things(mark: AnyMark, window: tuple[float, float] | None) -> Iterator[Thing]:
     colours = frozenset(to_hex(colour) for colour in COLOURS[mark.role])
     name = mark.name
+    weight = mark.emphasis if mark.emphasis in ("bold", "faint") else ""
     if isinstance(mark, marks.Curve):
         x, y = _within(window, mark.x, mark.y)
-        yield Thing("steps" if mark.steps else "line", name, colours, bool(mark.dash), x, y)
+        yield Thing("steps" if mark.steps else "line", name, colours, bool(mark.dash), x, y, weight=weight)
     elif isinstance(mark, marks.Dots | marks.Points):
         x, y = _within(window, mark.x, mark.y)
         yield Thing("dots", name, colours, x=x, y=y)
@@ -266,7 +281,8 @@ def _things(mark: AnyMark, window: tuple[float, float] | None) -> Iterator[Thing
     elif isinstance(mark, marks.Limit):
         at = np.array([mark.value])
         kind = "upright" if mark.is_upright else "level"
-        yield Thing(kind, name, colours, bool(mark.dash), *((at, EMPTY) if mark.is_upright else (EMPTY, at)))
+        x, y = (at, EMPTY) if mark.is_upright else (EMPTY, at)
+        yield Thing(kind, name, colours, bool(mark.dash), x, y, weight=weight)
         if mark.label:
             yield Thing("text", "", frozenset(), y=at, text=mark.label)
     elif isinstance(mark, marks.Spans):
@@ -285,21 +301,23 @@ def _other(mark: AnyMark, name: str, colours: frozenset[str]) -> Iterator[Thing]
     if isinstance(mark, marks.Bars):
         yield Thing("bars", name, colours, x=mark.x, y=mark.y, upper=mark.half)
     elif isinstance(mark, marks.Intervals):
-        for ends in (mark.thin, mark.thick):
+        for ends, heavy in ((mark.thin, ""), (mark.thick, "bold")):
             if ends is not None:
-                yield Thing("line", "", colours, x=np.array(ends), y=np.full(2, float(mark.row)))
+                yield Thing("line", "", colours, x=np.array(ends), y=np.full(2, float(mark.row)), weight=heavy)
         yield Thing("dots", name, colours, x=np.array([mark.value]), y=np.array([float(mark.row)]))
     elif isinstance(mark, marks.Outlines):
         for ring in mark.rings:
             if mark.dash:
                 yield Thing("circle", "", colours, True, x=np.array([float(np.hypot(*ring[0]))]))
             else:
-                yield Thing("line", name, colours, x=ring[:, 0], y=ring[:, 1])
+                faint = "faint" if mark.emphasis == "faint" else ""
+                yield Thing("line", name, colours, x=ring[:, 0], y=ring[:, 1], weight=faint)
         for text, ring in zip(mark.labels, mark.rings, strict=False):
             middle = ring[:-1].mean(axis=0)
             yield Thing("text", "", frozenset(), x=middle[:1], y=middle[1:], text=text)
     elif isinstance(mark, marks.Cells):
-        yield Thing("cells", "", frozenset())
+        ends = np.array([mark.low]), np.array([mark.high])
+        yield Thing("cells", "", frozenset(), x=ends[0], y=ends[1], upper=ends[1])
     else:
         assert isinstance(mark, marks.Told), type(mark)
 

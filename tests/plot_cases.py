@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -18,16 +19,19 @@ from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
 from groundstation.estimators.plan import Planned
 from groundstation.pipeline.one_flight.analyse import Given, analyse, run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.join import join_logs
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.results.answer import Answer, by_analysis
+from groundstation.results.arrays.flight import GnssLanes, Overview, StateLanes
 from groundstation.results.arrays.landing import LandingPath, LandingProtection
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.landing import LandingResult
 from groundstation.results.reference import ReferenceResult
 from groundstation.results.together import Together
+from groundstation.simulation.session import simulate_session
 from groundstation.tables.table import Flight
 from tests import report_example, viewer_example
 from tests.inertial_example import aided_figures, forecast_result, inertial_result
@@ -172,6 +176,63 @@ def session() -> FlightResults:
     return of_answers(*run_analyses((COOPERATIVE,), simulated(SHORT).session, given).answers.values())
 
 
+@cache
+def crowd() -> FlightResults:
+    """A session of more aircraft than there are roles of a series."""
+    from tests.cooperative_example import believed
+    from tests.session_example import SEED, SHORT
+
+    aircraft = tuple(
+        replace(SHORT.aircraft[0], name=f"V{number}", north_m=9000.0 * number, east_m=2000.0 * number**2, turns=())
+        for number in range(8)
+    )
+    scenario = replace(SHORT, aircraft=aircraft, duration_s=5.0)
+    given = SessionKnown(settings={"cooperative": believed(scenario)})
+    return of_answers(*run_analyses((COOPERATIVE,), simulate_session(scenario, SEED).session, given).answers.values())
+
+
+@cache
+def at_rest() -> FlightResults:
+    """An aircraft that did not move, in many modes, without a height on its approach."""
+    results = landing()
+    path = results.rows_of(LandingPath)
+    assert path is not None
+    count = 50
+    time = np.linspace(0.0, 100.0, count)
+    nowhere, zero = np.full(count, np.nan), np.zeros(count)
+    course = Overview(
+        time_s=time,
+        latitude_deg=56.0 + 1e-7 * np.sin(time),
+        longitude_deg=38.0 + 1e-7 * np.cos(time),
+        altitude_m=nowhere,
+        ground_speed_mps=zero,
+        heading_deg=nowhere,
+        track_deg=nowhere,
+        climb_mps=zero,
+        magnetic_heading_deg=np.linspace(350.0, 370.0, count) % 360.0,
+    )
+    modes = StateLanes(
+        lane=np.array(["mode"] * 15 + ["landed"]),
+        start_s=np.arange(16.0),
+        end_s=np.arange(16.0) + 1.0,
+        state=np.array([f"M{number}" for number in range(15)] + ["on the ground"]),
+    )
+    lost = GnssLanes(start_s=np.array([0.0, 9.0]), end_s=np.array([9.0, 99.0]), state=np.array(["good", "gdop > 2"]))
+    without_height = replace_column(path, height_m=np.full(len(path), np.nan))
+    return replace(results, figures=(course, modes, lost, without_height))
+
+
+def replace_column(arrays: LandingPath, **columns: Any) -> LandingPath:
+    """The arrays with some columns of other values."""
+    return LandingPath.of(FigureData(arrays.name, {**arrays.columns, **columns}, {}))
+
+
+def recorded(log: Path, folder: Path) -> FlightResults:
+    """Results of all analyses of a recorded log."""
+    target = folder / "flight.mcap"
+    return analysed(read_flight(target, convert_log(open_log(log), target)))
+
+
 def analysed(flight: Flight) -> FlightResults:
     """Results of all analyses of a flight."""
     source = Source("made.csv", "ab" * 32, 1, "flat-csv")
@@ -193,6 +254,20 @@ def figures_of(planned: Planned) -> tuple[FigureData, ...]:
     return (*planned.figures, *(figure for answer in planned.answers.values() for figure in answer.figures))
 
 
+RECORDED = (
+    "g1000/log_210623_141501_TEST1.csv",
+    "g1000/log_220417_125002_LFQA.csv",
+    "ulog/Proto_FLT09_REENCODED_fixedwing.ulg",
+    "ulog/pyulog_sample.ulg",
+    "ulog/quadrotor_local.ulg",
+    "dataflash/plane_4.2.3_pilot0004.BIN",
+    "dataflash/copter_3.6.7_log0041.BIN",
+    "tlog/uavlogviewer_vtol.tlog",
+    "inertial/gv_ff02.csv",
+    "fixedwing/umn_thor_flight75.csv",
+    "gnss/walk_0827_gnss_1730.ubx",
+    "reference_heading/pntos_drive_first_half.csv",
+)
 CASES: dict[str, Callable[[], FlightResults]] = {
     "report": report,
     "viewer": viewer,
@@ -209,6 +284,8 @@ CASES: dict[str, Callable[[], FlightResults]] = {
     "control": control,
     "placement": placement,
     "session": session,
+    "crowd": crowd,
+    "at_rest": at_rest,
 }
 
 

@@ -30,6 +30,7 @@ from groundstation.pipeline.many_flights.fleet import gather
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
 from groundstation.reports.fleet import densities
 from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_fleet_report
+from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import FleetResults, NotInFleet
 from tests.fleet_example import DAY_NS, START_NS, flights_table, save_flight, skill
@@ -113,7 +114,7 @@ def fleet_of(
     )
 
 
-def skill_of(flights: FigureData, rate: Any) -> tuple[SkillMerger, FigureData]:
+def skill_of(flights: FigureData, rate: Any) -> tuple[SkillMerger, FleetSkillFlights]:
     merger, rows = SkillMerger(), []
     for place, own in enumerate(rate.tolist()):
         for method, factor in (("raw_ins", 1.6), ("hold_velocity", 1.2), ("last_estimate", 1.0)):
@@ -127,17 +128,17 @@ def skill_of(flights: FigureData, rate: Any) -> tuple[SkillMerger, FigureData]:
     columns = {name: flights[name][np.array([place for place, _ in rows], dtype=np.intp)] for name in names}
     for name in ("method", "horizon_min", "starts", "rms_m", "coverage95"):
         columns[name] = np.array([getattr(one, name) for _, one in rows], dtype="U20" if name == "method" else "f8")
-    return merger, FigureData("skill_flights", columns, {})
+    return merger, FleetSkillFlights(**columns)
 
 
-def checks_of(flights: FigureData, rng: Any) -> FigureData:
+def checks_of(flights: FigureData, rng: Any) -> FleetChecks:
     count = len(flights)
     quantity = np.repeat(np.array(["reference", "onboard"]), count)
     z = np.concatenate([rng.normal(0.0, 1.5, count), rng.normal(0.0, 0.6, count)])
     columns = {name: np.tile(flights[name], 2) for name in ("flight_id", "aircraft", "verdict")}
     columns |= {"quantity": quantity, "z": z, "is_inside": np.abs(z) < 1.96}
     columns |= {"residual_deg": 0.05 * z, "sigma_deg": np.full(2 * count, 0.05)}
-    return FigureData("calibration_checks", columns, {})
+    return FleetChecks(**columns)
 
 
 def page_of(out: Path, fleet: FleetResults) -> Page:

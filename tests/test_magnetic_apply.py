@@ -198,7 +198,7 @@ def test_a_magnetometer_turned_by_2_5_deg_is_put_right(tmp_path: Path) -> None:
     sin, cos = float(np.sin(turn)), float(np.cos(turn))
     mounted = ((cos, sin, 0.0), (-sin, cos, 0.0), (0.0, 0.0, 1.0))  # its nose 2.5 deg to the right of the aircraft's
     made = magnetic_example.make(hard_nt=(0.0, 0.0, 0.0), soft=mounted)
-    results = analysed(made.flight)
+    results = analysed(made.flight, Configuration({"magnetic": {"alignment_sigma_deg": 0.3}}))
     save(tmp_path, results, Manifest())
     paths, problem = write_exports(load(tmp_path), with_pdf=False)
     assert ([path.name for path in paths], problem) == ([DEVIATION_CSV], "")

@@ -3,11 +3,13 @@
 import dataclasses
 import inspect
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from groundstation.chapters.control import title_of
 from groundstation.chapters.plots import PLOTS
 from groundstation.plots.marks import Floats
 from groundstation.plots.plot import Plot
@@ -15,17 +17,21 @@ from groundstation.reports.drawing import Drawing, Sketch, sketching
 from groundstation.reports.figures import DRAWERS
 from groundstation.results.flight import FlightResults
 from tests.painted_axes import Shown, Thing, described, painted
-from tests.plot_cases import CASES, names_of
+from tests.plot_cases import CASES, RECORDED, names_of, recorded
+from tests.real_logs import real_log
 
 THINNED = 400  # a drawer thins no series of fewer samples
 ROUNDING = {"rtol": 1e-9, "atol": 1e-9}
 MILLIMETRE = 0.51
+OFTEN = 4  # recorded logs that are compared each time
+LEAST_FIGURES = 2  # of any recorded log: track and profile
 BESIDE_KM = 0.3
 
 # Differences that are allowed, beside thinning:
 # the title of the time axis under the upper right panel of an odd number: each panel of its row has one now
 WRITTEN_TWICE = {("cooperative.errors", "A, m"), ("cooperative.errors", "B, m")}
 SHARED = "up, m"  # of landing_ranges.space: its horizontal axis is that of the panel above
+OF_THREE_WEIGHTS = {title_of("eigenvalue")}  # of control.measures: wide under the one law and over the other
 # FIRST_OF_A_WINDOW: a heading that jumped through north just before a window begins has its break there, too
 
 
@@ -44,7 +50,21 @@ def every() -> Iterator[Any]:
 
 @pytest.mark.parametrize(("case", "name"), list(every()))
 def test_the_description_shows_what_the_drawer_paints(case: str, name: str) -> None:
-    results = CASES[case]()
+    compare_figure(CASES[case](), name)
+
+
+@pytest.mark.real_log
+@pytest.mark.parametrize(
+    "log", [pytest.param(log, marks=[] if place < OFTEN else pytest.mark.slow) for place, log in enumerate(RECORDED)]
+)
+def test_the_description_of_a_recorded_log_shows_what_the_drawer_paints(log: str, tmp_path: Path) -> None:
+    results = recorded(real_log(log), tmp_path)
+    assert sum(compare_figure(results, name) for name in PLOTS) >= LEAST_FIGURES
+
+
+def compare_figure(results: FlightResults, name: str) -> int:
+    """Compare a figure with its description, all of those alike; how many there are."""
+    count = 0
     for of in names_of(name, results):
         old, new = drawn(name, results, of), PLOTS[name](results, *of)
         assert (old is None) == (new is None), of
@@ -55,6 +75,8 @@ def test_the_description_shows_what_the_drawer_paints(case: str, name: str) -> N
         assert (new.title, new.caption, new.alt) == (drawing.title, drawing.caption, drawing.alt)
         assert tuple(new.numbers) == tuple(drawing.numbers)
         compare(painted(sketch), new)
+        count += 1
+    return count
 
 
 def compare(old: list[Shown], plot: Plot) -> None:
@@ -68,7 +90,7 @@ def compare(old: list[Shown], plot: Plot) -> None:
         if (plot.name, new.y_title) not in WRITTEN_TWICE:
             assert {one.x_title for one in group} - {""} == {new.x_title} - {""}
         assert {one.title for one in group} - {""} == {new.title} - {""}
-        assert any(one.has_legend for one in group) == any(one.has_legend for one in windows), new.y_title
+        assert group[-1].legend == new.legend, new.y_title
         for before, after in zip(group, windows, strict=True):
             compare_panel(before, after, is_window=bool(panel.x.windows))
 
@@ -111,13 +133,18 @@ def compare_things(old: list[Thing], new: list[Thing], where: str, *, is_window:
         candidates = [
             one
             for one in new
-            if (one.kind, one.name, one.text, one.is_dashed) == (thing.kind, thing.name, thing.text, thing.is_dashed)
+            if told_of(one) == told_of(thing)
             and (thing.colours <= one.colours or not thing.colours)
+            and (one.weight == thing.weight or one.name in OF_THREE_WEIGHTS)
         ]
         fits = [one for one in candidates if is_same(thing, one, is_window=is_window)]
         assert fits, (where, brief(thing), [brief(one) for one in new])
         new.remove(fits[0])
     assert not new, (where, [brief(one) for one in new])
+
+
+def told_of(thing: Thing) -> tuple[Any, ...]:
+    return thing.kind, thing.name, thing.text, thing.is_dashed
 
 
 def with_dots_joined(things: list[Thing]) -> list[Thing]:
@@ -136,11 +163,20 @@ def with_dots_joined(things: list[Thing]) -> list[Thing]:
 
 def brief(thing: Thing) -> tuple[Any, ...]:
     known = finite_rows(thing)
-    return thing.kind, thing.name, thing.text, sorted(thing.colours), thing.is_dashed, known.shape, known[:2].tolist()
+    return (
+        thing.kind,
+        thing.name,
+        thing.text,
+        sorted(thing.colours),
+        thing.is_dashed,
+        thing.weight,
+        known.shape,
+        known[:2].tolist(),
+    )
 
 
 def has_points(thing: Thing) -> bool:
-    return thing.kind == "cells" or len(finite_rows(thing)) > 0
+    return len(finite_rows(thing)) > 0
 
 
 def finite_rows(thing: Thing) -> Floats:
@@ -160,6 +196,8 @@ def points(*columns: Floats) -> Floats:
 
 
 def is_same(old: Thing, new: Thing, *, is_window: bool) -> bool:
+    if new.kind == "cells":  # levels of a contour go up to the first beyond the highest value that has its own colour
+        return bool(old.x[0] == new.x[0] and old.y[0] < new.y[0] <= old.upper[0])
     if new.kind == "text":  # beside its place
         return bool(np.abs(finite_rows(old) - finite_rows(new)).max() < BESIDE_KM)
     if new.kind == "stepped band":

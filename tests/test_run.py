@@ -121,7 +121,7 @@ def test_a_folder_with_all_samples_gives_each_its_truth(tmp_path: Path) -> None:
     }
     assert verdict["taxi-good"] == "accept"
     assert verdict["taxi-drift"] == "reject"
-    assert verdict["taxi-short"] == "extend"
+    assert verdict["taxi-short"] == "advisory"
     assert verdict["taxi-notime"] == "undecided"
     assert by_name["taxi-notime"].flight_id.startswith("NOTIME_")
     assert by_name["taxi-damaged"].state == "data_lost"

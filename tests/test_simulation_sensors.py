@@ -7,7 +7,12 @@ import pytest
 
 from groundstation.base.angles import FloatArray, direction_of, wrap_180
 from groundstation.simulation.flight import scenario_truth, simulate
-from groundstation.simulation.flight_errors import EARTH_RADIUS_M, SCHULER_RADPS, schuler_error
+from groundstation.simulation.flight_errors import (
+    EARTH_RADIUS_M,
+    SCHULER_RADPS,
+    schuler_error,
+    turned_velocity_error,
+)
 from groundstation.simulation.readings import quantised
 from groundstation.simulation.scenario import InsSettings, load_scenario
 from groundstation.tables.table import Flight
@@ -197,3 +202,18 @@ def test_a_minute_of_taxi_is_good_to_some_arcminutes() -> None:
     assert len(fast) == 600
     assert 1.0 < float(np.sqrt(np.mean(np.square(errors_arcmin)))) < 7.0
     assert abs(np.mean(errors_arcmin)) < 4.0 * float(np.std(errors_arcmin)) / np.sqrt(len(flights))
+
+
+def test_an_azimuth_error_turns_each_change_of_velocity_and_swings_with_schuler() -> None:
+    """1 deg and 60 m/s to the north: 1.05 m/s too far east, which a quarter of 84.4 min later is gone."""
+    settings = replace(InsSettings(), azimuth_error_deg=1.0, azimuth_drift_dph=0.0, boresight_deg=3.0)
+    time_s = np.arange(0.0, 2.0 * np.pi / SCHULER_RADPS, 0.5)
+    north = 60.0 * np.clip(time_s / 20.0, 0.0, 1.0)
+    (_, of_north), (east_m, of_east) = turned_velocity_error(time_s, north, np.zeros_like(north), settings)
+    turned = 60.0 * np.deg2rad(1.0)
+    assert np.all(of_north == 0.0)
+    assert of_east[60] == pytest.approx(turned, abs=1e-3)
+    quarter = len(time_s) // 4
+    assert of_east[quarter + 20] == pytest.approx(0.0, abs=0.01 * turned)
+    assert of_east[2 * quarter + 20] == pytest.approx(-turned, rel=1e-3)
+    assert np.allclose(np.gradient(east_m, time_s)[1:-1], of_east[1:-1], atol=0.02)  # trapezoids at a kink

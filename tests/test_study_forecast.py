@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import UsageError
+from groundstation.estimators.inertial.hindcast import Hindcast
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.pipeline.verbs.catalogue import catalogue
 from groundstation.pipeline.verbs.synthesis import STUDIES, study_to
@@ -17,6 +18,7 @@ from groundstation.simulation.inertial_family import simulate_family
 from groundstation.studies import forecast, forecast_tables
 from groundstation.studies.forecast import study_forecast
 from groundstation.studies.forecast_cases import FIRST_SEED, NEW_ROUTES, Case, epochs_of, study_cases
+from groundstation.studies.forecast_coupled_bank import LEAD_STEP_S, LEADS, SetForecasts, fly_bank
 from groundstation.studies.forecast_outages import fly_with_outages, outages_of
 from groundstation.studies.forecast_runs import (
     COUPLED,
@@ -188,6 +190,7 @@ def test_study_writes_its_tables_and_page(monkeypatch: pytest.MonkeyPatch, left_
     assert set(tables["forecast_rms"]["case"]) == set(cases)
     assert set(tables["forecast_honesty"]["case"]) == {"matched", *held_out}
     assert set(tables["forecast_outages"]["case"]) == held_out
+    assert set(tables["forecast_coupled_bank"]["case"]) == held_out
     for text in (
         "Outages in the log",
         "Are windows better than the last estimate?",
@@ -196,6 +199,31 @@ def test_study_writes_its_tables_and_page(monkeypatch: pytest.MonkeyPatch, left_
     ):
         assert text in study.markdown
     assert "nan" not in study.markdown
+
+
+def test_the_bank_on_the_coupled_model_is_weighted_by_what_was_over() -> None:
+    """Before any outage was over the weights are those given; a set that forecasts well gets the weight later."""
+    start_s = 1800.0 + 300.0 * np.arange(30)
+    rng = np.random.default_rng(2)
+    actual = rng.normal(0.0, 50.0, (30, LEADS, 2))
+    mean = np.stack([actual + rng.normal(0.0, 10.0, actual.shape), actual + rng.normal(0.0, 300.0, actual.shape)])
+    sets = SetForecasts(mean, np.full(mean.shape, 100.0))
+    replay = Hindcast(np.arange(30), start_s, LEAD_STEP_S * np.arange(1.0, LEADS + 1.0), {}, actual)
+    weight = sets.weights(replay, np.zeros(LEADS), np.array([0.25, 0.75]))
+    assert weight.sum(axis=0) == pytest.approx(1.0)
+    assert weight[0, :2] == pytest.approx(0.25) and weight[0, 2:].min() > 0.99
+    mixed, variance = sets.mixed(weight)
+    assert np.abs(mixed[2:] - mean[0, 2:]).max() < 1.0
+    apart = mean[0, 0] - mean[1, 0]
+    assert variance[0] == pytest.approx(100.0 + 0.25 * 0.75 * np.square(apart))
+
+
+def test_the_bank_on_the_coupled_model_forecasts_about_as_well_as_the_class() -> None:
+    found = fly_bank(CASES["straight"], 0, SETTINGS)
+    ratio = np.sqrt(found.mean_square_m2 / found.mean_square_m2[0])
+    assert ratio[0] == pytest.approx(1.0) and (ratio > 0.7).all() and (ratio < 1.4).all()
+    assert not np.allclose(ratio[1], ratio[2])
+    assert (found.inside > 0.6).all() and (found.inside <= 1.0).all()
 
 
 def test_outages_are_drawn_by_flight_and_leave_gnss_between_them() -> None:

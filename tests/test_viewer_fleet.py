@@ -39,7 +39,7 @@ def untimed(fleet: FleetResults, first: int) -> FleetResults:
     starts = fleet.flights["start_utc"].copy()
     starts[first:] = np.datetime64("NaT")
     kept = ~np.isin(fleet.trend["flight_id"], fleet.flights["flight_id"][first:])
-    trend = FigureData("trend", {name: values[kept] for name, values in fleet.trend.columns.items()}, {})
+    trend = fleet.trend.where(kept)
     changes = tuple(one for one in fleet.change_points if one.flight_id in set(trend["flight_id"].tolist()))
     return replace(changed(fleet, start_utc=starts), trend=trend, change_points=changes)
 
@@ -236,7 +236,7 @@ def test_one_flight_and_none(tmp_path: Path) -> None:
 def test_flights_without_any_heading_leave_the_charts_out(fleet: FleetResults, tmp_path: Path) -> None:
     unknown = np.full(FLIGHTS, np.nan)
     bare = changed(fleet, error_deg=unknown, radial_error_rate_fit_nmiph=unknown, verdict=np.full(FLIGHTS, ""))
-    none = FigureData("trend", {name: values[:0] for name, values in fleet.trend.columns.items()}, {})
+    none = fleet.trend.where(slice(0))
     empty = gather_nothing(tmp_path).densities
     write_fleet_recording(
         tmp_path / "fleet.rrd", replace(bare, trend=none, change_points=(), densities=empty, normals=())

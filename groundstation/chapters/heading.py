@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 
+from groundstation.chapters.agreement import agreement_note
 from groundstation.chapters.assessed import reason_of
 from groundstation.chapters.gates import gate_grid, setting_facts
 from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Part, Section, kept
 from groundstation.chapters.verdict import NOT_ASSESSABLE, PARTS, claim
 from groundstation.chapters.wording import ABSENT, clock, interval, is_number, number, step_places
+from groundstation.results.agreement import heading_agreement
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult, OnboardComparison, Standstill, TaxiSegment
@@ -40,6 +42,7 @@ def heading(results: FlightResults) -> Section:
         return Section("heading", TITLE, LEAD, (note,), headline)
     told, segments = claim(answer), _segments(answer.segments)
     parts = (
+        agreement_note(heading_agreement(results.answers)),
         gate_grid(answer.gates),
         Figure("heading.difference"),
         Figure("heading.taxi"),

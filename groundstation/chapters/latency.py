@@ -1,8 +1,10 @@
 """Chapter: latency between sensors: how much later than the INS each shows the same motion."""
 
+from groundstation.chapters.agreement import agreement_note
 from groundstation.chapters.assessed import without_answer
-from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Part, Rank, Section
+from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Part, Rank, Section, kept
 from groundstation.chapters.wording import interval, number, significant, typeset
+from groundstation.results.agreement import latency_agreement
 from groundstation.results.flight import FlightResults
 from groundstation.results.latency import Latencies, Latency
 
@@ -30,7 +32,8 @@ def latency(results: FlightResults) -> Section | None:
         ]
         parts: tuple[Part, ...] = (Facts("Not observable", unseen), Figure("latency.search"))
         return Section("latency", TITLE, LEAD, parts, headline, is_open=True)
-    return Section("latency", TITLE, LEAD, (table, Figure("latency.search")), headline, claim=told)
+    twice = agreement_note(latency_agreement(results.answers))
+    return Section("latency", TITLE, LEAD, kept((twice, table, Figure("latency.search"))), headline, claim=told)
 
 
 def _claim(answer: Latencies) -> Claim | None:

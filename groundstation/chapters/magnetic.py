@@ -1,5 +1,6 @@
 """Chapter: magnetic deviation (system 3): verdict, coefficients, steer card, and what each correction leaves."""
 
+from groundstation.chapters.agreement import agreement_note
 from groundstation.chapters.assessed import reason_of
 from groundstation.chapters.gates import failed_to_inform, gate_grid, setting_facts
 from groundstation.chapters.magnetic_ground import LEAD as GROUND_LEAD
@@ -21,6 +22,7 @@ from groundstation.chapters.parts import (
     kept,
 )
 from groundstation.chapters.wording import ABSENT, clock, is_number, number, sentence, significant, typeset
+from groundstation.results.agreement import deviation_agreement
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.flight import FlightResults
 from groundstation.results.magnetic import (
@@ -28,6 +30,7 @@ from groundstation.results.magnetic import (
     LETTERS,
     METHOD_TITLES,
     Alignment,
+    ConditionName,
     MagneticResult,
     Method,
     PoissonParameters,
@@ -51,6 +54,11 @@ MEANING = {
     "E": "quadrantal, cos: oblique soft iron",
 }
 MOST_TURNS = 24
+CONDITIONS: dict[ConditionName, str] = {
+    "pitch": "1° more pitch",
+    "ground": "On the ground",
+    "gain": "Drift of the gains",
+}
 
 
 def magnetic(results: FlightResults) -> Section | None:
@@ -61,8 +69,10 @@ def magnetic(results: FlightResults) -> Section | None:
     told = _claim(answer)
     parts: tuple[Part | None, ...] = (
         *_conclusions(answer),
+        agreement_note(deviation_agreement(results.answers)),
         _coefficients(answer),
         _card(answer),
+        _other_conditions(answer),
         Note("Card to print, and every degree for programs:", files=(STEER_CARD, DEVIATION_CSV)),
         Figure("magnetic.deviation"),
         gate_grid(answer.gates),
@@ -169,6 +179,22 @@ def _card(answer: MagneticResult) -> Grid | None:
         f"heading; add: the deviation, added to that reading.{starred} {ADVISORY}"
     )
     return Grid("Steer card", heads, rows, caption) if rows else None
+
+
+def _other_conditions(answer: MagneticResult) -> Grid | None:
+    """What the figure did not have, with its size, beside the table."""
+    rows = [
+        (
+            CONDITIONS[row.name],
+            f"{number(row.size_deg, 3)} ± {number(row.sigma_deg, 3)}",
+            number(row.largest_deg, 2),
+            sentence(row.told),
+        )
+        for row in answer.other_conditions
+    ]
+    heads = (Head("Condition"), Head("RMS, °", True), Head("Most, °", True), Head("In words"))
+    caption = "By how much the deviation is another than in the table above; nothing of it is corrected or in its σ."
+    return Grid("Where the table does not hold", heads, rows, caption) if rows else None
 
 
 def _methods(answer: MagneticResult) -> Grid:

@@ -12,6 +12,7 @@ from groundstation.base.errors import UnknownNameError
 from groundstation.base.records import frozen
 from groundstation.base.serial import to_json
 from groundstation.base.timescales import utc_ns_to_iso
+from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights, FleetTrend
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import row_fields, rows_frame
 from groundstation.results.magnetic import LETTERS
@@ -280,20 +281,16 @@ class FleetResults:
     by_aircraft : tuple of AircraftRow
         The whole fleet first, then each aircraft by name; flights whose log names none count for the former alone, and
         have no trend and no outliers.
-    trend : FigureData
-        Control chart, one row per flight, quantity and aircraft with enough flights that have a time, in order of time:
-        ``aircraft``, ``quantity``, ``flight_id``, ``start_utc`` (datetime64[ns]), ``value``, ``level`` (median between
-        change points), ``low``, ``high`` (control limits), ``is_outside``.
+    trend : FleetTrend
+        Control charts.
     change_points : tuple of ChangePoint
     skill : tuple of FleetSkill
         By method in the order of ``METHODS``, then horizon.
-    skill_flights : FigureData
-        The shipped method of every flight: ``flight_id``, ``aircraft``, ``start_utc``, ``method``, ``horizon_min``,
-        ``starts``, ``rms_m``, ``coverage95``.
+    skill_flights : FleetSkillFlights
+        The shipped method of every flight.
     calibration : tuple of FleetCalibration
-    calibration_checks : FigureData
-        Every check, those of rejected flights too: ``quantity``, ``flight_id``, ``aircraft``, ``verdict``,
-        ``residual_deg``, ``sigma_deg``, ``z``, ``is_inside``.
+    calibration_checks : FleetChecks
+        Every check, those of rejected flights too.
     outliers : tuple of OutlierRow
     not_in_fleet : tuple of NotInFleet
         What failed or was skipped and why, failed first, by source.
@@ -309,12 +306,12 @@ class FleetResults:
     densities: Densities
     normals: tuple[FittedNormal, ...]
     by_aircraft: tuple[AircraftRow, ...]
-    trend: FigureData
+    trend: FleetTrend
     change_points: tuple[ChangePoint, ...]
     skill: tuple[FleetSkill, ...]
-    skill_flights: FigureData
+    skill_flights: FleetSkillFlights
     calibration: tuple[FleetCalibration, ...]
-    calibration_checks: FigureData
+    calibration_checks: FleetChecks
     outliers: tuple[OutlierRow, ...]
     not_in_fleet: tuple[NotInFleet, ...]
     stated: Mapping[str, float] = field(default_factory=dict)

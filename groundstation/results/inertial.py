@@ -81,7 +81,8 @@ class RealOutage:
 class AzimuthEstimate:
     """Azimuth (heading) error of the INS from what turns do to its velocity error; offered only where they allow it.
 
-    ``observable`` says whether ``sigma_deg`` is below the limit of the settings; if not, ``error_deg`` is None.
+    ``observable`` says whether ``sigma_deg`` is below the limit of the settings; if not, ``error_deg`` is None. The
+    error belongs to ``time_s``, flight seconds.
     """
 
     observable: bool
@@ -90,6 +91,7 @@ class AzimuthEstimate:
     turns: int
     velocity_change_mps: float
     reason: str
+    time_s: float | None = None
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,8 @@ from groundstation.results.heading import Gate
 
 MagneticVerdict = Literal["accept", "reject", "undecided"]
 MethodName = Literal["compass_table", "poisson_attitude", "constant_modulus"]
+ConditionName = Literal["pitch", "ground", "gain"]
+SourceName = Literal["taxi", "ground run", "turns"]
 MethodState = Literal["fitted", "refused"]
 TurnState = Literal["used", "rejected"]
 Vector = tuple[float, float, float]
@@ -23,13 +25,32 @@ ADVISORY = "Advisory, not a release to service."
 
 
 @dataclass(frozen=True)
+class AlignmentSource:
+    """One way in which the flight shows the INS heading error, at the time of the figure.
+
+    ``taxi``: the heading analysis; ``ground run``: the run to lift-off; ``turns``: azimuth by turns in flight, the
+    sigma of the mounting included. None where there is no number. ``at_s``: flight seconds at which it was seen.
+    ``reason``: why it is not used.
+    """
+
+    name: SourceName
+    error_deg: float | None
+    sigma_deg: float | None
+    at_s: float | None
+    is_used: bool
+    reason: str = ""
+    verdict: str = ""
+
+
+@dataclass(frozen=True)
 class Alignment:
     """INS heading error at the time of the figure, taken off the INS heading before anything is compared with it.
 
     ``aligned_error_deg`` and ``aligned_sigma_deg`` belong to ``aligned_at_s``, ``error_deg`` and ``sigma_deg`` to
     ``figure_at_s`` (flight seconds), after the drift of the hours between. ``origin`` says whence.
     ``speed_min_mps`` is the speed from which on the track may align. ``gyro_*`` are the drifts along forward, right,
-    down at the standstill before flight and their sigmas; None where no rates are logged.
+    down at the standstill before flight and their sigmas; None where no rates are logged. ``sources`` lists every way
+    in which the flight shows the error. It is the airframe's, less the mounting that the aircraft file states.
     """
 
     origin: str
@@ -44,6 +65,11 @@ class Alignment:
     speed_min_mps: float | None = None
     gyro_drift_deg_per_h: Vector | None = None
     gyro_drift_sigma_deg_per_h: Vector | None = None
+    sources: tuple[AlignmentSource, ...] = ()
+
+    def source(self, name: SourceName) -> AlignmentSource | None:
+        """The source of a name."""
+        return next((one for one in self.sources if one.name == name), None)
 
 
 @dataclass(frozen=True)
@@ -201,6 +227,24 @@ class BankBias:
 
 
 @dataclass(frozen=True)
+class OtherCondition:
+    """By how much the deviation is another than the table's under conditions that the figure did not have.
+
+    ``pitch``: for each degree of pitch more than the figure's, by the fitted iron. ``ground``: on the ground, by a
+    steady field in the body, ``added_nt``, that a current makes that flows only there or only in the air. ``gain``: at
+    the time in the air farthest from the figure, by gains that drift. ``size_deg`` is the RMS over the circle with its
+    sigma, ``largest_deg`` the most; None where they are not known. ``told`` says it in words.
+    """
+
+    name: ConditionName
+    size_deg: float | None
+    sigma_deg: float | None
+    largest_deg: float | None
+    told: str
+    added_nt: Vector | None = None
+
+
+@dataclass(frozen=True)
 class CardRow:
     """Steer card: to fly ``magnetic_heading_deg`` steer ``steer_deg`` by the uncorrected magnetic heading.
 
@@ -233,6 +277,8 @@ class MagneticResult(Answer):
         Magnetic heading minus true heading in bin [k, k + 1) of magnetic heading: declination is in it.
     deviation_deg : tuple of 360
         To be added to the reading: true magnetic heading minus reading, declination removed.
+    other_conditions : tuple of OtherCondition
+        Size of what the table does not hold: another pitch, the ground, gains that drift.
     residual_rms_deg : Residual or None
         Before and after the recommended correction, on the held-out part; None where nothing was left to hold out.
     figures
@@ -269,6 +315,7 @@ class MagneticResult(Answer):
     modulus: PoissonParameters | None = None
     table_fit_rms_deg: float | None = None
     attitude_wander_deg: float | None = None
+    other_conditions: tuple[OtherCondition, ...] = ()
     remarks: tuple[str, ...] = ()
     settings: dict[str, float | str | bool] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()

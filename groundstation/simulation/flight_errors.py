@@ -42,6 +42,9 @@ def flight_errors(motion: Trajectory, settings: InsSettings, seed: int) -> Fligh
     time_s = motion.time_ns / NS_PER_S
     north, east = (schuler_error(time_s, settings, channel) for channel in (0, 1))
     heading = heading_error_deg(time_s, settings)
+    if settings.turns_velocity:
+        turned = turned_velocity_error(time_s, motion.velocity_north_mps, motion.velocity_east_mps, settings)
+        north, east = ((own[0] + added[0], own[1] + added[1]) for own, added in zip((north, east), turned, strict=True))
     roll, pitch = (np.full(len(motion), error) for error in (settings.roll_error_deg, settings.pitch_error_deg))
     return FlightErrors((north[0], east[0]), (north[1], east[1]), heading, roll, pitch)
 
@@ -72,6 +75,31 @@ def schuler_error(time_s: FloatArray, settings: InsSettings, channel: int) -> tu
         - radius * drift_radps * (time_s - np.sin(phase) / rate)
     )
     return np.asarray(position), np.asarray(velocity)
+
+
+def turned_velocity_error(
+    time_s: FloatArray, north_mps: FloatArray, east_mps: FloatArray, settings: InsSettings
+) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
+    """Position (m) and velocity (m/s) error, north then east, of an azimuth error psi that turns each acceleration.
+
+    dv' = -g phi + psi x (-acceleration east, +acceleration north), phi' = dv / R: each change of velocity starts a
+    Schuler oscillation of its own. The mounting turns nothing. Ignored: Earth's rotation seen by the azimuth error,
+    which alignment on the ground balances. Source: Titterton and Weston, Strapdown Inertial Navigation Technology,
+    2nd ed. 2004, section 12.3.
+    """
+    azimuth_rad = np.deg2rad(heading_error_deg(time_s, settings) - settings.boresight_deg)
+    cosine, sine = np.cos(SCHULER_RADPS * time_s), np.sin(SCHULER_RADPS * time_s)
+    found = []
+    for gained in (-azimuth_rad * np.gradient(east_mps, time_s), azimuth_rad * np.gradient(north_mps, time_s)):
+        velocity = cosine * _integral(time_s, gained * cosine) + sine * _integral(time_s, gained * sine)
+        found.append((_integral(time_s, velocity), velocity))
+    return found[0], found[1]
+
+
+def _integral(time_s: FloatArray, values: FloatArray) -> FloatArray:
+    """Integral from the first time on by trapezoids, shape (n,)."""
+    steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time_s)
+    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _full_errors(motion: Trajectory, settings: InsSettings, seed: int) -> FlightErrors:

@@ -75,11 +75,13 @@ class InsSettings:
     ``tilt_arcsec`` is positive where it makes the velocity error fall (design of system 2), ``drift_dph`` likewise.
     ``error_model`` "schuler" is the closed solution of the figures given here; "full" draws all errors from
     ``ins_class`` and propagates them along the flight: azimuth, velocity, tilt, drift and position given here are then
-    not read, mounting and noise are.
+    not read, mounting and noise are. ``turns_velocity``: the azimuth error of the closed solution turns every change of
+    velocity, as it does in a real navigator; without it turns show an azimuth error of zero.
     """
 
     rate_hz: float = number(50.0, 0.01, 1000.0)
     error_model: Literal["schuler", "full"] = "schuler"
+    turns_velocity: bool = False
     ins_class: str = "navigation"
     azimuth_error_deg: float = number(1.0, -180.0, 180.0)
     azimuth_drift_dph: float = number(0.05, -600.0, 600.0)

@@ -4,12 +4,14 @@ from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.studies import forecast_tables as tables
 from groundstation.studies.forecast_cases import study_cases
 from groundstation.studies.forecast_consistency import RUNS, consistency_table
+from groundstation.studies.forecast_coupled_bank import bank_table, fly_banks
 from groundstation.studies.forecast_outages import fly_outages, outage_table
 from groundstation.studies.forecast_page import page
 from groundstation.studies.forecast_runs import COUPLED, Progress, run_cases
 from groundstation.studies.page import StudyResult
 
 OUTAGE_RUNS = 30  # flights of a case with outages in the log
+BANK_RUNS = 10  # that decide on the bank on the coupled model: two seconds of processor time each
 CALIBRATED_SHARE = 0.3  # of the flights: sigmas take longer than forecasts, and their shares converge sooner
 
 
@@ -39,6 +41,7 @@ def study_forecast(runs: int = 200, seed: int = 71, progress: Progress | None = 
         tables.honesty_table(outcomes),
         tables.gate_table(outcomes),
         consistency_table(cases[0].seed, min(runs, RUNS)),
+        bank_table(fly_banks(cases, max(2, min(calibrated, BANK_RUNS)), settings)),
         outage_table(fly_outages(cases, max(2, min(calibrated, OUTAGE_RUNS)), settings)),
     )
     is_coupled = settings.model == "coupled" and settings.default_method == tables.REFERENCE

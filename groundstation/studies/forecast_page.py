@@ -37,6 +37,7 @@ def page(
         _later(cases, tables["forecast_later_starts"]),
         _held_out(cases, tables, default_method),
         _honesty(tables, calibrated_runs),
+        _bank(tables["forecast_coupled_bank"]),
         _outages(tables["forecast_outages"]),
         section(
             "RMS of every method, all starts",
@@ -156,6 +157,24 @@ def _honesty(tables: dict[str, FigureData], calibrated_runs: int) -> Section:
         table(shown),
         "Position measurements that the gate rejected:",
         table(tables["forecast_gate"]),
+    )
+
+
+def _bank(bank: FigureData) -> Section:
+    methods = list(dict.fromkeys(bank["method"].tolist()))
+    cells = []
+    for case in dict.fromkeys(bank["case"].tolist()):
+        for method in methods:
+            rows = _rows(bank, case=case, method=method)
+            pairs = zip(bank["over_coupled"][rows], bank["coverage95"][rows], strict=True)
+            cells.append([case, method, *(f"{ratio:.3f}, {inside:.3f}" for ratio, inside in pairs)])
+    head = [f"{horizon:g} min" for horizon in dict.fromkeys(bank["horizon_min"].tolist())]
+    return section(
+        "A bank of noise sets on the coupled model",
+        f"{int(bank['flights'][0])} flights a case: RMS over that of the coupled model with the noise of the class, "
+        "all starts, against the truth; coverage of the 95 % band, against GNSS. The second bank has the class's own "
+        "filter among its sets, with half of the weight before any outage was over.",
+        grid(["case", "method", *head], cells),
     )
 
 

@@ -7,6 +7,7 @@ from groundstation.studies.magnetic_cases import CLAIM, SWEEPS, WIDE, Sweep, set
 from groundstation.studies.magnetic_coverage import SECOND, coverage_table, first_cells
 from groundstation.studies.magnetic_page import page
 from groundstation.studies.magnetic_runs import Progress, jobs_of, run_jobs
+from groundstation.studies.magnetic_taxis import taxi_table
 from groundstation.studies.page import StudyResult
 
 
@@ -18,9 +19,9 @@ def study_magnetic(
     Parameters
     ----------
     runs : int
-        Whole flights of the first family, and as many of the second, run k of its cell k modulo 12; half as many fly
-        each point of the sweeps, with the same iron, noise and INS at every point, and a quarter fly each incomplete
-        figure.
+        Whole flights of the first family, as many of the second, run k of its cell k modulo 12, and of the third,
+        modulo 11; half as many fly each point of the sweeps, with the same iron, noise and INS at every point, and a
+        quarter fly each incomplete figure.
     seed : int
         Flights have the seeds ``7 000 000 + 100 000 seed + run``.
     progress : callable, optional
@@ -40,6 +41,7 @@ def study_magnetic(
         if any(cell in run.wide for run in outcomes)
     ]
     found = (
+        taxi_table([run.taxi for run in outcomes if run.taxi is not None]),
         coverage_table([*first_cells(judged, sweeps, samples), *wide]),
         tables.honesty_table(kept),
         tables.residual_table(kept),

@@ -12,6 +12,7 @@ from groundstation.studies.magnetic_bias import Biases, formula_biases
 from groundstation.studies.magnetic_cases import BANK_DEG, EXACT, INCOMPLETE, JUDGED, REFERENCE, WIDE, Setup, seed_of
 from groundstation.studies.magnetic_flights import Hangar, judged_outcome, wide_outcome
 from groundstation.studies.magnetic_judge import Outcome
+from groundstation.studies.magnetic_taxis import TaxiOutcome, taxi_cells, taxi_outcome
 
 Progress = Callable[[str], None]
 
@@ -23,7 +24,7 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 @dataclass(frozen=True)
 class Job:
-    """One seed: what is flown with it. ``wide`` is the cell of the second family."""
+    """One seed: what is flown with it. ``wide`` is the cell of the second family, ``taxi`` that of the third."""
 
     run: int
     seed: int
@@ -31,6 +32,7 @@ class Job:
     judged: MagneticFamilySettings | None
     is_incomplete: bool
     wide: str = ""
+    taxi: str = ""
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,8 @@ class RunOutcome:
         Of this seed's iron, by formula.
     wide : mapping of cell to Outcome
         The flight of the second family.
+    taxi : TaxiOutcome or None
+        The flight of the third family.
     """
 
     run: int
@@ -57,11 +61,12 @@ class RunOutcome:
     incomplete: dict[str, Outcome]
     biases: Biases
     wide: dict[str, Outcome] = field(default_factory=dict)
+    taxi: TaxiOutcome | None = None
 
 
 def jobs_of(runs: int, seed: int, swept_setups: tuple[Setup, ...]) -> list[Job]:
     """One job for each run; the seed alone decides how each setup is flown."""
-    cells = tuple(WIDE)
+    cells, taxis = tuple(WIDE), tuple(taxi_cells())
     swept, incomplete = (max(2, round(share * runs)) for share in (SWEPT_SHARE, INCOMPLETE_SHARE))
     return [
         Job(
@@ -71,6 +76,7 @@ def jobs_of(runs: int, seed: int, swept_setups: tuple[Setup, ...]) -> list[Job]:
             JUDGED,
             run < incomplete,
             cells[run % len(cells)],
+            taxis[run % len(taxis)],
         )
         for run in range(runs)
     ]
@@ -100,6 +106,7 @@ def fly_job(job: Job) -> RunOutcome:
         {kind: hangar.outcome(REFERENCE, figure) for kind, figure in figures.items()},
         formula_biases(iron),
         {job.wide: wide_outcome(WIDE[job.wide], job.seed)} if job.wide else {},
+        taxi_outcome(job.taxi, job.seed) if job.taxi else None,
     )
 
 

@@ -110,13 +110,13 @@ def _interrupted(values: FloatArray, places: Int64Array, firsts: Int64Array) -> 
 def _control(recorder: FleetRecorder, fleet: FleetResults, aircraft: Aircraft, quantity: str, path: str) -> None:
     """Log level and control limits, interrupted at change points; the change points; the flights outside the limits."""
     trend = fleet.trend
-    mine = (trend["aircraft"] == aircraft.name) & (trend["quantity"] == quantity)
+    mine = (trend.aircraft == aircraft.name) & (trend.quantity == quantity)
     if not mine.any():
         return
     unit = TITLES[quantity].rpartition(", ")[2]
-    places = recorder.numbers(trend["flight_id"][mine].astype(np.str_))
+    places = recorder.numbers(trend.flight_id[mine])
     firsts = _firsts(recorder, fleet, aircraft, quantity)
-    level, low, high = (numbers(trend, name)[mine] for name in ("level", "low", "high"))
+    level, low, high = trend.level[mine], trend.low[mine], trend.high[mine]
     styles = [
         Line(f"level, {unit}", colours.LIGHT, THIN),
         Line(f"control limits, {unit}", colours.DIM, THIN),
@@ -124,10 +124,10 @@ def _control(recorder: FleetRecorder, fleet: FleetResults, aircraft: Aircraft, q
     ]
     pieces = _interrupted(np.column_stack([level, low, high]), places, firsts)
     recorder.lines(f"{path}/limits", places, pieces, styles * (len(firsts) + 1))
-    outside = trend["is_outside"][mine].astype(bool)
+    outside = trend.is_outside[mine]
     if outside.any():
         line = Line(f"outside the limits, {unit}", colours.YELLOW, MARK)
-        recorder.dots(f"{path}/outside", places[outside], numbers(trend, "value")[mine][outside], line)
+        recorder.dots(f"{path}/outside", places[outside], trend.value[mine][outside], line)
     if len(firsts):
         line = Line(f"new level, {unit}", colours.VERMILION, MARK)
         recorder.dots(f"{path}/change", firsts, level[np.searchsorted(places, firsts)], line)
@@ -151,11 +151,11 @@ def verdicts(aircraft: Sequence[Aircraft]) -> rrb.View:
 def skill_over_flights(recorder: FleetRecorder, fleet: FleetResults) -> list[rrb.View]:
     """Log the forecast skill of every flight, a series a horizon; the view."""
     found = fleet.skill_flights
-    rms = numbers(found, "rms_m")
+    rms = found.rms_m
     if not np.isfinite(rms).any():
         return []
-    ids, row_of = np.unique(recorder.numbers(found["flight_id"].astype(np.str_)), return_inverse=True)
-    horizons, column_of = np.unique(numbers(found, "horizon_min"), return_inverse=True)
+    ids, row_of = np.unique(recorder.numbers(found.flight_id), return_inverse=True)
+    horizons, column_of = np.unique(found.horizon_min, return_inverse=True)
     table = np.full((len(ids), len(horizons)), np.nan)
     table[row_of, column_of] = rms
     shades = colours.for_series(len(horizons))

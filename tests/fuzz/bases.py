@@ -258,7 +258,11 @@ _STARTS: dict[str, Callable[[bytes], Iterator[int]]] = {
 }
 FORMATS = tuple(_STARTS)
 _WRITTEN: dict[str, tuple[Callable[[], bytes], ...]] = {
-    "flat-csv": (flat_csv,),
+    "flat-csv": (
+        flat_csv,
+        lambda: (SAMPLES / "taxi-short.csv").read_bytes(),  # something is estimated of these
+        lambda: (SAMPLES / "taxi-damaged.csv").read_bytes(),
+    ),
     "csv-profile": (g1000,),
     "ulog": (ulog,),
     "dataflash": (dataflash,),

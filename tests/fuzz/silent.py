@@ -81,7 +81,7 @@ def silent_losses(format_name: str, cases: int, first: int, tally: Tally) -> Ite
         seed = first
         while tally.files < cases:
             base, other, edits = edits_of(Case(format_name, seed))
-            seed, expected = seed + 1, known[base.name]
+            seed, expected = seed + 1, known.get(base.name)
             if expected is None:
                 continue
             mutant = Mutant(base.data, other.data, edits)

@@ -24,7 +24,7 @@ HEADS = (
 )
 CAPTION = (
     "Error: INS heading − true heading; ± 95 %: half of its interval; reference: corrected parking heading minus "
-    "reference; INS: radial error rate, half of the time below; 60 min: RMS error of the forecast after 60 min "
+    "reference; INS: radial error rate, time-position fit; 60 min: RMS error of the forecast after 60 min "
     "without GNSS."
 )
 LINKED = (("recording", "rrd"), ("mcap", "mcap"))
@@ -119,8 +119,8 @@ def remarks_of(fleet: FleetResults) -> dict[str, list[Mark]]:
         )
     for outlier in fleet.outliers:
         note(outlier.flight_id, "warn", f"outlier: {title_of(outlier.quantity)}")
-    for row in np.flatnonzero(trend["is_outside"]) if len(trend) else ():
-        note(trend["flight_id"][row], "warn", f"outside limits: {title_of(str(trend['quantity'][row]))}")
+    for row in np.flatnonzero(trend.is_outside) if len(trend) else ():
+        note(trend.flight_id[row], "warn", f"outside limits: {title_of(str(trend.quantity[row]))}")
     for change in fleet.change_points:
         note(change.flight_id, "warn", f"new level from here: {title_of(change.quantity)}")
     for row in np.flatnonzero(flights["findings_fail"] > 0):

@@ -103,7 +103,7 @@ def _changes(fleet: FleetResults) -> list[str]:
 def _judged(fleet: FleetResults) -> str:
     """How much of the fleet has flights enough for trend and outliers."""
     named = len([name for name in fleet.aircraft if name])
-    charted = len(set(fleet.trend["aircraft"].tolist()))
+    charted = len(set(fleet.trend.aircraft.tolist()))
     fewest = fleet.stated.get("fewest_flights_for_a_trend")
     if charted == named or fewest is None:
         return ""

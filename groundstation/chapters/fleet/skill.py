@@ -23,7 +23,7 @@ def build(fleet: FleetResults) -> Section | None:
     shipped = shipped_method(fleet)
     parts: list[Part] = []
     aided_ids = fleet.flights["flight_id"][fleet.flights["ins_kind"] != "unaided"]
-    if aided := len(set(aided_ids.tolist()).intersection(fleet.skill_flights["flight_id"].tolist())):
+    if aided := len(set(aided_ids.tolist()).intersection(fleet.skill_flights.flight_id.tolist())):
         told = plural(aided, "flight has", "flights have")
         text = (
             f"{told} an INS that is aided by GNSS, or may be: their starts are included and look better than they are."
@@ -42,7 +42,7 @@ def drawn(fleet: FleetResults) -> list[FleetSkill]:
 
 def shipped_method(fleet: FleetResults) -> str:
     """The method that most flights ship, the first in the order of the methods where several do; empty without any."""
-    names, counts = np.unique(fleet.skill_flights["method"], return_counts=True)
+    names, counts = np.unique(fleet.skill_flights.method, return_counts=True)
     return str(names[int(np.argmax(counts))]) if len(names) else ""
 
 
@@ -75,7 +75,7 @@ def _by_horizon(rows: list[FleetSkill], shipped: str) -> Grid:
 
 
 def _in_detail(fleet: FleetResults, rows: list[FleetSkill]) -> Grid:
-    shipped = set(fleet.skill_flights["method"].tolist())
+    shipped = set(fleet.skill_flights.method.tolist())
     heads = (
         *(
             Head("Method"),

@@ -56,12 +56,12 @@ def _changes(fleet: FleetResults) -> Part:
 
 def flights_of(fleet: FleetResults, quantity: str, name: str) -> NDArray[np.intp]:
     """Rows of the trend of a quantity of an aircraft."""
-    return np.flatnonzero((fleet.trend["quantity"] == quantity) & (fleet.trend["aircraft"] == name))
+    return np.flatnonzero((fleet.trend.quantity == quantity) & (fleet.trend.aircraft == name))
 
 
 def charted(fleet: FleetResults, quantity: str) -> list[str]:
     """Aircraft with a trend of a quantity."""
-    return sorted(set(fleet.trend["aircraft"][fleet.trend["quantity"] == quantity].tolist()))
+    return sorted(set(fleet.trend.aircraft[fleet.trend.quantity == quantity].tolist()))
 
 
 def changes_of(fleet: FleetResults, quantity: str, name: str) -> list[tuple[int, ChangePoint]]:
@@ -78,13 +78,14 @@ def _levels(fleet: FleetResults, quantity: str) -> Grid | None:
     rows: list[tuple[Cell, ...]] = []
     for name in charted(fleet, quantity):
         own = flights_of(fleet, quantity, name)
-        now = {key: float(fleet.trend[key][own[-1]]) for key in ("level", "low", "high")}
+        last = fleet.trend.where(own[-1:])
+        now = {"level": float(last.level[0]), "low": float(last.low[0]), "high": float(last.high[0])}
         rows.append(
             (
                 *(aircraft_name(name), number(len(own), 0)),
-                *(day(fleet.trend["start_utc"][row]) for row in (own[0], own[-1])),
+                *(day(fleet.trend.start_utc[row]) for row in (own[0], own[-1])),
                 *(figure_of(quantity, value) for value in now.values()),
-                number(int(fleet.trend["is_outside"][own].sum()), 0),
+                number(int(fleet.trend.is_outside[own].sum()), 0),
                 number(len(changes_of(fleet, quantity, name)), 0),
             )
         )

@@ -11,7 +11,7 @@ from groundstation.results.arrays.forecast import ForecastGrowth, ForecastMap
 from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import FEWEST_STARTS, METHODS, CalibrationRow, ForecastResult
 
-OTHERS: tuple[Role, ...] = ("series 5", "series 6", "other", "series 7", "series 4", "unused", "series 2")
+OTHERS: tuple[Role, ...] = ("series 5", "series 6", "limit", "series 7", "series 4", "unused", "series 2")
 MAP_CELLS = 90  # along each side: finer is not seen on paper and makes the page heavy
 MAP_QUANTILE = 0.98  # the scale of colour ends there: a few bad starts would darken the rest
 NOMINAL: tuple[tuple[float, Role], ...] = ((0.50, "ins"), (0.68, "gnss"), (0.95, "answer"))  # shares in the bands
@@ -37,14 +37,14 @@ def growth(results: FlightResults) -> Plot | None:
         return None
     horizon, roles = data.horizon_min, method_roles(default)
     marks: list[AnyMark] = []
-    if data.sigma_m is not None and np.isfinite(data.sigma_m).any():
-        marks.append(Curve(x=horizon, y=data.sigma_m, role="ink", dash="dotted", name="σ claimed (shipped)"))
     ordered = sorted(known, key=lambda name: -_last(data.rms_m[name]))
     for name in ordered:
         is_shipped = name == default
         text = label(f"{METHODS[name]}{' (shipped)' if is_shipped else ''}")
         heavy: Emphasis = "bold" if is_shipped else "usual"
         marks.append(Curve(x=horizon, y=positive(data.rms_m[name]), role=roles[name], name=text, emphasis=heavy))
+    if data.sigma_m is not None and np.isfinite(data.sigma_m).any():
+        marks.append(Curve(x=horizon, y=data.sigma_m, role="ink", dash="dotted", name="σ claimed (shipped)"))
     panel = Panel(marks, Axis(HORIZON, "log"), Axis("RMS radial error, m", "log"), legend="beside")
     return Plot(
         "forecast.growth",

@@ -11,6 +11,8 @@ from groundstation.estimators.fleet.calibration import calibrate
 from groundstation.estimators.fleet.changes import ChangeSettings, Chart, control_chart
 from groundstation.estimators.fleet.moments import Moments, merged
 from groundstation.estimators.fleet.outliers import FALSE_OUTLIERS, FEWEST, find_outliers
+from groundstation.results.arrays.fleet import FleetChecks, FleetTrend
+from groundstation.results.arrays.typed import joined
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import (
     WHOLE_FLEET,
@@ -130,9 +132,9 @@ def _unscaled(quantity: str, value: FloatArray) -> FloatArray:
         return np.asarray(np.exp(value) if quantity in POSITIVE else value)
 
 
-def trends(flights: FigureData, settings: ChangeSettings) -> tuple[FigureData, tuple[ChangePoint, ...]]:
+def trends(flights: FigureData, settings: ChangeSettings) -> tuple[FleetTrend, tuple[ChangePoint, ...]]:
     """Control charts of every aircraft and quantity with enough flights that have a time, and their changes."""
-    charted: dict[str, list[NDArray]] = {name: [] for name in TREND_COLUMNS}
+    charted = [NO_TREND]
     changes: list[ChangePoint] = []
     for name, rows in groups_of(flights).items():
         for quantity in TRENDS:
@@ -143,42 +145,47 @@ def trends(flights: FigureData, settings: ChangeSettings) -> tuple[FigureData, t
             chart = control_chart(value, settings=settings)
             if chart is None:
                 continue
-            own: dict[str, NDArray] = {
-                "aircraft": np.full(len(timed), name),
-                "quantity": np.full(len(timed), quantity),
-                "flight_id": flights["flight_id"][timed],
-                "start_utc": flights["start_utc"][timed],
-                "value": flights[quantity][timed],
-                **{key: _unscaled(quantity, getattr(chart, key)) for key in ("level", "low", "high")},
-                "is_outside": chart.is_outside(value),
-            }
-            for key, values in own.items():
-                charted[key].append(values)
+            own = FleetTrend(
+                aircraft=np.full(len(timed), name),
+                quantity=np.full(len(timed), quantity),
+                flight_id=flights["flight_id"][timed],
+                start_utc=flights["start_utc"][timed],
+                value=flights[quantity][timed],
+                level=_unscaled(quantity, chart.level),
+                low=_unscaled(quantity, chart.low),
+                high=_unscaled(quantity, chart.high),
+                is_outside=chart.is_outside(value),
+            )
+            charted.append(own)
             changes += _change_points(name, quantity, own, chart)
-    columns = {key: np.concatenate([empty, *charted[key]]) for key, empty in TREND_COLUMNS.items()}
-    return FigureData("trend", columns, {}), tuple(changes)
+    return joined(charted), tuple(changes)
 
 
-TREND_COLUMNS: Mapping[str, NDArray] = {
-    **{name: np.zeros(0, dtype="U1") for name in ("aircraft", "quantity", "flight_id")},
-    "start_utc": np.zeros(0, dtype="datetime64[ns]"),
-    **{name: np.zeros(0) for name in ("value", "level", "low", "high")},
-    "is_outside": np.zeros(0, dtype=bool),
-}
+NO_TREND = FleetTrend(
+    aircraft=np.zeros(0, dtype="U1"),
+    quantity=np.zeros(0, dtype="U1"),
+    flight_id=np.zeros(0, dtype="U1"),
+    start_utc=np.zeros(0, dtype="datetime64[ns]"),
+    value=np.zeros(0),
+    level=np.zeros(0),
+    low=np.zeros(0),
+    high=np.zeros(0),
+    is_outside=np.zeros(0, dtype=bool),
+)
 
 
-def _change_points(name: str, quantity: TrendQuantity, own: Mapping[str, NDArray], chart: Chart) -> list[ChangePoint]:
-    edges = [0, *(change.index for change in chart.changes), len(own["value"])]
+def _change_points(name: str, quantity: TrendQuantity, own: FleetTrend, chart: Chart) -> list[ChangePoint]:
+    edges = [0, *(change.index for change in chart.changes), len(own)]
     return [
         ChangePoint(
             aircraft=name,
             quantity=quantity,
-            flight_id=str(own["flight_id"][change.index]),
-            start_utc_ns=int(own["start_utc"][change.index].astype(np.int64)),
+            flight_id=str(own.flight_id[change.index]),
+            start_utc_ns=int(own.start_utc[change.index].astype(np.int64)),
             flights_before=change.index - before,
             flights_after=after - change.index,
-            level_before=float(own["level"][change.index - 1]),
-            level_after=float(own["level"][change.index]),
+            level_before=float(own.level[change.index - 1]),
+            level_after=float(own.level[change.index]),
             p_value=change.p_value,
         )
         for change, before, after in zip(chart.changes, edges[:-2], edges[2:], strict=True)
@@ -203,10 +210,10 @@ def outliers(flights: FigureData) -> tuple[OutlierRow, ...]:
     return tuple(sorted(found, key=lambda one: (one.flight_id, list(LOOKED_AT).index(one.quantity))))
 
 
-def calibrations(checks: FigureData) -> tuple[FleetCalibration, ...]:
+def calibrations(checks: FleetChecks) -> tuple[FleetCalibration, ...]:
     """Judge each kind of check, flights with the verdict reject left out."""
     found = []
     for quantity, title in CHECKS.items():
-        own = (checks["quantity"] == quantity) & (checks["verdict"] != "reject")
-        found.append(calibrate(quantity, title, checks["z"][own], checks["is_inside"][own]))
+        own = (checks.quantity == quantity) & (checks.verdict != "reject")
+        found.append(calibrate(quantity, title, checks.z[own], checks.is_inside[own]))
     return tuple(one for one in found if one is not None)

@@ -33,6 +33,7 @@ MOST_SAMPLES = 3000  # of the honest interval; a longer taxi at a high rate is t
 LEAST_DRIFT_S = 5.0
 LEAST_IN_DIRECTION = 20  # samples
 STEP_SIGMA_DEG = 0.05  # of the size of a step, read off the INS heading
+MOST_STEPS = 8  # that have a coefficient each: time goes by the square of their number, and a single one is rejected
 FLAT_DEG_PER_S = 1e3
 
 
@@ -123,10 +124,24 @@ def _differences(
 
 
 def _before(used: Samples, steps: tuple[HeadingStep, ...]) -> tuple[Regressor, ...]:
-    """What the differences before each step have less than those after it: the error is that after the last."""
-    return tuple(
-        Regressor((used.time_s < step.time_s).astype(np.float64), -step.size_deg, STEP_SIGMA_DEG) for step in steps
+    """What the differences before each step have less than those after it: the error is that after the last.
+
+    Of more than ``MOST_STEPS`` the largest have a coefficient each, the others one that scales all of them, with the
+    variance that they would have one by one where each counts as much as it is large.
+    """
+    by_size = sorted(steps, key=lambda step: -abs(step.size_deg))
+    before = [(used.time_s < step.time_s).astype(np.float64) for step in by_size]
+    alone = [
+        Regressor(rows, -step.size_deg, STEP_SIGMA_DEG)
+        for rows, step in sorted(zip(before[:MOST_STEPS], by_size, strict=False), key=lambda pair: pair[1].time_s)
+    ]
+    if len(steps) <= MOST_STEPS:
+        return tuple(alone)
+    sizes_deg = np.array([step.size_deg for step in by_size[MOST_STEPS:]])
+    together = Regressor(
+        sizes_deg @ np.array(before[MOST_STEPS:]), -1.0, STEP_SIGMA_DEG / float(np.sqrt(np.mean(sizes_deg**2)))
     )
+    return (*alone, together)
 
 
 def solve(

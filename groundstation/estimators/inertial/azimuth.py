@@ -173,7 +173,7 @@ def estimate_azimuth(
         text = f"sigma {sigma_deg:.2g} deg above the limit of {settings.azimuth_sigma_max_deg:g} deg"
         return AzimuthEstimate(False, None, sigma_deg, len(changes), largest, text)
     text = f"{len(changes)} changes of velocity of up to {largest:.0f} m/s"
-    return AzimuthEstimate(True, error_deg, sigma_deg, len(changes), largest, text)
+    return AzimuthEstimate(True, error_deg, sigma_deg, len(changes), largest, text, changes.reference_s)
 
 
 def changes_of(differences: Differences, known: BoolArray, limits: AzimuthLimits) -> Changes:

@@ -70,7 +70,7 @@ class CoupledRun:
         States after each epoch (north channel, east channel, azimuth error rad, its drift rad/s, accelerometer biases
         forward and right m/s^2) and their sigmas.
     P : ndarray, shape (m, 16, 16)
-        Covariances at every tenth epoch from the first.
+        Covariances at every epoch, or every tenth (``every``), from the first.
     innovation, innovation_variance : ndarrays, shape (n, 2, 2)
         Measured minus predicted (position, velocity; north, east), NaN where absent.
     used : ndarray of int8, shape (n, 2, 2)
@@ -88,6 +88,7 @@ class CoupledRun:
     used: NDArray[np.int8]
     P: FloatArray
     reopened: int = 0
+    every: int = EVERY
 
     def __post_init__(self) -> None:
         for name in ("x", "sigma", "P", "innovation", "innovation_variance", "used"):
@@ -146,7 +147,9 @@ def coupled_matrix(motion: CraftMotion, beta_per_s: float) -> FloatArray:
     return out
 
 
-def run_coupled(differences: Differences, noise: InsNoise, settings: InertialSettings) -> CoupledRun:
+def run_coupled(
+    differences: Differences, noise: InsNoise, settings: InertialSettings, *, every: int = EVERY
+) -> CoupledRun:
     """Estimate the errors of both channels and the azimuth together; where GNSS is absent they are forecast.
 
     The noise of a horizontal channel is the class's; the azimuth starts with ``azimuth_deg``, its gyro with the
@@ -154,6 +157,7 @@ def run_coupled(differences: Differences, noise: InsNoise, settings: InertialSet
     Position and velocity error may be anything at the start (a log may begin in flight) and after a reset of the INS;
     a filter that has rejected GNSS for :data:`seams.PATIENCE_S` is opened too, the position by the innovation, tilt and
     drift kept. Where GNSS comes back after an outage beyond the gate and agrees with itself, the covariance is widened.
+    Covariances are kept at one epoch in ``every``.
     """
     epochs = only_used(differences.epochs, settings)
     n = len(epochs)
@@ -196,9 +200,9 @@ def run_coupled(differences: Differences, noise: InsNoise, settings: InertialSet
     )
     used = np.where(odd[:, None, None] & np.isfinite(z).reshape(n, 2, 2), np.int8(REJECTED), used)
     reopened = sum(run.reopened for run, _ in parts)
-    kept = [run.P[last[-first % EVERY :: EVERY]] for (run, last), first in zip(parts, begins.tolist(), strict=True)]
+    kept = [run.P[last[-first % every :: every]] for (run, last), first in zip(parts, begins.tolist(), strict=True)]
     P = np.concatenate(kept)
-    return CoupledRun(differences, noise, x, np.sqrt(np.maximum(variance, 0.0)), y, S, used, P, reopened)
+    return CoupledRun(differences, noise, x, np.sqrt(np.maximum(variance, 0.0)), y, S, used, P, reopened, every)
 
 
 @dataclass(frozen=True)

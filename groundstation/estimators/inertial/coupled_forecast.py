@@ -7,7 +7,6 @@ import numpy as np
 from groundstation.base.records import Int64Array
 from groundstation.estimators.inertial.coupled import (
     CHANNELS,
-    EVERY,
     LONGEST_STEP_S,
     RATES,
     SIZE,
@@ -62,7 +61,7 @@ def hindcast_coupled(run: CoupledRun, at: Int64Array, lead_s: FloatArray, settin
 def coupled_variance(run: CoupledRun, at: Int64Array, lead_s: FloatArray) -> FloatArray:
     """Variance of what :func:`hindcast_coupled` forecasts by the model, m^2, shape (s, l, 2).
 
-    That of the states at the start (at most nine epochs before it), their position known, and of the noise since.
+    That of the states at the start (last epoch whose covariance was kept), position known, and of the noise since.
     """
     out = np.zeros((len(at), len(lead_s), 2))
     if not len(lead_s):
@@ -74,7 +73,7 @@ def coupled_variance(run: CoupledRun, at: Int64Array, lead_s: FloatArray) -> Flo
     kept = kalman.Kept(states=False, covariances=False, gains=False, variances=True)
     for index, epoch in enumerate(at):
         values = _values_along(run, float(run.epochs.time_s[epoch]), elapsed)
-        start = np.array(run.P[epoch // EVERY])
+        start = np.array(run.P[epoch // run.every])
         start[CHANNELS[:, POSITION]] = start[:, CHANNELS[:, POSITION]] = 0.0
         carried = kalman.run_filter(
             RATES.transition(values, seconds, densities),

@@ -34,9 +34,12 @@ def _run(flight: "Flight", known: Known, settings: MagneticSettings) -> Found[Ma
         heading=known.answer(HeadingResult),
         heading_settings=known.settings_of(HeadingSettings),
         heading_request=None if known.intervals_problem else HeadingRequest(intervals=known.intervals),
+        inertial=inertial,
         latencies=known.answer(Latencies),
         kinds={inertial.ins_topic: inertial.kind} if inertial else {},
         aircraft=known.aircraft,
+        site=known.site,
+        weather=known.weather,
         phases=known.phases,
     )
     return Found(found, (_verdict(found),))

@@ -1,6 +1,7 @@
 """The ground before lift-off: where the INS heading may be aligned by the track, and system 1 run there once more."""
 
 import math
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
@@ -11,7 +12,7 @@ from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.samples import choose_topics
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.estimators.known import AircraftData
+from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.estimators.magnetic.entered import corrections_entered
 from groundstation.estimators.magnetic.gyros import GyroDrift, gyro_drift
 from groundstation.estimators.magnetic.settings import MagneticSettings
@@ -28,35 +29,34 @@ NO_LIMIT_MPS = 1000.0  # lift-off ends the run, not a speed
 
 @dataclass(frozen=True)
 class HeadingBasis:
-    """What system 1 needs besides the flight: its settings, the aircraft, intervals of the user, latencies."""
+    """What system 1 needs besides the flight: settings, aircraft, airfield, the user's intervals, latencies, METAR."""
 
     settings: HeadingSettings = field(default_factory=HeadingSettings)
     aircraft: AircraftData = field(default_factory=AircraftData)
     request: HeadingRequest = field(default_factory=HeadingRequest)
     latencies: Latencies | None = None
+    site: SiteData | None = None
+    weather: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class GroundRuns:
-    """Answers of system 1 on the ground before lift-off, each None where there is none.
+    """Answers of system 1 on the ground, each None where there is none.
 
     Parameters
     ----------
-    together : HeadingResult or None
-        Of taxi and of what is faster than ``speed_min_mps``, the take-off run above all, in one fit; ``why_not`` says
-        why there is none.
-    fast_epochs : int
-        Epochs in it that are faster than that.
+    fast : HeadingResult or None
+        Of what is faster than ``speed_min_mps`` before lift-off, the take-off run above all; ``why_not`` says why
+        there is none. Looked for only where taxi is not what aligns.
     taxi : HeadingResult or None
-        Of taxi within the speed limits of system 1 alone; ``why_not_taxi`` likewise.
+        Of taxi within the speed limits of system 1; ``why_not_taxi`` likewise.
     since : str
-        What ``together`` begins with, if not with the log.
+        What they begin with, if not with the log.
     """
 
-    together: HeadingResult | None = None
+    fast: HeadingResult | None = None
     taxi: HeadingResult | None = None
     speed_min_mps: float | None = None
-    fast_epochs: int = 0
     why_not: str = ""
     why_not_taxi: str = ""
     since: str = ""
@@ -94,14 +94,14 @@ def find_ground_runs(
     phases: Phases,
     basis: HeadingBasis,
     settings: MagneticSettings,
+    *,
+    is_enough: Callable[[HeadingResult], bool] = lambda _found: False,
 ) -> GroundRuns:
-    """Run system 1 on straight ground runs up to lift-off that are fast enough for the track error allowed.
+    """Find what aligns the INS heading on the ground: system 1's own answer ``heading``, else the run to lift-off.
 
-    Taxi within the limits of system 1 counts with them, though slower: its many epochs are weighed by its noise model,
-    errors correlated over both included. With ``uses_slower_taxi`` false it does not.
-
-    System 1's own answer ``heading`` stays beside it; where events of the operator bound the alignment it is found
-    again between them.
+    Where events of the operator bound the alignment, or a correction was entered after the taxi had begun, taxi is
+    judged again between them. The run counts where it is straight and fast enough for the track error allowed; with
+    ``uses_slower_taxi`` it is not looked for where the answer from taxi ``is_enough``.
     """
     try:
         window = alignment_window(flight, phases, settings)
@@ -110,17 +110,25 @@ def find_ground_runs(
         if settings.alignment_event:
             return GroundRuns(why_not=reason, why_not_taxi=reason)
         return GroundRuns(taxi=heading, why_not=reason)
-    part, taxi, why_not_taxi = _gnss_within(flight, window), heading, ""
+    part, taxi, why_not_taxi, since = _gnss_within(flight, window), heading, "", ""
     basis = replace(basis, request=replace(basis.request, ins_topic=ins_topic))
-    if window.is_by_event:
+    if window.is_by_event or (window.since and _begins_before(heading, window)):
         taxi, why_not_taxi = _estimated(flight, part, basis.settings, basis)
+        since = window.since
     speed_min_mps = _speed_min_mps(part, basis, settings)
-    limits, part = _fast_enough(part, speed_min_mps, basis.settings, settings)
-    together, why_not = _estimated(flight, part, limits, basis)
-    count, seconds = _fast_part(together, speed_min_mps)
-    if together is not None and seconds < settings.ground_run_min_s:
-        together, why_not = None, f"{seconds:.1f} s straight above {speed_min_mps:.1f} m/s before lift-off"
-    return GroundRuns(together, taxi, speed_min_mps, count, why_not, why_not_taxi, window.since)
+    if settings.uses_slower_taxi and taxi is not None and taxi.ins_topic == ins_topic and is_enough(taxi):
+        return GroundRuns(None, taxi, speed_min_mps, "taxi aligns", why_not_taxi, since)
+    limits = replace(basis.settings, taxi_speed_min_mps=speed_min_mps, taxi_speed_max_mps=NO_LIMIT_MPS)
+    fast, why_not = _estimated(flight, part, limits, basis)
+    seconds = _seconds(fast)
+    if fast is not None and seconds < settings.ground_run_min_s:
+        fast, why_not = None, f"{seconds:.1f} s straight above {speed_min_mps:.1f} m/s before lift-off"
+    return GroundRuns(fast, taxi, speed_min_mps, why_not, why_not_taxi, window.since if fast else since)
+
+
+def _begins_before(heading: HeadingResult | None, window: Window) -> bool:
+    """Whether an answer rests on data before a window."""
+    return heading is None or not heading.segments or heading.segments[0].start_s < window.start_s
 
 
 def gyros_at_standstill(flight: Flight, ins_topic: str, phases: Phases, settings: MagneticSettings) -> GyroDrift | None:
@@ -189,28 +197,12 @@ def _speed_min_mps(part: Flight, basis: HeadingBasis, settings: MagneticSettings
     return min(least_speed_mps(error_mps, settings.track_error_max_deg), NO_LIMIT_MPS)
 
 
-def _fast_enough(
-    part: Flight, speed_min_mps: float, heading: HeadingSettings, settings: MagneticSettings
-) -> tuple[HeadingSettings, Flight]:
-    """Limits of system 1 for all that counts, and the flight without the epochs between taxi and fast enough."""
-    if not settings.uses_slower_taxi:
-        return replace(heading, taxi_speed_min_mps=speed_min_mps, taxi_speed_max_mps=NO_LIMIT_MPS), part
-    slowest_mps = min(heading.taxi_speed_min_mps, speed_min_mps)
-    kept = {}
-    for topic in topics_of_kind("gnss", part.topics()):
-        speed = np.hypot(part[topic].values("velocity_north_mps"), part[topic].values("velocity_east_mps"))
-        kept[topic] = part[topic].take(~((speed > heading.taxi_speed_max_mps) & (speed <= speed_min_mps)))
-    limits = replace(heading, taxi_speed_min_mps=slowest_mps, taxi_speed_max_mps=NO_LIMIT_MPS)
-    return limits, replace(part, tables={**part.tables, **kept})
-
-
-def _fast_part(found: HeadingResult | None, speed_min_mps: float) -> tuple[int, float]:
-    """How many of the used epochs are faster than a speed, and the seconds they stand for."""
+def _seconds(found: HeadingResult | None) -> float:
+    """Seconds that the epochs used stand for."""
     samples = found_in(found.figures, HeadingSamples) if found else None
     if samples is None:
-        return 0, 0.0
-    count = int(np.count_nonzero(samples.is_used & (samples.ground_speed_mps > speed_min_mps)))
-    return count, count * float(np.median(np.diff(samples.time_s)))
+        return 0.0
+    return int(np.count_nonzero(samples.is_used)) * float(np.median(np.diff(samples.time_s)))
 
 
 def _estimated(
@@ -225,6 +217,8 @@ def _estimated(
             aircraft=basis.aircraft,
             request=basis.request,
             latencies=basis.latencies,
+            site=basis.site,
+            weather=basis.weather,
         )
     except NotAssessableError as error:
         return None, _reason(error)

@@ -1,7 +1,7 @@
 """The magnetic estimator: from the tables of a flight to a deviation, a verdict and a card."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -9,8 +9,8 @@ import numpy as np
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.records import BoolArray
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.estimators.known import AircraftData
-from groundstation.estimators.magnetic.alignment import S_PER_H, align
+from groundstation.estimators.known import AircraftData, SiteData
+from groundstation.estimators.magnetic.alignment import S_PER_H, align, refused
 from groundstation.estimators.magnetic.apply import corrected_by_table
 from groundstation.estimators.magnetic.before_lift_off import HeadingBasis, find_ground_runs, gyros_at_standstill
 from groundstation.estimators.magnetic.compass_table import CompassTable, build_table
@@ -28,6 +28,7 @@ from groundstation.estimators.magnetic.methods import (
     method_rows,
     recommend,
 )
+from groundstation.estimators.magnetic.other_conditions import FlownConditions, other_conditions
 from groundstation.estimators.magnetic.poisson import IronFit, corrected_heading_deg
 from groundstation.estimators.magnetic.readings import Readings, choose_topics
 from groundstation.estimators.magnetic.remarks import remarks_on
@@ -35,6 +36,7 @@ from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.estimators.magnetic.swings import compare_swings, steer_card
 from groundstation.estimators.magnetic.verdict import build_gates, decide
 from groundstation.results.heading import HeadingResult
+from groundstation.results.inertial import InertialResult
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import (
     Alignment,
@@ -57,9 +59,12 @@ def estimate_deviation(
     heading: HeadingResult | None = None,
     heading_settings: HeadingSettings | None = None,
     heading_request: HeadingRequest | None = None,
+    inertial: InertialResult | None = None,
     latencies: Latencies | None = None,
     kinds: Mapping[str, str] | None = None,
     aircraft: AircraftData | None = None,
+    site: SiteData | None = None,
+    weather: Iterable[str] = (),
     phases: Phases | None = None,
     ins_topic: str = "",
     magnetometer_topic: str = "",
@@ -72,15 +77,17 @@ def estimate_deviation(
         Topics ``ins`` (roll, pitch, true heading) and ``magnetometer``; ``electric`` where there is one.
     settings : MagneticSettings, optional
     heading : HeadingResult, optional
-        System 1's answer: aligns the INS heading where no faster ground run does.
-    heading_settings, heading_request : optional
-        With which system 1 looks at the ground runs up to lift-off.
+        System 1's answer: aligns the INS heading with its whole interval.
+    heading_settings, heading_request, site, weather : optional
+        With which system 1 looks at the ground run up to lift-off, where its answer does not align.
+    inertial : InertialResult, optional
+        System 2's answer: its azimuth by turns aligns too.
     latencies : Latencies, optional
         Where that of the magnetometer is observed, its times are put back by it.
     kinds : mapping of INS topic to kind, optional
         ``gnss_aided`` where system 2 found that other sensors correct the INS.
     aircraft : AircraftData, optional
-        Its mounting angle is taken off the INS heading.
+        Its mounting angle is taken off the INS heading, apart from the alignment.
     phases : Phases, optional
         Default: found here.
     ins_topic, magnetometer_topic : str
@@ -106,11 +113,12 @@ def estimate_deviation(
     readings, is_airborne, figures, turns = flown.readings, flown.is_airborne, flown.figures, flown.turns
     figure_at_s = float(np.mean([0.5 * (figure.start_s + figure.end_s) for figure in figures]))
     request = heading_request or HeadingRequest()
-    basis = HeadingBasis(heading_settings or HeadingSettings(), aircraft or AircraftData(), request, latencies)
-    runs = find_ground_runs(flight, topics[0], heading, phases, basis, settings)
+    aircraft = aircraft or AircraftData()
+    basis = HeadingBasis(heading_settings or HeadingSettings(), aircraft, request, latencies, site, tuple(weather))
+    runs = find_ground_runs(flight, topics[0], heading, phases, basis, settings, is_enough=lambda one: not refused(one))
     gyros = gyros_at_standstill(flight, topics[0], phases, settings)
-    alignment = align(heading, topics[0], figure_at_s, settings, runs, gyros)
-    readings = _aligned(readings, alignment, aircraft.mounting_deg if aircraft else 0.0)
+    alignment = align(heading, topics[0], figure_at_s, settings, runs, gyros, inertial=inertial, aircraft=aircraft)
+    readings = _aligned(readings, alignment, aircraft.mounting_deg)
     result = _answer(flight, topics, readings, is_airborne, (figures, turns), alignment, settings)
     return replace(result, remarks=remarks_on(flight, result, flown.latency_s, kinds or {}, settings))
 
@@ -150,6 +158,13 @@ def _answer(
         used, swings, coverage, alignment, residual, flown, method, shift.sigmas if shift else None, settings
     )
     verdict, reason = decide(gates)
+    conditions = FlownConditions(
+        readings,
+        is_airborne,
+        np.isin(np.arange(len(readings)), rows),
+        is_airborne & is_level(readings, settings),
+        fits.pitch_deg,
+    )
     card = deviation if method == "compass_table" else -_level_errors(fits)
     return MagneticResult(
         ins_topic=topics[0],
@@ -178,6 +193,9 @@ def _answer(
         modulus=_parameters(fits.modulus, a_sigma),
         table_fit_rms_deg=table.fit_rms_deg,
         attitude_wander_deg=fits.attitude_wander_deg,
+        other_conditions=other_conditions(
+            flight, conditions, fits.attitude, method, wander_deg=settings.attitude_wander_deg
+        ),
         settings={name: value for name, value in asdict(settings).items() if value is not None},
         figures=draw(readings, along, part, figures, fits, deviation, methods, (method, card)),
     )

@@ -6,7 +6,7 @@ from groundstation.base.toml_settings import check_ranges, number
 
 LIMITS = frozenset(  # settings that bound a gate and choose no data: a change of them needs no log
     {
-        *("alignment_sigma_max_deg", "held_out_rms_max_deg", "dip_sigmas_max"),
+        *("alignment_sigma_max_deg", "heading_sigmas_max", "held_out_rms_max_deg", "dip_sigmas_max"),
         *("altitude_min_m", "repeat_rms_max_deg"),
     }
 )
@@ -17,9 +17,10 @@ class MagneticSettings:
     """Limits of the magnetic estimator.
 
     ``alignment_sigma_deg`` is that of an INS heading that nothing aligned, ``drift_sigma_deg_per_h`` what is known
-    of its drift beforehand. The track aligns it at speeds at which ``gnss_velocity_error_mps`` (or what the receiver
-    states, where that is larger) turns the track by no more than ``track_error_max_deg``, and with
-    ``uses_slower_taxi`` on taxi as system 1 takes it. ``alignment_event`` and ``release_event`` are names of events
+    of its drift beforehand. System 1's answer from taxi aligns it; where that cannot, the run to lift-off does, at
+    speeds at which ``gnss_velocity_error_mps`` (or what the receiver states, where that is larger) turns the track by
+    no more than ``track_error_max_deg``. Without ``uses_slower_taxi`` that run comes first; the sigma of a sideslip
+    under power, ``take_off_sideslip_deg``, is added to it. ``alignment_event`` and ``release_event`` name events
     between which the alignment looks; empty: not used. ``declination_deg`` with its sigma replaces the model's, for a
     log without date or place. ``attitude_wander_deg`` is how far roll and pitch of the INS wander over minutes, as
     known beforehand: level flight beside the figure tells more. ``trusts_aided_heading`` states that an INS corrected
@@ -28,7 +29,9 @@ class MagneticSettings:
 
     rate_max_hz: float = number(10.0, 0.5, 1000.0)  # faster magnetometers are thinned
     gap_max_s: float = number(0.5, 0.0, 10.0)  # attitude is interpolated over no longer gap
-    alignment_sigma_deg: float = number(0.333, 0.0, 180.0)  # 20 arcmin
+    alignment_sigma_deg: float = number(1.0, 0.0, 180.0)  # a stored heading or a magnetic sensor: the INS of this use
+    take_off_sideslip_deg: float = number(0.3, 0.0, 180.0)  # power crabs the aircraft: one recorded run, by so much
+    mounting_sigma_deg: float = number(0.1, 0.0, 180.0)  # of the INS case, where the aircraft file states none
     drift_sigma_deg_per_h: float = number(0.1, 0.0, 1000.0)
     track_error_max_deg: float = number(0.3, 0.001, 45.0)  # patent
     gnss_velocity_error_mps: float = number(0.15, 0.001, 100.0)  # patent
@@ -68,6 +71,7 @@ class MagneticSettings:
     held_out_samples_min: int = number(50, 2, 1_000_000)
     held_out_rms_max_deg: float = number(1.0, 0.0, 180.0)
     alignment_sigma_max_deg: float = number(0.5, 0.0, 180.0)
+    heading_sigmas_max: float = number(3.0, 0.0, 1000.0)
     bank_bias_max_deg: float = number(0.3, 0.0, 180.0)
     dip_sigmas_max: float = number(3.0, 0.0, 1000.0)
     repeat_rms_max_deg: float = number(0.5, 0.0, 180.0)

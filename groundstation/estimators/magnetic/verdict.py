@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from groundstation.estimators.magnetic.alignment import against_heading
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.heading import Bound, Gate, GateState, judged_gate
 from groundstation.results.magnetic import (
@@ -38,12 +39,21 @@ def build_gates(
     repeat = max((swing.difference_rms_deg for swing in swings if swing.difference_rms_deg is not None), default=None)
     unsteady = max(turn.bank_sd_deg for turn in turns)
     after = residual.after if residual else None
+    contradicted = against_heading(alignment)
     bounds = gate_bounds(settings)
     return (
         _gate(bounds, "coverage", "circle covered by both branches", coverage.share),
         _gate(bounds, "bank_difference", "difference of opposite banks", unequal, "deg"),
         _gate(bounds, "bank_steadiness", "standard deviation of bank in a turn", unsteady, "deg"),
         _gate(bounds, "alignment", "sigma of the INS heading at the figure", alignment.sigma_deg, "deg"),
+        _gate(
+            bounds,
+            "heading",
+            "alignment, hence A, against the heading analysis of this log, in sigmas",
+            contradicted,
+            is_required=contradicted is not None,
+            reason="no heading analysis of this INS",
+        ),
         _gate(
             bounds,
             "held_out",
@@ -97,6 +107,7 @@ def gate_bounds(settings: MagneticSettings) -> dict[str, Bound]:
         "bank_difference": (None, settings.bank_difference_max_deg),
         "bank_steadiness": (None, settings.bank_sd_max_deg),
         "alignment": (None, settings.alignment_sigma_max_deg),
+        "heading": (None, settings.heading_sigmas_max),
         "held_out": (None, settings.held_out_rms_max_deg),
         "bank_bias": (None, settings.bank_bias_max_deg),
         "dip": (None, settings.dip_sigmas_max),

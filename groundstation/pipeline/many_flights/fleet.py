@@ -30,6 +30,7 @@ from groundstation.pipeline.many_flights.fleet_share import (
 )
 from groundstation.pipeline.many_flights.fleet_store import MOST_LISTED, Scan, scan
 from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights
 from groundstation.results.figures import FigureData
 from groundstation.results.file_names import INDEX_JSON, SUMMARY
 from groundstation.results.files import load, write_bytes
@@ -184,7 +185,7 @@ def _results(found: Scan, flights: FigureData, shares: Any, unread: list[NotInFl
     )
 
 
-def _details(found: Scan, flights: FigureData, shares: Any) -> tuple[SkillMerger, FigureData, FigureData]:
+def _details(found: Scan, flights: FigureData, shares: Any) -> tuple[SkillMerger, FleetSkillFlights, FleetChecks]:
     """Skill merged over the flights, the rows of each flight's shipped method, all checks."""
     merger, first = SkillMerger(), 0
     skill: list[dict[str, NDArray[Any]]] = []
@@ -200,8 +201,8 @@ def _details(found: Scan, flights: FigureData, shares: Any) -> tuple[SkillMerger
         first += len(part)
     return (
         merger,
-        _table("skill_flights", SKILL_COLUMNS, flights, skill),
-        _table("calibration_checks", CHECK_COLUMNS, flights, checks),
+        FleetSkillFlights.of(_table("skill_flights", SKILL_COLUMNS, flights, skill)),
+        FleetChecks.of(_table("calibration_checks", CHECK_COLUMNS, flights, checks)),
     )
 
 

@@ -139,7 +139,7 @@ def _judged(
         corrected,
         flight_phases(flight),
         kinds={inertial.ins_topic: inertial.kind} if inertial else {},
-        ins_error_deg=_ins_error_deg(results, corrected.ins_topic),
+        ins_error_deg=ins_error_deg(results, corrected.ins_topic),
         aircraft=settings.aircraft,
         settings=settings.of(MagneticSettings),
     )
@@ -155,15 +155,19 @@ def _judged(
     return [Finding("warn", "magnetic.applied_worse", f"{text}: it does not fit this flight", corrected.topic)]
 
 
-def _ins_error_deg(results: FlightResults, ins_topic: str) -> float:
-    """Error of the INS heading where it is known: at the figure, or as taxi shows it."""
+def ins_error_deg(results: FlightResults, ins_topic: str) -> float:
+    """Error of the INS heading where it is known: at the figure, as taxi shows it, or as turns in flight do."""
+    from groundstation.estimators.magnetic.alignment import refused
+
     magnetic, heading = results.answer(MagneticResult), results.answer(HeadingResult)
     if magnetic is not None and magnetic.ins_topic == ins_topic:
         return magnetic.alignment.error_deg
-    if heading is None or heading.ins_topic != ins_topic or heading.verdict == "reject":
-        return 0.0
-    error_deg, _sigma_deg = heading.azimuth
-    return error_deg if np.isfinite(error_deg) else 0.0
+    if heading is not None and heading.ins_topic == ins_topic and not refused(heading):
+        error_deg, _sigma_deg = heading.azimuth
+        return error_deg if np.isfinite(error_deg) else 0.0
+    inertial = results.answer(InertialResult)
+    azimuth = inertial.azimuth if inertial is not None and inertial.ins_topic == ins_topic else None
+    return azimuth.error_deg or 0.0 if azimuth is not None else 0.0
 
 
 def _figure(flight: Flight, corrected: "CorrectedHeading") -> CorrectedHeadingRows:

@@ -23,8 +23,8 @@ def growth(fleet: FleetResults) -> Drawing:
     methods = list(dict.fromkeys(row.method for row in rows))
     others = (name for name in methods if name not in ("raw_ins", shipped))
     colours = {"raw_ins": d.INS, shipped: d.USED} | dict(zip(others, OTHERS, strict=False))
-    own = fleet.skill_flights["method"] == shipped
-    horizon, rms = (fleet.skill_flights[key][own] for key in ("horizon_min", "rms_m"))
+    own = fleet.skill_flights.method == shipped
+    horizon, rms = fleet.skill_flights.horizon_min[own], fleet.skill_flights.rms_m[own]
     highest = {name: max(row.rms_m for row in rows if row.method == name) for name in methods}
 
     def paint(figure: Any) -> None:
@@ -62,9 +62,9 @@ def growth(fleet: FleetResults) -> Drawing:
 def flights(fleet: FleetResults) -> Drawing:
     """Draw the shipped method on every flight, and how honest its band is."""
     table, shipped = fleet.skill_flights, shipped_method(fleet)
-    horizons = np.unique(table["horizon_min"])
+    horizons = np.unique(table.horizon_min)
     horizon = HEADLINE_MIN if HEADLINE_MIN in horizons else float(horizons[-1])
-    own = np.flatnonzero((table["horizon_min"] == horizon) & (table["rms_m"] > 0.0))
+    own = np.flatnonzero((table.horizon_min == horizon) & (table.rms_m > 0.0))
     covered = sorted(
         (row.horizon_min, row.coverage95)
         for row in fleet.skill
@@ -94,13 +94,13 @@ def flights(fleet: FleetResults) -> Drawing:
 
 def _paint_flights(axes: Any, fleet: FleetResults, own: Any) -> None:
     table = fleet.skill_flights
-    timed = own[~np.isnat(table["start_utc"][own])]
+    timed = own[~np.isnat(table.start_utc[own])]
     if not len(timed):
         layout.nothing(axes, "no flight with a time")
         return
     axes.set_yscale("log")
     colours = colours_of(fleet)
-    time, rms, owner = (table[key][timed] for key in ("start_utc", "rms_m", "aircraft"))
+    time, rms, owner = table.start_utc[timed], table.rms_m[timed], table.aircraft[timed]
     for colour in dict.fromkeys(colours[name] for name in owner.tolist()):
         mine = np.array([colours[name] == colour for name in owner.tolist()])
         d.dots(axes, date_numbers(time[mine]), rms[mine], colour, dot_size(len(timed)), MOST_DOTS)

@@ -28,11 +28,11 @@ def charts(fleet: FleetResults, quantity: str) -> Drawing | None:
     if not names:
         return None
     rows = {name: flights_of(fleet, quantity, name) for name in names}
-    outside = {name: int(fleet.trend["is_outside"][rows[name]].sum()) for name in names}
+    outside = {name: int(fleet.trend.is_outside[rows[name]].sum()) for name in names}
     changed = {name: len(changes_of(fleet, quantity, name)) for name in names}
     first = sorted(names, key=lambda name: (-changed[name], -outside[name], -len(rows[name]), name))
     shown = sorted(first[:MOST_PANELS])
-    times = fleet.trend["start_utc"][fleet.trend["quantity"] == quantity]
+    times = fleet.trend.start_utc[fleet.trend.quantity == quantity]
     height = 14.0 + PANEL_MM * len(shown)
 
     def paint(figure: Any) -> None:
@@ -62,9 +62,9 @@ def charts(fleet: FleetResults, quantity: str) -> Drawing | None:
 
 
 def _paint_chart(axes: Any, fleet: FleetResults, quantity: str, name: str, rows: NDArray[np.intp]) -> None:
-    columns = ("value", "level", "low", "high")
-    value, level, low, high = (fleet.trend[key][rows] for key in columns)
-    time, is_outside = date_numbers(fleet.trend["start_utc"][rows]), fleet.trend["is_outside"][rows]
+    own = fleet.trend.where(rows)
+    value, level, low, high = own.value, own.level, own.low, own.high
+    time, is_outside = date_numbers(own.start_utc), own.is_outside
     d.dots(axes, time[~is_outside], value[~is_outside], d.INS, dot_size(len(rows)), MOST_DOTS, label="flight")
     if is_outside.any():
         d.dots(axes, time[is_outside], value[is_outside], d.GNSS, 4.0, MOST_DOTS, label="outside the limits", zorder=4)

@@ -19,9 +19,16 @@ Floats: TypeAlias = NDArray[np.float64]  # NaN is a gap
 Flags: TypeAlias = NDArray[np.bool_]
 Counts: TypeAlias = NDArray[np.int64]
 Texts: TypeAlias = NDArray[np.str_]
+Times: TypeAlias = NDArray[np.datetime64]  # UTC, nanoseconds
 ByName: TypeAlias = Mapping[str, Floats]  # a column each, by what their names differ in
 
-_KINDS: Mapping[Any, type[np.generic]] = {Floats: np.float64, Flags: np.bool_, Counts: np.int64, Texts: np.str_}
+_KINDS: Mapping[Any, type[np.generic]] = {
+    Floats: np.float64,
+    Flags: np.bool_,
+    Counts: np.int64,
+    Texts: np.str_,
+    Times: np.datetime64,
+}
 _FILLERS: Mapping[str, Any] = {"f": np.nan, "b": False, "i": 0, "U": ""}
 P = TypeVar("P")
 
@@ -261,6 +268,8 @@ def _names(kind: type, of: str) -> list[tuple[str, _Field]]:
 
 def _as(kind: Any, values: NDArray[Any]) -> NDArray[Any]:
     wanted = _KINDS[kind]
+    if wanted is np.datetime64:
+        return np.asarray(values, dtype="datetime64[ns]")
     if wanted is np.bool_ and values.dtype.kind == "f":
         return np.asarray(np.isfinite(values) & (values != 0.0))
     return np.asarray(values, dtype=wanted)

@@ -1,0 +1,46 @@
+"""Arrays of a fleet: control charts, forecast skill and checks of every flight."""
+
+from groundstation.results.arrays.typed import Arrays, Counts, Flags, Floats, Texts, Times
+
+
+class FleetTrend(Arrays, figure="trend"):
+    """Control charts: a row per flight, quantity and aircraft with enough flights that have a time, in order of time.
+
+    ``level`` is the median between change points, ``low`` and ``high`` are the control limits.
+    """
+
+    aircraft: Texts
+    quantity: Texts
+    flight_id: Texts
+    start_utc: Times
+    value: Floats
+    level: Floats
+    low: Floats
+    high: Floats
+    is_outside: Flags
+
+
+class FleetSkillFlights(Arrays, figure="skill_flights"):
+    """The shipped method of every flight, by horizon."""
+
+    flight_id: Texts
+    aircraft: Texts
+    start_utc: Times
+    method: Texts
+    horizon_min: Floats
+    starts: Counts
+    rms_m: Floats
+    coverage95: Floats
+
+
+class FleetChecks(Arrays, figure="calibration_checks"):
+    """Every check of a flight's answers, those of rejected flights too."""
+
+    quantity: Texts
+    flight_id: Texts
+    aircraft: Texts
+    verdict: Texts
+    residual_deg: Floats
+    sigma_deg: Floats
+    z: Floats
+    is_inside: Flags
