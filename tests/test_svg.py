@@ -26,7 +26,7 @@ from tests.plot_cases import CASES, names_of
 
 NUMBER = re.compile(r"-?\d*\.?\d+")
 HOSTILE = '</text><script>alert("x")</script>]]> & \' \x00\x1b[2J\u202e\ud800 一' + "é" * 500
-SCALES: tuple[Scale, ...] = ("linear", "log", "symlog", "time", "angle")
+SCALES: tuple[Scale, ...] = ("linear", "log", "symlog", "time", "angle", "date")
 NASTY = {
     "nothing": [],
     "one": [3.0],
@@ -264,6 +264,14 @@ def test_rows_share_an_axis_and_stand_above_each_other() -> None:
     assert (first.left_mm, first.width_mm) == (second.left_mm, second.width_mm)
     assert first.bottom_mm > second.bottom_mm + second.height_mm
     assert (first.x_title, second.x_title) == ("", "t")
+
+
+def test_row_of_fewer_panels_keeps_the_columns_of_the_others() -> None:
+    one = Panel((Curve(x=X, y=Y),), Axis("t"))
+    plot = Plot("made", "", "", "", (Row((one, one), 30.0), Row((one,), 30.0, columns=2)))
+    left, right, below = picture_of(plot).panels
+    assert (below.left_mm, below.width_mm) == (left.left_mm, left.width_mm)
+    assert right.left_mm > left.left_mm + left.width_mm
 
 
 def test_map_has_one_scale() -> None:

@@ -78,6 +78,18 @@ def test_ticks_of_time_are_round(end: float, texts: list[str]) -> None:
     assert told(Span("time", 0.0, end), 300.0, is_upright=False) == texts
 
 
+@pytest.mark.parametrize(
+    ("days", "texts"),
+    [
+        (3.0, ["1970-01-01", "1970-01-02", "1970-01-03", "1970-01-04"]),
+        (200.0, ["1970-01", "1970-03", "1970-05", "1970-07"]),
+        (1500.0, ["1970", "1971", "1972", "1973", "1974"]),
+    ],
+)
+def test_ticks_of_dates_are_round(days: float, texts: list[str]) -> None:
+    assert told(Span("date", 0.0, 86_400.0 * days), 320.0, is_upright=False) == texts
+
+
 def test_ticks_of_angles_are_in_thirties() -> None:
     assert told(Span("angle", 0.0, 360.0), 440.0, is_upright=False) == [str(30 * step) for step in range(13)]
     assert told(Span("angle", 0.0, 360.0), 190.0, is_upright=False) == [str(60 * step) for step in range(7)]

@@ -33,13 +33,14 @@ from groundstation.reports.svg.thinning import shown_rows
 MOST_SAMPLES = 5000
 NONE: Floats = np.zeros(0)
 LARGEST = float(np.finfo(np.float32).max)  # that the page holds
+_UNTOLD = {"symlog", "date"}  # scales whose values the page does not tell
 JUST_BELOW = np.nextafter(np.float32(1.0), np.float32(0.0))
 
 
 def frames_of(panels: Sequence[Placed], height_pt: float) -> tuple[Frame, ...]:
-    """Frames of a picture, but for axes that are neither linear nor logarithmic."""
+    """Frames of a picture, but for axes whose values the page does not tell."""
     boxes = [box for one in panels for box in one.boxes]
-    return tuple(_frame(box, height_pt) for box in boxes if "symlog" not in (box.x.scale, box.y.scale))
+    return tuple(_frame(box, height_pt) for box in boxes if not _UNTOLD & {box.x.scale, box.y.scale})
 
 
 def panels_of(panels: Sequence[Placed], height_pt: float) -> tuple[live.Panel, ...]:
@@ -64,7 +65,7 @@ def panels_of(panels: Sequence[Placed], height_pt: float) -> tuple[live.Panel, .
 def can_live(one: Placed) -> bool:
     """Whether all that stands on a panel is known to the page's script: curves, dots, bands, lanes over a number."""
     panel = one.panel
-    if panel.is_map or panel.nothing or panel.x.names or "symlog" in (panel.x.scale, panel.y.scale):
+    if panel.is_map or panel.nothing or panel.x.names or _UNTOLD & {panel.x.scale, panel.y.scale}:
         return False
     has_lanes = any(isinstance(mark, Lanes) for mark in panel.marks)
     if (names_of(panel) or has_rows(panel)) and not has_lanes:

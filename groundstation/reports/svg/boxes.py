@@ -186,19 +186,38 @@ def _has_scale(row: Row, column: int) -> bool:
 
 def _columns(plot: Plot, rows: list[list[_Told]]) -> tuple[list[list[float]], list[list[float]]]:
     """Room left and right of each panel: equal for those above each other, rows alike in their panels."""
-    keys = [tuple(round(panel.share, 3) for panel in row.panels) for row in plot.rows]
+    keys = [_shares(row) for row in plot.rows]
     lefts = [
-        [max(rows[other][column].left_pt for other in _alike(keys, row, column)) for column in range(len(rows[row]))]
+        [
+            max(
+                (rows[other][column].left_pt for other in _alike(keys, row, column) if column < len(rows[other])),
+                default=0.0,
+            )
+            for column in range(len(keys[row]))
+        ]
         for row in range(len(rows))
     ]
     rights = [
         [
-            max(rows[other][column].right_pt for other in range(len(rows)) if keys[other] == keys[row])
-            for column in range(len(rows[row]))
+            max(
+                (
+                    one[column].right_pt
+                    for one, key in zip(rows, keys, strict=True)
+                    if key == keys[row] and column < len(one)
+                ),
+                default=0.0,
+            )
+            for column in range(len(keys[row]))
         ]
         for row in range(len(rows))
     ]
     return lefts, rights
+
+
+def _shares(row: Row) -> tuple[float, ...]:
+    """Shares of the width of a row, those of columns without a panel among them."""
+    shares = [round(max(panel.share, 1e-3), 3) for panel in row.panels]
+    return (*shares, *[1.0] * (row.columns - len(shares)))
 
 
 def _alike(keys: Sequence[tuple[float, ...]], row: int, column: int) -> list[int]:
@@ -206,9 +225,8 @@ def _alike(keys: Sequence[tuple[float, ...]], row: int, column: int) -> list[int
 
 
 def _widths(plot: Plot, row: int, lefts: list[list[float]], rights: list[list[float]]) -> list[float]:
-    panels = plot.rows[row].panels
-    room = WIDTH_PT - EDGE_PT - sum(lefts[row]) - sum(rights[row]) - BETWEEN_PT * (len(panels) - 1)
-    shares = [max(panel.share, 1e-3) for panel in panels]
+    shares = _shares(plot.rows[row])
+    room = WIDTH_PT - EDGE_PT - sum(lefts[row]) - sum(rights[row]) - BETWEEN_PT * (len(shares) - 1)
     return [max(room * share / sum(shares), LEAST_PT) for share in shares]
 
 

@@ -129,7 +129,12 @@ def x_span(panel: Panel, drawn: Floats) -> Span:
     """Ends of the horizontal axis; ``drawn`` are those of what stands on it and on panels that share it."""
     axis = panel.x
     return span_of(
-        axis.scale, axis.low, axis.high, drawn, axis.linear_to, is_tight=axis.scale == "time" or _is_grid(panel)
+        axis.scale,
+        axis.low,
+        axis.high,
+        drawn,
+        axis.linear_to,
+        is_tight=axis.scale in ("time", "date") or _is_grid(panel),
     )
 
 

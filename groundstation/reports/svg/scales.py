@@ -96,7 +96,7 @@ def _apart(scale: Scale, first: float, last: float) -> tuple[float, float]:
         return (first, last) if last > first * (1.0 + LEAST_SPAN) else (first / 2.0, last * 2.0)
     if last - first > least:
         return first, last
-    margin = 1.0 if scale in ("time", "angle") else max(0.05 * abs(first), 1e-6)
+    margin = 1.0 if scale in ("time", "angle", "date") else max(0.05 * abs(first), 1e-6)
     return first - margin, last + margin
 
 

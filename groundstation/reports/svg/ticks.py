@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 
 from groundstation.chapters.wording import MINUS, NARROW_SPACE, clock
+from groundstation.reports.svg.dates import date_ticks
 from groundstation.reports.svg.font import width_pt
 from groundstation.reports.svg.scales import Span
 
@@ -31,6 +32,8 @@ def ticks_of(span: Span, length_pt: float, *, is_upright: bool) -> tuple[Tick, .
     low, high = min(span.low, span.high), max(span.low, span.high)
     if span.scale == "time":
         return _time(low, high, min(max(int(length_pt / TIME_ROOM_PT), 1), MOST))
+    if span.scale == "date":
+        return date_ticks(low, high, length_pt)
     if span.scale == "log":
         return _log(span, low, high, length_pt, is_upright)
     if span.scale == "symlog":
