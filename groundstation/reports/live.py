@@ -60,6 +60,11 @@ class Svg(str):
         made.panels, made.frames = panels, frames
         return made
 
+    @property
+    def is_painted(self) -> bool:
+        """Whether it is a picture, not the key of one that is to be painted."""
+        return self.startswith("<svg")
+
 
 def panels_of(figure: Any) -> tuple[Panel, ...]:
     """The axes of a painted figure from left to right and from top to bottom; none where one of them cannot live."""

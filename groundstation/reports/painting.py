@@ -79,14 +79,16 @@ def document_begun(tell: Callable[[], Document], processes: int = 1) -> Iterator
     with sketching() as sketches:
         document = tell()
     drawings = (part for section in document.sections for part in section.parts if isinstance(part, Drawing))
-    with painting_begun(sketches, processes, {drawing.svg: drawing.name for drawing in drawings}) as finish:
+    with painting_begun(
+        sketches, processes, {drawing.svg: drawing.name for drawing in drawings if not drawing.svg.is_painted}
+    ) as finish:
         yield Painting(document, finish)
 
 
 def _painted(parts: Iterable[Part], pictures: Mapping[str, Svg]) -> Iterator[Part]:
     """Parts with pictures; a drawing that has none is left out."""
     for part in parts:
-        if not isinstance(part, Drawing):
+        if not isinstance(part, Drawing) or part.svg.is_painted:
             yield part
         elif part.svg in pictures:
             yield replace(part, svg=pictures[part.svg])

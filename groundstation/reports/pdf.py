@@ -13,11 +13,12 @@ from groundstation.chapters.parts import Mark
 from groundstation.chapters.wording import clean
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.page import TEMPLATES
+from groundstation.reports.svg.font import FONTS
 from groundstation.results.files import write_bytes
 
 TEMPLATE = TEMPLATES / "report.typ"
-# A page inherits both from elsewhere: the name space from HTML, the joins from its style sheet.
-SVG_ALONE = '<svg xmlns="http://www.w3.org/2000/svg" stroke-linejoin="round" '
+# A page inherits them from elsewhere: the name space from HTML, joins and font from its style sheet.
+SVG_ALONE = '<svg xmlns="http://www.w3.org/2000/svg" stroke-linejoin="round" font-family="DejaVu Sans" '
 
 
 class PdfError(GroundstationError):
@@ -50,8 +51,8 @@ def pdf_bytes(document: object, template: Path | None = None) -> bytes:
     """Set a report and return the bytes of its PDF.
 
     The template imports and reads nothing: the document comes as one JSON text in ``sys.inputs``, whose strings typst
-    shows as they are. Its root is a folder that holds the template alone, its fonts are those in its package, its time
-    is 1970.
+    shows as they are. Its root is a folder that holds the template alone, its fonts are those in its package and, for
+    pictures, in ours, its time is 1970.
     """
     import typst
 
@@ -61,6 +62,7 @@ def pdf_bytes(document: object, template: Path | None = None) -> bytes:
             shutil.copy(template or TEMPLATE, root),
             root=root,
             ignore_system_fonts=True,
+            font_paths=[str(FONTS)],
             sys_inputs={"document": text},
             timestamp=0,
             format="pdf",

@@ -6,6 +6,7 @@ from dataclasses import replace
 from groundstation.base.failures import attempt
 from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.parts import Figure, Part, Section
+from groundstation.plots.plot import Plot
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures import (
     control,
@@ -27,9 +28,10 @@ from groundstation.reports.figures import (
     standstill,
     together,
 )
+from groundstation.reports.svg.picture import picture_of
 from groundstation.results.flight import FlightResults
 
-Drawn = Drawing | Sequence[Drawing] | None
+Drawn = Drawing | Plot | Sequence[Drawing | Plot] | None
 
 # By the name that a chapter gives; a figure that is one of several alike gets which.
 DRAWERS: dict[str, Callable[[FlightResults], Drawn] | Callable[[FlightResults, str], Drawn]] = {
@@ -100,7 +102,18 @@ def drawn_by(drawers: Mapping[str, Callable[..., Drawn]], section: Section, resu
             parts.append(part)
             continue
         name = ".".join(filter(None, (part.name, part.of)))
-        drawn = attempt("figure", name, drawers[part.name], results, *([part.of] if part.of else []))
-        found = () if drawn is None else [drawn] if isinstance(drawn, Drawing) else drawn
-        parts += [replace(one, name=name) for one in found]
+        found = attempt("figure", name, _drawings, drawers[part.name], results, *([part.of] if part.of else []))
+        parts += [replace(one, name=name) for one in found or ()]
     return replace(section, parts=tuple(parts))
+
+
+def _drawings(drawer: Callable[..., Drawn], *of: object) -> list[Drawing]:
+    """What a drawer makes, each description of a plot as a picture."""
+    drawn = drawer(*of)
+    several = [drawn] if isinstance(drawn, Drawing | Plot) else drawn or ()
+    return [drawing_of(one) if isinstance(one, Plot) else one for one in several]
+
+
+def drawing_of(plot: Plot) -> Drawing:
+    """The part of a report that shows a plot."""
+    return Drawing(plot.title, plot.caption, plot.alt, picture_of(plot), plot.numbers, plot.name)

@@ -1,0 +1,1 @@
+"""Pictures written from the description of a plot as SVG, without matplotlib."""

@@ -1,0 +1,93 @@
+"""A grid of values by colour, and its scale beside the frame."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.plots.marks import Cells, Floats
+from groundstation.plots.ranges import thin
+from groundstation.reports.svg import path
+from groundstation.reports.svg.boxes import BAR_PT, MOST_OF_A_TITLE, TICK_PT, TO_BAR_PT, TO_TEXT_PT, Box
+from groundstation.reports.svg.colours import EDGE, STEPS, viridis
+from groundstation.reports.svg.extents import edges
+from groundstation.reports.svg.font import SIZE_PT, label, middle, width_pt, written
+from groundstation.reports.svg.scales import Span
+from groundstation.reports.svg.ticks import ticks_of
+
+MOST_CELLS = 90  # along either axis
+
+
+def cells_shape(mark: Cells, box: Box) -> str:
+    """The cells of a grid: for each colour all that are at least as high, one over the other, so that no seam shows."""
+    columns, rows = thin(len(mark.x), MOST_CELLS), thin(len(mark.y), MOST_CELLS)
+    if not len(columns) or not len(rows) or mark.values.shape != (len(mark.y), len(mark.x)):
+        return ""
+    across, down = box.across(edges(mark.x[columns])), box.down(edges(mark.y[rows]))
+    if not (np.isfinite(across).all() and np.isfinite(down).all()):
+        return ""
+    across, down = np.clip(across, box.left, box.right), np.clip(down, box.top, box.bottom)
+    levels = _levels(mark, mark.values[np.ix_(rows, columns)])
+    parts = []
+    for step in np.unique(levels[levels >= 0]).tolist():
+        left, right, low, high = _blocks(levels >= step)
+        parts.append(
+            f'<path d="{path.boxes(across[left], across[right], down[low], down[high])}" fill="{_colour(step)}"/>'
+        )
+    return f'<g shape-rendering="crispEdges">{"".join(parts)}</g>'
+
+
+def _colour(step: int) -> str:
+    return viridis((step + 0.5) / STEPS)
+
+
+def _levels(mark: Cells, values: Floats) -> NDArray[np.int64]:
+    """Which colour each cell has, -1 for none."""
+    span = _scale(mark)
+    shares = span.shares(np.clip(values, None, span.high))
+    if mark.is_log:
+        shares = np.where(values <= 0.0, 0.0, shares)
+    known = np.isfinite(shares)
+    found = np.clip(np.floor(np.where(known, shares, 0.0) * STEPS), 0, STEPS - 1).astype(np.int64)
+    return np.where(known, found, -1)
+
+
+def _scale(mark: Cells) -> Span:
+    low, high = (float(end) if np.isfinite(end) else 0.0 for end in (mark.low, mark.high))
+    if mark.is_log:
+        low = low if low > 0.0 else 1e-3
+        return Span("log", low, high if high > low else 10.0 * low)
+    return Span("linear", low, high if high > low else low + max(1e-6, abs(low) * 1e-6))
+
+
+def _blocks(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:
+    """Blocks of cells: first column and that behind the last, first row and that behind the last; no cell twice."""
+    padded = np.pad(mask.astype(np.int8), ((0, 0), (1, 1)))
+    row, left = np.nonzero(np.diff(padded, axis=1) == 1)
+    right = np.nonzero(np.diff(padded, axis=1) == -1)[1]
+    order = np.lexsort((row, right, left))
+    row, left, right = row[order], left[order], right[order]
+    is_new = np.ones(len(row), dtype=bool)
+    is_new[1:] = (np.diff(left) != 0) | (np.diff(right) != 0) | (np.diff(row) != 1)
+    first = np.flatnonzero(is_new)
+    last = np.append(first[1:], len(row)) - 1
+    return left[first], right[first], row[first], row[last] + 1
+
+
+def scale_beside(mark: Cells, box: Box) -> str:
+    """The scale of colours right of a frame, with its ticks and title."""
+    span = _scale(mark)
+    left, step = box.right + TO_BAR_PT, box.height / STEPS
+    parts = []
+    for place in range(STEPS):  # each over the one before
+        edge = np.array([left]), np.array([left + BAR_PT]), np.array([box.top]), np.array([box.bottom - place * step])
+        parts.append(f'<path d="{path.boxes(*edge)}" fill="{_colour(place)}"/>')
+    right, widest, marks = left + BAR_PT, 0.0, []
+    for value, text in ticks_of(span, box.height, is_upright=True):
+        y = box.bottom - box.height * span.share(value)
+        marks.append(f"M{right:.2f} {y:.2f}h{TICK_PT:g}")
+        parts.append(written(text, right + TICK_PT + TO_TEXT_PT, y + middle()))
+        widest = max(widest, width_pt(text))
+    parts.append(f'<path d="{"".join(marks)}" stroke="{EDGE}" stroke-width=".6"/>')
+    title = label(mark.title, MOST_OF_A_TITLE)
+    x = right + TICK_PT + TO_TEXT_PT + widest + SIZE_PT + 2.0
+    parts.append(written(title, x, box.top + 0.5 * box.height, "middle", is_upright=True))
+    return "".join(parts)

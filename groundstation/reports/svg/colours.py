@@ -1,0 +1,106 @@
+"""The look of a picture: a colour for each role, widths of lines, shades of phases, the scale of cells."""
+
+import numpy as np
+
+from groundstation.plots.marks import Emphasis, Floats, Role
+
+INK, FAINT, EDGE, GRID, PAPER = "#1c2530", "#6b7683", "#8d97a3", "#e4e8ec", "#ffffff"
+
+# Okabe and Ito (2008), colour-blind safe. One meaning, one colour, in every figure.
+COLOURS: dict[Role, str] = {
+    "truth": INK,
+    "gnss": "#d55e00",
+    "ins": "#0072b2",
+    "answer": "#007f5f",
+    "limit": "#8a2be2",
+    "unused": "#a9b1ba",
+    "paper": PAPER,
+    "ink": INK,
+    "faint": FAINT,
+    "good": "#007f5f",
+    "warn": "#e69f00",
+    "bad": "#b3261e",
+    "other": "#cc79a7",
+    "series 1": "#0072b2",
+    "series 2": "#d55e00",
+    "series 3": "#007f5f",
+    "series 4": "#cc79a7",
+    "series 5": "#e69f00",
+    "series 6": "#56b4e9",
+    "series 7": "#7a6a00",
+}
+SHADES = {
+    "unknown": "#eef0f2",
+    "standstill": "#d9dee3",
+    "taxi": "#f6e3b4",
+    "take-off run": "#f2b8a0",
+    "airborne": "#d3e7f5",
+    "landing roll": "#e3cfe6",
+}
+LANE: dict[Emphasis, float] = {"faint": 0.3, "thin": 0.6, "usual": 1.0, "bold": 1.0}  # of a lane
+DOT: dict[Emphasis, float] = {"faint": 0.75, "thin": 0.75, "usual": 0.75, "bold": 1.0}  # of dots, which are many
+LIMIT_PT: dict[Emphasis, float] = {"faint": 0.6, "thin": 0.6, "usual": 0.9, "bold": 1.5}
+LINE_PT: dict[Emphasis, float] = {"faint": 0.5, "thin": 0.8, "usual": 1.1, "bold": 2.2}
+DOT_PT: dict[Emphasis, float] = {"faint": 1.3, "thin": 1.6, "usual": 1.8, "bold": 3.0}
+SHADE: dict[Emphasis, float] = {"faint": 0.10, "thin": 0.15, "usual": 0.19, "bold": 0.35}  # opacity of a band
+DASHES = {"dashed": "4 2", "dotted": "1 1.6"}
+SYMBOL_PT = 4.5  # across a symbol of the usual size
+
+# Viridis (van der Walt and Smith 2015, CC0) at sixteenths of its length.
+_VIRIDIS = "".join(
+    (
+        "440154 48186a 472d7b 424086 3b528b 33638d 2c728e 26828e 21918c ",
+        "1fa088 28ae80 3fbc73 5ec962 84d44b addc30 d8e219 fde725",
+    )
+)
+_VIRIDIS_AT = [[int(text[at : at + 2], 16) for at in (0, 2, 4)] for text in _VIRIDIS.split()]
+NO_PLACES: Floats = np.zeros(0)
+STEPS = 20  # colours of a scale
+
+
+def with_alpha(colour: str, alpha: float) -> str:
+    """Colour and opacity as one number.
+
+    Examples
+    --------
+    >>> with_alpha("#0072b2", 0.5)
+    '#0072b280'
+    """
+    return f"{colour}{round(255.0 * alpha):02x}"
+
+
+def opacity(of: str, share: float) -> str:
+    """The attribute of an opacity, none of what is opaque.
+
+    Examples
+    --------
+    >>> opacity("fill", 0.5), opacity("fill", 1.0)
+    (' fill-opacity="0.5"', '')
+    """
+    return "" if share == 1.0 else f' {of}-opacity="{share:g}"'
+
+
+def viridis(share: float) -> str:
+    """The colour at a share of the scale from 0 to 1.
+
+    Examples
+    --------
+    >>> viridis(0.0), viridis(0.5), viridis(1.0), viridis(7.0)
+    ('#440154', '#21918c', '#fde725', '#fde725')
+    """
+    place = min(max(share, 0.0), 1.0) * (len(_VIRIDIS_AT) - 1)
+    low = min(int(place), len(_VIRIDIS_AT) - 2)
+    ends = _VIRIDIS_AT[low : low + 2]
+    mixed = [round(one + (place - low) * (other - one)) for one, other in zip(*ends, strict=True)]
+    return "#" + "".join(f"{part:02x}" for part in mixed)
+
+
+def shade_of(kind: str, role: Role, emphasis: Emphasis = "usual") -> tuple[str, float]:
+    """Colour and opacity of shaded ground: a phase of flight has its own, all else a faint one of its role.
+
+    Examples
+    --------
+    >>> shade_of("taxi", "ink"), shade_of("95 %", "answer", "faint")
+    (('#f6e3b4', 1.0), ('#007f5f', 0.1))
+    """
+    return (SHADES[kind], 1.0) if kind in SHADES else (COLOURS[role], SHADE[emphasis])

@@ -1,0 +1,225 @@
+"""A plot as a picture: its description written as one SVG element, and the panels by which a page draws it live.
+
+The element has neither style sheet nor script and refers to nothing outside of itself. Its text takes the font of where
+it stands. Equal descriptions give equal bytes.
+"""
+
+import re
+import zlib
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from groundstation.plots.marks import AnyMark, Cells, Floats, Limit, Outlines, Points, Spans
+from groundstation.plots.plot import Plot
+from groundstation.reports.live import Svg
+from groundstation.reports.svg import boxes as b
+from groundstation.reports.svg import legend
+from groundstation.reports.svg.alive import frames_of, panels_of
+from groundstation.reports.svg.boxes import Box, Placed, placed
+from groundstation.reports.svg.cells import scale_beside
+from groundstation.reports.svg.colours import COLOURS, EDGE, FAINT, GRID, INK, PAPER
+from groundstation.reports.svg.extents import has_rows, names_of
+from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, TITLE_PT, label, lines_of, middle, width_pt, written
+from groundstation.reports.svg.shapes import is_within, shape
+from groundstation.reports.svg.ticks import Tick
+
+MOST_LABELS, MOST_OF_A_LABEL = 60, 24
+LABEL_SHARE = 0.66  # of the width: where the label of a line across begins
+HALO = f' stroke="{PAPER}" stroke-width="2.4" paint-order="stroke"'
+_NOT_IN_AN_ID = re.compile(r"[^A-Za-z0-9_-]+")
+
+
+def picture_of(plot: Plot) -> Svg:
+    """Write a plot as an SVG element that can stand in a page, with its panels; its frames where it cannot live."""
+    panels, height = placed(plot)
+    key = key_of(plot.name)
+    clips, parts, number = [], [], 0
+    for one in panels:
+        for box in one.boxes:
+            frame = f"M{box.left:.2f} {box.top:.2f}h{box.width:.2f}v{box.height:.2f}h-{box.width:.2f}z"
+            clips.append(f'<clipPath id="{key}-c{number}"><path d="{frame}"/></clipPath>')
+            parts.append(_frame(box, f"{key}-c{number}"))
+            number += 1
+        parts.append(_around(one))
+    head = f'<svg viewBox="0 0 {b.WIDTH_PT:.2f} {height:.2f}" aria-hidden="true" font-size="{SIZE_PT:g}" fill="{INK}">'
+    live = panels_of(panels, height)
+    return Svg(
+        f"{head}<defs>{''.join(clips)}</defs>{''.join(parts)}</svg>", live, () if live else frames_of(panels, height)
+    )
+
+
+def key_of(name: str) -> str:
+    """The name of a plot as names within its picture begin.
+
+    Examples
+    --------
+    >>> key_of("heading.difference"), key_of("a b") == key_of("a/b")
+    ('heading-difference-21a38b2c', False)
+    """
+    kept = _NOT_IN_AN_ID.sub("-", name)
+    return kept if kept == name else f"{kept[:60]}-{zlib.crc32(name.encode('utf-8', 'replace')):08x}"
+
+
+def _frame(box: Box, clip: str) -> str:
+    """One frame: grid, axes, what stands on it."""
+    under: list[tuple[AnyMark, str]] = []
+    over: list[tuple[AnyMark, str]] = []
+    for mark in box.panel.marks:
+        (under if is_within(mark) else over).append((mark, shape(mark, box)))
+    has_grid = not any(isinstance(mark, Cells) for mark in box.panel.marks)
+    grounds = "".join(told for mark, told in under if isinstance(mark, Spans | Cells))
+    rest = "".join(told for mark, told in under if not isinstance(mark, Spans | Cells))
+    within = f'<g clip-path="url(#{clip})">{grounds}{_grid(box) if has_grid else ""}{rest}</g>'
+    return within + _axes(box) + "".join(told for _, told in over) + _labels(box) + _nothing(box)
+
+
+def _x_places(box: Box) -> list[tuple[float, str]]:
+    return _places(box.x_ticks, box.across, box.left, box.right)
+
+
+def _y_places(box: Box) -> list[tuple[float, str]]:
+    return _places(box.y_ticks, box.down, box.top, box.bottom)
+
+
+def _places(
+    ticks: tuple[Tick, ...], along: Callable[[Floats], Floats], low: float, high: float
+) -> list[tuple[float, str]]:
+    """Ticks by their points along an edge, those that lie on it."""
+    points = along(np.array([place for place, _ in ticks], dtype=np.float64))
+    found = zip(points.tolist(), (text for _, text in ticks), strict=True)
+    return [(point, text) for point, text in found if low - 0.1 <= point <= high + 0.1]
+
+
+def _grid(box: Box) -> str:
+    lines = [f"M{x:.2f} {box.top:.2f}v{box.height:.2f}" for x, _ in _x_places(box)]
+    if not (names_of(box.panel) or has_rows(box.panel)):
+        lines += [f"M{box.left:.2f} {y:.2f}h{box.width:.2f}" for y, _ in _y_places(box)]
+    return f'<path d="{"".join(lines)}" stroke="{GRID}" stroke-width=".5"/>' if lines else ""
+
+
+def _axes(box: Box) -> str:
+    """Edges, ticks and what is written there."""
+    parts = [f"M{box.left:.2f} {box.top:.2f}V{box.bottom:.2f}H{box.right:.2f}"]
+    texts = []
+    for x, text in _x_places(box):
+        parts.append(f"M{x:.2f} {box.bottom:.2f}v{b.TICK_PT:g}")
+        if box.has_x_texts:
+            texts.append(written(text, x, box.bottom + b.TICK_PT + b.TO_TEXT_PT + 2 * middle(), "middle"))
+    for y, text in _y_places(box):
+        if not names_of(box.panel):
+            parts.append(f"M{box.left:.2f} {y:.2f}h-{b.TICK_PT:g}")
+        if box.has_y_texts:
+            texts.append(written(text, box.left - b.TICK_PT - b.TO_TEXT_PT, y + middle(), "end"))
+    if box.x_title:
+        y = box.bottom + b.TICK_PT + b.TO_TEXT_PT + 2 * LINE_SHARE * SIZE_PT
+        texts.append(written(box.x_title, box.left + 0.5 * box.width, y, "middle"))
+    texts += _upright_title(box)
+    return f'<path d="{"".join(parts)}" fill="none" stroke="{EDGE}" stroke-width=".6"/>' + "".join(texts)
+
+
+def _upright_title(box: Box) -> Iterator[str]:
+    lines = b.title_lines(box.y_title, box.height + 16.0)
+    x = box.left - b.TICK_PT - b.TO_TEXT_PT - b.widest(box.y_ticks) - b.TO_TITLE_PT
+    for place, line in enumerate(reversed(lines)):
+        at = x - LINE_SHARE * SIZE_PT * place - 0.2 * SIZE_PT
+        yield written(line, at, box.top + 0.5 * box.height, "middle", is_upright=True)
+
+
+def _nothing(box: Box) -> str:
+    """Why a panel is empty, in the middle of its frame."""
+    if not box.panel.nothing:
+        return ""
+    lines = lines_of(label(box.panel.nothing, 200), box.width - 8.0, 4)
+    x, y = box.left + 0.5 * box.width, box.top + 0.5 * box.height + middle()
+    first = y - 0.5 * LINE_SHARE * SIZE_PT * (len(lines) - 1)
+    return "".join(
+        written(line, x, first + LINE_SHARE * SIZE_PT * place, "middle", look=f' fill="{FAINT}"')
+        for place, line in enumerate(lines)
+    )
+
+
+def _labels(box: Box) -> str:
+    """Labels of points and outlines beside their places, each where it covers no other if there is room."""
+    wanted: list[tuple[float, float, str, str, bool]] = []
+    for mark in box.panel.marks:
+        if isinstance(mark, Points):
+            places = zip(box.across(mark.x).tolist(), box.down(mark.y).tolist(), mark.labels, strict=False)
+            wanted += [(x, y, text, COLOURS[mark.role], False) for x, y, text in places]
+        elif isinstance(mark, Outlines):
+            for ring, text in zip(mark.rings, mark.labels, strict=False):
+                corners = np.column_stack([box.across(ring[:-1, 0]), box.down(ring[:-1, 1])])
+                corners = corners[np.isfinite(corners).all(axis=1)]
+                if len(corners):
+                    middle_x, middle_y = corners.mean(axis=0).tolist()
+                    wanted.append((middle_x, middle_y, text, FAINT, True))
+    taken: list[tuple[float, float, float, float]] = []
+    parts = [_beside(mark, box) for mark in box.panel.marks if isinstance(mark, Limit) and mark.label]
+    inside = [one for one in wanted if box.left <= one[0] <= box.right and box.top <= one[1] <= box.bottom and one[2]]
+    for x, y, text, colour, is_middle in inside[:MOST_LABELS]:
+        shown = label(text, MOST_OF_A_LABEL)
+        left, base = _free(x, y, width_pt(shown), taken, box, is_middle)
+        parts.append(written(shown, left, base, look=f' fill="{colour}"{HALO}'))
+    return "".join(parts)
+
+
+def _beside(mark: Limit, box: Box) -> str:
+    """The label of a line across the frame: above it, or right of an upright one."""
+    shown = label(mark.label, MOST_OF_A_LABEL)
+    place = float((box.across if mark.is_upright else box.down)(np.array([mark.value]))[0])
+    low, high = (box.left, box.right) if mark.is_upright else (box.top, box.bottom)
+    if not low <= place <= high:
+        return ""
+    along = box.left + min(LABEL_SHARE * box.width, max(box.width - width_pt(shown) - 2.0, 0.0))
+    x, y = (place + 2.0, box.top + SIZE_PT) if mark.is_upright else (along, place - 2.0)
+    return written(shown, x, y, look=f' fill="{COLOURS[mark.role]}"{HALO}')
+
+
+def _free(
+    x: float, y: float, wide: float, taken: list[tuple[float, float, float, float]], box: Box, is_middle: bool
+) -> tuple[float, float]:
+    """Left end and base line of a label: above its place, below, right or left of it, where no other stands."""
+    high = SIZE_PT
+    above, below, level = y - 4.5, y + 4.0 + 2 * middle(), y + middle()
+    tries = [(x - 0.5 * wide, above), (x - 0.5 * wide, below), (x + 5.0, level), (x - 5.0 - wide, level)]
+    if is_middle:
+        tries.insert(0, (x - 0.5 * wide, level))
+    tries += [(x - 0.5 * wide, above - high), (x - 0.5 * wide, below + high)]
+    tries += [(x + 3.0, above), (x - 3.0 - wide, above), (x + 3.0, below), (x - 3.0 - wide, below)]
+    bounds = [(left, base - high, left + wide, base + 0.2 * high) for left, base in tries]
+    is_free = [_inside(one, box) and not any(_meet(one, other) for other in taken) for one in bounds]
+    place = is_free.index(True) if True in is_free else 0
+    taken.append(bounds[place])
+    return tries[place]
+
+
+def _inside(one: tuple[float, float, float, float], box: Box) -> bool:
+    return one[0] >= box.left - 20.0 and one[2] <= box.right + b.EDGE_PT and one[1] >= box.top and one[3] <= box.bottom
+
+
+def _meet(one: tuple[float, float, float, float], other: tuple[float, float, float, float]) -> bool:
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+
+
+def _around(one: Placed) -> str:
+    """Title and legend of a panel, and the scale of its cells."""
+    first = one.boxes[0]
+    parts = []
+    y = first.top - 3.0 - 0.5 * legend.LINE_PT
+    for line in reversed(one.lines):
+        parts.append(legend.drawn_line(line, one.right, y))
+        y -= legend.LINE_PT
+    if one.title:
+        at = y if one.has_own_line or not one.lines else first.top - 3.0 - 0.5 * legend.LINE_PT
+        bold = ' font-weight="bold"'
+        parts.append(written(one.title, first.left, at + middle(TITLE_PT), size_pt=TITLE_PT, look=bold))
+    cells = b.scale_of(one.panel)
+    if cells is not None and one.has_scale:
+        parts.append(scale_beside(cells, one.boxes[-1]))
+    if one.panel.legend == "beside":
+        right = one.right + 8.0 + (b.SCALE_PT if one.has_scale else 0.0)
+        parts += [
+            legend.drawn(entry, right, first.top + 6.0 + legend.LINE_PT * 1.1 * place)
+            for place, entry in enumerate(one.entries)
+        ]
+    return "".join(parts)

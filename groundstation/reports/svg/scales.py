@@ -1,0 +1,112 @@
+"""Scales of axes: where a value lies between the ends, and the ends of what has none of its own."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.plots.marks import Floats
+from groundstation.plots.plot import Scale
+from groundstation.plots.ranges import finite
+
+LINEAR_SHARE = 10.0 / 9.0  # of a decade: the room of a symlog scale from zero to where it becomes logarithmic
+MARGIN = 0.05  # of what is drawn, on either side
+LEAST_SPAN = 1e-9  # of the greater end: ends nearer to each other are moved apart
+SMALLEST = 1e-200  # ends nearer to each other are one, and nothing smaller stands on a logarithmic scale
+LARGEST = 1e200  # what is beyond is as good as infinite, and its squares are not
+
+
+@dataclass(frozen=True)
+class Span:
+    """A scale with its ends; one that runs backwards has the greater first."""
+
+    scale: Scale
+    low: float
+    high: float
+    linear_to: float = 1.0
+
+    def shares(self, values: Floats) -> Floats:
+        """Share of the way from ``low`` to ``high``; NaN where the scale has no place for a value."""
+        ends = self._drawn(np.array([self.low, self.high]))
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.asarray((self._drawn(values) - ends[0]) / (ends[1] - ends[0]), dtype=np.float64)
+
+    def share(self, value: float) -> float:
+        """Share of the way for one value."""
+        return float(self.shares(np.array([value]))[0])
+
+    def _drawn(self, values: Floats) -> Floats:
+        values = np.where(np.isfinite(values), np.clip(values, -LARGEST, LARGEST), np.nan)
+        if self.scale == "log":
+            return np.asarray(np.log10(np.where(values >= SMALLEST, values, np.nan)))
+        if self.scale == "symlog":
+            size = np.abs(values) / self.linear_to
+            with np.errstate(divide="ignore"):
+                beyond = LINEAR_SHARE + np.log10(np.maximum(size, 1.0))
+            return np.asarray(np.sign(values) * np.where(size <= 1.0, LINEAR_SHARE * size, beyond))
+        return values
+
+
+def span_of(
+    scale: Scale,
+    low: float | None,
+    high: float | None,
+    drawn: Floats,
+    linear_to: float = 1.0,
+    *,
+    is_tight: bool = False,
+) -> Span:
+    """The scale with ends: its own, else those of what is drawn, with a little around them unless ``is_tight``.
+
+    Examples
+    --------
+    >>> span_of("linear", None, 10.0, np.array([0.0, 4.0]), is_tight=True)
+    Span(scale='linear', low=0.0, high=10.0, linear_to=1.0)
+    >>> span_of("log", None, None, np.zeros(0), is_tight=True).low
+    1.0
+    """
+    linear_to = linear_to if math.isfinite(linear_to) and linear_to > 0.0 else 1.0
+    known = np.clip(finite(drawn), -LARGEST, LARGEST)
+    if scale == "log":
+        known = known[known >= SMALLEST]
+        low, high = (end if end is None or end >= SMALLEST else None for end in (low, high))
+    ends = [float(known.min()), float(known.max())] if known.size else [1.0, 10.0] if scale == "log" else [0.0, 1.0]
+    given = [None if end is None or not math.isfinite(end) else min(max(end, -LARGEST), LARGEST) for end in (low, high)]
+    is_reversed = all(end is not None for end in given) and given[0] > given[1]  # type: ignore[operator]
+    if is_reversed:
+        given.reverse()
+    if not known.size and given != [None, None]:  # one end is known, nothing else
+        ends = [one if one is not None else (given[1] or 0.0) - 1.0 for one in given[:1]] + [
+            one if one is not None else (given[0] or 0.0) + 1.0 for one in given[1:]
+        ]
+        if scale == "log":
+            ends = [given[0] or 0.1 * (given[1] or 10.0), given[1] or 10.0 * (given[0] or 1.0)]
+    first, last = (own if own is not None else end for own, end in zip(given, ends, strict=True))
+    first, last = _apart(scale, first, last)
+    if not is_tight:
+        first, last = _wider(scale, (first, last), (given[0] is None, given[1] is None), linear_to)
+    return Span(scale, last, first, linear_to) if is_reversed else Span(scale, first, last, linear_to)
+
+
+def _apart(scale: Scale, first: float, last: float) -> tuple[float, float]:
+    """Ends that are not one, nor so near that no number lies between them."""
+    first, last = min(first, last), max(first, last)
+    least = max(LEAST_SPAN * max(abs(first), abs(last)), SMALLEST)
+    if scale == "log":
+        return (first, last) if last > first * (1.0 + LEAST_SPAN) else (first / 2.0, last * 2.0)
+    if last - first > least:
+        return first, last
+    margin = 1.0 if scale in ("time", "angle", "date") else max(0.05 * abs(first), 1e-6)
+    return first - margin, last + margin
+
+
+def _wider(
+    scale: Scale, ends: tuple[float, float], is_open: tuple[bool, bool], linear_to: float
+) -> tuple[float, float]:
+    """Ends with a margin where they are not given."""
+    span = Span(scale, *ends, linear_to)
+    if scale == "log":
+        factor = (ends[1] / ends[0]) ** MARGIN
+        return ends[0] / (factor if is_open[0] else 1.0), ends[1] * (factor if is_open[1] else 1.0)
+    margin = MARGIN * (span.high - span.low)
+    return ends[0] - (margin if is_open[0] else 0.0), ends[1] + (margin if is_open[1] else 0.0)
