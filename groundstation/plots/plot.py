@@ -8,8 +8,9 @@ from groundstation.plots.marks import AnyMark
 
 WIDTH_MM = 178.0  # the printable width of A4
 
-# A scale of time is written as minutes and seconds; of an angle in steps of 30; a symlog one is linear about zero.
-Scale = Literal["linear", "log", "symlog", "time", "angle"]
+# A scale of time is written as minutes and seconds; of an angle in steps of 30; a symlog one is linear about zero; one
+# of dates holds seconds since 1970, UTC.
+Scale = Literal["linear", "log", "symlog", "time", "angle", "date"]
 
 
 @dataclass(frozen=True)
@@ -77,11 +78,15 @@ class Panel:
 
 @dataclass(frozen=True)
 class Row:
-    """Panels side by side, of one height; ``shares_x``: their axis is that of the row below, where it is written."""
+    """Panels side by side, of one height; ``shares_x``: their axis is that of the row below, where it is written.
+
+    ``columns``: each panel is as wide as one of so many, where the row holds fewer.
+    """
 
     panels: tuple[Panel, ...]
     height_mm: float = 40.0
     shares_x: bool = False
+    columns: int = 0
 
 
 @dataclass(frozen=True)
