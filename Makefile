@@ -58,10 +58,10 @@ slow: $(DEV) ## the long Monte Carlo tests
 fuzz: $(DEV) ## mutated logs through every reader for three minutes; FUZZ=10000: so many of each format
 	$(BIN)/python -m tests.fuzz
 
-schemas: $(DEV) ## make the package's descriptor set from schemas/*.proto, schemas/summary.schema.json from the results
+schemas: $(DEV) ## make the package's descriptor set from schemas/*.proto, schemas/*.schema.json from the results
 	$(BIN)/python -m grpc_tools.protoc -Ischemas --include_imports \
 		--descriptor_set_out=groundstation/store/descriptors.binpb schemas/*.proto
-	$(BIN)/python -m groundstation.pipeline.verbs.schema schemas/summary.schema.json
+	$(BIN)/python -m groundstation.pipeline.verbs.schema schemas/summary.schema.json schemas/installations.schema.json
 
 bench: $(RUNTIME) ## benchmarks against peers, printed as ratios
 	$(PIP) -e '.[bench]'

@@ -63,8 +63,8 @@ def test_front_tells_flight_verdict_and_number_to_type() -> None:
     assert told.verdict == Mark("good", "Accept")
     assert told.headline == "Enter −1.05°" and told.to_sign
     assert told.sentences[0] == "Every required gate passed."
-    assert told.sentences[1] == "Failed, but does not decide: Excess kurtosis 2.4 (wanted −1.2 … 2)."
-    assert told.sentences[2].startswith("INS heading reads too high by 1.04°")
+    assert told.sentences[1].startswith("INS heading reads too high by 1.04°")
+    assert told.sentences[-1] == "Failed, but does not decide: Excess kurtosis 2.4 (wanted −1.2 … 2)."
     assert (told.subject, told.key) == ("Heading correction", "heading")
     pairs = dict(told.pairs)
     assert pairs["Start"] == "2026-05-04 06:00:00 UTC"
@@ -76,8 +76,10 @@ def test_front_tells_flight_verdict_and_number_to_type() -> None:
 
 
 def test_advisory_says_how_good_the_number_is_and_gives_none_to_type() -> None:
-    answer = heading_result(verdict="advisory", confidence95_deg=(0.6, 1.4))
+    reason = "good to +-24 arcmin; taxi the other way. To be entered only where that is enough: -1 deg"
+    answer = heading_result(verdict="advisory", confidence95_deg=(0.6, 1.4), verdict_reason=reason)
     found = claim(answer)
+    assert found.sentences[0] == "Taxi the other way.", "the headline says how good"
     assert found.mark == Mark("warn", "Advisory")
     assert found.headline == "Good to ± 24′ only: taxi the other way, or state the wind" and not found.to_sign
 
@@ -99,7 +101,7 @@ def test_other_verdicts_give_no_number_to_type(verdict: str, mark: Mark, headlin
     results = example(heading_result(verdict=verdict, verdict_reason="a gate says so", correction_deg=None))
     told = front(results)
     assert (told.verdict, told.headline, told.to_sign) == (mark, headline, False)
-    assert told.sentences[0] == "A gate says so." and told.sentences[-1] == "INS heading reads too high by 1.04°."
+    assert told.sentences[0] == "A gate says so." and told.sentences[1] == "INS heading reads too high by 1.04°."
     assert heading(results).headline == f"{mark.symbol} {mark.text} · {headline}"
 
 
@@ -112,7 +114,7 @@ def test_accepted_error_below_half_a_step_needs_nothing_typed() -> None:
     [(1.5, "too high by 1.50°"), (-0.4, "too low by 0.40°"), (0.001, "agrees"), (float("nan"), "not be estimated")],
 )
 def test_words_say_the_sense_of_the_error(error_deg: float, word: str) -> None:
-    assert word in front(example(heading_result(error_deg=error_deg))).sentences[-1]
+    assert word in front(example(heading_result(error_deg=error_deg))).sentences[1]
 
 
 def test_flight_without_heading_says_why_on_the_front() -> None:

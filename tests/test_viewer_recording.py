@@ -437,3 +437,16 @@ def _bare_results(flight: Flight) -> FlightResults:
     """Results without a single figure."""
     source = Source("a.csv", "0" * 64, 0, "flat-csv")
     return FlightResults("20260504T060000Z", source, {}, START_NS, flight.duration_s, "failed")
+
+
+def test_a_recording_leaves_no_thread_behind(tmp_path: Path, flight: Flight, results: FlightResults) -> None:
+    """A process that writes many recordings keeps the threads of none; Rerun's own way to send a layout leaves two."""
+
+    def threads() -> int:
+        return len(list(Path("/proc/self/task").iterdir()))
+
+    write_recording(tmp_path / "first.rrd", flight, results)
+    before = threads()
+    for number in range(4):
+        write_recording(tmp_path / f"{number}.rrd", flight, results)
+    assert threads() <= before

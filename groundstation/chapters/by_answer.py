@@ -9,6 +9,7 @@ from groundstation.chapters.forecast import forecast
 from groundstation.chapters.generic import generic
 from groundstation.chapters.heading import heading
 from groundstation.chapters.inertial import inertial
+from groundstation.chapters.installation import installation
 from groundstation.chapters.landing import landing
 from groundstation.chapters.landing_beacons import landing_beacons
 from groundstation.chapters.latency import latency
@@ -23,6 +24,7 @@ from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
+from groundstation.results.installation import InstallationResult
 from groundstation.results.landing import LandingResult
 from groundstation.results.landing_beacons import BeaconLanding
 from groundstation.results.latency import Latencies
@@ -33,6 +35,7 @@ from groundstation.results.together import Together
 
 # In the order of the report. An answer that none of them tells has the generic chapter.
 FLIGHT_CHAPTERS: tuple[Chapter, ...] = (
+    Chapter((InstallationResult,), installation),
     Chapter((HeadingResult,), heading),
     Chapter((InertialResult,), inertial),
     Chapter((ForecastResult,), forecast),

@@ -19,6 +19,7 @@ WORKINGS = ("density", "convergence", "spectrum")
 STANDSTILL_FIGURES = (Figure("standstill.components"), Figure("standstill.mean_speed"))
 AIRCRAFT = "aircraft."  # what begins the names of settings of the aircraft file
 HELD = "The receiver holds its velocity at standstill, so its error there cannot be seen."
+NO_SERIAL = "no INS serial is stated (ins_serial): earlier flights of the unit cannot be found"
 UNKNOWN_REASON = "the log does not hold what the method needs"
 USES = {"exclude": "Left out by hand", "force": "Used by hand despite the gates"}
 ESTIMATE_HEADS = (Head("Estimate"), Head("Value", True), Head("95 %", True), Head("Meaning"))
@@ -51,8 +52,14 @@ def heading(results: FlightResults) -> Section:
         *_standstill(answer.standstill),
         _by_hand(results.chosen),
     )
+    has_serial = bool(results.metadata.get("ins_serial") or answer.settings.get("aircraft.ins_serial"))
     workings = (
-        *(_estimates(answer), _spread(answer), _geometry(answer), _standstill_facts(answer.standstill)),
+        *(
+            _estimates(answer),
+            _spread(answer, has_serial=has_serial),
+            _geometry(answer),
+            _standstill_facts(answer.standstill),
+        ),
         *(Figure(f"heading.{name}") for name in WORKINGS),
         *_settings(answer.settings),
     )
@@ -208,7 +215,7 @@ def _geometry(answer: HeadingResult) -> Facts:
     return Facts("Lever arm, time offset, drift", pairs)
 
 
-def _spread(answer: HeadingResult) -> Facts | None:
+def _spread(answer: HeadingResult, *, has_serial: bool) -> Facts | None:
     """What parts of the taxi have of their own, what is added for steady terms, and steps."""
     if not is_number(answer.steady_sigma_deg):
         return None
@@ -218,6 +225,7 @@ def _spread(answer: HeadingResult) -> Facts | None:
         ("Wander of INS heading minus path, σ", number(answer.wander_spread_deg, 3, "°"), wander),
         *_of_the_wind(answer),
         ("Remaining steady sideslip, σ", number(answer.steady_sigma_deg, 3, "°"), answer.steady_origin),
+        *([] if has_serial else [("Learned of the installation", "nothing", NO_SERIAL)]),
         *(
             ("Step of the INS heading", number(step.size_deg, 2, "°", signed=True), f"at {clock(step.time_s)}")
             for step in answer.steps

@@ -12,10 +12,11 @@ from groundstation.results.heading import HeadingResult
 PUBLISHED_LIMIT_ARCMIN = 20.0
 PARTS: Mapping[str, str] = {"taxi": "this taxi", "wind": "wind", "installation": "installation"}
 SAME_EVERYWHERE = (
-    "It holds for even power and free brakes: taxi on one engine, or against a brake that drags, adds 9 to 24 arcmin "
-    "that nothing shows, not even there and back."
+    "It holds for even power and free brakes: one engine, or a brake that drags, adds 9 to 24′ that nothing shows, not "
+    "even there and back."
 )
 UNEVEN_POWER = "Uneven power is stated: what it may add is in the interval, under installation."
+GOOD_TO = "good to +-"  # what the reason of an advisory begins with; the headline says it
 VERDICTS: Mapping[str, Mark] = {
     "accept": Mark("good", "Accept"),
     "advisory": Mark("warn", "Advisory"),
@@ -63,9 +64,8 @@ def reasons(heading: HeadingResult) -> tuple[str, ...]:
     why = typeset(
         re.split(r": enter |\. Not to be entered|\. To be entered", heading.verdict_reason)[0]
     )  # told by the headline
-    each = (sentence(part) for part in why.split("; "))
-    found = failed_to_inform(heading.gates), _in_words(heading), steady_terms(heading)
-    return tuple(filter(None, (*each, *found)))
+    each = [sentence(part) for part in why.split("; ") if not part.startswith(typeset(GOOD_TO))]
+    return tuple(filter(None, (*each, _in_words(heading), *steady_terms(heading), failed_to_inform(heading.gates))))
 
 
 def half_width(ends: tuple[float, float]) -> str:
@@ -73,25 +73,18 @@ def half_width(ends: tuple[float, float]) -> str:
     return f"± {number(0.5 * (ends[1] - ends[0]) * ARCMIN_PER_DEG, 0, '′')}"
 
 
-def steady_terms(heading: HeadingResult) -> str:
-    """What of the interval this taxi, the wind and the installation make; empty where not known."""
-    measured, sigma = heading.confidence95_measured_deg, heading.steady_sigma_deg
-    if measured is None or not all(map(is_number, measured)) or not is_number(sigma):
-        return ""
-    driven = "the directions driven do not remove" if heading.directions else "this taxi cannot show"
-    origin = "as the aircraft file states" if heading.steady_origin == "aircraft file" else "shipped figures"
-    text = (
-        f"95 % interval {interval(heading.confidence95_deg, 3, '°')}, including steady sideslip that "
-        f"{driven} (σ {number(sigma, 2, '°')}, {origin}); {interval(measured, 3, '°')} from this taxi alone."
-    )
+def steady_terms(heading: HeadingResult) -> tuple[str, ...]:
+    """What of the interval this taxi, the wind and the installation make, and what it is of; none where not known."""
+    if not is_number(heading.steady_sigma_deg):
+        return ()
     power = UNEVEN_POWER if heading.settings.get("aircraft.taxi_power") == "uneven" else SAME_EVERYWHERE
-    return " ".join(filter(None, (text, _parts(heading), _typed(heading), power)))
+    return tuple(filter(None, (_parts(heading), power, _typed(heading))))
 
 
 def _parts(heading: HeadingResult) -> str:
     """The parts that the interval is made of, each as the half width it would have alone."""
     parts = (
-        f"{PARTS.get(one.name, one.name)} ± {number(one.half_width_deg * ARCMIN_PER_DEG, 1, '′')}"
+        f"{PARTS.get(one.name, one.name)} ± {number(one.half_width_deg * ARCMIN_PER_DEG, 0, '′')}"
         for one in heading.interval_parts
     )
     told = ", ".join(parts)
@@ -101,7 +94,8 @@ def _parts(heading: HeadingResult) -> str:
         if wind
         else ""
     )
-    return f"Its parts: {told}.{known}" if told else ""
+    origin = ", by the aircraft file" if heading.steady_origin == "aircraft file" else ""
+    return f"95 %, {half_width(heading.confidence95_deg)}: {told}{origin}.{known}" if told else ""
 
 
 def _typed(heading: HeadingResult) -> str:
@@ -111,8 +105,8 @@ def _typed(heading: HeadingResult) -> str:
         return ""
     azimuth = number(heading.platform_error_deg, 3, "°", signed=True)
     return (
-        "The airframe's error is the one that is typed, because it is the airframe that is pointed and checked; the "
-        f"platform's azimuth error, the mounting taken off, is {azimuth} {half_width(ends)}."
+        "This is the airframe's error, which is typed because the airframe is what is pointed and checked; the "
+        f"platform's, mounting taken off, is {azimuth} {half_width(ends)}."
     )
 
 

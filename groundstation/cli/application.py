@@ -189,6 +189,16 @@ WeatherFile = Annotated[
         readable=False,
     ),
 ]
+InstallationFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--installation",
+        help="installations.json of earlier flights: a second heading answer, with the mounting and the crosswind "
+        "factor that they taught.",
+        metavar="FILE",
+        readable=False,
+    ),
+]
 SiteFile = Annotated[
     Path | None,
     typer.Option(

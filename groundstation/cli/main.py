@@ -27,6 +27,7 @@ from groundstation.cli.application import (
     FailOnMode,
     Force,
     IcdFiles,
+    InstallationFile,
     IntervalsFile,
     Isolate,
     Jobs,
@@ -217,6 +218,7 @@ def run(
     site: SiteFile = None,
     intervals: IntervalsFile = None,
     weather: WeatherFile = None,
+    installation: InstallationFile = None,
     thresholds: ThresholdsFile = None,
     profile: Profile = None,
     icd: IcdFiles = None,
@@ -269,11 +271,12 @@ def run(
     from groundstation.pipeline.many_flights.batch import run_many, run_together
     from groundstation.pipeline.many_flights.dry_run import plan_many
     from groundstation.pipeline.many_flights.references import judged_by
-    from groundstation.pipeline.one_flight.configuration import applying, load_configuration
+    from groundstation.pipeline.one_flight.configuration import applying, installed_as, load_configuration
 
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd, weather)
     is_one_log = together or (len(paths) == 1 and not Path(paths[0]).is_dir())
-    configuration = judged_by(applying(settings, apply), reference or (), is_one_log=is_one_log)
+    settings = installed_as(applying(settings, apply), installation)
+    configuration = judged_by(settings, reference or (), is_one_log=is_one_log)
     if together and (dry_run or scheduler or stations is not None or timeout is not None or store or isolate):
         beside = "--dry-run, --scheduler, --stations, --timeout, --store or --isolate"
         raise UsageError("--together", beside, "--together without them")

@@ -45,9 +45,12 @@ def simulate(
 @answers_with_exit_code
 def study(
     name: Annotated[
-        Literal["heading", "crew", "forecast", "magnetic", "cooperative", "control", "landing", "approach"],
+        Literal[
+            "heading", "crew", "installation", "forecast", "magnetic", "cooperative", "control", "landing", "approach"
+        ],
         typer.Argument(
-            help="heading, crew, forecast, magnetic, cooperative, control, landing or approach.", metavar="NAME"
+            help="heading, crew, installation, forecast, magnetic, cooperative, control, landing or approach.",
+            metavar="NAME",
         ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the tables.", metavar="DIR")],
@@ -60,7 +63,9 @@ def study(
     minutes: Annotated[
         float | None,
         typer.Option(
-            "--minutes", help="Stop after so many minutes (heading, crew); the same command continues.", min=0.1
+            "--minutes",
+            help="Stop after so many minutes (heading, crew, installation); the same command continues.",
+            min=0.1,
         ),
     ] = None,
     force: Force = False,

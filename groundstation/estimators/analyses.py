@@ -10,6 +10,7 @@ from groundstation.estimators.control.analysis import SESSION_PLAN
 from groundstation.estimators.cooperative.analysis import COOPERATIVE
 from groundstation.estimators.heading.analysis import HEADING
 from groundstation.estimators.inertial.analysis import FORECAST, INERTIAL
+from groundstation.estimators.installation.analysis import INSTALLATION
 from groundstation.estimators.landing_beacons.analysis import LANDING_BEACONS
 from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
 from groundstation.estimators.latency.analysis import LATENCY
@@ -20,7 +21,7 @@ from groundstation.estimators.together.analysis import TOGETHER_ANALYSIS
 from groundstation.results.answer import Answer
 
 FLIGHT_ANALYSES: tuple[Analysis, ...] = (
-    *(HEADING, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND),
+    *(HEADING, INSTALLATION, INERTIAL, FORECAST, LATENCY, MAGNETIC, MAGNETIC_GROUND),
     *(LANDING, LANDING_BEACONS),
     TOGETHER_ANALYSIS,
     REFERENCE,

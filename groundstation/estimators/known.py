@@ -11,6 +11,7 @@ from groundstation.base.errors import GroundstationError, SettingsError
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.toml_settings import check_ranges, number, required_number
 from groundstation.results.answer import A, Answers, answer_of
+from groundstation.results.installation import Lesson
 from groundstation.tables.phases import Phases
 
 S = TypeVar("S")
@@ -50,8 +51,8 @@ class AircraftData:
     ins_kind : str
         Whether GNSS corrects the INS already, ``gnss_aided`` or ``unaided``; empty: the log shows it.
     ins_serial, ins_alignment : str
-        Which unit is installed and how it is aligned ("gyrocompass", "stored heading"): for the acceptance of many
-        flights; no estimator looks at them.
+        Which unit is installed and how it is aligned ("gyrocompass", "stored heading"): by them earlier flights
+        teach how the unit sits, and the acceptance groups flights.
     nav_start_utc : str
         When the INS began to navigate, ISO 8601, where the log does not show it; it may lie before the log.
     always_on_ground : bool
@@ -228,6 +229,8 @@ class Known:
         Answers of the analyses before this one.
     workings : mapping
         What an earlier analysis computed on the way, by its name; it is not saved.
+    lessons : tuple of Lesson, optional
+        What earlier flights say of installations, where the user gives a file of them.
     """
 
     phases: Phases
@@ -239,6 +242,7 @@ class Known:
     settings: Mapping[str, Any] = field(default_factory=dict)
     answers: Answers = field(default_factory=dict)
     workings: Mapping[str, Any] = field(default_factory=dict)
+    lessons: tuple[Lesson, ...] | None = None
 
     @property
     def excluded_s(self) -> tuple[tuple[float, float], ...]:

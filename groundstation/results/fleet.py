@@ -15,6 +15,7 @@ from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights, FleetTrend
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import row_fields, rows_frame
+from groundstation.results.installation import Pooled
 from groundstation.results.magnetic import LETTERS
 
 if TYPE_CHECKING:
@@ -268,6 +269,32 @@ class SessionRow:
 
 
 @dataclass(frozen=True)
+class InstallationRow:
+    """One unit in one aircraft: what its flights say together; :class:`groundstation.results.installation.Installed`.
+
+    ``place`` counts the installations of the fleet from 1. ``odd`` and ``changed`` name flights taken for another
+    unit's, and those from which on it sits otherwise, joined by ", ". ``pooled`` are figures of other sensors.
+    """
+
+    place: int
+    ins_serial: str
+    aircraft: str
+    first_flight: str
+    last_flight: str
+    flights: int
+    taught: int
+    mounting_deg: float | None = None
+    mounting_sigma_deg: float | None = None
+    sum_deg: float | None = None
+    sum_sigma_deg: float | None = None
+    factor: float | None = None
+    factor_sigma: float | None = None
+    odd: str = ""
+    changed: str = ""
+    pooled: tuple[Pooled, ...] = ()
+
+
+@dataclass(frozen=True)
 class FleetResults:
     """Everything the fleet report, fleet.rrd and notebooks show.
 
@@ -300,6 +327,10 @@ class FleetResults:
         By aircraft, then time.
     sessions : tuple of SessionRow
         By session id.
+    installations : tuple of InstallationRow
+        By serial and time.
+    installation_flights : FigureData
+        A row for each flight of them: what earlier ones had taught, its learned answer, its residual.
     """
 
     flights: FigureData
@@ -317,6 +348,8 @@ class FleetResults:
     stated: Mapping[str, float] = field(default_factory=dict)
     deviations: tuple[DeviationRow, ...] = ()
     sessions: tuple[SessionRow, ...] = ()
+    installations: tuple[InstallationRow, ...] = ()
+    installation_flights: FigureData = field(default_factory=lambda: FigureData("installation_flights", {}, {}))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stated", MappingProxyType(dict(self.stated)))

@@ -192,6 +192,9 @@ class HeadingResult(Answer):
     wind, aircraft_class, sideslip_deg
         The wind used, the class whose factor turned it to sideslip, and the mean sideslip (heading minus track) taken
         off with them; None where no wind is known.
+    mean_direction : (north, east), optional
+        Mean of the unit vectors of motion as the samples weigh them: with the wind it gives the crosswind that the
+        number holds, with its sigma how much of it may remain. Its length is 1 one way, near 0 there and back.
     confidence95_measured_deg : (low, high), optional
         The interval without steady sideslip: what this taxi shows by itself.
     steady_sigma_deg, steady_origin
@@ -273,6 +276,7 @@ class HeadingResult(Answer):
     wind: TaxiWind | None = None
     aircraft_class: str = ""
     sideslip_deg: float | None = None
+    mean_direction: tuple[float, float] | None = None
     segment_spread_deg: float | None = None
     wander_spread_deg: float | None = None
     wander_s: float | None = None

@@ -78,11 +78,42 @@ class RealOutage:
 
 
 @dataclass(frozen=True)
+class EarlyAzimuth:
+    """Azimuth error at flight time ``time_s``, from the turns of the first hour of them alone, and its drift.
+
+    An azimuth error oscillates over 24 h: what is carried back to the taxi may not come from hours later.
+    """
+
+    error_deg: float
+    sigma_deg: float
+    time_s: float
+    rate_deg_per_h: float
+    rate_sigma_deg_per_h: float
+    correlation: float
+    turns: int
+
+    def at(self, time_s: float) -> tuple[float, float]:
+        """The error and its sigma at another flight time, deg.
+
+        Examples
+        --------
+        >>> seen = EarlyAzimuth(0.5, 0.03, 3600.0, 0.1, 0.02, 0.0, 4)
+        >>> [round(value, 4) for value in seen.at(0.0)]
+        [0.4, 0.0361]
+        """
+        hours = (time_s - self.time_s) / 3600.0
+        grown = self.rate_sigma_deg_per_h * hours
+        variance = self.sigma_deg**2 + grown**2 + 2.0 * self.correlation * self.sigma_deg * grown
+        return self.error_deg + self.rate_deg_per_h * hours, max(variance, 0.0) ** 0.5
+
+
+@dataclass(frozen=True)
 class AzimuthEstimate:
     """Azimuth (heading) error of the INS from what turns do to its velocity error; offered only where they allow it.
 
     ``observable`` says whether ``sigma_deg`` is below the limit of the settings; if not, ``error_deg`` is None. The
-    error belongs to ``time_s``, flight seconds.
+    error is that at ``time_s``, flight seconds: the last turn; ``early`` is for the time of the taxi, None where the
+    first hour shows too little.
     """
 
     observable: bool
@@ -92,6 +123,7 @@ class AzimuthEstimate:
     velocity_change_mps: float
     reason: str
     time_s: float | None = None
+    early: EarlyAzimuth | None = None
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from typing import Any
 
 from groundstation.base.serial import is_kept_apart
 from groundstation.results.document import SCHEMA_VERSION, SummaryDocument
+from groundstation.results.installation import FORMAT_VERSION, Installations
 
 TITLE = "summary.json of one flight"
 ABOUT = (
@@ -55,6 +56,19 @@ NAMES = {  # of definitions, where they are not that of the class
     "FlightDocument": "flight",
 }
 Schema = dict[str, Any]
+
+
+def installations_schema() -> Schema:
+    """The schema of installations.json."""
+    definitions: dict[str, Schema] = {}
+    whole = _object(Installations, definitions)
+    whole["properties"]["format_version"] = {"const": FORMAT_VERSION}
+    head = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": "installations.schema.json",
+        "title": "installations.json of a folder of flights",
+    }
+    return {**head, **whole, "$defs": definitions}
 
 
 def summary_schema(answer_types: Mapping[str, type]) -> Schema:

@@ -9,15 +9,15 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import rerun as rr
-from rerun.catalog import CatalogClient, DatasetEntry
+from rerun.catalog import DatasetEntry
 from rerun.chunk import RrdReader
 from rerun.server import Server
-from rerun_bindings import CatalogClientInternal
 
 from groundstation.base.errors import GroundstationError
 from groundstation.viewer.catalog_table import save_flight_table
 from groundstation.viewer.fleet import FLEET, FLIGHTS_TEXT
 from groundstation.viewer.gate import Gate, hidden_address
+from groundstation.viewer.inner import catalog_client
 from groundstation.viewer.recording import open_stream
 from groundstation.viewer.verification import damaged
 
@@ -68,8 +68,7 @@ def catalog_server(
         When the port is taken or the address is not of this machine.
     """
     with _behind_a_gate(host, port) as (server, url), tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
-        # the public constructor asks for datafusion (43 MB), which listing and registering do not use
-        client = CatalogClient._from_internal(CatalogClientInternal(server.url(), None, None))
+        client = catalog_client(server.url())
         segments: dict[str, tuple[str, ...]] = {SESSIONS: ()}
         links: dict[str, str] = {}
         refused: list[tuple[Path, str]] = []

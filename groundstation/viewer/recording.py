@@ -12,7 +12,6 @@ from urllib.parse import urlsplit
 
 import rerun as rr
 import rerun.blueprint as rrb
-import rerun_bindings
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.failures import attempt, failures, with_failures
@@ -20,6 +19,7 @@ from groundstation.base.to_disk import sync_file
 from groundstation.results.answer import Answer
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
+from groundstation.viewer.inner import forget_closed, send_blueprint
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.properties import send_properties
 from groundstation.viewer.recorder import FLIGHT_TIME, Recorder
@@ -79,7 +79,7 @@ def save_stream(path: Path, identity: str, send: Callable[[rr.RecordingStream], 
     temporary = path.with_name(f".{path.name}.partial")
     try:
         _save(temporary, identity, send)
-        rerun_bindings.flush_and_cleanup_orphaned_recordings()  # else the threads and buffers of each one stay
+        forget_closed()
         sync_file(temporary)
         temporary.replace(path)
     except (OSError, RuntimeError) as error:  # Rerun's own are RuntimeErrors
@@ -177,7 +177,7 @@ def send_layout(
         auto_layout=False,
         auto_views=False,
     )
-    stream.send_blueprint(blueprint, make_active=True, make_default=True)
+    send_blueprint(stream, blueprint)
     stream.flush(timeout_sec=FLUSH_SECONDS)
     return blueprint
 

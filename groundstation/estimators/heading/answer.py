@@ -100,6 +100,7 @@ def build_answer(
         wind=steady.wind,
         aircraft_class=steady.aircraft_class,
         sideslip_deg=solution.sideslip_deg,
+        mean_direction=solution.mean_direction,
         segment_spread_deg=solution.posterior.parameter("segment_deg"),
         wander_spread_deg=solution.posterior.parameter("wander_deg"),
         wander_s=solution.posterior.parameter("wander_s"),

@@ -107,7 +107,7 @@ class HeadingSettings:
     mounting_sigma_deg: float = number(0.1, 0.0)  # of the platform's number alone
 
     # Honest interval
-    posterior_draws: int = number(4000, LEAST_DRAWS)  # the half width then agrees within 5 % whatever the seed
+    posterior_draws: int = number(4000, LEAST_DRAWS)  # the half width then hardly hangs on the seed: docs/heading.md
     posterior_seed: int = number(2015, 0)
     growth_steps: int = number(120, 2)
 

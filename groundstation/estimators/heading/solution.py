@@ -70,6 +70,8 @@ class Solution:
     steps : tuple of HeadingStep
     sideslip_deg : float or None
         Mean sideslip taken off, by the weights of the samples; None where no wind is known.
+    mean_direction : (north, east)
+        Mean of the unit vectors of motion, by those weights: a wind's part across it is what the sideslip is made by.
     """
 
     samples: Samples
@@ -91,6 +93,7 @@ class Solution:
     wind_of_parts_deg: FloatArray
     steps: tuple[HeadingStep, ...]
     sideslip_deg: float | None
+    mean_direction: tuple[float, float]
 
 
 def _centred(difference_deg: FloatArray) -> FloatArray:
@@ -168,6 +171,7 @@ def solve(
     draws = posterior.draws_of_ordinary_parts(DRAWS_FOR_PARTS)
     drift, drift_sigma = _drift(thinned, reference_time_s, draws)
     segments = tuple(_segment(differences, used, used.segment == number, draws) for number in np.unique(used.segment))
+    direction_rad = np.deg2rad(differences.direction_deg)
     parts = _parts(differences, used, segments, draws, settings.part_max_s)
     full_weight = np.zeros(len(samples))
     full_weight[samples.is_used] = weight * len(used)
@@ -180,6 +184,7 @@ def solve(
         growth_samples=posterior.growth_samples * thinning,
         running=run_recursion(_centred(used.difference_deg)),
         sideslip_deg=None if steady.wind is None else float(weight @ steady.sideslip_deg(differences.direction_deg)),
+        mean_direction=(float(weight @ np.cos(direction_rad)), float(weight @ np.sin(direction_rad))),
         knowledge=knowledge,
         uncorrected_deg=float(wrap_180(np.mean(uncorrected))),
         weight=full_weight,

@@ -17,7 +17,7 @@ from groundstation.estimators.inertial.filter import Epochs, FilterRun, run_filt
 from groundstation.estimators.inertial.model import VELOCITY, FloatArray
 from groundstation.estimators.inertial.noise import RADPS_PER_DPH
 from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.results.inertial import AzimuthEstimate
+from groundstation.results.inertial import AzimuthEstimate, EarlyAzimuth
 from groundstation.tables.motion import runs
 
 PARAMETERS = ("azimuth", "azimuth_drift", "latency", "scale", "bias_forward", "bias_right")
@@ -25,6 +25,8 @@ AZIMUTH, AZIMUTH_DRIFT, LATENCY, SCALE, BIAS_FORWARD, BIAS_RIGHT = range(6)
 ITERATIONS = 3  # what the filter had taken for tilt in earlier turns shrinks by ten or more each time
 BOUND95 = 1.959963984540054
 AZIMUTH_PRIOR_RAD = 1.0  # no knowledge
+EARLY_S = 3600.0  # of turns that tell the azimuth on taxi: it oscillates over 24 h
+S_PER_H, LEAST_PRODUCT = 3600.0, 1e-300
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,27 @@ class Changes:
     def __len__(self) -> int:
         return len(self.before_s)
 
+    def point_one_way(self, limits: AzimuthLimits) -> bool:
+        """Whether all of them have nearly the same direction: an azimuth then looks like a scale error."""
+        unit = self.velocity_mps / np.hypot(*self.velocity_mps.T)[:, None]
+        return bool(np.hypot(*unit.mean(axis=0)) > limits.opposed_share)
+
+    def first(self, span_s: float) -> "Changes":
+        """Those whose middle is within some seconds of the first one's."""
+        middle_s = 0.5 * (self.before_s + self.after_s)
+        count = int(np.sum(middle_s <= middle_s[0] + span_s))
+        columns = np.array(self.columns[:count])
+        columns[:, :, AZIMUTH_DRIFT] += columns[:, :, AZIMUTH] * (middle_s[-1] - middle_s[count - 1])
+        return replace(
+            self,
+            before=self.before[:count],
+            after=self.after[:count],
+            before_s=self.before_s[:count],
+            after_s=self.after_s[:count],
+            velocity_mps=self.velocity_mps[:count],
+            columns=columns,
+        )
+
     @property
     def reference_s(self) -> float:
         """Time the azimuth belongs to: the middle of the last change."""
@@ -106,11 +129,15 @@ class AzimuthFit:
         Scaled by sqrt(chi-square / degrees of freedom) where that exceeds one, and then by Student's quantile: the
         scatter of a few turns is itself uncertain.
         """
+        return self.widening * float(np.sqrt(self.covariance[AZIMUTH, AZIMUTH]))
+
+    @property
+    def widening(self) -> float:
+        """What the sigmas of the covariance are multiplied by."""
         spread = float(np.sum(np.square(self.normalised))) / self.freedom
-        sigma = self.sigma_scale * float(np.sqrt(self.covariance[AZIMUTH, AZIMUTH]))
-        return (
-            sigma if spread <= 1.0 else sigma * float(np.sqrt(spread) * student_quantile(0.975, self.freedom)) / BOUND95
-        )
+        if spread <= 1.0:
+            return self.sigma_scale
+        return self.sigma_scale * float(np.sqrt(spread) * student_quantile(0.975, self.freedom)) / BOUND95
 
 
 def estimate_azimuth(
@@ -164,8 +191,7 @@ def estimate_azimuth(
             f"{len(changes)} turns or other changes of velocity of {limits.change_mps:g} m/s or more with GNSS on both "
             f"sides; at least {limits.least_changes} are needed",
         )
-    unit = changes.velocity_mps / np.hypot(*changes.velocity_mps.T)[:, None]
-    if np.hypot(*unit.mean(axis=0)) > limits.opposed_share:
+    if changes.point_one_way(limits):
         return _refused(len(changes), largest, "all changes of velocity point the same way")
     fit = fit_azimuth(differences, run, settings, changes, known, limits)
     error_deg, sigma_deg = (float(np.rad2deg(part)) for part in (fit.values[AZIMUTH], fit.sigma_rad))
@@ -173,7 +199,36 @@ def estimate_azimuth(
         text = f"sigma {sigma_deg:.2g} deg above the limit of {settings.azimuth_sigma_max_deg:g} deg"
         return AzimuthEstimate(False, None, sigma_deg, len(changes), largest, text)
     text = f"{len(changes)} changes of velocity of up to {largest:.0f} m/s"
-    return AzimuthEstimate(True, error_deg, sigma_deg, len(changes), largest, text, changes.reference_s)
+    early = _early(differences, run, settings, changes, known, limits, fit)
+    return AzimuthEstimate(True, error_deg, sigma_deg, len(changes), largest, text, changes.reference_s, early)
+
+
+def _early(
+    differences: Differences,
+    run: FilterRun,
+    settings: InertialSettings,
+    changes: Changes,
+    known: BoolArray,
+    limits: AzimuthLimits,
+    whole: AzimuthFit,
+) -> EarlyAzimuth | None:
+    """The azimuth from the first hour of changes; None where they are too few, or all point one way."""
+    first = changes.first(EARLY_S)
+    if len(first) < limits.least_changes or first.point_one_way(limits):
+        return None
+    is_whole = len(first) == len(changes)
+    fit = whole if is_whole else fit_azimuth(differences, run, settings, first, known, limits)
+    both = [AZIMUTH, AZIMUTH_DRIFT]
+    sigma, rate_sigma = np.sqrt(np.diag(fit.covariance)[both])
+    return EarlyAzimuth(
+        error_deg=float(np.rad2deg(fit.values[AZIMUTH])),
+        sigma_deg=float(np.rad2deg(fit.sigma_rad)),
+        time_s=first.reference_s,
+        rate_deg_per_h=float(np.rad2deg(fit.values[AZIMUTH_DRIFT])) * S_PER_H,
+        rate_sigma_deg_per_h=float(np.rad2deg(fit.widening * rate_sigma)) * S_PER_H,
+        correlation=float(fit.covariance[AZIMUTH, AZIMUTH_DRIFT] / max(sigma * rate_sigma, LEAST_PRODUCT)),
+        turns=len(first),
+    )
 
 
 def changes_of(differences: Differences, known: BoolArray, limits: AzimuthLimits) -> Changes:

@@ -19,6 +19,7 @@ from groundstation.pipeline.many_flights.delta_sink import delta_place, put_flig
 from groundstation.pipeline.many_flights.fleet_store import Scan, refresh
 from groundstation.pipeline.many_flights.found_sessions import Asked, find_sessions, run_sessions
 from groundstation.pipeline.many_flights.inputs import session_folders
+from groundstation.pipeline.many_flights.installations import told
 from groundstation.pipeline.many_flights.known_flights import KnownFlights
 from groundstation.pipeline.many_flights.listed_logs import (
     inputs_of,
@@ -243,6 +244,8 @@ def _run_here(
         problems = _write_beside(out, outcomes, asked, found)
         sync_folder(out)
         stored = put_flights(asked.store, found, outcomes) if asked.store else ()
+        if asked.configuration.lessons is None:  # else the answer by the file is told
+            outcomes = told(outcomes, out)
         return (*outcomes, *apart, *unwritten, *problems, *stored)
 
 
@@ -303,6 +306,7 @@ def _run_remote(
                 beside = _write_beside(copy, outcomes, asked, found)
                 stored = put_flights(asked.store, found, outcomes) if asked.store else ()
                 problems = (*unwritten, *beside, *stored)
+                outcomes = told(outcomes, copy)
                 is_whole = True
             finally:
                 output.publish(FLEET_FILES, is_whole=is_whole)

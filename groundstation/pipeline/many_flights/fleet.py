@@ -15,6 +15,7 @@ from groundstation.estimators.fleet import answer
 from groundstation.estimators.fleet.changes import ChangeSettings
 from groundstation.estimators.fleet.density import densities_of
 from groundstation.estimators.fleet.deviation import deviations
+from groundstation.estimators.fleet.installations import installation_flights, installation_rows
 from groundstation.estimators.fleet.moments import Moments
 from groundstation.estimators.fleet.skill import SkillMerger
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
@@ -29,6 +30,7 @@ from groundstation.pipeline.many_flights.fleet_share import (
     to_arrow,
 )
 from groundstation.pipeline.many_flights.fleet_store import MOST_LISTED, Scan, scan
+from groundstation.pipeline.many_flights.installations import installations_in
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights
 from groundstation.results.figures import FigureData
@@ -160,6 +162,8 @@ def _results(found: Scan, flights: FigureData, shares: Any, unread: list[NotInFl
     histograms = compress(chain.from_iterable(map(histograms_of, cells)), is_sampled.tolist())
     trend, changes = answer.trends(flights, settings)
     merger, skill_flights, checks = _details(found, flights, shares)
+    read = installations_in(found.out)
+    installations = () if read is None else read.installations
     sessions: list[SessionRow] = []
     for folder in found.sessions:
         try:
@@ -182,6 +186,8 @@ def _results(found: Scan, flights: FigureData, shares: Any, unread: list[NotInFl
         deviations=deviations(flights),
         sessions=tuple(sessions),
         stated=answer.stated_rates(settings),
+        installations=installation_rows(installations),
+        installation_flights=installation_flights(installations),
     )
 
 

@@ -17,13 +17,15 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.fleet.density import SampleHistogram
 from groundstation.estimators.fleet.skill import SkillOfFlight
+from groundstation.estimators.installation.lesson import lesson_of_flight
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, answer_values
 from groundstation.pipeline.many_flights.fleet_rows import Check, checks_of, flight_row, heading_samples, skill_of
 from groundstation.pipeline.many_flights.fleet_samples import SampleStore
 from groundstation.reports.index import IndexRow, index_row
 from groundstation.results.columns import FlightColumn
 from groundstation.results.figures import FigureData
-from groundstation.results.files import load, utf8_text
+from groundstation.results.files import SavedFlight, load, mapping, utf8_text
+from groundstation.results.installation import Lesson
 from groundstation.tables.session_tracks import aircraft_named
 
 TEXTS = ("text", "category")
@@ -51,6 +53,7 @@ DETAILS = {
     "checks": "what independent thing each estimate was compared with",
     "sample_cell": "cells of 0.01 deg that hold used heading samples",
     "sample_count": "how many samples each of them holds",
+    "lesson": "JSON: what the flight says of the installation of its INS; empty without a serial",
 }
 
 
@@ -76,6 +79,8 @@ class FlightShare:
         File of its heading samples in the dataset of samples; empty without any.
     parts : tuple of str
         Digests of its consecutive logs but the first.
+    lesson : Lesson, optional
+        What it says of the installation of its INS; None where it states no serial.
     """
 
     row: Mapping[str, Any]
@@ -89,6 +94,7 @@ class FlightShare:
     hears: tuple[str, ...]
     samples: str
     parts: tuple[str, ...] = ()
+    lesson: Lesson | None = None
 
 
 def share_of(folder: Path, store: SampleStore | None = None) -> FlightShare:
@@ -116,7 +122,13 @@ def share_of(folder: Path, store: SampleStore | None = None) -> FlightShare:
         tuple(topic.partition(".")[2] for topic in topics_of_kind("link", tuple(results.ledger.topics))),
         store.put(row, samples) if samples is not None and store is not None else "",
         tuple(part.sha256 for part in saved.manifest.parts[1:]),
+        _lesson(saved),
     )
+
+
+def _lesson(saved: SavedFlight) -> Lesson | None:
+    lesson = lesson_of_flight(saved.results, mapping(saved.manifest.configuration, "aircraft"), saved.folder.name)
+    return lesson if lesson.ins_serial else None
 
 
 def to_arrow(shares: Sequence[FlightShare]) -> Any:
@@ -131,6 +143,8 @@ def to_arrow(shares: Sequence[FlightShare]) -> Any:
     for name, part in (("sample_cell", "cell"), ("sample_count", "count")):
         counts = [getattr(share.histogram, part) for share in shares]
         arrays[name] = pa.array(counts, pa.list_(pa.field("element", pa.int32())))  # as Parquet names it
+    lessons = ["" if share.lesson is None else _json(to_json_exactly(share.lesson)) for share in shares]
+    arrays["lesson"] = pa.array(lessons, pa.string())
     meanings = {column.name: column.meaning for column in FLIGHT_COLUMNS} | DETAILS
     return pa.table(arrays).replace_schema_metadata({"columns": json.dumps(meanings)})
 
@@ -144,6 +158,11 @@ def flights_of(table: Any) -> FigureData:
 def index_rows_of(table: Any) -> list[IndexRow]:
     """The rows of the index in a table of shares."""
     return [from_json(IndexRow, json.loads(text)) for text in table.column("index").to_pylist()]
+
+
+def lessons_of(table: Any) -> Iterator[Lesson]:
+    """What the flights in a table of shares say of installations, those that state a serial."""
+    yield from (from_json(Lesson, json.loads(text)) for text in table.column("lesson").to_pylist() if text)
 
 
 def skill_rows_of(table: Any) -> tuple[NDArray[np.intp], dict[str, NDArray[Any]]]:

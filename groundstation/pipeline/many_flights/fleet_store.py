@@ -278,6 +278,23 @@ def _names_by_month(keys: Keys) -> dict[str, list[str]]:
     return {month: keys.names_at(places) for month, places in keys.by_month().items()}
 
 
+def restamp(out: Path, names: Iterable[str]) -> None:
+    """Take down how flight folders stand now: what was changed in them since they were read is not of the dataset."""
+    import pyarrow as pa
+
+    by_month: dict[str, set[str]] = {}
+    for name in names:
+        by_month.setdefault(month_of(name), set()).add(name)
+    for month, changed in sorted(by_month.items()):
+        keys = read_keys(out, month)
+        stamps = [
+            stamp_of(out, name) or 0 if name in changed else stamp
+            for name, stamp in zip(keys.names, keys.stamps(), strict=True)
+        ]
+        place = keys.table.schema.get_field_index("stamp")
+        write_keys(out, month, Keys(keys.table.set_column(place, "stamp", pa.array(stamps, pa.int64()))))
+
+
 def forget_month(out: Path, month: str) -> None:
     """Remove a month of the dataset: its flights are read again."""
     for path in (key_path(out, month), _path(out, month)):

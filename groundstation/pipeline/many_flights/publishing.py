@@ -1,6 +1,7 @@
 """What stands beside the flight folders of an OUT: the index and what the flights say together."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
@@ -17,6 +18,7 @@ from groundstation.pipeline.many_flights.fleet_store import (
     Scan,
     forget_month,
     refresh,
+    restamp,
     scan,
 )
 from groundstation.pipeline.many_flights.inputs import (
@@ -27,6 +29,7 @@ from groundstation.pipeline.many_flights.inputs import (
     plan_folders,
     session_folders,
 )
+from groundstation.pipeline.many_flights.installations import INSTALLATIONS, refresh_installations, show_installation
 from groundstation.pipeline.one_flight.cores import cores
 from groundstation.pipeline.one_flight.flight import REPORT_FILES
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
@@ -38,7 +41,10 @@ from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
 
 MOST_SKIPPED = 1000  # files that the index lists
 FLEET_RECORDING, FLEET_PDF = "fleet.rrd", str(Path(FLEET_PAGE).with_suffix(".pdf"))
-FLEET_FILES = (INDEX_JSON, INDEX_CSV, FLEET_PARQUET, FLIGHTS, SAMPLES, FLEET_RECORDING, FLEET_PAGE, FLEET_PDF)
+FLEET_FILES = (
+    *(INDEX_JSON, INDEX_CSV, FLEET_PARQUET, FLIGHTS, SAMPLES, INSTALLATIONS),
+    *(FLEET_RECORDING, FLEET_PAGE, FLEET_PDF),
+)
 
 
 def write_beside(
@@ -50,14 +56,18 @@ def write_beside(
     only_results: bool = False,
     found: Scan | None = None,
     painters: int = 1,
+    remade: Sequence[str] | None = None,
 ) -> tuple[Outcome, ...]:
     """Write everything that stands beside the flight folders; returns what could not be written or read.
 
     ``found`` is what :func:`groundstation.pipeline.many_flights.fleet_store.refresh` gave, where it was called already.
     With ``only_results`` the page and the recording of all flights are removed: they would tell of an earlier run.
-    ``painters`` is how many processes paint the figures of the page.
+    ``painters`` is how many processes paint the figures of the page. ``remade`` are the flights whose reports are new;
+    left out: those of ``outcomes`` that were not finished before.
     """
     problems: list[Outcome] = []
+    if remade is None:
+        remade = [one.flight_id for one in outcomes if one.flight_id and not one.was_finished]
     again: set[str] = set()
     try:
         with told_in_a_line(str(out)), gathered_failures():
@@ -66,6 +76,9 @@ def write_beside(
                     found, unwritten = refresh(out)
                     problems += unwritten
                 try:
+                    learn = partial(refresh_installations, out, found, remade)
+                    shown = attempt("installations", "fleet", learn, unless=(OSError, GroundstationError))
+                    restamp(out, shown or ())
                     problems += _write_beside(out, outcomes, kept_rows, found, with_pdf, only_results, painters)
                     problems += [_beside(out, "failed", f"{out}: {one.text}", one.trace) for one in failures()]
                     break
@@ -194,9 +207,11 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
             problems.append(_beside(folder, "done", f"{folder.name}: {written.problem}"))
         problems += [_beside(folder, "incomplete", f"{folder.name}: {one.text}", one.trace) for one in written.failures]
     if is_flight:
+        show_installation(out.absolute())
         return paths, tuple(problems)
     told = {one.source for one in problems}
-    beside = write_beside(out, (), rows_without_flight(out), with_pdf=with_pdf, painters=cores())
+    remade = [folder.name for folder in flight_folders(out)]
+    beside = write_beside(out, (), rows_without_flight(out), with_pdf=with_pdf, painters=cores(), remade=remade)
     unread = [one for one in beside if one.source not in told]
     return [*paths, *(out / name for name in FLEET_FILES if (out / name).exists())], (*problems, *unread)
 

@@ -148,6 +148,7 @@ def known_of(flight: Flight, configuration: Configuration) -> Known:
         site=settings.site,
         settings=settings.analyses,
         weather=configuration.weather,
+        lessons=configuration.lessons,
     )
     try:
         return replace(known, intervals=_intervals(flight, configuration))

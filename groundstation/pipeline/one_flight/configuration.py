@@ -19,6 +19,7 @@ from groundstation.pipeline.one_flight.isolation import Isolation
 if TYPE_CHECKING:
     from groundstation.estimators.known import AircraftData, SiteData
     from groundstation.pipeline.one_flight.deviation_to_apply import Apply
+    from groundstation.results.installation import Lesson
     from groundstation.tables.session_settings import SessionSettings
 
 ISOLATION = "isolation"  # the table that changes no result: it is not kept
@@ -122,6 +123,8 @@ class Configuration:
         Files of which the one of the log's time judges the answers.
     weather : tuple of str
         METAR lines; each flight takes the wind of the one nearest to its taxi.
+    lessons : tuple of Lesson, optional
+        What earlier flights say of installations, from an installations.json.
 
     Raises
     ------
@@ -138,6 +141,7 @@ class Configuration:
     apply: "Apply | None" = None
     references: References = NO_REFERENCES
     weather: tuple[str, ...] = ()
+    lessons: "tuple[Lesson, ...] | None" = None
 
     def __post_init__(self) -> None:
         self.thresholds  # noqa: B018 -- a slip is told now
@@ -269,6 +273,21 @@ def load_configuration(
         files={name: str(path) for name, path in files.items() if isinstance(path, Path)},
         weather=_weather(document.get("weather", []), weather, _name(config)),
     )
+
+
+def installed_as(configuration: Configuration, installation: Path | None) -> Configuration:
+    """The configuration with what earlier flights say of installations; as it is without a file.
+
+    Raises
+    ------
+    SettingsError
+        When it is no installations.json that can be read.
+    """
+    if installation is None:
+        return configuration
+    from groundstation.results.installation import read_installations
+
+    return replace(configuration, lessons=read_installations(installation).lessons)
 
 
 def applying(configuration: Configuration, apply: str) -> Configuration:

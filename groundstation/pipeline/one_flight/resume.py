@@ -164,7 +164,8 @@ def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool, dig
     )
     intervals = [[asdict(part) for part in listed] for listed in (configuration.exclude, configuration.force)]
     apply = None if configuration.apply is None else asdict(configuration.apply)
-    analysis = _digest(conversion, tables, intervals, apply, configuration.weather)
+    lessons = [] if configuration.lessons is None else [[asdict(one) for one in configuration.lessons]]
+    analysis = _digest(conversion, tables, intervals, apply, configuration.weather, *lessons)
     return Keys(conversion, analysis, _digest(analysis, with_pdf))
 
 

@@ -9,16 +9,23 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.base.digits import digits_of
 from groundstation.base.errors import GroundstationError
 from groundstation.base.serial import to_json
 from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES
+from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.estimators.installation.answer import verdict_of
 from groundstation.pipeline.many_flights.inputs import saved_flights
+from groundstation.pipeline.many_flights.installations import installations_in
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, csv_text, load, mapping, write_text
-from groundstation.results.heading import Gate
+from groundstation.results.heading import Gate, judged_gate
+from groundstation.results.installation import InstalledFlight
 from groundstation.results.rules import Rejudged
 
+LEARNED_GATE = "whole_half_width_learned"
+LEARNED_TITLE = "half width of the 95 % interval, the installation learned"
 OTHER_TABLES = ("aircraft", "site", "thresholds")  # they change what is measured, not how it is judged
 SHIPPED = "shipped limits"
 
@@ -86,10 +93,11 @@ def rules_test(new: Path, out: Path) -> RulesTest:
     told: list[RulesRow] = []
     unread: list[str] = []
     judged: list[tuple[Rejudged, str]] = []
+    learned = learned_in(out)
     for folder in folders:
         try:
             saved = load(folder, ANSWER_TYPES)
-            found = list(_of_flight(saved, configuration))
+            found = list(_of_flight(saved, configuration, learned.get(folder.name)))
         except GroundstationError as error:
             unread.append(str(error))
             continue
@@ -133,7 +141,43 @@ def write_rules(found: RulesTest, path: Path) -> None:
     write_text(path, csv_of(found))
 
 
-def _of_flight(saved: SavedFlight, configuration: Configuration) -> Iterator[tuple[Rejudged, str]]:
+def learned_in(out: Path) -> dict[str, InstalledFlight]:
+    """Flights with a heading answer that earlier ones taught, by their ids."""
+    found = installations_in(out)
+    flights = () if found is None else (flight for one in found.installations for flight in one.flights)
+    return {one.lesson.flight_id: one for one in flights if one.answer is not None and not one.answer.why_not}
+
+
+def _learned(flight: InstalledFlight, heading: Rejudged, settings: HeadingSettings) -> Rejudged:
+    """The verdict on the learned number under other limits, from the gates on the taxi as they were judged again."""
+    assert flight.answer is not None
+    failed = tuple(gate.name for gate in heading.gates_after if gate.required and gate.state != "passed")
+    limit_deg = round(settings.whole_half_width_max_deg, digits_of("limit_deg"))  # as it is stored
+    lesson = replace(
+        flight.lesson,
+        verdict=heading.after,
+        failed=failed,
+        limit_deg=limit_deg if settings.whole_decides else None,
+    )
+    half_width_deg = flight.answer.half_width_deg
+    before, after = (
+        judged_gate(
+            (None, limit_deg if one.limit_deg is None else one.limit_deg),
+            LEARNED_GATE,
+            LEARNED_TITLE,
+            half_width_deg,
+            unit="deg",
+            required=one.limit_deg is not None,
+        )
+        for one in (flight.lesson, lesson)
+    )
+    verdict = verdict_of(lesson, half_width_deg)
+    return Rejudged("heading, installation learned", flight.answer.verdict, verdict, (before,), (after,))
+
+
+def _of_flight(
+    saved: SavedFlight, configuration: Configuration, learned: InstalledFlight | None = None
+) -> Iterator[tuple[Rejudged, str]]:
     """Every verdict of a flight, judged again, and what of it only the log could tell."""
     results, unsure = saved.results, set[str]()
     for analysis in FLIGHT_ANALYSES:
@@ -149,6 +193,8 @@ def _of_flight(saved: SavedFlight, configuration: Configuration) -> Iterator[tup
             if missing or one.gates_before != one.gates_after:
                 unsure.add(analysis.name)
             yield one, ", ".join(missing)
+            if learned is not None and isinstance(settings, HeadingSettings):
+                yield _learned(learned, one, settings), ", ".join(missing)
 
 
 def _not_limits(settings: Any, stored: Mapping[str, Any], limits: frozenset[str]) -> list[str]:

@@ -1,10 +1,12 @@
-"""``python -m groundstation.pipeline.verbs.schema FILE`` writes the JSON Schema of summary.json, all analyses in it."""
+"""``python -m groundstation.pipeline.verbs.schema SUMMARY INSTALLATIONS`` writes the JSON Schemas of both files."""
 
 import sys
 from pathlib import Path
 
 from groundstation.estimators.analyses import ANSWER_TYPES
-from groundstation.results.schema import schema_text
+from groundstation.results.files import json_text
+from groundstation.results.schema import installations_schema, schema_text
 
 if __name__ == "__main__":
     Path(sys.argv[1]).write_text(schema_text(ANSWER_TYPES), encoding="utf-8")
+    Path(sys.argv[2]).write_text(json_text(installations_schema()), encoding="utf-8")

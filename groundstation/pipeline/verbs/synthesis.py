@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 STUDIES = {
     "heading": "heading correction before take-off: errors, coverage of the interval, figures of the paper repeated",
     "crew": "heading verdicts on taxi in the wind: accepted, advisory, refused; both numbers; what is no straight taxi",
+    "installation": "what earlier flights teach of mounting and crab: coverage and verdicts on fleets of aircraft",
     "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
     "magnetic": "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
     "cooperative": "navigation between aircraft: published figures with ours beside them, divergence, consistency",
@@ -23,7 +24,7 @@ STUDIES = {
     "approach": "recorded approaches: the localizer as a reference for positions, how honest its interval is",
 }
 
-RESUMED = ("heading", "crew")  # studies that keep their runs
+RESUMED = ("heading", "crew", "installation")  # studies whose runs are kept
 
 
 def simulate_to(
@@ -126,8 +127,8 @@ def study_to(
     """Run a study into a folder: ``<name>.md`` and tables/*.csv; returns the page's text.
 
     With ``recorded``, a folder with sets of recorded robots, the cooperative study runs on these. The studies of
-    the heading (heading, crew) keep their runs in ``runs/``: the same command goes on with them, ``minutes`` ends it
-    before all are made; ``force`` makes them afresh.
+    the heading (heading, crew) and of the installation keep their runs in
+    ``runs/``: the same command goes on with them, ``minutes`` ends it before all are made; ``force`` makes them afresh.
 
     Raises
     ------
@@ -160,18 +161,19 @@ def study_to(
 def _resumed(
     name: str, study: "Callable[..., StudyResult]", folder: Path, minutes: float | None, *, afresh: bool
 ) -> "Callable[..., StudyResult]":
-    """A study of the heading with the runs kept in a folder."""
+    """A study with the runs kept in a folder."""
     from functools import partial
     from shutil import rmtree
 
     from groundstation.pipeline.verbs.kept_runs import KeptRuns
     from groundstation.studies.heading_crew import CrewOutcome
     from groundstation.studies.heading_family import RunOutcome
+    from groundstation.studies.installation_pool import TaxiOfPool
 
     if afresh and folder.is_dir():
         rmtree(folder)
-    outcome: type[RunOutcome] | type[CrewOutcome] = CrewOutcome if name == "crew" else RunOutcome
-    kept: KeptRuns[Any] = KeptRuns(folder, outcome)
+    outcomes: dict[str, type] = {"heading": RunOutcome, "crew": CrewOutcome, "installation": TaxiOfPool}
+    kept: KeptRuns[Any] = KeptRuns(folder, outcomes[name])
     return partial(study, kept=kept, minutes=minutes)
 
 
@@ -198,6 +200,10 @@ def _study(name: str) -> "Callable[..., StudyResult]":
         from groundstation.studies.heading_crew import study_crew
 
         return study_crew
+    if name == "installation":
+        from groundstation.studies.installation import study_installation
+
+        return study_installation
     if name == "forecast":
         from groundstation.studies.forecast import study_forecast
 

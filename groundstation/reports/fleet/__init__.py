@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.fleet import aircraft, calibration, densities, deviation, skill, trend
+from groundstation.reports.fleet import aircraft, calibration, densities, deviation, installations, skill, trend
 from groundstation.results.fleet import FleetResults
 
 # By the name that a chapter gives; a figure that is one of several alike gets which.
@@ -17,4 +17,5 @@ DRAWERS: dict[str, Callable[[FleetResults], Drawing] | Callable[[FleetResults, s
     "fleet.densities": densities.overlay,
     "fleet.densities_by_aircraft": densities.by_aircraft,
     "fleet.deviation": deviation.curves,
+    "fleet.installation": installations.over_time,
 }

@@ -1,0 +1,27 @@
+"""Where the report of a flight shows what earlier flights taught: it is filled in once all of them are known.
+
+The report of a flight is written when the flight is run; earlier flights may arrive later. It therefore has two places,
+between marks that nothing from a log can write, and only what stands between them changes.
+"""
+
+import re
+
+from groundstation.chapters.installation import not_learned, parts, sentence
+from groundstation.reports.page import render
+from groundstation.results.installation import InstallationResult
+
+TOP, CHAPTER = "installation-top", "installation"
+
+
+def with_installation(page: str, answer: InstallationResult | None) -> str:
+    """The page of a flight with a learned answer in its places; with none, they are empty."""
+    top = chapter = ""
+    if answer is not None:
+        top = render("installation-top.html.j2", text=not_learned(answer) if answer.why_not else sentence(answer))
+        chapter = render("installation.html.j2", told=parts(answer))
+    return _filled(_filled(page, TOP, top), CHAPTER, chapter)
+
+
+def _filled(page: str, name: str, content: str) -> str:
+    between = re.compile(rf"(<!--{name}-->).*?(<!--/{name}-->)", re.DOTALL)
+    return between.sub(lambda found: f"{found[1]}{content}{found[2]}", page, count=1)
