@@ -1,7 +1,7 @@
 """Axes painted by matplotlib and panels of a description as the same plain things, so that they can be compared."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 import numpy as np
@@ -93,7 +93,7 @@ def _painted(axes: Any, figure_mm: float) -> Shown:
         axes.get_title(loc="left"),
         axes.get_xlabel(),
         axes.get_ylabel(),
-        ("time" if axes.get_label() == TIME else axes.get_xscale(), axes.get_yscale()),
+        (_scale_of(axes), axes.get_yscale()),
         (None, None) if axes.get_autoscalex_on() else axes.get_xlim(),
         (None, None) if axes.get_autoscaley_on() else axes.get_ylim(),
         names_beside(axes),
@@ -104,6 +104,11 @@ def _painted(axes: Any, figure_mm: float) -> Shown:
         None if told is None else marks.Told(x=told.x, y=told.y, value=told.value, title=told.title),
         next((text.get_text() for text in axes.texts if text.get_transform() == axes.transAxes), ""),
     )
+
+
+def _scale_of(axes: Any) -> str:
+    is_date = "Date" in type(axes.xaxis.get_major_formatter()).__name__
+    return "time" if axes.get_label() == TIME else "date" if is_date else str(axes.get_xscale())
 
 
 def _name(artist: Any) -> str:
@@ -124,9 +129,13 @@ def _things_on(axes: Any) -> Iterator[Thing]:
         ends = np.array([segment[:, 1] for segment in stems.get_segments()])
         name = str(container.get_label())
         yield Thing("bars", name, _one(data.get_color()), x=x, y=y, upper=0.5 * (ends[:, 1] - ends[:, 0]))
+    dotted = {to_hex(patch.get_edgecolor()) for patch in axes.patches if isinstance(patch, PathPatch)}
+    of_lines = {colour: name for colour, name in in_legend.items() if colour not in dotted}
     for line in axes.lines:
         if len(line.get_xdata()) and id(line) not in bars:
-            yield from _line(axes, line)
+            for thing in _line(axes, line):  # the first of a colour has the name that stands in the legend alone
+                name = "" if thing.name or thing.kind != "line" else of_lines.pop(min(thing.colours), "")
+                yield replace(thing, name=thing.name or name)
     for band in axes.collections:
         if isinstance(band, PolyCollection):
             yield from _band(band)
@@ -139,8 +148,10 @@ def _things_on(axes: Any) -> Iterator[Thing]:
         if text.get_transform() != axes.transAxes and text.get_text():
             is_beside_a_line = getattr(text, "xycoords", None) == axes.get_yaxis_transform()
             place = getattr(text, "xy", None) or text.get_position()
+            is_at_an_upright = getattr(text, "xycoords", None) == axes.get_xaxis_transform()
             x = EMPTY if is_beside_a_line else np.array([place[0]])
-            yield Thing("text", "", frozenset(), x=x, y=np.array([place[1]]), text=text.get_text())
+            y = EMPTY if is_at_an_upright else np.array([place[1]])
+            yield Thing("text", "", frozenset(), x=x, y=y, text=text.get_text())
 
 
 def _line(axes: Any, line: Any) -> Iterator[Thing]:
@@ -286,7 +297,7 @@ def _things(mark: AnyMark, window: tuple[float, float] | None) -> Iterator[Thing
         x, y = (at, EMPTY) if mark.is_upright else (EMPTY, at)
         yield Thing(kind, name, colours, bool(mark.dash), x, y, weight=weight)
         if mark.label:
-            yield Thing("text", "", frozenset(), y=at, text=mark.label)
+            yield Thing("text", "", frozenset(), x=x, y=y, text=mark.label)
     elif isinstance(mark, marks.Spans):
         seen: set[str] = set()
         for start, end, kind in zip(mark.start, mark.end, mark.kind.tolist(), strict=True):

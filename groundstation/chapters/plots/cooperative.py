@@ -127,7 +127,7 @@ def errors(results: FlightResults) -> Plot | None:
     panels = [_error(data, name, algorithm, legend=name == shown[0]) for name in shown]
     rows = []
     for first in range(0, len(panels), 2):
-        rows.append(Row(tuple(panels[first : first + 2]), 28.0, shares_x=first + 4 <= len(panels)))
+        rows.append(Row(tuple(panels[first : first + 2]), 28.0, shares_x=first + 4 <= len(panels), columns=2))
     more = len(answer.vehicle_names) - len(shown)
     return Plot(
         "cooperative.errors",
