@@ -10,7 +10,13 @@ import groundstation.results.arrays as package
 from groundstation.results.arrays.typed import Arrays, MissingColumnError
 from groundstation.results.figures import FigureData
 
-FILLERS: dict[type, Any] = {np.float64: np.nan, np.bool_: False, np.int64: 0, np.str_: ""}
+FILLERS: dict[type, Any] = {
+    np.float64: np.nan,
+    np.bool_: False,
+    np.int64: 0,
+    np.str_: "",
+    np.datetime64: np.datetime64("NaT", "ns"),
+}
 
 
 def kinds() -> dict[str, type[Arrays]]:

@@ -12,7 +12,10 @@ from groundstation.chapters.parts import Figure
 from groundstation.chapters.plots.fleet import FLEET_PLOTS
 from groundstation.reports.drawing import sketching
 from groundstation.reports.fleet import DRAWERS
+from groundstation.results.arrays.fleet import FleetInstallationFlights
 from groundstation.results.fleet import FleetResults
+from groundstation.results.installation import InstallationRow
+from tests.figure_arrays import filled
 from tests.painted_axes import Shown, Thing, painted
 from tests.test_fleet_report import fleet_of
 from tests.test_plots_equal import compare, same_words
@@ -24,6 +27,24 @@ DEVIATION = {
     **{f"magnetic_{letter}_deg": [0.1 * place] * 20 + [np.nan] * 10 for place, letter in enumerate("abcde")},
     **{f"magnetic_{letter}_sigma_deg": [0.1] * 20 + [np.nan] * 10 for letter in "abcde"},
 }
+
+
+def with_installation(fleet: FleetResults) -> FleetResults:
+    """A fleet with one installation of four flights, of which the first knew nothing."""
+    row = InstallationRow(1, "4711", "A1", "f1", "f4", 4, 4)
+    flights = FleetInstallationFlights.of(
+        filled(
+            "installation_flights",
+            place=np.ones(4, dtype=np.int64),
+            sum_deg=np.array([np.nan, 0.1, 0.15, 0.12]),
+            sum_sigma_deg=np.array([np.nan, 0.1, 0.07, 0.05]),
+            factor=np.array([np.nan, 0.03, 0.028, 0.027]),
+            factor_sigma=np.array([np.nan, 0.012, 0.011, 0.009]),
+        )
+    )
+    return replace(fleet, installations=(row,), installation_flights=flights)
+
+
 FLEETS: dict[str, Callable[[], FleetResults]] = {
     "usual": lambda: fleet_of(60),
     "bands": lambda: fleet_of(200, samples=20),
@@ -31,6 +52,7 @@ FLEETS: dict[str, Callable[[], FleetResults]] = {
     "unnamed": lambda: fleet_of(30, ("",)),
     "timeless": lambda: fleet_of(30, start_utc=[None] * 30),
     "deviation": lambda: fleet_of(30, **DEVIATION),
+    "installations": lambda: with_installation(fleet_of(30)),
     "forty aircraft": lambda: fleet_of(80, [f"R{number}" for number in range(40)], samples=5),
 }
 

@@ -12,7 +12,7 @@ from groundstation.base.errors import UnknownNameError
 from groundstation.base.records import frozen
 from groundstation.base.serial import to_json
 from groundstation.base.timescales import utc_ns_to_iso
-from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights, FleetTrend
+from groundstation.results.arrays.fleet import FleetChecks, FleetInstallationFlights, FleetSkillFlights, FleetTrend
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import row_fields, rows_frame
 from groundstation.results.installation import InstallationRow
@@ -303,7 +303,7 @@ class FleetResults:
         By session id.
     installations : tuple of InstallationRow
         By serial and time.
-    installation_flights : FigureData
+    installation_flights : FleetInstallationFlights
         A row for each flight of them: what earlier ones had taught, its learned answer, its residual.
     """
 
@@ -323,7 +323,7 @@ class FleetResults:
     deviations: tuple[DeviationRow, ...] = ()
     sessions: tuple[SessionRow, ...] = ()
     installations: tuple[InstallationRow, ...] = ()
-    installation_flights: FigureData = field(default_factory=lambda: FigureData("installation_flights", {}, {}))
+    installation_flights: FleetInstallationFlights = field(default_factory=FleetInstallationFlights.empty)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "stated", MappingProxyType(dict(self.stated)))

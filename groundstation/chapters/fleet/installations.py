@@ -45,7 +45,7 @@ def build(fleet: FleetResults) -> Section | None:
 
 def rows_of(fleet: FleetResults, place: int) -> NDArray[np.intp]:
     """Rows of the flights of an installation, in order of time."""
-    return np.flatnonzero(fleet.installation_flights["place"] == place)
+    return np.flatnonzero(fleet.installation_flights.place == place)
 
 
 def name_of(row: InstallationRow) -> str:
@@ -119,19 +119,19 @@ def _flights(fleet: FleetResults, row: InstallationRow) -> Grid:
     )
     cells = []
     for place in rows.tolist():
-        value = {name: flights[name][place] for name in flights.columns}
-        residual, sigma = float(value["residual_deg"]), float(value["residual_sigma_deg"])
+        residual, sigma = float(flights.residual_deg[place]), float(flights.residual_sigma_deg[place])
         told = number(residual, 2, signed=True)
-        verdict = str(value["verdict"])
+        verdict = str(flights.verdict[place])
         cells.append(
             (
-                *(str(value["flight_id"]), day(value["start_utc"]), number(int(value["flights"]), 0)),
-                *(bounded(value["alone_error_deg"], 2, signed=True), _arcmin(value["alone_half_width_deg"])),
-                *(bounded(value["error_deg"], 2, signed=True), _arcmin(value["half_width_deg"])),
+                *(str(flights.flight_id[place]), day(flights.start_utc[place]), number(int(flights.flights[place]), 0)),
+                bounded(flights.alone_error_deg[place], 2, signed=True),
+                _arcmin(flights.alone_half_width_deg[place]),
+                *(bounded(flights.error_deg[place], 2, signed=True), _arcmin(flights.half_width_deg[place])),
                 VERDICTS.get(verdict, ABSENT),
-                bounded(value["platform_error_deg"], 2, signed=True),
+                bounded(flights.platform_error_deg[place], 2, signed=True),
                 Mark("warn", told) if np.isfinite(residual) and abs(residual) > FAR * sigma else told,
-                _teaches(str(value["not_taught"]), float(value["odd"]), float(value["changed"])),
+                _teaches(str(flights.not_taught[place]), float(flights.odd[place]), float(flights.changed[place])),
             )
         )
     caption = "Minus azimuth in flight: the learned number of the platform less what the turns of that flight showed."

@@ -134,7 +134,7 @@ def _unscaled(quantity: str, value: FloatArray) -> FloatArray:
 
 def trends(flights: FigureData, settings: ChangeSettings) -> tuple[FleetTrend, tuple[ChangePoint, ...]]:
     """Control charts of every aircraft and quantity with enough flights that have a time, and their changes."""
-    charted = [NO_TREND]
+    charted = [FleetTrend.empty()]
     changes: list[ChangePoint] = []
     for name, rows in groups_of(flights).items():
         for quantity in TRENDS:
@@ -159,19 +159,6 @@ def trends(flights: FigureData, settings: ChangeSettings) -> tuple[FleetTrend, t
             charted.append(own)
             changes += _change_points(name, quantity, own, chart)
     return joined(charted), tuple(changes)
-
-
-NO_TREND = FleetTrend(
-    aircraft=np.zeros(0, dtype="U1"),
-    quantity=np.zeros(0, dtype="U1"),
-    flight_id=np.zeros(0, dtype="U1"),
-    start_utc=np.zeros(0, dtype="datetime64[ns]"),
-    value=np.zeros(0),
-    level=np.zeros(0),
-    low=np.zeros(0),
-    high=np.zeros(0),
-    is_outside=np.zeros(0, dtype=bool),
-)
 
 
 def _change_points(name: str, quantity: TrendQuantity, own: FleetTrend, chart: Chart) -> list[ChangePoint]:

@@ -1,12 +1,13 @@
 """Installations of a fleet as tables: one row each, and one for each of their flights."""
 
 from collections.abc import Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from groundstation.estimators.installation.settings import InstallationSettings
-from groundstation.results.figures import FigureData
+from groundstation.results.arrays.fleet import FleetInstallationFlights
 from groundstation.results.installation import Installation, InstallationRow, InstalledFlight
 
 NUMBERS = (
@@ -44,14 +45,11 @@ def _named(flights: Sequence[str], probability: Sequence[float], least: float) -
     return ", ".join(name for name, one in zip(flights, probability, strict=False) if one > least)
 
 
-def installation_flights(installations: Sequence[Installation]) -> FigureData:
+def installation_flights(installations: Sequence[Installation]) -> FleetInstallationFlights:
     """One row for each flight: what the flights before it had taught, its answers, its residual."""
     rows = [_flight(place, one, flight) for place, one in enumerate(installations, 1) for flight in one.flights]
-    kinds: dict[str, Any] = {"place": np.int64, "flights": np.int64, "start_utc": "datetime64[ns]", "odd": np.float64}
-    kinds |= dict.fromkeys((*NUMBERS, *BELIEVED, "changed"), np.float64)
-    names = list(rows[0]) if rows else []
-    columns = {name: np.array([row[name] for row in rows], dtype=kinds.get(name, np.str_)) for name in names}
-    return FigureData("installation_flights", columns, {})
+    names = [one.name for one in fields(FleetInstallationFlights)]
+    return FleetInstallationFlights(**{name: np.array([row[name] for row in rows]) for name in names})
 
 
 def _flight(place: int, one: Installation, flight: InstalledFlight) -> dict[str, Any]:

@@ -44,3 +44,33 @@ class FleetChecks(Arrays, figure="calibration_checks"):
     sigma_deg: Floats
     z: Floats
     is_inside: Flags
+
+
+class FleetInstallationFlights(Arrays, figure="installation_flights"):
+    """Flights of every installation: what the flights before each had taught, its answers, its residual."""
+
+    place: Counts
+    aircraft: Texts
+    ins_serial: Texts
+    flight_id: Texts
+    start_utc: Times
+    not_taught: Texts
+    flights: Counts
+    verdict_alone: Texts
+    verdict: Texts
+    error_deg: Floats
+    half_width_deg: Floats
+    alone_error_deg: Floats
+    alone_half_width_deg: Floats
+    platform_error_deg: Floats
+    platform_standard_error_deg: Floats
+    residual_deg: Floats
+    residual_sigma_deg: Floats
+    mounting_deg: Floats
+    mounting_sigma_deg: Floats
+    sum_deg: Floats
+    sum_sigma_deg: Floats
+    factor: Floats
+    factor_sigma: Floats
+    odd: Floats
+    changed: Floats

@@ -107,6 +107,12 @@ class Arrays(FigureData):
         vars(made)["name"] = figure.name
         return made
 
+    @classmethod
+    def empty(cls) -> Self:
+        """The figure without a row."""
+        made: Self = _empty(cls)
+        return made
+
     def of_one(self, *of: str) -> Self:
         """The same arrays under the name of one of several figures of a kind."""
         made = self._each(lambda values: values)
@@ -264,6 +270,21 @@ def _made(kind: type, figure: FigureData, of: str, taken: set[str]) -> Any:
 
 def _names(kind: type, of: str) -> list[tuple[str, _Field]]:
     return [(part.pattern.format(of), part) for part in _fields(kind)]
+
+
+def _empty(kind: type) -> Any:
+    """A figure or part whose columns have no rows; those that it may lack are left out."""
+    columns: dict[str, Any] = {}
+    for part in _fields(kind):
+        if part.is_optional:
+            columns[part.name] = None
+        elif part.kind == ByName:
+            columns[part.name] = {}
+        elif isinstance(part.kind, type) and issubclass(part.kind, Part):
+            columns[part.name] = _empty(part.kind)
+        else:
+            columns[part.name] = _as(part.kind, np.zeros(0))
+    return kind(**columns)
 
 
 def _as(kind: Any, values: NDArray[Any]) -> NDArray[Any]:

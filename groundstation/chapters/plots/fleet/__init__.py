@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from groundstation.chapters.plots.fleet import aircraft, calibration, densities, deviation, skill, trend
+from groundstation.chapters.plots.fleet import aircraft, calibration, densities, deviation, installations, skill, trend
 from groundstation.plots.plot import Plot
 from groundstation.results.fleet import FleetResults
 
@@ -17,4 +17,5 @@ FLEET_PLOTS: dict[str, Callable[[FleetResults], Plot] | Callable[[FleetResults, 
     "fleet.densities": densities.overlay,
     "fleet.densities_by_aircraft": densities.by_aircraft,
     "fleet.deviation": deviation.curves,
+    "fleet.installation": installations.over_time,
 }
