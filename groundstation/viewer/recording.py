@@ -27,6 +27,7 @@ from groundstation.viewer.tabs.forecast import forecast
 from groundstation.viewer.tabs.generic import generic_tab
 from groundstation.viewer.tabs.heading import heading
 from groundstation.viewer.tabs.inertial import inertial
+from groundstation.viewer.tabs.installation import installation
 from groundstation.viewer.tabs.landing import landing
 from groundstation.viewer.tabs.landing_beacons import landing_beacons
 from groundstation.viewer.tabs.log import log
@@ -43,6 +44,7 @@ DEFAULT_PORT = 9876
 # In order: a tab and the analyses whose answers it shows. An answer that none of them shows has the generic tab.
 ANSWER_TABS: tuple[tuple[Callable[[Recorder, FlightResults], rrb.Container | None], tuple[str, ...]], ...] = (
     (heading, ("heading",)),
+    (installation, ("installation",)),
     (inertial, ("inertial",)),
     (forecast, ("forecast",)),
     (magnetic, ("magnetic", "magnetic_ground")),

@@ -102,9 +102,9 @@ def _lessons(out: Path, found: Scan) -> Iterator[Lesson]:
     for name in found.stale:
         try:
             saved = load(out / name, ANSWER_TYPES)
+            lesson = lesson_of_flight(saved.results, mapping(saved.manifest.configuration, "aircraft"), name)
         except Exception:  # it is told of where the index is written
             continue
-        lesson = lesson_of_flight(saved.results, mapping(saved.manifest.configuration, "aircraft"), name)
         if lesson.ins_serial:
             yield lesson
 
