@@ -1,6 +1,7 @@
 """The panels of a plot as a page draws them live, straight from its description; frames of what stays a picture."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -50,7 +51,7 @@ def panels_of(panels: Sequence[Placed], height_pt: float) -> tuple[live.Panel, .
         if not can_live(one):
             return ()
         for box in one.boxes:
-            curves = [curve for mark in one.panel.marks for curve in _curves(mark, box)]
+            curves = [_held(curve) for mark in one.panel.marks for curve in _curves(mark, box)]
             found.append(
                 live.Panel(
                     **vars(_frame(box, height_pt)),
@@ -62,8 +63,14 @@ def panels_of(panels: Sequence[Placed], height_pt: float) -> tuple[live.Panel, .
     return tuple(found)
 
 
+def _held(curve: live.Curve) -> live.Curve:
+    """The curve with numbers that the page holds."""
+    x, y, upper = (np.clip(values, -LARGEST, LARGEST) for values in (curve.x, curve.y, curve.upper))
+    return replace(curve, x=x, y=y, upper=upper)
+
+
 def can_live(one: Placed) -> bool:
-    """Whether all that stands on a panel is known to the page's script: curves, dots, bands, lanes over a number."""
+    """Tell whether all that stands on a panel is known to the page's script: lines, dots, bands, lanes."""
     panel = one.panel
     if panel.is_map or panel.nothing or panel.x.names or _UNTOLD & {panel.x.scale, panel.y.scale}:
         return False
@@ -110,7 +117,7 @@ def _single(span: Span) -> tuple[float, float]:
 
 
 def _samples(box: Box) -> Samples | None:
-    """What the cursor is told near a place: samples that say so, else the values of cells."""
+    """Values that the cursor is told near a place: samples that say so, else those of cells."""
     told = next((mark for mark in box.panel.marks if isinstance(mark, Told)), None)
     if told is not None:
         columns = told.x, told.y, told.value
@@ -123,7 +130,7 @@ def _samples(box: Box) -> Samples | None:
         columns, title = (across.ravel(), up.ravel(), cells.values.ravel()), label(cells.title)
     known = np.flatnonzero(np.isfinite(np.array(columns)).all(axis=0))
     rows = known[thin(len(known), MOST_SAMPLES)]
-    return Samples(title, *(column[rows] for column in columns))
+    return Samples(title, *(np.clip(column[rows], -LARGEST, LARGEST) for column in columns))
 
 
 def _grounds(box: Box) -> tuple[tuple[float, float, str, str], ...]:

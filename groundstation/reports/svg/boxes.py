@@ -1,4 +1,4 @@
-"""Where frames stand in a picture: room for what is written around them, columns that agree, windows; points."""
+"""Places of frames in a picture: room for what is written around them, columns that agree, windows; points."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -178,7 +178,7 @@ def scale_of(panel: Panel) -> Cells | None:
 
 
 def _has_scale(row: Row, column: int) -> bool:
-    """Whether the scale of cells stands beside a panel: of several alike in a row beside the last."""
+    """Tell whether the scale of cells stands beside a panel: of several alike in a row beside the last."""
     here = [scale_of(panel) for panel in row.panels[column : column + 2]]
     alike = [(one.low, one.high, one.title, one.is_log) for one in here if one is not None]
     return here[0] is not None and (len(alike) < 2 or alike[0] != alike[1])
@@ -235,7 +235,7 @@ def _maps(plot: Plot, rows: list[list[_Told]], widths: list[list[float]]) -> lis
     rows = [list(row) for row in rows]
     for number, row in enumerate(plot.rows):
         for column, told in enumerate(rows[number]):
-            if not told.panel.is_map:
+            if not told.panel.is_map or len(told.y) > 1 or {told.x.scale, told.y[0].scale} != {"linear"}:
                 continue
             x, y = extents.equal(told.x, told.y[0], widths[number][column], row.height_mm * PT_PER_MM)
             ticks = _y_ticks(told.panel, y, row.height_mm * PT_PER_MM)

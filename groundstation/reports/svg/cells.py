@@ -8,9 +8,9 @@ from groundstation.plots.ranges import thin
 from groundstation.reports.svg import path
 from groundstation.reports.svg.boxes import BAR_PT, MOST_OF_A_TITLE, TICK_PT, TO_BAR_PT, TO_TEXT_PT, Box
 from groundstation.reports.svg.colours import EDGE, STEPS, viridis
-from groundstation.reports.svg.extents import edges
+from groundstation.reports.svg.extents import NOTHING, edges
 from groundstation.reports.svg.font import SIZE_PT, label, middle, width_pt, written
-from groundstation.reports.svg.scales import Span
+from groundstation.reports.svg.scales import Span, span_of
 from groundstation.reports.svg.ticks import ticks_of
 
 MOST_CELLS = 90  # along either axis
@@ -40,9 +40,8 @@ def _colour(step: int) -> str:
 
 
 def _levels(mark: Cells, values: Floats) -> NDArray[np.int64]:
-    """Which colour each cell has, -1 for none."""
-    span = _scale(mark)
-    shares = span.shares(np.clip(values, None, span.high))
+    """The number of the colour of each cell, -1 for none."""
+    shares = np.clip(_scale(mark).shares(values), 0.0, 1.0)
     if mark.is_log:
         shares = np.where(values <= 0.0, 0.0, shares)
     known = np.isfinite(shares)
@@ -51,11 +50,7 @@ def _levels(mark: Cells, values: Floats) -> NDArray[np.int64]:
 
 
 def _scale(mark: Cells) -> Span:
-    low, high = (float(end) if np.isfinite(end) else 0.0 for end in (mark.low, mark.high))
-    if mark.is_log:
-        low = low if low > 0.0 else 1e-3
-        return Span("log", low, high if high > low else 10.0 * low)
-    return Span("linear", low, high if high > low else low + max(1e-6, abs(low) * 1e-6))
+    return span_of("log" if mark.is_log else "linear", mark.low, mark.high, NOTHING, is_tight=True)
 
 
 def _blocks(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:

@@ -1,4 +1,4 @@
-"""What a panel shows of its axes: the ends of all that is drawn, rows with names, windows."""
+"""Ends of the axes of a panel: those of all that is drawn, rows with names, windows."""
 
 from collections.abc import Sequence
 
@@ -38,8 +38,9 @@ def edges(centres: Floats) -> Floats:
     """
     if len(centres) < 2:
         return np.array([centres[0] - 0.5, centres[0] + 0.5]) if len(centres) else np.zeros(0)
-    inner = 0.5 * (centres[1:] + centres[:-1])
-    return np.concatenate([[2.0 * centres[0] - inner[0]], inner, [2.0 * centres[-1] - inner[-1]]])
+    with np.errstate(invalid="ignore", over="ignore"):
+        inner = 0.5 * centres[1:] + 0.5 * centres[:-1]
+        return np.concatenate([[2.0 * centres[0] - inner[0]], inner, [2.0 * centres[-1] - inner[-1]]])
 
 
 def x_extent(marks: Sequence[AnyMark]) -> Floats:
@@ -97,7 +98,7 @@ def names_of(panel: Panel) -> tuple[tuple[float, str], ...]:
 
 
 def has_rows(panel: Panel) -> bool:
-    """Whether the vertical axis counts rows from the top."""
+    """Tell whether the vertical axis counts rows from the top."""
     return any(isinstance(mark, Lanes | Intervals) for mark in panel.marks)
 
 
@@ -115,11 +116,8 @@ def y_span(panel: Panel) -> Span:
         places = [place for place, _ in names_of(panel)]
         places += [float(mark.row) for mark in panel.marks if isinstance(mark, Intervals)]
         last = max((place for place in places if np.isfinite(place)), default=0.0)
-        return Span(
-            "linear",
-            last + BELOW_ROWS if axis.low is None else axis.low,
-            -ABOVE_ROWS if axis.high is None else axis.high,
-        )
+        ends = last + BELOW_ROWS if axis.low is None else axis.low, -ABOVE_ROWS if axis.high is None else axis.high
+        return span_of("linear", *ends, NOTHING, is_tight=True)
     is_bars = any(isinstance(mark, Histogram) for mark in panel.marks)
     low = 0.0 if axis.low is None and is_bars and drawn.size and drawn[0] >= 0.0 and axis.scale != "log" else axis.low
     return span_of(axis.scale, low, axis.high, drawn, axis.linear_to, is_tight=_is_grid(panel))
@@ -147,7 +145,7 @@ def windows_of(panel: Panel, span: Span) -> tuple[Span, ...]:
     known = [(low, high) for low, high in panel.x.windows if np.isfinite([low, high]).all() and high > low]
     if not known:
         return (span,)
-    return tuple(Span(span.scale, low, high, span.linear_to) for low, high in known)
+    return tuple(span_of(span.scale, *ends, NOTHING, span.linear_to, is_tight=True) for ends in known)
 
 
 def equal(x: Span, y: Span, width_pt: float, height_pt: float) -> tuple[Span, Span]:
@@ -165,4 +163,4 @@ def equal(x: Span, y: Span, width_pt: float, height_pt: float) -> tuple[Span, Sp
 
 def _grown(span: Span, length: float) -> Span:
     middle, half = 0.5 * (span.low + span.high), 0.5 * np.copysign(length, span.high - span.low)
-    return Span(span.scale, float(middle - half), float(middle + half), span.linear_to)
+    return span_of(span.scale, float(middle - half), float(middle + half), NOTHING, is_tight=True)

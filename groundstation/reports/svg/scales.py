@@ -13,6 +13,7 @@ LINEAR_SHARE = 10.0 / 9.0  # of a decade: the room of a symlog scale from zero t
 MARGIN = 0.05  # of what is drawn, on either side
 LEAST_SPAN = 1e-9  # of the greater end: ends nearer to each other are moved apart
 SMALLEST = 1e-200  # ends nearer to each other are one, and nothing smaller stands on a logarithmic scale
+LEAST_LINEAR = 1e-100
 LARGEST = 1e200  # what is beyond is as good as infinite, and its squares are not
 
 
@@ -36,7 +37,7 @@ class Span:
         return float(self.shares(np.array([value]))[0])
 
     def _drawn(self, values: Floats) -> Floats:
-        values = np.where(np.isfinite(values), np.clip(values, -LARGEST, LARGEST), np.nan)
+        values = np.where(np.isfinite(values), np.clip(values, -10.0 * LARGEST, 10.0 * LARGEST), np.nan)
         if self.scale == "log":
             return np.asarray(np.log10(np.where(values >= SMALLEST, values, np.nan)))
         if self.scale == "symlog":
@@ -65,27 +66,28 @@ def span_of(
     >>> span_of("log", None, None, np.zeros(0), is_tight=True).low
     1.0
     """
-    linear_to = linear_to if math.isfinite(linear_to) and linear_to > 0.0 else 1.0
+    linear_to = min(max(linear_to, LEAST_LINEAR), LARGEST) if math.isfinite(linear_to) and linear_to > 0.0 else 1.0
     known = np.clip(finite(drawn), -LARGEST, LARGEST)
     if scale == "log":
         known = known[known >= SMALLEST]
         low, high = (end if end is None or end >= SMALLEST else None for end in (low, high))
-    ends = [float(known.min()), float(known.max())] if known.size else [1.0, 10.0] if scale == "log" else [0.0, 1.0]
     given = [None if end is None or not math.isfinite(end) else min(max(end, -LARGEST), LARGEST) for end in (low, high)]
     is_reversed = all(end is not None for end in given) and given[0] > given[1]  # type: ignore[operator]
     if is_reversed:
         given.reverse()
-    if not known.size and given != [None, None]:  # one end is known, nothing else
-        ends = [one if one is not None else (given[1] or 0.0) - 1.0 for one in given[:1]] + [
-            one if one is not None else (given[0] or 0.0) + 1.0 for one in given[1:]
-        ]
-        if scale == "log":
-            ends = [given[0] or 0.1 * (given[1] or 10.0), given[1] or 10.0 * (given[0] or 1.0)]
+    ends = [float(known.min()), float(known.max())] if known.size else _about(scale, *given)
     first, last = (own if own is not None else end for own, end in zip(given, ends, strict=True))
     first, last = _apart(scale, first, last)
     if not is_tight:
         first, last = _wider(scale, (first, last), (given[0] is None, given[1] is None), linear_to)
     return Span(scale, last, first, linear_to) if is_reversed else Span(scale, first, last, linear_to)
+
+
+def _about(scale: Scale, low: float | None, high: float | None) -> list[float]:
+    """Ends where nothing is drawn, from the one that is known."""
+    if scale == "log":
+        return [low or 0.1 * (high or 10.0), high or 10.0 * (low or 1.0)]
+    return [(1.0 if high is None else high) - 1.0 if low is None else low, (low or 0.0) + 1.0 if high is None else high]
 
 
 def _apart(scale: Scale, first: float, last: float) -> tuple[float, float]:
@@ -96,7 +98,8 @@ def _apart(scale: Scale, first: float, last: float) -> tuple[float, float]:
         return (first, last) if last > first * (1.0 + LEAST_SPAN) else (first / 2.0, last * 2.0)
     if last - first > least:
         return first, last
-    margin = 1.0 if scale in ("time", "angle", "date") else max(0.05 * abs(first), 1e-6)
+    margin = 10.0 * least if scale in ("time", "angle", "date") else 0.05 * abs(first)
+    margin = max(margin, 1.0 if scale in ("time", "angle", "date") else 1e-6)
     return first - margin, last + margin
 
 
@@ -106,7 +109,7 @@ def _wider(
     """Ends with a margin where they are not given."""
     span = Span(scale, *ends, linear_to)
     if scale == "log":
-        factor = (ends[1] / ends[0]) ** MARGIN
+        factor = 10.0 ** (MARGIN * (math.log10(ends[1]) - math.log10(ends[0])))
         return ends[0] / (factor if is_open[0] else 1.0), ends[1] * (factor if is_open[1] else 1.0)
     margin = MARGIN * (span.high - span.low)
     return ends[0] - (margin if is_open[0] else 0.0), ends[1] + (margin if is_open[1] else 0.0)

@@ -35,13 +35,13 @@ LANE_PT, LEAST_LANE_PT, ROUND = 7.0, 0.25, ' style="stroke-linecap:round"'
 
 
 def shape(mark: AnyMark, box: Box) -> str:
-    """What a mark is in a frame; empty where nothing of it is to be seen."""
+    """A mark as it stands in a frame; empty where nothing of it is to be seen."""
     draw: Callable[[Any, Box], str] | None = _SHAPES.get(type(mark))
     return draw(mark, box) if draw else ""
 
 
 def is_within(mark: AnyMark) -> bool:
-    """Whether a mark is cut at the edges of the frame; symbols are not."""
+    """Tell whether a mark is cut at the edges of the frame; symbols are not."""
     return not isinstance(mark, Points | Intervals)
 
 
@@ -84,7 +84,7 @@ def _dots(mark: Dots, box: Box) -> str:
 
 
 def _seen(x: Floats, y: Floats, box: Box, beyond: float = 2.0) -> Any:
-    """Which places lie in the frame, or so near that a dot there reaches into it."""
+    """Tell which places lie in the frame, or so near that a dot there reaches into it."""
     with np.errstate(invalid="ignore"):
         return (
             (x >= box.left - beyond) & (x <= box.right + beyond) & (y >= box.top - beyond) & (y <= box.bottom + beyond)

@@ -1,4 +1,4 @@
-"""Which samples of a curve are drawn, where they are too many: extremes and gaps stay."""
+"""Samples of a curve that are drawn, where they are too many: extremes and gaps stay."""
 
 import numpy as np
 from numpy.typing import NDArray

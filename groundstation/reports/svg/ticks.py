@@ -144,7 +144,7 @@ def _log(span: Span, low: float, high: float, length_pt: float, is_upright: bool
         if low * (1.0 - 1e-9) <= part * 10.0**power <= high * (1.0 + 1e-9)
     ]
     if len(places) < 2:
-        return _linear(low, high, length_pt / 2.0, is_upright)
+        return tuple(tick for tick in _linear(low, high, length_pt / 2.0, is_upright) if tick[0] >= low)
     texts = [of_decade(place) for place in places]
     if any(text[-1] in POWERS for text in texts):  # all as powers, or none
         texts = [of_decade(place, as_power=True) for place in places]
@@ -189,7 +189,7 @@ def _symlog(span: Span, length_pt: float, is_upright: bool) -> tuple[Tick, ...]:
 
 
 def _weight(size: float, linear_to: float) -> int:
-    """Which marks stay where there is no room for all: zero, decades, fives and twos."""
+    """Rank of a mark where there is no room for all: zero, decades, fives and twos."""
     if size == 0.0:
         return 0
     part = size / 10.0 ** math.floor(math.log10(size) + 1e-9)
