@@ -314,6 +314,15 @@ def test_hostile_summaries_end_in_a_row_or_a_reason(tmp_path: Path, hostile: Any
     json.dumps(results.to_dict(), allow_nan=False)
 
 
+def test_a_flight_whose_samples_file_is_gone_stays_without_them(tmp_path: Path) -> None:
+    folders = [save_flight(tmp_path, number) for number in range(3)]
+    (folders[1] / "arrays" / "heading_samples.parquet").unlink()
+    results = write(tmp_path)
+    assert len(results) == 3 and len(results.densities) == 2
+    assert np.isfinite(results.densities.pooled_per_deg).all()
+    assert all(one.sample_mean_deg is not None and np.isfinite(one.sample_mean_deg) for one in results.by_aircraft)
+
+
 def test_metadata_that_is_broken_is_told_and_stops_nothing(tmp_path: Path) -> None:
     broken, _whole = (save_flight(tmp_path, number) for number in range(2))
     path = broken / "arrays" / "heading_samples.parquet"

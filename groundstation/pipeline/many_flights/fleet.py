@@ -154,7 +154,7 @@ def _parts(found: Scan, shares: Any, columns: Sequence[str]) -> Iterator[Any]:
 
 def _results(found: Scan, flights: FigureData, shares: Any, unread: list[NotInFleet]) -> FleetResults:
     settings = ChangeSettings()
-    is_sampled = flights["samples"] > 0
+    is_sampled = (flights["samples"] > 0) & np.isfinite(flights["sample_mean_deg"])  # whose samples are there
     figures = (flights[name][is_sampled].tolist() for name in ("samples", "sample_mean_deg", "sample_m2_deg2"))
     moments = [Moments(int(count), mean, m2) for count, mean, m2 in zip(*figures, strict=True)]
     aircraft = flights["aircraft"][is_sampled].tolist()
