@@ -55,11 +55,6 @@ class Half:
         """Of its lines, in points."""
         return WIDTHS[self.letter]
 
-    def rows_of(self, kind: type[T]) -> T | None:
-        """The typed arrays of a figure, None when the flight has none or they are empty."""
-        found = self.saved.figure(kind.figure)
-        return None if found is None else kind.of(found)
-
     def on_clock_of_a(self, time_s: FloatArray) -> FloatArray:
         """Flight seconds of this flight on the clock of A."""
         return np.asarray(time_s + self.offset_s)
@@ -106,7 +101,7 @@ def send_comparison(
 
 def _of_both(halves: Sequence[Half], kind: type[T]) -> list[tuple[Half, T]]:
     """The typed arrays of a figure, of those flights that have them."""
-    return [(half, rows) for half in halves if (rows := half.rows_of(kind)) is not None]
+    return [(half, rows) for half in halves if (rows := half.saved.rows_of(kind)) is not None]
 
 
 def _overview(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container:
@@ -267,18 +262,15 @@ def _inertial(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | Non
 
 def _cooperative(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | None:
     """What two sessions computed of their errors, and what these were."""
-    found = [(half, rows) for half in halves if (rows := half.saved.rows_of(SessionErrors)) is not None]
-    views = []
+    found = _of_both(halves, SessionErrors)
     computed = [CurveOfHalf(half, rows.time_s, rows.two_sigma_r_m) for half, rows in found]
     errors = [CurveOfHalf(half, rows.time_s, rows.rms_error_m) for half, rows in found]
-    for column, title, curves in (
-        ("two_sigma_r_m", "2σ_r as computed, worst aircraft, m", computed),
-        ("rms_error_m", "Horizontal error, RMS of all aircraft, m", errors),
-    ):
-        view = _overlay(recorder, f"session_errors/{column}", title, curves)
-        if view is not None:
-            views.append(view)
-    return rrb.Vertical(contents=views, name="Cooperative") if views else None
+    views = (
+        _overlay(recorder, "session_errors/two_sigma_r_m", "2σ_r as computed, worst aircraft, m", computed),
+        _overlay(recorder, "session_errors/rms_error_m", "Horizontal error, RMS of all aircraft, m", errors),
+    )
+    shown = [view for view in views if view is not None]
+    return rrb.Vertical(contents=shown, name="Cooperative") if shown else None
 
 
 def _forecast(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | None:

@@ -1,6 +1,5 @@
 """INS errors: what the filter says of position, velocity, tilt and drift of each channel, and how far to trust it."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +15,7 @@ from groundstation.results.arrays.inertial import (
     InertialStates,
     InertialTrack,
     ObservabilityOfChannel,
+    StateName,
     StatesOfChannel,
 )
 from groundstation.results.flight import FlightResults
@@ -34,66 +34,22 @@ BAND_QUANTILES = (10.0, 90.0)  # the band of the first minutes and of long outag
 
 @dataclass(frozen=True)
 class StateLine:
-    """A state of a channel: name, title, unit and columns, of which GNSS measures only some."""
+    """A state of a channel as it is shown: name, title, unit."""
 
-    name: str
+    name: StateName
     title: str
     unit: str
-    estimate: Callable[[StatesOfChannel], FloatArray]
-    sigma: Callable[[StatesOfChannel], FloatArray]
-    measured: Callable[[StatesOfChannel], FloatArray] | None = None
-    smoothed: Callable[[StatesOfChannel], FloatArray] | None = None
 
 
 FAST = (
-    StateLine(
-        "position",
-        "position error",
-        "m",
-        estimate=lambda states: states.position_m,
-        sigma=lambda states: states.position_sigma_m,
-        measured=lambda states: states.measured_position_m,
-        smoothed=lambda states: states.smoothed_position_m,
-    ),
-    StateLine(
-        "velocity",
-        "velocity error",
-        "m/s",
-        estimate=lambda states: states.velocity_mps,
-        sigma=lambda states: states.velocity_sigma_mps,
-        measured=lambda states: states.measured_velocity_mps,
-        smoothed=lambda states: states.smoothed_velocity_mps,
-    ),
-    StateLine(
-        "tilt",
-        "platform tilt",
-        "arcsec",
-        estimate=lambda states: states.tilt_arcsec,
-        sigma=lambda states: states.tilt_sigma_arcsec,
-    ),
-    StateLine(
-        "drift",
-        "constant gyro drift",
-        "deg/h",
-        estimate=lambda states: states.drift_dph,
-        sigma=lambda states: states.drift_sigma_dph,
-    ),
+    StateLine("position", "position error", "m"),
+    StateLine("velocity", "velocity error", "m/s"),
+    StateLine("tilt", "platform tilt", "arcsec"),
+    StateLine("drift", "constant gyro drift", "deg/h"),
 )
 SLOW = (
-    StateLine(
-        "drift_rate",
-        "drift rate",
-        "deg/h per h",
-        estimate=lambda states: states.drift_rate_dphph,
-        sigma=lambda states: states.drift_rate_sigma_dphph,
-    ),
-    StateLine(
-        "random_drift",
-        "random gyro drift",
-        "deg/h",
-        estimate=lambda states: states.random_drift_dph,
-        sigma=lambda states: states.random_drift_sigma_dph,
-    ),
+    StateLine("drift_rate", "drift rate", "deg/h per h"),
+    StateLine("random_drift", "random gyro drift", "deg/h"),
 )
 
 
@@ -147,16 +103,15 @@ def _state(
 ) -> rrb.View:
     """One state: measured where GNSS shows it, smoothed, estimate, and its filled 95 % band."""
     path, gaps = f"inertial/{channel}/{state.name}", gap_after(time_ns)
-    estimate, half = state.estimate(states), NORMAL_95 * state.sigma(states)
+    one = states.state(state.name)
+    estimate, half = one.value, NORMAL_95 * one.sigma
     shown, series, lines = [estimate], list[FloatArray](), list[Line]()
-    measured = None if state.measured is None else state.measured(states)
-    if measured is not None and np.isfinite(measured).any():
-        series.append(measured)  # a line, not dots: Rerun would draw those over the estimate
+    if np.isfinite(one.measured).any():
+        series.append(one.measured)  # a line, not dots: Rerun would draw those over the estimate
         lines.append(Line(f"INS − GNSS, {state.unit}", colours.SAMPLES, THIN))
-        shown.append(measured)
-    smoothed = None if state.smoothed is None else state.smoothed(states)
-    if smoothed is not None and np.isfinite(smoothed).any():
-        series.append(smoothed)
+        shown.append(one.measured)
+    if np.isfinite(one.smoothed).any():
+        series.append(one.smoothed)
         lines.append(Line(f"smoothed (RTS), {state.unit}", colours.PAPER, THIN))
     recorder.band(f"{path}/b_band", time_ns, estimate, half, ESTIMATE, gaps)  # over the others
     if series:
@@ -194,9 +149,7 @@ def _innovation(recorder: Recorder, time_ns: Int64Array, channel: str, states: S
 def _observability(recorder: Recorder, time_ns: Int64Array, channel: str, states: ObservabilityOfChannel) -> rrb.View:
     """Observability of the six states, 0 to 1."""
     path = f"inertial/{channel}/observability"
-    values = np.column_stack(
-        [states.position, states.velocity, states.tilt, states.drift, states.drift_rate, states.random_drift]
-    )
+    values = np.column_stack(list(states.states().values()))
     titles = [state.title for state in (*FAST, *SLOW)]
     lines = [Line(title, colour) for title, colour in zip(titles, colours.for_series(len(titles)), strict=True)]
     recorder.lines(path, time_ns, values, lines, gap_after(time_ns))

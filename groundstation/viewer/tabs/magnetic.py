@@ -1,6 +1,6 @@
 """Magnetic: the deviation by each method against heading, the branches, the errors and the field over time."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import rerun.blueprint as rrb
@@ -28,11 +28,6 @@ from groundstation.viewer.views import document, plot
 
 THIN, BOLD, DOT = 1.0, 2.0, 1.6
 SHADES = dict(zip(METHOD_TITLES, (colours.INS, colours.ANSWER, colours.HONEST), strict=True))
-AFTER: Mapping[MethodName, Callable[[MagneticSamples], FloatArray]] = {  # error after the correction by each method
-    "compass_table": lambda samples: samples.error_compass_table_deg,
-    "poisson_attitude": lambda samples: samples.error_poisson_attitude_deg,
-    "constant_modulus": lambda samples: samples.error_constant_modulus_deg,
-}
 MARGIN = 0.08
 RUN, FITTED = Line("ground runs", colours.INS, BOLD), Line("A to E", colours.ANSWER, THIN)
 
@@ -148,7 +143,7 @@ def _errors(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     time_ns = recorder.time_ns(figure.time_s[mine])
     for title, values, shade in (
         ("before", figure.error_before_deg, colours.SAMPLES),
-        ("after", AFTER[method](figure), colours.ANSWER),
+        ("after", figure.error_after_deg(method), colours.ANSWER),
     ):
         recorder.dots(f"magnetic/error/{title}", time_ns, values[mine], Line(f"{title}, deg", shade, DOT))
     title = "Error of magnetic heading on data that no fit used, deg: before grey, after green"
@@ -176,11 +171,7 @@ def _modulus(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     if figure is None:
         return []
     shown = [(figure.before_nt, Line("as read, nT", colours.SAMPLES, THIN))]
-    freed: tuple[tuple[MethodName, FloatArray], ...] = (
-        ("poisson_attitude", figure.poisson_attitude_nt),
-        ("constant_modulus", figure.constant_modulus_nt),
-    )
-    shown += [(values, Line(f"{METHOD_TITLES[name]}, nT", SHADES[name])) for name, values in freed]
+    shown += [(values, Line(f"{METHOD_TITLES[name]}, nT", SHADES[name])) for name, values in figure.freed().items()]
     known = [(values, line) for values, line in shown if np.isfinite(values).any()]
     if not known:
         return []
