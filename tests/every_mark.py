@@ -20,13 +20,12 @@ from groundstation.plots.marks import (
     Points,
     Spans,
     Told,
-    ring,
 )
 from groundstation.plots.plot import Axis, Panel, Plot, one_panel
 
 X = np.arange(5.0)
 Y = np.array([1.0, 3.0, 2.0, 5.0, 4.0])
-SQUARE = ring([(0.0, 1.0), (4.0, 1.0), (4.0, 4.0)])
+SQUARE = np.array([(0.0, 1.0), (4.0, 1.0), (4.0, 4.0), (0.0, 1.0)])
 NO_TEXT = np.zeros(0, dtype=np.str_)
 
 DRAWN: Mapping[str, AnyMark] = {

@@ -13,7 +13,7 @@ import pytest
 from groundstation.chapters.control import title_of
 from groundstation.chapters.plots import PLOTS
 from groundstation.chapters.plots.acceptance import JUDGED
-from groundstation.chapters.plots.comparison import COMPARED, Side
+from groundstation.chapters.plots.comparison import COMPARED, OVERLAYS, Side
 from groundstation.pipeline.many_flights.acceptance import accept
 from groundstation.plots.marks import Floats
 from groundstation.plots.plot import Plot
@@ -257,8 +257,8 @@ def test_the_descriptions_of_a_comparison_show_what_the_drawers_paint(tmp_path: 
     sides = [comparison._Side("A", folders[0], comparison.A), comparison._Side("B", folders[1], comparison.B, 3.0)]
     told = [Side("A", folders[0], "drift_windows"), Side("B", folders[1], "drift_windows", 3.0)]
     drawers = {"tracks": comparison._tracks, "growth": comparison._growth}
-    drawers |= {one.name: partial(comparison._overlay, told=one) for one in comparison.LINES}
-    assert list(COMPARED) == ["tracks", *(one.name for one in comparison.LINES), "growth"]
+    drawers |= {one.name: partial(comparison._overlay, told=one) for one in OVERLAYS}
+    assert list(COMPARED) == ["tracks", *(one.name for one in OVERLAYS), "growth"]
     count = 0
     for name, describe in COMPARED.items():
         with sketching() as sketches:

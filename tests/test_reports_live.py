@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.plots.ranges import broken_at_gaps, windows
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.frames import TIME
@@ -45,7 +46,7 @@ def test_curves_dots_bands_and_limits_are_those_of_the_picture() -> None:
 
 def test_a_break_of_a_line_stays_one() -> None:
     def paint(figure: Any) -> None:
-        time, value = d.broken_at_gaps([0.0, 1.0, 2.0, 9.0, 10.0], [1.0, 2.0, 3.0, 4.0, 5.0])
+        time, value = broken_at_gaps([0.0, 1.0, 2.0, 9.0, 10.0], [1.0, 2.0, 3.0, 4.0, 5.0])
         d.line(layout.place(figure, 16, 12, 174, 50), time, value, d.INS)
 
     ((curve,),) = [panel.curves for panel in panels(paint)]
@@ -112,7 +113,7 @@ def test_the_frame_of_a_picture_is_where_its_axes_stand() -> None:
 
 def test_a_broken_time_axis_has_a_panel_for_each_run() -> None:
     time = np.concatenate([np.arange(0.0, 40.0), np.arange(2000.0, 2080.0)])
-    spans = layout.windows(time)
+    spans = windows(time)
 
     def paint(figure: Any) -> None:
         for axes in layout.time_panels(figure, (16, 12, 174, 50), spans):

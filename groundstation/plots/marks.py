@@ -3,9 +3,9 @@
 Every array has one dimension unless said otherwise; NaN is a gap. A mark without a name is left out of the legend.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -194,7 +194,6 @@ class Points(Mark):
     symbol: Symbol = "dot"
     labels: tuple[str, ...] = ()
     is_hollow: bool = False
-    size: float = 1.0  # times the usual
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -238,20 +237,3 @@ class Told(Mark):
 AnyMark: TypeAlias = (
     Curve | Dots | Band | Histogram | Lanes | Spans | Limit | Bars | Intervals | Points | Outlines | Cells | Told
 )
-
-
-def arrays_of(mark: AnyMark) -> dict[str, NDArray[Any]]:
-    """Arrays of a mark by the name of the field."""
-    return {name: value for name, value in vars(mark).items() if isinstance(value, np.ndarray)}
-
-
-def ring(points: Sequence[Sequence[float]]) -> Floats:
-    """A closed line through points, its first at its end again.
-
-    Examples
-    --------
-    >>> ring([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]).shape
-    (4, 2)
-    """
-    line = np.asarray(points, dtype=np.float64)
-    return line if np.array_equal(line[0], line[-1]) else np.vstack([line, line[:1]])

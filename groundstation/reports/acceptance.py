@@ -10,6 +10,7 @@ from groundstation.base.failures import attempt, gathered_failures
 from groundstation.chapters import acceptance as chapters
 from groundstation.chapters.acceptance_front import front, stated
 from groundstation.chapters.parts import Document
+from groundstation.plots.ranges import thin
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -52,7 +53,7 @@ def _single(found: Acceptance, *quantities: str) -> list[Limit]:
 def _growth(found: Acceptance) -> Drawing:
     growth, curves = found.growth, found.curves
     hours, flight = growth.hours, curves.flight
-    shown = d.thin(len(found.included), MOST_CURVES)
+    shown = thin(len(found.included), MOST_CURVES)
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 16, 12, 174, 86)

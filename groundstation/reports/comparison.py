@@ -1,106 +1,29 @@
 """The page of a comparison: what differs between two flights, and their figures over each other."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, Generic, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from groundstation.base.failures import attempt
 from groundstation.base.geodesy import north_east_m, on_earth, plan_north_east_m
-from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.comparison import answers, findings, opening, settings
 from groundstation.chapters.parts import Section
+from groundstation.chapters.plots.comparison import NEAR_M, OVERLAYS, Overlay
+from groundstation.plots.ranges import broken_at_gaps, finite, padded
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.figures.inertial import plain_log
 from groundstation.reports.page import TEMPLATES, render
-from groundstation.results.arrays.cooperative import SessionErrors
 from groundstation.results.arrays.flight import Overview
 from groundstation.results.arrays.forecast import ForecastGrowth
-from groundstation.results.arrays.heading import HeadingRunning
-from groundstation.results.arrays.inertial import InertialStates, InertialTrack
-from groundstation.results.arrays.typed import Floats, T
 from groundstation.results.comparison import Comparison
 from groundstation.results.files import SavedFlight
 from groundstation.results.forecast import ForecastResult
 
 A, B = d.INS, d.GNSS
 MOST = 3000  # points of a line
-NEAR_M = 200_000.0  # flights that begin no further apart share one map
-
-
-@dataclass(frozen=True)
-class _Curve:
-    """What is drawn of a flight over its time, with half of its 95 % band; None where there is no band."""
-
-    time_s: Floats
-    values: Floats | None
-    half: Floats | None = None
-
-
-class _Line(Generic[T]):
-    """A curve of both flights: its figure, what is read of it, its axis and title."""
-
-    def __init__(self, kind: type[T], key: str, read: Callable[[T], _Curve], axis: str, title: str) -> None:
-        self.name, self.axis, self.title = f"{kind.figure}-{key}", axis, title
-        self._kind, self._read = kind, read
-
-    def of(self, saved: SavedFlight) -> _Curve | None:
-        """The curve of a flight, None where it has no number."""
-        rows = saved.rows_of(self._kind)
-        curve = None if rows is None else self._read(rows)
-        return curve if curve is not None and curve.values is not None and np.isfinite(curve.values).any() else None
-
-
-def _altitude(data: Overview) -> _Curve:
-    return _Curve(data.time_s, data.altitude_m)
-
-
-def _speed(data: Overview) -> _Curve:
-    return _Curve(data.time_s, data.ground_speed_mps)
-
-
-def _heading(data: Overview) -> _Curve:
-    return _Curve(data.time_s, d.broken_at_wrap(data.heading_deg))
-
-
-def _mean(data: HeadingRunning) -> _Curve:
-    return _Curve(data.time_s, data.mean_deg, data.honest_half_width_deg)
-
-
-def _radial(data: InertialTrack) -> _Curve:
-    return _Curve(data.time_s, data.ins_error_m)
-
-
-def _north(data: InertialStates) -> _Curve:
-    return _Curve(data.time_s, data.north.position_m, NORMAL_95 * data.north.position_sigma_m)
-
-
-def _east(data: InertialStates) -> _Curve:
-    return _Curve(data.time_s, data.east.position_m, NORMAL_95 * data.east.position_sigma_m)
-
-
-def _computed(data: SessionErrors) -> _Curve:
-    return _Curve(data.time_s, data.two_sigma_r_m)
-
-
-def _error(data: SessionErrors) -> _Curve:
-    return _Curve(data.time_s, data.rms_error_m)
-
-
-LINES: tuple[_Line[Any], ...] = (
-    _Line(Overview, "altitude_m", _altitude, "altitude, m", "Altitude"),
-    _Line(Overview, "ground_speed_mps", _speed, "ground speed, m/s", "Ground speed"),
-    _Line(Overview, "heading_deg", _heading, "true heading, °", "INS heading"),
-    _Line(HeadingRunning, "mean_deg", _mean, "heading error, °", "Heading error, running mean"),
-    _Line(InertialTrack, "ins_error_m", _radial, "radial error, m", "Radial error of the INS against GNSS"),
-    _Line(InertialStates, "north_position_m", _north, "north, m", "North position error"),
-    _Line(InertialStates, "east_position_m", _east, "east, m", "East position error"),
-    _Line(SessionErrors, "two_sigma_r_m", _computed, "m", "2σ_r as computed, worst aircraft"),
-    _Line(SessionErrors, "rms_error_m", _error, "m", "Horizontal error against the truth, RMS of all aircraft"),
-)
 
 
 def comparison_html(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> str:
@@ -127,7 +50,7 @@ def _figures(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> Section 
     sides = (_Side("A", a, A), _Side("B", b, B, comparison.alignment.offset_s))
     drawings = [
         attempt("figure", "tracks", _tracks, sides),
-        *(attempt("figure", line.name, _overlay, sides, line) for line in LINES),
+        *(attempt("figure", line.name, _overlay, sides, line) for line in OVERLAYS),
         attempt("figure", "growth", _growth, sides),
     ]
     parts = [drawing for drawing in drawings if drawing is not None]
@@ -147,7 +70,7 @@ class _Side(NamedTuple):
         return 2.4 if self.letter == "A" else 1.0
 
 
-def _overlay(sides: Sequence[_Side], told: _Line[Any]) -> Drawing | None:
+def _overlay(sides: Sequence[_Side], told: Overlay[Any]) -> Drawing | None:
     """A curve of both flights over the flight time of A, with its band."""
     drawn = [(side, curve) for side in sides if (curve := told.of(side.saved)) is not None]
     if not drawn:
@@ -160,7 +83,7 @@ def _overlay(sides: Sequence[_Side], told: _Line[Any]) -> Drawing | None:
         for side, curve in drawn:
             unknown = np.full(len(curve.time_s), np.nan)
             known = (unknown if one is None else one for one in (curve.values, curve.half))
-            time, values, half = d.broken_at_gaps(curve.time_s + side.offset_s, *known)
+            time, values, half = broken_at_gaps(curve.time_s + side.offset_s, *known)
             for edge in (values - half, values + half):
                 d.line(axes, time, edge, side.colour, 0.5, MOST, alpha=0.7)
                 shown.append(edge)
@@ -168,10 +91,10 @@ def _overlay(sides: Sequence[_Side], told: _Line[Any]) -> Drawing | None:
             times.append(time)
             shown.append(values)
         # The bands of the first samples may leave the picture.
-        low, high = np.percentile(d.finite(*shown), (0.5, 99.5) if has_band else (0.0, 100.0))
-        axes.set_ylim(*layout.padded(float(low), float(high)))
+        low, high = np.percentile(finite(*shown), (0.5, 99.5) if has_band else (0.0, 100.0))
+        axes.set_ylim(*padded(float(low), float(high)))
         axes.set_ylabel(told.axis)
-        every = d.finite(*times)
+        every = finite(*times)
         layout.time_axis(axes, float(every.min()), float(every.max()))
         layout.legend_above(axes)
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from groundstation.chapters.parts import Part
 from groundstation.chapters.wording import clean
+from groundstation.plots.ranges import thin
 from groundstation.reports.frames import MM_PER_INCH, Samples, frames_of
 from groundstation.reports.live import Svg, panels_of
 
@@ -238,19 +238,6 @@ def _font_characters() -> frozenset[int]:
     return _characters
 
 
-def thin(count: int, most: int = MAX_POINTS) -> NDArray[np.int64]:
-    """Positions of at most ``most`` of ``count`` samples, evenly spread, the same every time.
-
-    Examples
-    --------
-    >>> thin(10, 4).tolist(), thin(3, 4).tolist()
-    ([0, 3, 6, 9], [0, 1, 2])
-    """
-    if count <= most:
-        return np.arange(count)
-    return np.round(np.linspace(0, count - 1, most)).astype(np.int64)
-
-
 def dots(axes: Any, x: Any, y: Any, colour: str, size: float = 1.8, most: int = MAX_POINTS, **options: Any) -> None:
     """Draw samples as dots: strokes of hardly any length with round ends, in one path; a tenth of markers' bytes."""
     known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
@@ -267,7 +254,7 @@ def tell(axes: Any, x: Any, y: Any, value: Any, title: str) -> None:
     """Have a page say the value of the sample that is nearest to the cursor; ``title`` says of what."""
     columns = [np.asarray(values, dtype=np.float64).ravel() for values in (x, y, value)]
     known = np.flatnonzero(np.isfinite(columns).all(axis=0))
-    shown = known[thin(len(known))]
+    shown = known[thin(len(known), MAX_POINTS)]
     axes.samples_told = Samples(title, *(column[shown] for column in columns))
 
 
@@ -303,37 +290,6 @@ def line(axes: Any, x: Any, y: Any, colour: str, width: float = 1.0, most: int =
     axes.plot(x[keep], y[keep], color=colour, linewidth=width, **options)
 
 
-def broken_at_wrap(angle_deg: Any) -> NDArray[np.float64]:
-    """Headings with NaN where they jump through north: the line breaks there instead of crossing the figure.
-
-    Examples
-    --------
-    >>> broken_at_wrap([358.0, 359.0, 1.0, 2.0]).tolist()
-    [358.0, 359.0, nan, 2.0]
-    """
-    angle = np.array(angle_deg, dtype=np.float64)
-    with np.errstate(invalid="ignore"):
-        jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180.0)
-    angle[jumps + 1] = np.nan
-    return angle
-
-
-def broken_at_gaps(time: Any, *values: Any) -> tuple[NDArray[np.float64], ...]:
-    """Time and values with a NaN wherever time leaps: the line breaks at the gap.
-
-    Examples
-    --------
-    >>> [column.tolist() for column in broken_at_gaps([0.0, 1.0, 9.0, 10.0], [1.0, 2.0, 3.0, 4.0])]
-    [[0.0, 1.0, 9.0, 9.0, 10.0], [1.0, 2.0, nan, 3.0, 4.0]]
-    """
-    time = np.asarray(time, dtype=np.float64)
-    steps = np.diff(time)
-    known = steps[np.isfinite(steps)]
-    leaps = np.flatnonzero(steps > 5.0 * np.median(known)) + 1 if known.size else np.zeros(0, dtype=np.int64)
-    broken = [np.insert(np.asarray(column, dtype=np.float64), leaps, np.nan) for column in values]
-    return np.insert(time, leaps, time[leaps]), *broken
-
-
 def spans(axes: Any, start: Any, end: Any, name: Any, colours: dict[str, str]) -> None:
     """Shade the background by phase, each phase named once in the legend."""
     seen: set[str] = set()
@@ -353,9 +309,3 @@ def lanes(axes: Any, start: Any, end: Any, state: Any, states: list[str], colour
     axes.set_ylim(len(states) - 0.4, -0.6)
     axes.grid(axis="y", visible=False)
     axes.tick_params(axis="y", length=0)
-
-
-def finite(*arrays: Any) -> NDArray[np.float64]:
-    """All finite values of some arrays, joined."""
-    joined = np.concatenate([np.asarray(values, dtype=np.float64).ravel() for values in arrays] or [np.zeros(0)])
-    return np.asarray(joined[np.isfinite(joined)])

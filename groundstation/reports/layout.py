@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 
 from groundstation.chapters.wording import clock
-from groundstation.reports.drawing import FAINT, LIMIT, finite
+from groundstation.reports.drawing import FAINT, LIMIT
 from groundstation.reports.frames import MM_PER_INCH, TIME
 
-LEAST_PAUSE_S, MOST_WINDOWS = 60.0, 6  # a longer pause breaks a time axis
 PANEL_GAP_MM, LEAST_PANEL_MM = 9.0, 20.0
 
 
@@ -36,26 +35,6 @@ def time_axis(axes: Any, low: float, high: float, title: bool = True, most: int 
         axes.set_xlabel("flight time, h:min:s" if high >= 3600 else "flight time, min:s")
     else:
         axes.tick_params(labelbottom=False)
-
-
-def windows(time: Any, least_gap_s: float = LEAST_PAUSE_S) -> list[tuple[float, float]]:
-    """Spans of flight time that the samples fill, a little around each; a longer pause ends one, at most six of them.
-
-    Examples
-    --------
-    >>> windows([0.0, 1.0, 2.0, 500.0, 540.0])
-    [(-2.0, 4.0), (498.0, 542.0)]
-    """
-    known = np.sort(finite(time))
-    if not known.size:
-        return [(0.0, 1.0)]
-    pauses = np.diff(known)
-    longest = np.argsort(-pauses, kind="stable")[: MOST_WINDOWS - 1]
-    cuts = np.sort(longest[pauses[longest] > least_gap_s]).tolist()
-    ends = [*cuts, len(known) - 1]
-    starts = [0, *(cut + 1 for cut in cuts)]
-    spans = [(float(known[first]), float(known[last])) for first, last in zip(starts, ends, strict=True)]
-    return [padded(low, high, 0.05, 2.0) for low, high in spans]
 
 
 def time_panels(
@@ -129,9 +108,3 @@ def nothing(axes: Any, text: str) -> None:
     """Say in the middle of empty axes why they are empty."""
     axes.set_yticks([])
     axes.text(0.5, 0.5, text, color=FAINT, ha="center", va="center", transform=axes.transAxes)
-
-
-def padded(low: float, high: float, share: float = 0.06, least: float = 1e-6) -> tuple[float, float]:
-    """Axis limits around a range."""
-    margin = max(share * (high - low), least)
-    return low - margin, high + margin

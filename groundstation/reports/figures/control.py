@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import unwrap
 from groundstation.chapters.control import title_of
+from groundstation.plots.ranges import finite, padded
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -141,7 +142,7 @@ def law(results: FlightResults) -> Drawing | None:
                 values = data.speed_mps[mine] if is_speed else _unwrapped(data, mine, row.start)
                 d.line(axes, time_s[mine], values, colour, width, label=title_of(name))
                 drawn.append(values)
-            low, high = layout.padded(float(d.finite(*drawn).min()), float(d.finite(*drawn).max()), 0.1, 0.5)
+            low, high = padded(float(finite(*drawn).min()), float(finite(*drawn).max()), 0.1, 0.5)
             axes.set_ylim(low, high)
             for value in (row.low, row.high):
                 if low <= value <= high:

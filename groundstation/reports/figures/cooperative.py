@@ -9,6 +9,7 @@ from groundstation.base.ellipse import magnified, outlines
 from groundstation.base.local_frame import plane_through
 from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.cooperative import REFERENCE, title_of, trusted
+from groundstation.plots.ranges import broken_at_gaps, finite, thin
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -64,7 +65,7 @@ def session_map(results: FlightResults) -> Drawing | None:
             north, east = plane[mine, 0] / M_PER_KM, plane[mine, 1] / M_PER_KM
             d.line(axes, east, north, colour, 1.2, label=d.label(name, 12))
             d.dots(axes, east[:1], north[:1], colour, 4.0)
-            for row in mine[-1:] if _is_crowd(answer) else mine[d.thin(len(mine), ELLIPSES)]:
+            for row in mine[-1:] if _is_crowd(answer) else mine[thin(len(mine), ELLIPSES)]:
                 drawn = (plane[row, :2] + larger * ellipses[row]) / M_PER_KM
                 d.line(axes, drawn[:, 1], drawn[:, 0], colour, 0.6)
             if _is_crowd(answer):
@@ -161,7 +162,7 @@ def _largest(answer: CooperativeResult, algorithm: str) -> list[str]:
 
 
 def _ceiling(*series: FloatArray) -> float:
-    known = d.finite(*series)
+    known = finite(*series)
     return 1.15 * float(known.max()) if known.size and known.max() > 0.0 else 1.0
 
 
@@ -192,10 +193,10 @@ def geometry(results: FlightResults) -> Drawing | None:
             axes = layout.place(figure, 18, top - 34, 174, top)
             for name, (colour, told) in styles.items():
                 mine = vehicle == name
-                when, values = d.broken_at_gaps(time_s[mine], column[mine])
+                when, values = broken_at_gaps(time_s[mine], column[mine])
                 d.line(axes, when, values, colour, 1.0 if told else 0.5, label=told or None)
             axes.set_ylabel(title)
-            known = d.finite(column)
+            known = finite(column)
             if title == "HDOP" and known.size and known.max() > 20.0 * np.median(known):
                 axes.set_yscale("log")
                 plain_log(axes.yaxis, (1.0,))
@@ -220,7 +221,7 @@ def links(results: FlightResults) -> Drawing | None:
     time_s, mark, receiver = data.time_s, data.mark, data.receiver
     with np.errstate(divide="ignore", invalid="ignore"):
         normal = data.innovation / data.sigma
-    far = d.finite(np.abs(normal))
+    far = finite(np.abs(normal))
     ceiling = float(np.clip(1.1 * far.max(initial=3.0), 4.0, 12.0))
 
     def paint(figure: Any) -> None:

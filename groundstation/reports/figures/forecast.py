@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.chapters.wording import number
+from groundstation.plots.ranges import finite, thin
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -65,7 +66,7 @@ def growth(results: FlightResults) -> Drawing | None:
 
 
 def _last(values: NDArray[np.float64]) -> float:
-    known = d.finite(values)
+    known = finite(values)
     return float(known[-1]) if known.size else 0.0
 
 
@@ -124,13 +125,13 @@ def hindcast_map(results: FlightResults) -> Drawing | None:
     if data is None:
         return None
     names = [name for name in dict.fromkeys((_shipped(results), "raw_ins")) if has_values(data.radial_m.get(name))]
-    starts, horizons = np.unique(d.finite(data.start_s)), np.unique(d.finite(data.horizon_min))
+    starts, horizons = np.unique(finite(data.start_s)), np.unique(finite(data.horizon_min))
     if not names or min(len(starts), len(horizons)) < 2 or len(starts) * len(horizons) != len(data):
         return None
-    rows, columns = d.thin(len(starts), MAP_CELLS), d.thin(len(horizons), MAP_CELLS)
+    rows, columns = thin(len(starts), MAP_CELLS), thin(len(horizons), MAP_CELLS)
     cubes = [data.radial_m[name].reshape(len(starts), len(horizons))[np.ix_(rows, columns)].T for name in names]
     hours, minutes = starts[rows] / 3600.0, horizons[columns]
-    top = float(np.quantile(d.finite(*cubes), MAP_QUANTILE))
+    top = float(np.quantile(finite(*cubes), MAP_QUANTILE))
 
     def paint(figure: Any) -> None:
         from matplotlib.ticker import MaxNLocator

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.chapters.generic import columns_by_unit, quantity, titled
+from groundstation.plots.ranges import broken_at_gaps, padded
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -31,12 +32,12 @@ def series(results: FlightResults, name: str) -> Drawing | None:
             bottom = BOTTOM_MM + place * (PANEL_MM + GAP_MM)
             axes = layout.place(figure, 18, bottom, 174, bottom + PANEL_MM)
             for column, colour in zip(columns, d.SERIES, strict=False):
-                x, y = d.broken_at_gaps(time, numbers(data, column)[order])
+                x, y = broken_at_gaps(time, numbers(data, column)[order])
                 d.line(axes, x, y, colour, 1.0, label=d.label(quantity(column)[0]))
             axes.set_ylabel(
                 d.label(", ".join(filter(None, (quantity(columns[0])[0] if len(columns) == 1 else "", unit))))
             )
-            layout.time_axis(axes, *layout.padded(float(np.nanmin(time)), float(np.nanmax(time))), title=place == 0)
+            layout.time_axis(axes, *padded(float(np.nanmin(time)), float(np.nanmax(time))), title=place == 0)
             layout.legend_above(axes, 4)
 
     title = titled(quantity(name)[0])

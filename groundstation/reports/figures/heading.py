@@ -1,11 +1,13 @@
 """Figures of the taxi stage: difference over time, density, convergence, heading and track, estimates by segment."""
 
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 
 from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.wording import clock, is_number, number
+from groundstation.plots.ranges import broken_at_wrap, finite, padded, thin, windows
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -26,10 +28,10 @@ TAXI_SPEED_MARGIN = 1.6  # the take-off run leaves the figure, or the taxi would
 SLOWEST_TRACK_MPS = 1.0  # below it the direction of motion is noise and is not drawn
 
 
-def taxi_windows(samples: HeadingSamples) -> list[tuple[float, float]]:
+def taxi_windows(samples: HeadingSamples) -> tuple[tuple[float, float], ...]:
     """Spans of flight time that the taxi figures show, one for each ground run that was used; of all where none was."""
     time, used = samples.time_s, samples.is_used
-    return layout.windows(time[used] if used.any() else time)
+    return windows(time[used] if used.any() else time)
 
 
 def _within(samples: S, span: tuple[float, float]) -> S:
@@ -67,7 +69,7 @@ def difference(results: FlightResults) -> Drawing | None:
 
 def _running_band(axes: Any, running: HeadingRunning) -> None:
     time, mean = running.time_s, running.mean_deg
-    keep = d.thin(len(running), 2000)
+    keep = thin(len(running), 2000)
     time, mean = time[keep], mean[keep]
     honest, e = running.honest_half_width_deg[keep], running.precision_deg[keep]
     if np.isfinite(honest).any():
@@ -95,11 +97,11 @@ def _running_band(axes: Any, running: HeadingRunning) -> None:
 
 
 def _sample_range(value: Any, used: Any) -> tuple[float, float]:
-    shown = d.finite(value[used]) if used.any() else d.finite(value)
+    shown = finite(value[used]) if used.any() else finite(value)
     if not shown.size:
         return -1.0, 1.0
     low, high = (float(shown.min()), float(shown.max())) if used.any() else np.quantile(shown, [0.02, 0.98]).tolist()
-    return layout.padded(low, high, 0.12, 0.05)
+    return padded(low, high, 0.12, 0.05)
 
 
 def convergence(results: FlightResults) -> Drawing | None:
@@ -115,7 +117,7 @@ def convergence(results: FlightResults) -> Drawing | None:
     )
     answer = results.answer(HeadingResult)
     limits = {} if answer is None else {gate.name: gate.limit for gate in answer.gates}
-    keep = d.thin(len(running), 2000)
+    keep = thin(len(running), 2000)
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 16, 12, 174, 52)
@@ -129,7 +131,7 @@ def convergence(results: FlightResults) -> Drawing | None:
         _plain_log_labels(axes.yaxis)
         axes.set_xlabel("cycles (distinct GNSS epochs used)")
         axes.set_ylabel("angle, °")
-        known = d.finite(cycles)
+        known = finite(cycles)
         axes.set_xlim(0, max(float(known.max()), 2.0) if known.size else 1.0)
         layout.legend_above(axes)
 
@@ -222,21 +224,23 @@ def taxi(results: FlightResults) -> Drawing | None:
     return Drawing("Taxi: heading, track, speed and gates", caption, alt, d.draw("taxi", height, paint), names)
 
 
-def _paint_angles(panels: list[Any], samples: HeadingSamples, spans: list[tuple[float, float]]) -> None:
+def _paint_angles(panels: list[Any], samples: HeadingSamples, spans: Sequence[tuple[float, float]]) -> None:
     for axes, span in zip(panels, spans, strict=True):
         mine = _within(samples, span)
         time, nose, speed = mine.time_s, mine.heading_deg, mine.ground_speed_mps
         track = np.where(speed > SLOWEST_TRACK_MPS, mine.track_deg, np.nan)
-        d.line(axes, time, d.broken_at_wrap(track), d.GNSS, 0.8, 3000, label="GNSS track")
-        d.line(axes, time, d.broken_at_wrap(nose), d.INS, 1.0, 3000, label="INS heading")
-        angles = d.finite(nose, track)
+        d.line(axes, time, broken_at_wrap(track), d.GNSS, 0.8, 3000, label="GNSS track")
+        d.line(axes, time, broken_at_wrap(nose), d.INS, 1.0, 3000, label="INS heading")
+        angles = finite(nose, track)
         if angles.size:
-            axes.set_ylim(*layout.padded(float(angles.min()), float(angles.max()), 0.06, 1.0))
+            axes.set_ylim(*padded(float(angles.min()), float(angles.max()), 0.06, 1.0))
     panels[0].set_ylabel("angle from true north, °")
 
 
-def _paint_speed(panels: list[Any], samples: HeadingSamples, spans: list[tuple[float, float]], limit_mps: Any) -> None:
-    driven = d.finite(samples.ground_speed_mps[samples.is_used])
+def _paint_speed(
+    panels: list[Any], samples: HeadingSamples, spans: Sequence[tuple[float, float]], limit_mps: Any
+) -> None:
+    driven = finite(samples.ground_speed_mps[samples.is_used])
     for axes, span in zip(panels, spans, strict=True):
         mine = _within(samples, span)
         d.line(axes, mine.time_s, mine.ground_speed_mps, d.GNSS, 0.9, 3000)
@@ -246,7 +250,7 @@ def _paint_speed(panels: list[Any], samples: HeadingSamples, spans: list[tuple[f
     panels[0].set_ylim(0.0, TAXI_SPEED_MARGIN * float(driven.max()) if driven.size else None)
 
 
-def _lane_states(lanes: HeadingLanes | None, spans: list[tuple[float, float]]) -> list[str]:
+def _lane_states(lanes: HeadingLanes | None, spans: Sequence[tuple[float, float]]) -> list[str]:
     if lanes is None:
         return []
     start, end, state = lanes.start_s, lanes.end_s, lanes.state

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.normal import NORMAL_95
+from groundstation.plots.ranges import finite, padded, thin
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -20,9 +21,7 @@ from groundstation.results.arrays.inertial import (
 from groundstation.results.arrays.typed import Floats
 from groundstation.results.flight import FlightResults
 
-CHANNELS = ("north", "east")
 BAND_QUANTILES = (10.0, 90.0)  # the band of the first minutes and of long outages may leave the axis
-SUFFIXES = {"position": "m", "velocity": "mps", "tilt": "arcsec", "drift": "dph"}
 UNITS = {"position": "m", "velocity": "m/s", "tilt": "arcsec", "drift": "°/h"}
 STATES = {
     "position": "position",
@@ -98,7 +97,7 @@ def _are_known(data: InertialStates, name: str) -> bool:
 def _paint_state(axes: Any, time: Floats, state: StateSeries) -> None:
     estimate, measured, smoothed = state.value, state.measured, state.smoothed
     half = NORMAL_95 * state.sigma
-    keep = d.thin(len(time), MOST)
+    keep = thin(len(time), MOST)
     if np.isfinite(half).any():
         low, high = (estimate - half)[keep], (estimate + half)[keep]
         axes.fill_between(time[keep], low, high, color=d.USED, alpha=0.2, linewidth=0, label="95 % band")
@@ -107,11 +106,11 @@ def _paint_state(axes: Any, time: Floats, state: StateSeries) -> None:
     if np.isfinite(smoothed).any():
         d.line(axes, time, smoothed, d.INK, 0.8, MOST, zorder=3, label="smoothed (RTS)")
     d.line(axes, time, estimate, d.USED, 1.1, MOST, zorder=2.5, label="estimate")
-    shown = d.finite(estimate, measured)
+    shown = finite(estimate, measured)
     if shown.size:
-        edges = [d.finite(estimate - half), d.finite(estimate + half)]
+        edges = [finite(estimate - half), finite(estimate + half)]
         ends = [float(end) for edge in edges if edge.size for end in np.percentile(edge, BAND_QUANTILES)]
-        axes.set_ylim(*layout.padded(min(float(shown.min()), *ends), max(float(shown.max()), *ends), 0.08))
+        axes.set_ylim(*padded(min(float(shown.min()), *ends), max(float(shown.max()), *ends), 0.08))
 
 
 def has_values(*columns: Floats | None) -> bool:
@@ -121,7 +120,7 @@ def has_values(*columns: Floats | None) -> bool:
 
 def span(time_s: Floats) -> tuple[float, float]:
     """First and last flight time of a figure."""
-    times = d.finite(time_s)
+    times = finite(time_s)
     return (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)
 
 
@@ -211,7 +210,7 @@ def innovations(results: FlightResults) -> Drawing | None:
 
 
 def _symmetric(values: NDArray[np.float64]) -> tuple[float, float]:
-    largest = float(np.abs(d.finite(values)).max(initial=1.3 * NORMAL_95))
+    largest = float(np.abs(finite(values)).max(initial=1.3 * NORMAL_95))
     return -1.1 * min(largest, 8.0), 1.1 * min(largest, 8.0)
 
 
@@ -301,6 +300,6 @@ def _zero(axes: Any) -> None:
 
 def _most_of(values: NDArray[np.float64]) -> tuple[float, float]:
     """Limits that hold all but one in a hundred."""
-    known = np.abs(d.finite(values))
+    known = np.abs(finite(values))
     largest = 1.3 * float(np.quantile(known, 0.99)) if known.size else 1.0
     return -max(largest, 1e-3), max(largest, 1e-3)

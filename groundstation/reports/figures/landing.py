@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray
 from groundstation.base.units import DOTS_PER_FULL_SCALE
+from groundstation.plots.ranges import padded
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -118,7 +119,7 @@ def final(results: FlightResults, of: str) -> Drawing | None:
         for gate in one.stabilised:
             side.axhline(gate.height_m, color=d.FAINT, linewidth=0.6, linestyle=(0, (2, 2)))
         if np.isfinite(height).any():
-            side.set_ylim(*layout.padded(0.0, float(np.nanmax(height))))
+            side.set_ylim(*padded(0.0, float(np.nanmax(height))))
         else:
             layout.nothing(side, "no height above the threshold")
         for axes in (above, side):

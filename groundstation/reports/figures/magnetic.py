@@ -7,6 +7,7 @@ import numpy as np
 from groundstation.base.geodesy import on_earth, plan_north_east_m
 from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.wording import number
+from groundstation.plots.ranges import broken_at_gaps, padded, windows
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -79,7 +80,7 @@ def held_out(results: FlightResults) -> Drawing | None:
         for axes in (left, right):
             axes.axhline(0.0, color=d.FAINT, linewidth=0.6)
         left.set_ylabel("error of magnetic heading, °")
-        layout.time_axis(left, *layout.padded(float(time.min()), float(time.max())), most=5)
+        layout.time_axis(left, *padded(float(time.min()), float(time.max())), most=5)
         _heading_axis(right)
         right.set_xticks(range(0, 361, 60))
         layout.legend_above(left, 2)
@@ -168,7 +169,7 @@ def modulus(results: FlightResults) -> Drawing | None:
     if answer is None or data is None:
         return None
     time = data.time_s
-    spans = layout.windows(time)
+    spans = windows(time)
     horizontal, down = answer.declination.horizontal_nt, answer.declination.down_nt
 
     def paint(figure: Any) -> None:
@@ -180,7 +181,7 @@ def modulus(results: FlightResults) -> Drawing | None:
                 *((after, METHOD_COLOURS[name], METHOD_TITLES[name]) for name, after in data.freed().items()),
             ):
                 if np.isfinite(values).any():
-                    broken_time, broken = d.broken_at_gaps(time[mine], values[mine] / 1e3)
+                    broken_time, broken = broken_at_gaps(time[mine], values[mine] / 1e3)
                     d.line(axes, broken_time, broken, colour, 1.0, label=name)
             if horizontal is not None and down is not None:
                 layout.limit_line(axes, float(np.hypot(horizontal, down)) / 1e3, "field of the model")

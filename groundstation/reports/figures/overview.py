@@ -8,6 +8,7 @@ import numpy as np
 from groundstation.base.ellipse import ELLIPSE_95, outlines
 from groundstation.base.geodesy import on_earth, plan_north_east_m
 from groundstation.chapters.wording import number
+from groundstation.plots.ranges import broken_at_wrap, finite
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -138,7 +139,7 @@ def profile(results: FlightResults) -> Drawing | None:
         (data.height_above_airfield_m, "height above airfield"),
     )
     speed, speed_name = _first_known((data.ground_speed_mps, "ground speed"), (data.true_airspeed_mps, "true airspeed"))
-    times = d.finite(time)
+    times = finite(time)
     low, high = (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)
     states = [] if gnss is None else sorted(set(gnss.state.tolist()), key=lambda name: (name != "good", name))[:8]
     lane_mm = 4.6 * len(states) + (3.0 if states else 0.0)
@@ -201,7 +202,7 @@ def attitude(results: FlightResults) -> Drawing | None:
         for curves, unit in listed
         if any(values is not None and np.isfinite(values).any() for values, _ in curves)
     ]
-    times = d.finite(data.time_s)
+    times = finite(data.time_s)
     if not panels or not times.size:
         return None
     height = 14.0 + 36.0 * len(panels)
@@ -211,7 +212,7 @@ def attitude(results: FlightResults) -> Drawing | None:
             axes = layout.place(figure, 30, 12 + 36 * place, 174, 42 + 36 * place)
             for (values, name), colour in zip(curves, (d.INS, d.GNSS), strict=True):
                 if values is not None and np.isfinite(values).any():
-                    shown = values if name in ("roll", "pitch") else d.broken_at_wrap(values)
+                    shown = values if name in ("roll", "pitch") else broken_at_wrap(values)
                     d.line(axes, data.time_s, shown, colour, 0.9, label=name)
             axes.set_ylabel(unit)
             layout.time_axis(axes, float(times.min()), float(times.max()), title=place == 0)
@@ -233,7 +234,7 @@ def states(results: FlightResults) -> Drawing | None:
     modes = list(dict.fromkeys(named[shown & (lane == "mode")].tolist()))
     rows = [*dict.fromkeys(named[shown & (lane != "mode")].tolist()), *modes[:MOST_MODES]]
     course = results.rows_of(Overview)
-    times = d.finite(start if course is None else course.time_s, start, end)
+    times = finite(start if course is None else course.time_s, start, end)
     if not rows or not times.size:
         return None
     height = 14.0 + 4.6 * len(rows)

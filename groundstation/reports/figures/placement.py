@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.chapters.placement import design_title
+from groundstation.plots.ranges import finite, padded
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -26,7 +27,7 @@ def accuracy_map(results: FlightResults) -> Drawing | None:
         return None
     north, east = (np.unique(values) / M_PER_KM for values in (data.north_m, data.east_m))
     sigma = data.sigma_m.reshape(len(north), len(east))
-    known = d.finite(sigma)
+    known = finite(sigma)
     if not known.size:
         return None
     low, high = float(known.min()), float(np.percentile(known, TOP_SHARE))
@@ -51,7 +52,7 @@ def accuracy_map(results: FlightResults) -> Drawing | None:
             _stand(axes, points, answer)
         axes.set_aspect("equal", adjustable="box", anchor="W")
         axes.set_xlim(float(east[0]), float(east[-1]))
-        axes.set_ylim(*layout.padded(float(north[0]), float(north[-1]), 0.03))
+        axes.set_ylim(*padded(float(north[0]), float(north[-1]), 0.03))
         axes.set_xlabel("east, km")
         axes.set_ylabel("north, km")
         axes.legend(loc="center left", bbox_to_anchor=(1.25, 0.5), bbox_transform=axes.transAxes)

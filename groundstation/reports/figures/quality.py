@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.chapters.wording import number
+from groundstation.plots.ranges import finite, padded
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -23,10 +24,10 @@ def gaps(results: FlightResults) -> Drawing | None:
     gap_topic = np.zeros(0, dtype=np.str_) if holes is None else holes.topic
     order = sorted(range(len(topic)), key=lambda row: (topic[row] not in gap_topic, row))[:MOST_LANES]
     order.sort()
-    times = d.finite(first, last)
+    times = finite(first, last)
     if not times.size:
         return None
-    low, high = layout.padded(float(times.min()), float(times.max()), 0.01, 0.5)
+    low, high = padded(float(times.min()), float(times.max()), 0.01, 0.5)
     height, least = 20.0 + 4.6 * len(order), (high - low) / 400.0  # narrower marks would not be seen
 
     def paint(figure: Any) -> None:

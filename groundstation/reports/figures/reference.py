@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.wording import MINUS
+from groundstation.plots.ranges import broken_at_gaps, finite, padded
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -84,16 +85,16 @@ def _panels(data: ReferenceErrors, quantity: str) -> tuple[_Panel, ...]:
 def _paint(axes: Any, time: FloatArray, values: FloatArray, half: FloatArray, colour: str) -> None:
     axes.axhline(0.0, color=d.FAINT, linewidth=0.6, zorder=1)
     if np.isfinite(half).any():
-        broken, low, high = d.broken_at_gaps(time, -half, half)
+        broken, low, high = broken_at_gaps(time, -half, half)
         axes.fill_between(broken, low, high, color=d.FAINT, alpha=0.22, linewidth=0, label="95 % claimed")
-    broken, line = d.broken_at_gaps(time, values)
+    broken, line = broken_at_gaps(time, values)
     d.line(axes, broken, line, colour, 1.0, zorder=2, label="error")
-    shown = d.finite(values)
+    shown = finite(values)
     reach = float(np.abs(shown).max()) if shown.size else 1.0
-    claimed = d.finite(half)
+    claimed = finite(half)
     most = min(float(claimed.max()), BAND_SEEN * reach) if claimed.size else 0.0
     if shown.size:
-        axes.set_ylim(*layout.padded(min(float(shown.min()), -most), max(float(shown.max()), most), 0.08))
+        axes.set_ylim(*padded(min(float(shown.min()), -most), max(float(shown.max()), most), 0.08))
 
 
 def track(results: FlightResults) -> Drawing | None:
@@ -103,7 +104,7 @@ def track(results: FlightResults) -> Drawing | None:
         return None
     of, north, east = data.subject, data.place_north_m, data.place_east_m
     names = list(dict.fromkeys(of.tolist()))
-    known = d.finite(north, east)
+    known = finite(north, east)
     if not known.size:
         return None
     scale, unit = (1e-3, "km") if float(np.ptp(known)) > 3_000.0 else (1.0, "m")

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.chapters.wording import is_number, number
+from groundstation.plots.ranges import broken_at_gaps, finite, padded
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -30,13 +31,13 @@ def components(results: FlightResults) -> Drawing | None:
     north, east = data.velocity_north_mps, data.velocity_east_mps
     still = _assessed(results)
     count = int(np.count_nonzero(inside & np.isfinite(north) & np.isfinite(east)))
-    known = np.abs(d.finite(north[inside], east[inside]) if inside.any() else d.finite(north, east))
+    known = np.abs(finite(north[inside], east[inside]) if inside.any() else finite(north, east))
     reach = 1.1 * max(float(known.max()) if known.size else 0.0, RAW_LIMIT_MPS)
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 16, 12, 101, 65)
-        window = d.finite(time[inside]) if inside.any() else d.finite(time)
-        moments, *lines = d.broken_at_gaps(time, north, east)
+        window = finite(time[inside]) if inside.any() else finite(time)
+        moments, *lines = broken_at_gaps(time, north, east)
         d.line(axes, moments, lines[0], d.INS, 0.8, 3000, label="north")
         d.line(axes, moments, lines[1], d.GNSS, 0.8, 3000, label="east")
         if inside.any() and window.size:
@@ -45,7 +46,7 @@ def components(results: FlightResults) -> Drawing | None:
             )
         axes.set_ylim(-reach, reach)
         low, high = (float(window.min()), float(window.max())) if window.size else (0.0, 1.0)
-        layout.time_axis(axes, *layout.padded(low, high, 0.15, 2.0))
+        layout.time_axis(axes, *padded(low, high, 0.15, 2.0))
         axes.set_ylabel("GNSS velocity, m/s")
         layout.legend_above(axes)
         _plane(layout.place(figure, 121, 12, 174, 65), north[inside], east[inside], reach, still)
@@ -82,7 +83,7 @@ def mean_speed(results: FlightResults) -> Drawing | None:
     if data is None:
         return None
     window, speed, height = data.window_s, data.speed_of_mean_mps, data.density_per_mps
-    windows = sorted(set(d.finite(window).tolist()))
+    windows = sorted(set(finite(window).tolist()))
     still = _assessed(results)
     measured = None if still is None else still.speed_of_mean_mps
 

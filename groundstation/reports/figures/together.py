@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.chapters.generic import quantity
+from groundstation.plots.ranges import broken_at_gaps, padded
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -27,7 +28,7 @@ def motion(results: FlightResults, label: str) -> Drawing | None:
     time = both.time_s
     reference, other = both.motion.values()
     (difference,) = left.difference.values()
-    ends = layout.padded(float(np.nanmin(time)), float(np.nanmax(time)))
+    ends = padded(float(np.nanmin(time)), float(np.nanmax(time)))
 
     def paint(figure: Any) -> None:
         above = layout.place(figure, 18, BOTTOM_MM + PANEL_MM + GAP_MM, 174, BOTTOM_MM + 2 * PANEL_MM + GAP_MM)
@@ -35,13 +36,13 @@ def motion(results: FlightResults, label: str) -> Drawing | None:
             (reference, log.reference_topic, d.SERIES[0], 2.2),
             (other, log.topic, d.SERIES[1], 0.9),
         ):
-            x, y = d.broken_at_gaps(time, values)
+            x, y = broken_at_gaps(time, values)
             d.line(above, x, y, colour, width, label=d.label(topic))
         above.set_ylabel(d.label(f"{shown.signal}, {shown.unit}"))
         layout.time_axis(above, *ends, title=False)
         layout.legend_above(above, 2)
         below = layout.place(figure, 18, BOTTOM_MM, 174, BOTTOM_MM + PANEL_MM)
-        x, y = d.broken_at_gaps(time, difference)
+        x, y = broken_at_gaps(time, difference)
         d.line(below, x, y, d.SERIES[2], 0.8)
         below.axhline(0.0, color="0.6", linewidth=0.6)
         below.set_ylabel(d.label(f"difference, {shown.unit}"))

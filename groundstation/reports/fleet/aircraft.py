@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.chapters.fleet.aircraft import RATE, assessed, unaided_figures
 from groundstation.chapters.fleet.common import aircraft_name, plural
+from groundstation.plots.ranges import finite
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -28,7 +29,7 @@ def forest(fleet: FleetResults) -> Drawing:
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 58, 12, 174, height - 6)
         for place, row in enumerate(shown):
-            own = d.finite(error[owner == row.aircraft])
+            own = finite(error[owner == row.aircraft])
             d.dots(axes, own, np.full(len(own), place), d.UNUSED, dot_size(len(own)), most, zorder=1.5)
             if row.confidence95_deg is not None:
                 bar = np.array([row.confidence95_deg])
@@ -55,7 +56,7 @@ def rates(fleet: FleetResults) -> Drawing:
     shown = rows_shown({name: len(values) for name, values in rates.items()})
     most = max(MOST_DOTS // len(shown), 20)
     height = 18.0 + ROW_MM * (len(shown) + 1)
-    drawn = d.finite(*(rates[name] for name in shown))
+    drawn = finite(*(rates[name] for name in shown))
 
     def paint(figure: Any) -> None:
         axes = layout.place(figure, 58, 12, 174, height - 6)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from groundstation.chapters.fleet.common import aircraft_name, plural
 from groundstation.chapters.fleet.densities import angle
 from groundstation.chapters.wording import number
+from groundstation.plots.ranges import padded
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -77,7 +78,7 @@ def _span(densities: Densities) -> tuple[float, float]:
     first = int(np.searchsorted(below, LEFT_OUT, side="right")) - 1
     last = int(np.searchsorted(below, below[-1] - LEFT_OUT))
     low, high = float(densities.edge_deg[max(first, 0)]), float(densities.edge_deg[min(last, len(below) - 1)])
-    return (low, high) if high > low else layout.padded(low, high, 0.06, width)
+    return (low, high) if high > low else padded(low, high, 0.06, width)
 
 
 def _beyond(densities: Densities, low: float, high: float) -> str:

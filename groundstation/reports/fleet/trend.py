@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from groundstation.chapters.fleet.common import plural, title_of
 from groundstation.chapters.fleet.trend import QUANTITIES, changes_of, charted, flights_of
+from groundstation.plots.ranges import finite, padded
 from groundstation.reports import drawing as d
 from groundstation.reports import layout
 from groundstation.reports.drawing import Drawing
@@ -78,13 +79,13 @@ def _paint_chart(axes: Any, fleet: FleetResults, quantity: str, name: str, rows:
         start = float(date_numbers(np.array([change.start_utc_ns], dtype="datetime64[ns]"))[0])
         axes.axvline(start, color=d.INK, linewidth=0.8, linestyle=":")
         layout.beside(axes, start, 0.86, f" {number_}", d.INK, axes.get_xaxis_transform(), "left")
-    drawn = d.finite(value, low, high)
+    drawn = finite(value, low, high)
     if quantity == POSITIVE:
         axes.set_yscale("log")
         plain_log(axes.yaxis)
         axes.set_ylim(*log_limits(drawn[drawn > 0.0]))
     else:
-        axes.set_ylim(*layout.padded(float(drawn.min()), float(drawn.max()), 0.08, 0.05))
+        axes.set_ylim(*padded(float(drawn.min()), float(drawn.max()), 0.08, 0.05))
 
 
 def _runs(*columns: NDArray[np.float64]) -> Sequence[NDArray[np.intp]]:

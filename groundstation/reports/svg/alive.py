@@ -24,6 +24,7 @@ from groundstation.reports import live
 from groundstation.reports.frames import TIME, Frame, Samples
 from groundstation.reports.svg import colours
 from groundstation.reports.svg.boxes import PT_PER_MM, Box, Placed
+from groundstation.reports.svg.colours import NO_PLACES
 from groundstation.reports.svg.extents import has_rows, names_of
 from groundstation.reports.svg.font import label
 from groundstation.reports.svg.legend import MOST_OF_A_NAME, ground
@@ -32,7 +33,6 @@ from groundstation.reports.svg.shapes import stepped
 from groundstation.reports.svg.thinning import shown_rows
 
 MOST_SAMPLES = 5000
-NONE: Floats = np.zeros(0)
 LARGEST = float(np.finfo(np.float32).max)  # that the page holds
 _UNTOLD = {"symlog", "date"}  # scales whose values the page does not tell
 JUST_BELOW = np.nextafter(np.float32(1.0), np.float32(0.0))
@@ -81,12 +81,10 @@ def can_live(one: Placed) -> bool:
 
 
 def _is_known(mark: AnyMark) -> bool:
-    if isinstance(mark, Curve):
+    if isinstance(mark, Curve | Band):
         return _goes_one_way(mark.x)
     if isinstance(mark, Points):
         return not any(mark.labels) and mark.symbol in ("dot", "circle", "ring")
-    if isinstance(mark, Band):
-        return _goes_one_way(mark.x)
     return isinstance(mark, Dots | Histogram | Lanes | Spans | Limit | Told)
 
 
@@ -155,13 +153,13 @@ def _curves(mark: AnyMark, box: Box) -> list[live.Curve]:
     colour, name = colours.COLOURS[mark.role], label(mark.name, MOST_OF_A_NAME)
     width = colours.LINE_PT[mark.emphasis]
     if isinstance(mark, Curve):
-        return [live.Curve("line", name, colour, width, bool(mark.dash), *_line(mark, box), NONE)]
+        return [live.Curve("line", name, colour, width, bool(mark.dash), *_line(mark, box), NO_PLACES)]
     if isinstance(mark, Dots | Points):
         size = colours.DOT_PT[mark.emphasis] if isinstance(mark, Dots) else 3.0
         known = np.flatnonzero(_has_place(mark.x, box.x.scale) & _has_place(mark.y, box.y.scale))
         rows = known[thin(len(known), MOST_SAMPLES)]
         rows = rows[np.argsort(mark.x[rows], kind="stable")]
-        return [live.Curve("dots", name, colour, size, False, mark.x[rows], mark.y[rows], NONE)]
+        return [live.Curve("dots", name, colour, size, False, mark.x[rows], mark.y[rows], NO_PLACES)]
     if isinstance(mark, Band):
         shade = colours.with_alpha(colour, colours.SHADE[mark.emphasis])
         return [live.Curve("band", name, shade, 0.0, False, *_band(mark, box))]
@@ -178,7 +176,7 @@ def _curves(mark: AnyMark, box: Box) -> list[live.Curve]:
                 bool(mark.dash),
                 ends,
                 np.full(2, mark.value),
-                NONE,
+                NO_PLACES,
             )
         ]
     return _lanes(mark) if isinstance(mark, Lanes) else []
@@ -238,7 +236,7 @@ def _one_after_another(x: Floats) -> Floats:
 
 def _bars(mark: Histogram) -> tuple[Floats, Floats, Floats]:
     if len(mark.edges) != len(mark.heights) + 1 or not len(mark.heights):
-        return NONE, NONE, NONE
+        return NO_PLACES, NO_PLACES, NO_PLACES
     x = _one_after_another(np.repeat(mark.edges, 2)[1:-1])
     return x, np.zeros(len(x)), np.repeat(np.nan_to_num(mark.heights), 2)
 

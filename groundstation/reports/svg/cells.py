@@ -7,8 +7,8 @@ from groundstation.plots.marks import Cells, Floats
 from groundstation.plots.ranges import thin
 from groundstation.reports.svg import path
 from groundstation.reports.svg.boxes import BAR_PT, MOST_OF_A_TITLE, TICK_PT, TO_BAR_PT, TO_TEXT_PT, Box
-from groundstation.reports.svg.colours import EDGE, STEPS, viridis
-from groundstation.reports.svg.extents import NOTHING, edges
+from groundstation.reports.svg.colours import EDGE, NO_PLACES, STEPS, viridis
+from groundstation.reports.svg.extents import edges
 from groundstation.reports.svg.font import SIZE_PT, label, middle, width_pt, written
 from groundstation.reports.svg.scales import Span, span_of
 from groundstation.reports.svg.ticks import ticks_of
@@ -50,7 +50,7 @@ def _levels(mark: Cells, values: Floats) -> NDArray[np.int64]:
 
 
 def _scale(mark: Cells) -> Span:
-    return span_of("log" if mark.is_log else "linear", mark.low, mark.high, NOTHING, is_tight=True)
+    return span_of("log" if mark.is_log else "linear", mark.low, mark.high, NO_PLACES, is_tight=True)
 
 
 def _blocks(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:

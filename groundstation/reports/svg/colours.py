@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from groundstation.plots.marks import Emphasis, Floats, Role
+from groundstation.plots.marks import Dash, Emphasis, Floats, Role
 
 INK, FAINT, EDGE, GRID, PAPER = "#1c2530", "#6b7683", "#8d97a3", "#e4e8ec", "#ffffff"
 
@@ -78,6 +78,17 @@ def opacity(of: str, share: float) -> str:
     (' fill-opacity="0.5"', '')
     """
     return "" if share == 1.0 else f' {of}-opacity="{share:g}"'
+
+
+def dashes(dash: Dash) -> str:
+    """The attribute of a dashed line, none of a solid one.
+
+    Examples
+    --------
+    >>> dashes("")
+    ''
+    """
+    return f' stroke-dasharray="{DASHES[dash]}"' if dash else ""
 
 
 def viridis(share: float) -> str:

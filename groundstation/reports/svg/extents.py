@@ -22,9 +22,9 @@ from groundstation.plots.marks import (
 )
 from groundstation.plots.plot import Panel
 from groundstation.plots.ranges import finite
+from groundstation.reports.svg.colours import NO_PLACES
 from groundstation.reports.svg.scales import Span, span_of
 
-NOTHING: Floats = np.zeros(0)
 ABOVE_ROWS, BELOW_ROWS = 0.6, 0.6  # of a row, before the first and behind the last
 
 
@@ -106,7 +106,7 @@ def y_spans(panel: Panel, count: int) -> tuple[Span, ...]:
     """Ends of the vertical axis in each of so many windows."""
     whole = y_span(panel)
     own = panel.y.ranges if len(panel.y.ranges) == count else ()
-    return tuple(span_of(whole.scale, *ends, NOTHING, whole.linear_to) for ends in own) or (whole,) * count
+    return tuple(span_of(whole.scale, *ends, NO_PLACES, whole.linear_to) for ends in own) or (whole,) * count
 
 
 def y_span(panel: Panel) -> Span:
@@ -117,7 +117,7 @@ def y_span(panel: Panel) -> Span:
         places += [float(mark.row) for mark in panel.marks if isinstance(mark, Intervals)]
         last = max((place for place in places if np.isfinite(place)), default=0.0)
         ends = last + BELOW_ROWS if axis.low is None else axis.low, -ABOVE_ROWS if axis.high is None else axis.high
-        return span_of("linear", *ends, NOTHING, is_tight=True)
+        return span_of("linear", *ends, NO_PLACES, is_tight=True)
     is_bars = any(isinstance(mark, Histogram) for mark in panel.marks)
     low = 0.0 if axis.low is None and is_bars and drawn.size and drawn[0] >= 0.0 and axis.scale != "log" else axis.low
     return span_of(axis.scale, low, axis.high, drawn, axis.linear_to, is_tight=_is_grid(panel))
@@ -145,7 +145,7 @@ def windows_of(panel: Panel, span: Span) -> tuple[Span, ...]:
     known = [(low, high) for low, high in panel.x.windows if np.isfinite([low, high]).all() and high > low]
     if not known:
         return (span,)
-    return tuple(span_of(span.scale, *ends, NOTHING, span.linear_to, is_tight=True) for ends in known)
+    return tuple(span_of(span.scale, *ends, NO_PLACES, span.linear_to, is_tight=True) for ends in known)
 
 
 def equal(x: Span, y: Span, width_pt: float, height_pt: float) -> tuple[Span, Span]:
@@ -163,4 +163,4 @@ def equal(x: Span, y: Span, width_pt: float, height_pt: float) -> tuple[Span, Sp
 
 def _grown(span: Span, length: float) -> Span:
     middle, half = 0.5 * (span.low + span.high), 0.5 * np.copysign(length, span.high - span.low)
-    return span_of(span.scale, float(middle - half), float(middle + half), NOTHING, is_tight=True)
+    return span_of(span.scale, float(middle - half), float(middle + half), NO_PLACES, is_tight=True)

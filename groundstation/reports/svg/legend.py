@@ -121,7 +121,7 @@ def _sign(entry: Entry, x: float, y: float) -> str:
         line = f'<path d="M{half:.2f} {y - 4.0:.2f}v8" stroke="{colour}" stroke-width="1"/>'
         return line + symbol("dot", half, y, 3.6, colour)
     if isinstance(mark, Curve | Limit | Outlines):
-        pattern = f' stroke-dasharray="{colours.DASHES[mark.dash]}"' if mark.dash else ""
+        pattern = colours.dashes(mark.dash)
         width = (colours.LIMIT_PT if isinstance(mark, Limit) else colours.LINE_PT)[mark.emphasis]
         return (
             f'<path d="M{x:.2f} {y:.2f}h{SIGN_PT:g}" fill="none" stroke="{colour}" stroke-width="{width:g}"{pattern}/>'

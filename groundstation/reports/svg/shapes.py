@@ -54,7 +54,7 @@ def _curve(mark: Curve, box: Box) -> str:
     if mark.steps:
         x, y, starts = stepped(x, y, starts)
     width = colours.LINE_PT[mark.emphasis]
-    dash = f' stroke-dasharray="{colours.DASHES[mark.dash]}"' if mark.dash else ""
+    dash = colours.dashes(mark.dash)
     told = path.polyline(x, y, starts)
     ends = ROUND if path.NO_LENGTH in told else ""  # a sample between gaps is a dot
     return _stroked(told, colours.COLOURS[mark.role], width, dash + ends)
@@ -183,7 +183,7 @@ def _limit(mark: Limit, box: Box) -> str:
         if mark.is_upright
         else f"M{box.left:.2f} {place:g}H{box.right:.2f}"
     )
-    dash = f' stroke-dasharray="{colours.DASHES[mark.dash]}"' if mark.dash else ""
+    dash = colours.dashes(mark.dash)
     return _stroked(told, colours.COLOURS[mark.role], colours.LIMIT_PT[mark.emphasis], dash)
 
 
@@ -219,7 +219,7 @@ def _points(mark: Points, box: Box) -> str:
     x, y = box.across(mark.x), box.down(mark.y)
     rows = np.flatnonzero(_seen(x, y, box, 0.1))
     rows = rows[thin(len(rows), MOST_SYMBOLS)]
-    half = 0.5 * colours.SYMBOL_PT * min(max(mark.size, 0.1), 10.0)
+    half = 0.5 * colours.SYMBOL_PT
     told = "".join(outline(mark.symbol, float(x[row]), float(y[row]), half) for row in rows.tolist())
     colour = colours.COLOURS[mark.role]
     return f'<path d="{told}" {look(mark.symbol, colour, is_hollow=mark.is_hollow)}/>' if told else ""
@@ -237,7 +237,7 @@ def _outlines(mark: Outlines, box: Box) -> str:
         under = f'<path d="{told}" fill="{colours.PAPER}" fill-opacity=".75"/>'  # legible over cells
         shade = f'fill="{colour}" fill-opacity=".12" stroke="{colour}"'
         return f'{under}<path d="{told}" {shade} stroke-width="{colours.LINE_PT[mark.emphasis]:g}"/>'
-    dash = f' stroke-dasharray="{colours.DASHES[mark.dash]}"' if mark.dash else ""
+    dash = colours.dashes(mark.dash)
     return _stroked(told, colour, colours.LINE_PT[mark.emphasis], dash)
 
 
