@@ -307,6 +307,9 @@ def test_json_has_both(both: Path, tmp_path: Path) -> None:
         told = (document[0] if verb == "check" else document)["power_ups"]
         assert [{key: one[key] for key in ("number", "start", "end")} for one in told] == expected
         assert all(one["is_utc"] for one in told)
+    alone = json.loads(groundstation("check", both, "--json")[1])[0]["power_ups"]
+    for more in (("--timeout", "60"), ("--isolate",)):  # from a process of its own
+        assert json.loads(groundstation("check", both, "--json", *more)[1])[0]["power_ups"] == alone, more
     code, printed = groundstation("run", both, "-o", tmp_path / "out", "--only", "results", "--json")
     assert code == 0 and [one["power_up"] for one in json.loads(printed)] == [1, 2]
 

@@ -116,8 +116,7 @@ class ClockModel:
         """What is added to device times of records."""
         if len(self.starts) == 1:
             return self.offsets_ns[0]
-        segment = np.searchsorted(self.starts, record_index, side="right") - 1
-        return self.offsets_ns[np.maximum(segment, 0)]
+        return ClockOffsets(self.starts, self.offsets_ns).at(record_index)
 
     def valid_ns(
         self, record_index: Int64Array, device_time_ns: Column, validity_ns: Int64Array, time_ns: Int64Array

@@ -33,7 +33,6 @@ SILENT_NS, YEAR_NS = 3_600 * NS_PER_S, 366 * 86_400 * NS_PER_S  # a silence that
 LASTING_NS = 60 * NS_PER_S  # both sides of such a step
 WRAP_NS = 5 * NS_PER_S  # the counter stands so near to 2^n before it wraps
 PLAUSIBLE_NS = NS_PER_S  # from the last record before a wrap to the first behind it, unless the usual step is longer
-_TICKS_NS = (100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 _LATE_NS = 30 * NS_PER_S  # records of the time before a wrap come no later
 
 
@@ -352,9 +351,9 @@ def _moduli() -> tuple[tuple[int, str], ...]:
     """Counters of 24, 32 and 48 bits by their ticks, of a day and of a week; those that last less than a minute not."""
     names = {100: "100 ns", 1_000: "1 µs", 10_000: "10 µs", 100_000: "0.1 ms", 1_000_000: "1 ms", 10_000_000: "10 ms"}
     found = [
-        ((1 << bits) * tick, f"counter of {bits} bits and {names[tick]}")
+        ((1 << bits) * tick, f"counter of {bits} bits and {name}")
         for bits in (24, 32, 48)
-        for tick in _TICKS_NS
+        for tick, name in names.items()
         if 60 * NS_PER_S < (1 << bits) * tick < LAST_RECORD
     ]
     return (*found, (86_400 * NS_PER_S, "time of day"), (WEEK_S * NS_PER_S, "time of the week"))

@@ -260,7 +260,7 @@ def _with_mixed(clock: ClockModel, part: PowerUp, window: Window) -> ClockModel:
 def _wrapped(clock: ClockModel, part: PowerUp) -> ClockModel:
     """The model for times as the device wrote them, from one for a counter without an end."""
     starts = np.unique(np.concatenate((clock.starts, [wrap.record_index for wrap in part.wraps])).astype(np.int64))
-    offsets = clock.offsets_ns[np.maximum(np.searchsorted(clock.starts, starts, side="right") - 1, 0)]
+    offsets = ClockOffsets(clock.starts, clock.offsets_ns).at(starts)
     for wrap in part.wraps:
         offsets = offsets + np.where(starts >= wrap.record_index, wrap.modulus_ns, 0)
     starts[0] = min(int(starts[0]), part.first)

@@ -4,7 +4,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError
@@ -95,7 +95,7 @@ def run_joined(
         return ()
     tasks: list[tuple[int, Job]] = []
     for number, stretch in enumerate(found):
-        first = placement.flights()[stretch.numbers[0]]
+        first = outcomes[stretch.numbers[0]]
         add_suffix = bool(first.flight_id) and plain_id(first.flight_id, first.sha256) != first.flight_id
         tasks.append((number, work[stretch.numbers[0] % len(work)].of_parts(stretch.parts, add_suffix=add_suffix)))
     apart = []
@@ -116,20 +116,25 @@ class _Folders:
     """Files of folders by the families of their names, each folder looked at once."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple[Path, str], list[str]] = {}
+        self._known: dict[Path, dict[str, str]] = {}
 
     def next_file(self, path: Path) -> Path | None:
         """The file behind one of those in its folder whose names differ in a number alone."""
-        key = path.parent, family(path.name)
-        if key not in self._known:
-            try:
-                names = [one.name for one in path.parent.iterdir() if family(one.name) == key[1]]
-            except OSError:
-                names = []
-            self._known[key] = sorted(names, key=order_of)
-        names = self._known[key]
-        at = names.index(path.name) + 1 if path.name in names else len(names)
-        return path.parent / names[at] if at < len(names) else None
+        if path.parent not in self._known:
+            self._known[path.parent] = _followers(path.parent)
+        name = self._known[path.parent].get(path.name)
+        return None if name is None else path.parent / name
+
+
+def _followers(folder: Path) -> dict[str, str]:
+    """For each file of a folder, the one behind it among those of its family."""
+    families: dict[str, list[str]] = {}
+    try:
+        for one in folder.iterdir():
+            families.setdefault(family(one.name), []).append(one.name)
+    except OSError:
+        return {}
+    return {name: after for names in families.values() for name, after in pairwise(sorted(names, key=order_of))}
 
 
 def _may_join(parts: Sequence[PartOfRun]) -> bool:
@@ -142,11 +147,9 @@ def _others(own: Sequence[Stretch], strangers: Iterable[Path], known: KnownFligh
     of_files = (found for path in strangers for found in known.beside(path))
     mine = {part.sha256 for one in own for part in one.parts}
     paths = {part.path for one in own for part in one.parts}
-    seen: set[str] = set()
-    for name, manifest in chain(of_logs, of_files):
-        if name in seen or not _may_join(manifest.parts):
+    for manifest in known.manifests_of(dict.fromkeys(chain(of_logs, of_files))):
+        if not _may_join(manifest.parts):
             continue
-        seen.add(name)
         left = [part for part in manifest.parts if part.sha256 not in mine and part.path not in paths]
         if len(left) == len(manifest.parts):
             yield Stretch(manifest.parts)
@@ -222,10 +225,10 @@ def _only(stretches: Sequence[Stretch], one: int, others: Sequence[int]) -> int 
 
 def _pairs(stretches: Sequence[Stretch], folders: _Folders) -> Iterator[tuple[int, int]]:
     """Numbers of stretches of which the second goes on from the first."""
-    by_start = sorted((start, number) for number, one in enumerate(stretches) for start in _starts(one.first))
+    by_start = sorted((start, number) for number, one in enumerate(stretches) for start in _moments(one.first, 0))
     for number, one in enumerate(stretches):
         found: set[int] = set()
-        for kind, end_ns in _ends(one.last):
+        for kind, end_ns in _moments(one.last, 1):
             low = bisect_left(by_start, ((kind, end_ns - round(LATE_S * NS_PER_S)), -1))
             high = bisect_right(by_start, ((kind, end_ns + round(LONGEST_GAP_S * NS_PER_S)), len(stretches)))
             found.update(other for _start, other in by_start[low:high] if other != number)
@@ -236,11 +239,6 @@ def _pairs(stretches: Sequence[Stretch], folders: _Folders) -> Iterator[tuple[in
                 yield number, other
 
 
-def _starts(part: PartOfRun) -> Iterable[tuple[str, int]]:
-    """When a log begins, by each clock that tells it."""
-    return [("device", part.device_ns[0]), *([("utc", part.utc_ns[0])] if part.utc_ns else [])]
-
-
-def _ends(part: PartOfRun) -> Iterable[tuple[str, int]]:
-    """The same of its end."""
-    return [("device", part.device_ns[1]), *([("utc", part.utc_ns[1])] if part.utc_ns else [])]
+def _moments(part: PartOfRun, at: int) -> list[tuple[str, int]]:
+    """When a log begins (0) or ends (1), by each clock that tells it."""
+    return [("device", part.device_ns[at]), *([("utc", part.utc_ns[at])] if part.utc_ns else [])]

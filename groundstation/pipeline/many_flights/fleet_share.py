@@ -122,11 +122,12 @@ def share_of(folder: Path, store: SampleStore | None = None) -> FlightShare:
         tuple(topic.partition(".")[2] for topic in topics_of_kind("link", tuple(results.ledger.topics))),
         store.put(row, samples) if samples is not None and store is not None else "",
         tuple(part.sha256 for part in saved.manifest.parts[1:]),
-        _lesson(saved),
+        lesson_of(saved),
     )
 
 
-def _lesson(saved: SavedFlight) -> Lesson | None:
+def lesson_of(saved: SavedFlight) -> Lesson | None:
+    """What a flight teaches of its installation; None where the INS has no serial number."""
     lesson = lesson_of_flight(saved.results, mapping(saved.manifest.configuration, "aircraft"), saved.folder.name)
     return lesson if lesson.ins_serial else None
 

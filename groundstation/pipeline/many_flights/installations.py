@@ -9,16 +9,15 @@ from groundstation.base.errors import SettingsError
 from groundstation.base.serial import from_json
 from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.installation.analysis import sentence_of
-from groundstation.estimators.installation.lesson import lesson_of_flight
 from groundstation.estimators.installation.series import Series, installation_of, series_of
 from groundstation.estimators.installation.settings import InstallationSettings
-from groundstation.pipeline.many_flights.fleet_share import lessons_of
+from groundstation.pipeline.many_flights.fleet_share import lesson_of, lessons_of
 from groundstation.pipeline.many_flights.fleet_store import Scan
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.sealing import note
 from groundstation.reports.flight_report import REPORT
 from groundstation.reports.installation import with_installation
-from groundstation.results.files import load, mapping, write_text
+from groundstation.results.files import load, write_text
 from groundstation.results.installation import (
     METHOD_VERSION,
     Installation,
@@ -101,11 +100,10 @@ def _lessons(out: Path, found: Scan) -> Iterator[Lesson]:
         yield from lessons_of(part)
     for name in found.stale:
         try:
-            saved = load(out / name, ANSWER_TYPES)
-            lesson = lesson_of_flight(saved.results, mapping(saved.manifest.configuration, "aircraft"), name)
+            lesson = lesson_of(load(out / name, ANSWER_TYPES))
         except Exception:  # it is told of where the index is written
             continue
-        if lesson.ins_serial:
+        if lesson is not None:
             yield lesson
 
 

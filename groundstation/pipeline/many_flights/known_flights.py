@@ -70,22 +70,23 @@ class KnownFlights:
     @cached_property
     def paths_of_parts(self) -> frozenset[str]:
         """Where the logs behind the first one are of flights that came from several."""
-        several = self._manifests_of(self._of_several)
-        return frozenset(part.path for _name, manifest in several for part in manifest.parts[1:])
+        several = self.manifests_of(self._of_several)
+        return frozenset(part.path for manifest in several for part in manifest.parts[1:])
 
-    def about(self, part: PartOfRun) -> Iterator[tuple[str, Manifest]]:
+    def about(self, part: PartOfRun) -> list[str]:
         """Flights that another one may go on from, or that may go on from it: by their times, or names of files."""
         is_sure = part.utc_ns is not None and part.aircraft
-        yield from self._manifests_of({*self._near(part), *([] if is_sure else self._beside(Path(part.path)))})
+        return sorted({*self._near(part), *([] if is_sure else self.beside(Path(part.path)))})
 
-    def beside(self, path: Path) -> Iterator[tuple[str, Manifest]]:
+    def beside(self, path: Path) -> list[str]:
         """Flights of files in the folder of another one whose names differ from its in a number alone."""
-        yield from self._manifests_of(self._beside(path))
+        return self._by_family.get((path.parent, family(path.name)), [])
 
-    def _manifests_of(self, names: Iterable[str]) -> Iterator[tuple[str, Manifest]]:
-        for name in sorted(names):
-            with suppress(GroundstationError):  # it is gone, or not whole
-                yield name, self._manifests.get(name) or load_manifest((self._out or Path()) / name)
+    def manifests_of(self, names: Iterable[str]) -> Iterator[Manifest]:
+        """What is recorded of some flights, without those that are gone or not whole."""
+        for name in names:
+            with suppress(GroundstationError):
+                yield self._manifests.get(name) or load_manifest((self._out or Path()) / name)
 
     def _near(self, part: PartOfRun) -> list[str]:
         """Flights that overlap with a log, or nearly."""
@@ -96,12 +97,16 @@ class KnownFlights:
         rows = np.flatnonzero((start_ns <= part.utc_ns[1] + gap_ns) & (end_ns >= part.utc_ns[0] - gap_ns))
         return [self._names[row] for row in rows.tolist()]
 
-    def _beside(self, path: Path) -> list[str]:
+    @cached_property
+    def _by_family(self) -> dict[tuple[Path, str], list[str]]:
+        """Flights by the folder of their log and the family of its name, in the order of their names."""
         if self._out is None:
-            return []
+            return {}
         paths = (*self._keys.column("path"), *(one.source.path for one in self._manifests.values()))
-        pairs, like = zip(self._names, map(Path, paths), strict=True), family(path.name)
-        return [name for name, one in pairs if one.parent == path.parent and family(one.name) == like]
+        found: dict[tuple[Path, str], list[str]] = {}
+        for name, path in sorted(zip(self._names, map(Path, paths), strict=True)):
+            found.setdefault((path.parent, family(path.name)), []).append(name)
+        return found
 
     @cached_property
     def _spans(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -11,7 +11,7 @@ from groundstation.base.findings import SEVERITIES, Finding, worst
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.base.serial import to_json_exactly
-from groundstation.integrity.limits import Thresholds, shipped
+from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import (
@@ -179,14 +179,6 @@ def _for_session(
     stations = load_stations(file if file.is_file() else None)
     usability = usability_of_session(purpose, list(flights.values()), configuration, stations)
     return [one.judged(usability, fail_on) if number in flights else one for number, one in enumerate(found)]
-
-
-def check_log(log: Log, thresholds: Thresholds | None = None, *, fail_on: str = "none") -> Checked:
-    """Compute the ledger of a log.
-
-    The topics of a groundstation MCAP are counted anew; what only the log could tell is taken from the ledger in it.
-    """
-    return checked_with_flight(log, thresholds or shipped(), fail_on, with_flight=False)[0]
 
 
 def _check_or_reason(

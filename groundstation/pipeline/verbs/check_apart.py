@@ -1,7 +1,7 @@
 """Checks and descriptions of logs, each in a process of its own: with a limit of time, or isolated."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from groundstation.pipeline.many_flights.confined import Bounds
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
+from groundstation.pipeline.one_flight.segments import PowerUpTold
 from groundstation.pipeline.verbs.check import Checked, check_here, require_logs, unread
 from groundstation.pipeline.verbs.describe import Description, describe, suggest_icd
 
@@ -51,20 +52,21 @@ class _Told:
     clock: Clock
     findings: tuple[Finding, ...]
     usability: Mapping[str, Any] | None
+    power_ups: tuple[PowerUpTold, ...]
 
     @classmethod
     def of(cls, checked: Checked) -> "_Told":
         usability = None if checked.usability is None else checked.usability.to_dict()
-        return cls(checked.outcome, checked.facts, checked.ledger, checked.clock, checked.findings, usability)
+        return cls(**(vars(checked) | {"usability": usability}))
 
     def checked(self) -> Checked:
         """The same as it was there."""
-        found = Checked(self.outcome, self.facts, self.ledger, self.clock, self.findings)
+        found = Checked(**(vars(self) | {"usability": None}))
         if self.usability is None:
             return found
         from groundstation.pipeline.verbs.usable import usability_from
 
-        return Checked(self.outcome, self.facts, self.ledger, self.clock, self.findings, usability_from(self.usability))
+        return replace(found, usability=usability_from(self.usability))
 
 
 @dataclass(frozen=True)
