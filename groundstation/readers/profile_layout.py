@@ -26,9 +26,9 @@ class _Fed:
     derivations: list[Derivation]
     remarks: list[Remark]
 
-    def add(self, rule: Rule) -> bool:
-        """Tell whether the field of a rule was free."""
-        return self.rules.setdefault(rule.key, rule) is rule
+    def add(self, rule: Rule) -> None:
+        """Add a rule where its field is free."""
+        self.rules.setdefault(rule.key, rule)
 
 
 def layout_of(

@@ -9,7 +9,7 @@ INFOCOM 1999.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Literal, TypeAlias
 
@@ -241,10 +241,6 @@ class Line:
         if not self.drift:
             return np.full(len(clock_ns), self.offset_ns, dtype=np.int64)
         return np.asarray(self.offset_ns + np.rint((clock_ns - self.zero_ns) * self.drift).astype(np.int64))
-
-    def shifted(self, by_ns: int) -> "Line":
-        """The line with another offset."""
-        return replace(self, offset_ns=self.offset_ns + by_ns)
 
 
 def lower_line(track: Track) -> Line:

@@ -9,7 +9,6 @@ from groundstation.base.errors import SettingsError
 from groundstation.base.serial import MismatchError, from_json, to_json
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
-from groundstation.results.files import json_text
 from groundstation.results.heading import IntervalPart
 
 FORMAT_VERSION = 1
@@ -309,6 +308,8 @@ def as_stored(lesson: Lesson) -> Lesson:
 
 def installations_text(found: Installations) -> str:
     """The file as text."""
+    from groundstation.results.files import json_text  # whoever teaches alone writes nothing
+
     return json_text(to_json(found))
 
 

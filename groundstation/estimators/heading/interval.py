@@ -86,6 +86,11 @@ class Differences:
     error_prior_deg: tuple[float, float] | None = None
     segment: NDArray[np.int64] | None = None
 
+    @property
+    def apart(self) -> tuple[Regressor, ...]:
+        """The regressors that are told apart."""
+        return tuple(one for one in self.regressors if one.is_apart)
+
 
 class _Found(NamedTuple):
     """Of k draws: log posterior (k,), coefficients (k, c), variances (k, m, c), the error without terms told apart.
@@ -223,7 +228,7 @@ def error_posterior(
         coefficients[:, 0], variance[:, 0] = alone[:, 0], measured_deg**2
         sigma_deg = np.hypot(measured_deg, _left_in_error(differences, np.asarray(weight @ points)))
     coefficients[:, 0] += target.reference_deg
-    plain = _Target(standstill, without_apart(differences))
+    plain = _Target(standstill, without_apart(differences)) if target.apart else target
     growing = plain.evaluate(even_draws(points, weight, DRAWS_OF_GROWTH), checkpoints).variance
     return ErrorPosterior(
         mean_deg=coefficients[:, 0],
@@ -245,7 +250,7 @@ def _target_of(differences: Differences, standstill: StandstillVelocities) -> _T
 
     Directions then disagree by what a crosswind does; without these terms that would be taken for errors of the INS.
     """
-    apart = [one for one in differences.regressors if one.is_apart]
+    apart = differences.apart
     if all(float(np.ptp(one.values)) * one.prior_sigma < NOTICED_DEG for one in apart):
         return _Target(standstill, without_apart(differences))
     known = without_apart(differences).regressors
@@ -273,7 +278,7 @@ def _left_in_error(differences: Differences, parameters: FloatArray) -> float:
     """
     variance, measured = 0.0, without_apart(differences)
     known = tuple(replace(one, prior_mean=0.0) for one in measured.regressors)
-    for term in (one for one in differences.regressors if one.is_apart):
+    for term in differences.apart:
         alone = replace(measured, difference_deg=term.values, regressors=known, error_prior_deg=None)
         through = float(fixed_noise_estimate(alone, parameters[None, :])[0][0])
         variance += (term.prior_sigma * through) ** 2

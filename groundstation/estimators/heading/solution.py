@@ -280,7 +280,7 @@ def _parts(
 def _wind_found(differences: Differences, posterior: ErrorPosterior) -> FloatArray:
     """What the terms told apart are found to make of each difference, degrees; zero where one direction hides them."""
     known = 1 + len(without_apart(differences).regressors)
-    terms = [one for one in differences.regressors if one.is_apart]
+    terms = differences.apart
     found = [posterior.coefficient(place)[0] for place in range(known, posterior.coefficients.shape[1])]
     return sum(
         (size * term.values for size, term in zip(found, terms, strict=False)), np.zeros(len(differences.time_s))
@@ -289,7 +289,7 @@ def _wind_found(differences: Differences, posterior: ErrorPosterior) -> FloatArr
 
 def _wind_of(parts: tuple[TaxiSegment, ...], differences: Differences) -> FloatArray:
     """One sigma of each term told apart, averaged over each part, degrees, shape (parts, terms)."""
-    terms, time_s = [one for one in differences.regressors if one.is_apart], differences.time_s
+    terms, time_s = differences.apart, differences.time_s
     inside = [(time_s >= part.start_s) & (time_s <= part.end_s) for part in parts]
     means = [[one.prior_sigma * float(np.mean(one.values[mask])) for one in terms] for mask in inside]
     return np.array(means).reshape(len(parts), len(terms))

@@ -343,10 +343,21 @@ def _is_curable(gate: Gate, standstill: Standstill | None, settings: HeadingSett
     return gate.name == STANDSTILL_GATE and is_short
 
 
-def _is_mostly_steady(gates: tuple[Gate, ...]) -> bool:
-    """Whether wind and installation are a larger part of the whole interval than this taxi."""
+def is_mostly_steady(whole_deg: float, alone_deg: float) -> bool:
+    """Whether wind and installation are a larger part of the whole interval than this taxi.
+
+    Examples
+    --------
+    >>> is_mostly_steady(0.3, 0.2), is_mostly_steady(0.3, 0.25)
+    (True, False)
+    """
+    return whole_deg**2 >= 2.0 * alone_deg**2
+
+
+def _lacks_steady_parts(gates: tuple[Gate, ...]) -> bool:
+    """Whether what the whole interval lacks is no more taxi; also where its parts are not known."""
     whole, alone = (next((gate.value for gate in gates if gate.name == name), None) for name in (WHOLE, TAXI_ALONE))
-    return whole is None or alone is None or whole**2 >= 2.0 * alone**2
+    return whole is None or alone is None or is_mostly_steady(whole, alone)
 
 
 def decide(
@@ -362,7 +373,7 @@ def decide(
     failed = tuple(gate for gate in gates if gate.required and gate.state == "failed")
     if any(not _is_curable(gate, standstill, settings) for gate in failed):
         return "reject", failed
-    if failed and ({gate.name for gate in failed} != {WHOLE} or not _is_mostly_steady(gates)):
+    if failed and ({gate.name for gate in failed} != {WHOLE} or not _lacks_steady_parts(gates)):
         return "extend", failed
     missing = tuple(gate for gate in gates if gate.required and gate.state == "not_measured")
     if missing:

@@ -10,7 +10,7 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.posterior import mixture_quantile
-from groundstation.estimators.heading.verdict import WHOLE, round_to_step
+from groundstation.estimators.heading.verdict import WHOLE, is_mostly_steady, round_to_step
 from groundstation.estimators.installation.model import Belief, Mixture, doubts, installed, predict
 from groundstation.estimators.installation.settings import InstallationSettings
 from groundstation.results.heading import IntervalPart
@@ -115,8 +115,7 @@ def verdict_of(lesson: Lesson, half_width_deg: float) -> str:
         return "extend"
     if lesson.limit_deg is None or half_width_deg <= lesson.limit_deg:
         return "accept"
-    is_mostly_steady = half_width_deg**2 >= 2.0 * (NORMAL_95 * lesson.taxi_sigma_deg) ** 2
-    return "advisory" if is_mostly_steady else "extend"
+    return "advisory" if is_mostly_steady(half_width_deg, NORMAL_95 * lesson.taxi_sigma_deg) else "extend"
 
 
 def _reason(lesson: Lesson, verdict: str, number: LearnedNumber, correction_deg: float) -> str:

@@ -57,7 +57,7 @@ def _answered(series: Series, teacher: "_Teacher") -> Iterator[tuple[Lesson, Ins
     """Flights with their answers; the teacher then has been taught by all of them."""
     for lesson in series.lessons:  # of those that begin at one time none teaches
         yield lesson, teacher.answer(lesson)
-        teacher.teach([lesson])
+        teacher.teach(lesson)
 
 
 def answer_from(lesson: Lesson, earlier: Sequence[Lesson], settings: InstallationSettings) -> InstallationResult:
@@ -65,9 +65,11 @@ def answer_from(lesson: Lesson, earlier: Sequence[Lesson], settings: Installatio
     if lesson.number_deg is None or not (lesson.ins_serial and lesson.aircraft and lesson.start_utc):
         return alone_answer(lesson, lesson.not_taught)
     others = [one for one in earlier if one.place[0] < lesson.place[0] and one.flight_id != lesson.flight_id]
-    same = [one for one in series_of([*others, lesson]) if lesson in one.lessons]
-    found = (answer for series in same for one, answer in answers_of(series, settings) if one is lesson)
-    return next((one for one in found if one is not None), None) or alone_answer(lesson, lesson.not_taught)
+    same = next(one for one in series_of([*others, lesson]) if lesson in one.lessons)
+    teacher = _Teacher(settings)
+    for one in same.lessons[: same.lessons.index(lesson)]:
+        teacher.teach(one)
+    return teacher.answer(lesson) or alone_answer(lesson, lesson.not_taught)
 
 
 def installation_of(series: Series, settings: InstallationSettings) -> Installation:
@@ -136,14 +138,13 @@ class _Teacher:
     def taught_by(self) -> tuple[str, ...]:
         return tuple(one.flight_id for one in self._taught)
 
-    def teach(self, lessons: Iterable[Lesson]) -> None:
-        for one in lessons:
-            if one.teaches and one.number_deg is not None:
-                self._taught.append(one)
-                if self.belief is None or self._prior != one.prior:
-                    self._relearn(one)
-                else:
-                    self.belief = learn(self.belief, one, self.settings)
+    def teach(self, one: Lesson) -> None:
+        if one.teaches and one.number_deg is not None:
+            self._taught.append(one)
+            if self.belief is None or self._prior != one.prior:
+                self._relearn(one)
+            else:
+                self.belief = learn(self.belief, one, self.settings)
 
     def answer(self, lesson: Lesson) -> InstallationResult | None:
         if lesson.number_deg is None or lesson.error_deg is None:

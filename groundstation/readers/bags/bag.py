@@ -4,6 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TypeAlias
 
@@ -117,7 +118,7 @@ class Bag:
     def _is_folder(self) -> bool:
         return self.source.head.lstrip().startswith(MARK)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Bytes of all its files that are there."""
         size = 0

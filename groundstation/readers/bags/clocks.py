@@ -166,7 +166,7 @@ def _added_where_right(track: Track, offsets: Offsets) -> tuple[int, int] | None
         within = track.take((track.record_index >= offsets.starts[place]) & (track.record_index < end))
         if len(within) < min(FEWEST_READINGS, len(track)) or np.median(within.receipt_ns) < FIRST_NS:
             continue
-        if abs(int(np.quantile(within.late_ns, 0.1, method="lower"))) <= _LARGEST_LAG_NS:
+        if _is_near(within):
             return int(offsets.starts[place]), int(offsets.added_ns[place])
     return None
 
@@ -224,7 +224,7 @@ class Lags:
         for one in several:
             track = one.track
             parted = stretches_of(offsets.moved(track)) if offsets.stated else one.stretches
-            stretches = [found for found in parted if _is_near(found)]
+            stretches = [found for found in parted if _is_near(found.track)]
             record, log_ns, stamp_ns = one.stamps.all()
             late_ns = log_ns + offsets.at(record) - stamp_ns
             is_within = np.zeros(len(record), dtype=bool)
@@ -257,8 +257,7 @@ class Lags:
         """Whether the stamps are believed."""
         if self.is_stopped or self.share < BELIEVED_SHARE:
             return self.is_stopped
-        within = (self.lag_ns >= -_LARGEST_LAG_NS) & (self.lag_ns <= self.most_ns)
-        return bool(within.mean() >= USUAL_SHARE)
+        return bool(self.believed(self.lag_ns).mean() >= USUAL_SHARE)
 
     def believed(self, lag_ns: Int64Array) -> BoolArray:
         """Which stamps are near enough to the log time, shape (n,)."""
@@ -287,8 +286,8 @@ def _is_stopped(one: Stamped) -> bool:
     return bool((np.diff(stamp_ns) >= 0).all() and np.ptp(stamp_ns) > _LARGEST_LAG_NS)
 
 
-def _is_near(stretch: Stretch) -> bool:
-    low = np.quantile(stretch.track.late_ns, 0.1, method="lower")
+def _is_near(track: Track) -> bool:
+    low = np.quantile(track.late_ns, 0.1, method="lower")
     return bool(abs(int(low)) <= _LARGEST_LAG_NS)
 
 

@@ -15,6 +15,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.readers.flightdata_hdf5.canonical import TRACK, Feed, feeds_of, track_feed, values_at
 from groundstation.readers.flightdata_hdf5.container import FAILURES, HIGHEST_RATE_HZ, Container, Parameter, opened
 from groundstation.readers.layout import velocity_from_track
+from groundstation.readers.parts import bounded
 from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
 
@@ -194,9 +195,7 @@ def _batch(topic: str, times_ns: Int64Array, columns: dict[str, Column]) -> Reco
 def _numbered(batch: RecordBatch, instants: Int64Array, next_index: int) -> Iterator[RecordBatch]:
     """A batch, in parts that are not too long, with its place in the source: instants are numbered in order of time."""
     index = next_index + np.searchsorted(instants, batch.device_time_ns.values).astype(np.int64)
-    whole = RecordBatch(batch.topic, index, batch.device_time_ns, batch.columns)
-    for start in range(0, len(whole), MAX_BATCH_ROWS):
-        yield whole if len(whole) <= MAX_BATCH_ROWS else whole.take(slice(start, start + MAX_BATCH_ROWS))
+    yield from bounded(RecordBatch(batch.topic, index, batch.device_time_ns, batch.columns))
 
 
 @dataclass

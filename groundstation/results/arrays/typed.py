@@ -3,7 +3,7 @@
 import re
 import typing
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from functools import cache
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeAlias, TypeVar, cast, dataclass_transform
@@ -33,14 +33,14 @@ _FILLERS: Mapping[str, Any] = {"f": np.nan, "b": False, "i": 0, "U": ""}
 P = TypeVar("P")
 
 
-def column(name: str, *, default: Any = MISSING) -> Any:
+def column(name: str) -> Any:
     """Field whose column has another name; ``{}`` in the name of a :class:`Part`'s stands for that of the part."""
-    return field(default=default, metadata={"name": name})
+    return field(metadata={"name": name})
 
 
-def family(name: str, *, default: Any = MISSING) -> Any:
+def family(name: str) -> Any:
     """Field of columns :data:`ByName`; ``{}`` in the name stands for what they differ in."""
-    return field(default=default, metadata={"name": name})
+    return field(metadata={"name": name})
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(column, family, field))
@@ -249,8 +249,7 @@ def _made(kind: type, figure: FigureData, of: str, taken: set[str]) -> Any:
         if part.kind == ByName:
             families.append(part)
         elif isinstance(part.kind, type) and issubclass(part.kind, Part):
-            is_there = not part.is_optional or any(name in figure.columns for name, _ in _names(part.kind, part.name))
-            found[part.name] = _made(part.kind, figure, part.name, taken) if is_there else None
+            found[part.name] = _made(part.kind, figure, part.name, taken)
         else:
             name = part.pattern.format(of)
             taken.add(name)
@@ -266,10 +265,6 @@ def _made(kind: type, figure: FigureData, of: str, taken: set[str]) -> Any:
         taken.update(part.pattern.format(name) for name in members)
         found[part.name] = members if members or not part.is_optional else None
     return kind(**found)
-
-
-def _names(kind: type, of: str) -> list[tuple[str, _Field]]:
-    return [(part.pattern.format(of), part) for part in _fields(kind)]
 
 
 def _empty(kind: type) -> Any:
