@@ -150,7 +150,8 @@ Isolate = Annotated[
     bool,
     typer.Option(
         "--isolate",
-        help="Read each log in a process of its own, with limits of memory, time and file size ([isolation]).",
+        help="Read each log in a process of its own, with the limits of memory, time and file size that the settings "
+        "state in isolation.",
     ),
 ]
 Progress = Annotated[ProgressMode, typer.Option("--progress", help="Progress on stderr: a bar, nothing, JSON lines.")]

@@ -194,7 +194,7 @@ def _map(recorder: Recorder, results: FlightResults, answer: ForecastResult) -> 
         views.append(_tensor(name, path))
     span = f"{_clock(float(starts[0]))} … {_clock(float(starts[-1]))}"
     title = (
-        f"Radial error, 0 (dark) … {top:.0f} m (bright). To the right: start, {span}; "
+        f"Radial error, 0 (dark blue) … {top:.0f} m (dark red). To the right: start, {span}; "
         f"down: horizon, {horizons[0]:g} … {horizons[-1]:g} min. The dark corner lies beyond the end of the flight."
     )
     recorder.document("forecast/map_legend", title)
