@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from groundstation.cli.main import PURPOSES, app
+from groundstation.cli.main import app
+from groundstation.cli.single_logs import PURPOSES
 from groundstation.estimators.heading.examine import OF_DATA
 from groundstation.estimators.heading.wording import told
 from groundstation.integrity.limits import shipped

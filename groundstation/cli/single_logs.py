@@ -1,0 +1,168 @@
+"""Verbs for single logs that make no flight: ``info``, ``check`` and ``convert``. Heavy imports happen inside them."""
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from groundstation.base.errors import UsageError
+from groundstation.cli.application import (
+    DATA_LOST,
+    DONE,
+    FAILED,
+    AircraftFile,
+    ConfigFile,
+    FailOn,
+    Force,
+    IcdFiles,
+    Isolate,
+    Json,
+    Profile,
+    Progress,
+    Quiet,
+    ReferenceFiles,
+    SiteFile,
+    ThresholdsFile,
+    Timeout,
+    Together,
+    Verbose,
+    answers_with_exit_code,
+    app,
+    examples,
+    say,
+    tell,
+    time_bound,
+)
+
+PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have an ``examine``; a test compares them
+
+
+@app.command(epilog=examples("info"))
+@answers_with_exit_code
+def info(
+    log: Annotated[Path, typer.Argument(help="A recorded log or an MCAP.", metavar="LOG", readable=False)],
+    profile: Profile = None,
+    icd: IcdFiles = None,
+    suggest_icd: Annotated[
+        bool, typer.Option("--suggest-icd", help="Print a draft ICD for what is on its buses.")
+    ] = False,
+    timeout: Timeout = None,
+    json: Json = False,
+    verbose: Verbose = False,
+) -> int | None:
+    """Show what a log is: format, clock, span, topics with rows, rates, fields; its buses (word by word with -v)."""
+    from groundstation.cli import printing
+    from groundstation.pipeline.one_flight.convert import why_nothing_is_placed
+    from groundstation.pipeline.verbs import describe
+
+    bounds = time_bound(timeout)
+    if bounds is not None:
+        from groundstation.pipeline.verbs import check_apart as apart
+    if suggest_icd:
+        tell(apart.suggest_icd_apart(log, bounds) if bounds is not None else describe.suggest_icd(log))
+        return DONE
+    icds = tuple(icd or ())
+    if bounds is not None:
+        description = apart.describe_apart(log, profile, icds, bounds)
+    else:
+        description = describe.describe(log, profile, icds)
+    shown = printing.as_json(description.to_dict()) if json else printing.description(description, everything=verbose)
+    tell(shown)
+    if not description.has_records:
+        say(f"error: {log.name}: {why_nothing_is_placed(description.findings)}")
+        return FAILED
+    return DATA_LOST if description.has_lost_data else DONE
+
+
+@app.command(epilog=examples("check"))
+@answers_with_exit_code
+def check(
+    logs: Annotated[list[Path], typer.Argument(help="Recorded logs or MCAPs.", metavar="LOG", readable=False)],
+    purpose: Annotated[
+        str,
+        typer.Option(
+            "--for",
+            help="The first line says whether the log can be used for this analysis: yes, no, in part, and what is "
+            "missing where. Exit 4 at no; with --fail-on warn also at in part. Logs of a session are judged together.",
+            metavar=PURPOSES,
+        ),
+    ] = "",
+    aircraft: AircraftFile = None,
+    site: SiteFile = None,
+    thresholds: ThresholdsFile = None,
+    config: ConfigFile = None,
+    profile: Profile = None,
+    icd: IcdFiles = None,
+    timeout: Timeout = None,
+    isolate: Isolate = False,
+    fail_on: FailOn = "none",
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+    progress: Progress = "auto",
+) -> int | None:
+    """Print the integrity ledger: rates, coverage, gaps, losses and odd values of every topic. Writes nothing.
+
+    With --for, the first line says whether the log can be used for that analysis.
+    """
+    from groundstation.cli import check_table, printing
+    from groundstation.cli.progress import listener
+    from groundstation.pipeline.one_flight.configuration import load_configuration
+    from groundstation.pipeline.verbs.check import check_many
+
+    configuration = load_configuration(config, aircraft, site, profile=profile, thresholds=thresholds, icds=icd)
+    bounds = time_bound(timeout, configuration.isolation if isolate else None)
+    with listener("none" if quiet else progress) as listen:
+        check_logs = check_many
+        if bounds is not None:
+            from groundstation.pipeline.verbs.check_apart import check_apart
+
+            check_logs = partial(check_apart, bounds=bounds)
+        checked = check_logs(logs, configuration, purpose=purpose, fail_on=fail_on, listen=listen)
+    check_table.show(checked, as_json_text=json, quiet=quiet, everything=verbose)
+    return printing.worst_code(tuple(one.outcome for one in checked))
+
+
+@app.command(epilog=examples("convert"))
+@answers_with_exit_code
+def convert(
+    logs: Annotated[list[Path], typer.Argument(help="Recorded logs.", metavar="LOG", readable=False)],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            help="MCAP to write; a folder for several logs. A name *.ch10 writes Chapter 10 with its ICD.",
+            metavar="FILE",
+        ),
+    ],
+    thresholds: ThresholdsFile = None,
+    config: ConfigFile = None,
+    profile: Profile = None,
+    icd: IcdFiles = None,
+    together: Together = False,
+    reference: ReferenceFiles = None,
+    timeout: Timeout = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+    progress: Progress = "auto",
+) -> int | None:
+    """Convert recorded logs to MCAP (protobuf channels, zstd, indexed); the clock is repaired, both times are kept."""
+    from groundstation.cli import printing
+    from groundstation.cli.progress import listener
+    from groundstation.pipeline.many_flights.references import judged_by
+    from groundstation.pipeline.one_flight.configuration import load_configuration
+    from groundstation.pipeline.verbs.conversions import convert_many, convert_together
+
+    settings = load_configuration(config, profile=profile, thresholds=thresholds, icds=icd)
+    configuration = judged_by(settings, reference or (), is_one_log=together or len(logs) == 1)
+    if together and timeout is not None:
+        raise UsageError("--together", "--timeout", "--together without it")
+    with listener("none" if quiet else progress) as listen:
+        convert_logs = convert_together if together else partial(convert_many, bounds=time_bound(timeout))
+        outcomes = convert_logs(logs, output, configuration=configuration, force=force, listen=listen)
+    printing.outcomes(outcomes, as_json_text=json, quiet=quiet)
+    return printing.worst_code(outcomes)
