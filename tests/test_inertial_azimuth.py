@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from groundstation.estimators.inertial import azimuth
-from groundstation.estimators.inertial.azimuth import AzimuthLimits, estimate_azimuth
+from groundstation.estimators.inertial import azimuth, velocity_changes
+from groundstation.estimators.inertial.azimuth import estimate_azimuth
 from groundstation.estimators.inertial.differences import Differences, drag_per_s
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, run_filter
 from groundstation.estimators.inertial.model import ChannelModel, FloatArray
@@ -18,7 +18,7 @@ from groundstation.simulation.ins_class import load_ins_class
 from groundstation.simulation.ins_errors import SensorErrors, TrueMotion, propagate
 
 SETTINGS = InertialSettings()
-LIMITS = AzimuthLimits()
+LIMITS = velocity_changes.AzimuthLimits()
 SPEED = 200.0
 LEFT_OUT_SHARE = 0.03  # Earth's rotation between the channels, which the channel filter does not know
 
@@ -129,14 +129,14 @@ def test_time_offset_in_endless_turns(both_ways: bool) -> None:
     acceleration = np.gradient(velocity, axis=0)
     error = 0.1 * acceleration + 0.02 * np.random.default_rng(1).standard_normal(velocity.shape)
     differences = flying(velocity, error)
-    limits = AzimuthLimits(average_s=4.0, longest_s=20.0)
+    limits = velocity_changes.AzimuthLimits(average_s=4.0, longest_s=20.0)
     known = np.ones(901, dtype=bool)
-    changes = azimuth.changes_of(differences, known, limits)
+    changes = velocity_changes.changes_of(differences, known, limits)
     fit = azimuth.fit_azimuth(differences, filtered(differences), SETTINGS, changes, known, limits)
     assert len(changes) > 20
-    assert abs(fit.values[azimuth.AZIMUTH]) < 2.0 * fit.sigma_rad
+    assert abs(fit.values[velocity_changes.AZIMUTH]) < 2.0 * fit.sigma_rad
     if both_ways:
-        assert fit.values[azimuth.LATENCY] == pytest.approx(0.1, abs=0.02)
+        assert fit.values[velocity_changes.LATENCY] == pytest.approx(0.1, abs=0.02)
     else:
         assert np.rad2deg(fit.sigma_rad) > 1.0
 
@@ -227,7 +227,7 @@ def standardised(runs: int, seed: int, ins: str, route: str, gnss: GnssNoise) ->
         if result.error_deg is None or result.sigma_deg is None:
             refused += 1
             continue
-        changes = azimuth.changes_of(differences, np.ones(len(velocity), dtype=bool), LIMITS)
+        changes = velocity_changes.changes_of(differences, np.ones(len(velocity), dtype=bool), LIMITS)
         truth = np.interp(changes.reference_s, batch.time_s, batch.azimuth_error_rad[0])
         out.append((result.error_deg - np.rad2deg(truth)) / result.sigma_deg)
     return np.array(out), refused
