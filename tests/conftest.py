@@ -1,4 +1,4 @@
-"""Fixtures of the whole suite: the headless viewer, runs made once, reports without their figures."""
+"""Fixtures of the whole suite: the headless viewer and browser, runs made once."""
 
 import os
 
@@ -9,8 +9,7 @@ import gc
 import hashlib
 import pickle
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, nullcontext
-from contextvars import Context
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -21,8 +20,7 @@ from groundstation.base import compile as compiling
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
-from groundstation.reports.drawing import sketching
-from tests.blank_figures import blank_figures
+from tests.browser import Browser, BrowserError, browser
 from tests.viewer_shots import NoViewerError, viewer
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
@@ -56,32 +54,32 @@ def headless_viewer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callab
         yield start
 
 
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    """A browser; without one the tests are skipped, but not in CI."""
+    try:
+        with browser() as started:
+            yield started
+    except BrowserError as error:
+        if os.environ.get("CI") == "true":
+            raise
+        pytest.skip(str(error))
+
+
 @pytest.fixture(scope="session")
 def finished_run(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Outcome]:
-    """Run a sample log with everything a run makes, once for all tests of all workers: copy it before you change it.
-
-    With ``is_blank`` figures are frames of their size.
-    """
+    """Run a sample log with everything a run makes, once for all tests of all workers: copy it before you change it."""
     is_worker = "PYTEST_XDIST_WORKER" in os.environ
     shared = tmp_path_factory.getbasetemp().parent if is_worker else tmp_path_factory.getbasetemp()
 
-    def run(sample: str, configuration: Configuration | None = None, *, is_blank: bool = False) -> Outcome:
+    def run(sample: str, configuration: Configuration | None = None) -> Outcome:
         wanted = configuration or Configuration()
-        folder = shared / f"finished-{sample}-{hashlib.sha256(repr((wanted, is_blank)).encode()).hexdigest()[:8]}"
+        folder = shared / f"finished-{sample}-{hashlib.sha256(repr(wanted).encode()).hexdigest()[:8]}"
         told = folder / "outcome.pickle"
         with FileLock(f"{folder}.lock"):
             if not told.exists():
-                # a context of its own: a test that leaves its figures unpainted may be the first to ask
-                with blank_figures() if is_blank else nullcontext():
-                    (outcome,) = Context().run(run_many, [SAMPLES / f"{sample}.csv"], folder / "out", wanted, jobs=1)
+                (outcome,) = run_many([SAMPLES / f"{sample}.csv"], folder / "out", wanted, jobs=1)
                 told.write_bytes(pickle.dumps(outcome))
         return pickle.loads(told.read_bytes())
 
     return run
-
-
-@pytest.fixture
-def unpainted() -> Iterator[None]:
-    """Leave the figures of reports unpainted, three quarters of a run's work: for tests that look at no report."""
-    with sketching():
-        yield

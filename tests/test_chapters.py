@@ -17,11 +17,11 @@ from groundstation.chapters.heading import heading
 from groundstation.chapters.next_steps import next_steps
 from groundstation.chapters.overview import overview
 from groundstation.chapters.parts import Facts, Figure, Grid, Mark, Note, Part, Section
+from groundstation.chapters.plots import PLOTS
 from groundstation.chapters.provenance import provenance
 from groundstation.chapters.quality import quality
 from groundstation.chapters.verdict import claim
-from groundstation.reports.drawing import Drawing
-from groundstation.reports.figures import DRAWERS, with_drawings
+from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.heading import Gate, HeadingResult
@@ -281,8 +281,8 @@ def test_every_figure_of_a_chapter_has_a_drawer() -> None:
     chapters = [heading(results), overview(results), quality(results)]
     whole = [replace(one, parts=(*one.parts, *one.appendix)) for one in chapters if one]
     named = [part.name for one in whole for part in one.parts if isinstance(part, Figure)]
-    assert set(named) <= set(DRAWERS) and len(named) == len(set(named)) == 13
-    drawn = [part for one in whole for part in with_drawings(one, results).parts if isinstance(part, Drawing)]
+    assert set(named) <= set(PLOTS) and len(named) == len(set(named)) == 13
+    drawn = [part for one in whole for part in drawn_by(PLOTS, one, results).parts if isinstance(part, Drawing)]
     assert len(drawn) == 12, "the example has no spectrum"
 
 

@@ -17,9 +17,10 @@ from groundstation.chapters.by_answer import (
 from groundstation.chapters.generic import MOST_ROWS, figures_over_time, generic
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Facts, Section
+from groundstation.chapters.plots import PLOTS
+from groundstation.chapters.plots.generic import series
 from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES, PLANS, SESSION_ANALYSES
-from groundstation.reports.drawing import Drawing, draw, sketching
-from groundstation.reports.figures import with_drawings
+from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.results.answer import Answer, by_analysis
 from groundstation.results.columns import AnswerColumn
 from groundstation.results.figures import FigureData
@@ -180,24 +181,14 @@ def test_figures_over_time_are_those_of_the_analysis() -> None:
 
 def test_a_figure_has_a_panel_for_each_unit() -> None:
     results = flight(wind(), WindAloft(3.0))
-    with sketching():
-        drawn = with_drawings(generic(results, wind()), results)
+    drawn = drawn_by(PLOTS, generic(results, wind()), results)
     (drawing,) = (part for part in drawn.parts if isinstance(part, Drawing))
     assert (drawing.title, drawing.numbers) == ("Wind samples", ("wind_samples",))
     assert "n = 60 rows" in drawing.caption
-    painted: list[tuple[str, list[str]]] = []
-
-    with sketching() as sketches:
-        with_drawings(generic(results, wind()), results)
-    (sketch,) = sketches.values()
-
-    def look(page: object) -> None:
-        sketch.paint(page)
-        for axes in page.axes:  # type: ignore[attr-defined]
-            painted.append((axes.get_ylabel(), [line.get_label() for line in axes.lines]))
-
-    draw("look", sketch.height_mm, look)
-    assert painted == [("turbulence", ["turbulence"]), ("m/s", ["north", "east"])]
+    plot = series(results, "wind_samples")
+    assert plot is not None
+    told = [(panel.y.title, [mark.name for mark in panel.marks]) for panel in plot.panels]
+    assert told == [("m/s", ["north", "east"]), ("turbulence", ["turbulence"])]
 
 
 def test_an_answer_with_a_chapter_has_no_second_one(tmp_path: Path) -> None:

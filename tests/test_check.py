@@ -224,7 +224,6 @@ def test_thresholds_are_checked_and_a_file_wins_over_the_section(tmp_path: Path)
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_an_answer_that_leans_on_a_damaged_span_says_so(finished_run: Callable[..., Outcome], tmp_path: Path) -> None:
     sound = finished_run("taxi-good")
     summary = load(Path(sound.folder)).summary

@@ -123,7 +123,6 @@ def test_a_foreign_file_in_a_folder_is_skipped_and_listed(tmp_path: Path) -> Non
     assert "readme.txt" in (tmp_path / "out/index.csv").read_text(encoding="utf-8")
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_settings_beside_logs_are_no_logs_and_what_is_skipped_is_told_by_reason(tmp_path: Path) -> None:
     logs = tmp_path / "logs"
     logs.mkdir()

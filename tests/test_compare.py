@@ -24,7 +24,6 @@ from groundstation.pipeline.verbs.alignment import align, events_of
 from groundstation.pipeline.verbs.clip import Wanted, clip
 from groundstation.pipeline.verbs.compare import compare, compare_to, deltas_of
 from groundstation.reports.comparison import comparison_html
-from groundstation.reports.drawing import sketching
 from groundstation.results.answer import by_analysis
 from groundstation.results.comparison import Comparison, Delta
 from groundstation.results.figures import FigureData
@@ -55,8 +54,7 @@ def groundstation(*arguments: str) -> tuple[int, str, str]:
 
 def ran(log: Path, out: Path, **settings: Any) -> Path:
     """The folder of a log that was run."""
-    with sketching():  # nothing here looks at the flights' own reports
-        outcome = run_flight(Job(log, out, Configuration(settings), with_pdf=False))
+    outcome = run_flight(Job(log, out, Configuration(settings), with_pdf=False))
     assert outcome.folder, outcome.text
     return Path(outcome.folder)
 

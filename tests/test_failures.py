@@ -14,7 +14,11 @@ from groundstation.base.failures import Failure, attempt, failures, gathered_fai
 from groundstation.base.ledger import Ledger
 from groundstation.chapters import by_answer
 from groundstation.chapters.fleet import CHAPTERS as FLEET_CHAPTERS
-from groundstation.chapters.parts import Document, Figure, Front, Note, Section
+from groundstation.chapters.parts import Figure, Note, Section
+from groundstation.chapters.plots import PLOTS
+from groundstation.chapters.plots.acceptance import JUDGED
+from groundstation.chapters.plots.comparison import COMPARED
+from groundstation.chapters.plots.fleet import FLEET_PLOTS
 from groundstation.cli.main import main
 from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
 from groundstation.estimators.analysis import Analysis
@@ -24,10 +28,8 @@ from groundstation.pipeline.one_flight import analyse as analysing
 from groundstation.pipeline.one_flight import flight as running
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
-from groundstation.reports import acceptance, comparison, fleet_report, painting, sections
-from groundstation.reports import fleet as fleet_figures
-from groundstation.reports.drawing import Drawing, draw, sketching
-from groundstation.reports.figures import DRAWERS, drawn_by
+from groundstation.reports import comparison, drawing, fleet_report, sections
+from groundstation.reports.drawing import drawn_by
 from groundstation.results.answer import Answer
 from groundstation.results.files import load_document, put_failures, save
 from groundstation.tables.table import Flight
@@ -167,43 +169,18 @@ def test_damage_checks_lines_and_columns_that_fail_leave_the_rest(name: str, mon
 
 
 @pytest.mark.parametrize(
-    ("drawers", "name"),
-    [(one, name) for one in (DRAWERS, fleet_figures.DRAWERS, acceptance.DRAWN) for name in one],
+    ("plots", "name"),
+    [(one, name) for one in (PLOTS, FLEET_PLOTS, JUDGED) for name in one],
     ids=lambda one: one if isinstance(one, str) else "",
 )
 def test_a_figure_that_cannot_be_drawn_leaves_the_rest_of_its_chapter(
-    drawers: dict[str, Any], name: str, monkeypatch: pytest.MonkeyPatch
+    plots: dict[str, Any], name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(drawers, name, fails)
+    monkeypatch.setitem(plots, name, fails)
     section = Section("a", "A", "", (Note("before"), Figure(name), Figure(name, "one"), Note("behind")))
     with gathered_failures():
-        assert drawn_by(drawers, section, None).parts == (Note("before"), Note("behind"))
+        assert drawn_by(plots, section, None).parts == (Note("before"), Note("behind"))
         assert codes() == [f"internal.figure.{name}", f"internal.figure.{name}.one"]
-
-
-def pages_of(number: int, failing: set[int]) -> Callable[[], Document]:
-    def paint(at: int) -> Callable[[Any], None]:
-        return lambda figure: fails() if at in failing else figure.subplots().plot([0.0, 1.0], [at, 1.0])
-
-    def tell() -> Document:
-        parts = [
-            Drawing("", "", "", draw(f"key-{at}", 20.0, paint(at), 40.0), (), f"name.{at}") for at in range(number)
-        ]
-        return Document("", "", Front(""), (Section("", "", "", (Note("text"), *parts)),))
-
-    return tell
-
-
-@pytest.mark.parametrize("processes", [1, 2, 3])
-def test_a_figure_that_cannot_be_painted_leaves_the_others_however_many_paint(processes: int) -> None:
-    whole = painting.with_painted_figures(pages_of(6, set()))
-    with gathered_failures():
-        found = painting.with_painted_figures(pages_of(6, {5, 1}), processes)
-        assert codes() == ["internal.figure.name.1", "internal.figure.name.5"], "in their order"
-    kept = [part for at, part in enumerate(whole.sections[0].parts) if at not in (2, 6)]
-    assert list(found.sections[0].parts) == kept
-    with pytest.raises(ZeroDivisionError):
-        painting.with_painted_figures(pages_of(6, {5, 1}), processes)
 
 
 # ------------------------------------------------------------------------------------------------ chapters
@@ -216,12 +193,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-@pytest.fixture
-def untold() -> Iterator[None]:
-    with sketching():
-        yield
-
-
 OF_A_FLIGHT = [
     *(("BEFORE_THE_ANSWERS", name) for name in sections.BEFORE_THE_ANSWERS),
     *(("ON_THE_DATA", name) for name in sections.ON_THE_DATA),
@@ -231,7 +202,7 @@ OF_A_FLIGHT = [
 
 @pytest.mark.parametrize(("where", "name"), OF_A_FLIGHT)
 def test_a_chapter_on_a_flight_that_fails_leaves_the_others(
-    where: str, name: str, folder: Path, untold: None, monkeypatch: pytest.MonkeyPatch
+    where: str, name: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(getattr(sections, where), name, fails)
     with gathered_failures():
@@ -263,7 +234,7 @@ def _named(chapter: Any) -> Callable[[Any], Section]:
 
 
 def test_a_generic_chapter_a_front_and_a_page_that_fail_leave_the_rest(
-    folder: Path, tmp_path: Path, untold: None, monkeypatch: pytest.MonkeyPatch
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from groundstation.reports import flight_report
 
@@ -274,7 +245,7 @@ def test_a_generic_chapter_a_front_and_a_page_that_fail_leave_the_rest(
         assert by_answer.answer_chapters(results) == () and codes() == ["internal.chapter.other"]
     monkeypatch.setattr(flight_report, "front", fails)
     with gathered_failures():
-        document = flight_report.sketched_document(load(folder))
+        document = flight_report.flight_document(load(folder))
         assert document.front.title == ANSWERED.flight_id and len(document.sections) > 5
         page = tmp_path / "report.html"
         page.write_text("of an earlier run", encoding="utf-8")
@@ -284,7 +255,7 @@ def test_a_generic_chapter_a_front_and_a_page_that_fail_leave_the_rest(
 
 @pytest.mark.parametrize("name", FLEET_CHAPTERS)
 def test_a_chapter_on_a_fleet_that_fails_leaves_the_others(
-    name: str, fleet: Any, untold: None, monkeypatch: pytest.MonkeyPatch
+    name: str, fleet: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = fleet_report.fleet_document(fleet)
     monkeypatch.setitem(FLEET_CHAPTERS, name, fails)
@@ -369,31 +340,30 @@ def _compared(folder: Path) -> Any:
 
 def test_a_figure_of_a_comparison_that_fails_leaves_the_others(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     saved, compared = load(folder), _compared(folder)
-    for name, code in (("_tracks", "tracks"), ("_growth", "growth")):
-        with monkeypatch.context() as patch, sketching():
-            patch.setattr(comparison, name, fails)
-            with gathered_failures():
-                assert "Altitude" in comparison.comparison_html(compared, saved, saved)
-                assert codes() == [f"internal.figure.{code}"]
+    for name in COMPARED:
+        with monkeypatch.context() as patch, gathered_failures():
+            patch.setitem(COMPARED, name, fails)
+            assert "Answers" in comparison.comparison_html(compared, saved, saved)
+            assert codes() == [f"internal.figure.{name}"]
 
 
 # ------------------------------------------------------------------------------------------------ a whole run
 
 
 def break_five(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
-    """Make an analysis, a figure as drawn, one as painted, a chapter and a tab fail; the codes in their order."""
+    """Make an analysis, a plot, the picture of one, a chapter and a tab fail; the codes in their order."""
     monkeypatch.setattr(analysing, "FLIGHT_ANALYSES", changed(FLIGHT_ANALYSES, "latency", run=fails, requires=()))
-    monkeypatch.setitem(DRAWERS, "overview.profile", fails)
-    paint = painting._paint
-    monkeypatch.setattr(painting, "_paint", lambda key, sketch: fails() if key == "map" else paint(key, sketch))
+    monkeypatch.setitem(PLOTS, "overview.profile", fails)
+    write = drawing.picture_of
+    monkeypatch.setattr(drawing, "picture_of", lambda plot: fails() if plot.name == "overview.track" else write(plot))
     monkeypatch.setitem(sections.BEFORE_THE_ANSWERS, "next_steps", fails)
     monkeypatch.setattr(recording, "raw", fails)
     return (
         "internal.analysis.latency",
-        "internal.chapter.next_steps",
-        "internal.figure.overview.profile",
         "internal.tab.raw",
+        "internal.chapter.next_steps",
         "internal.figure.overview.track",
+        "internal.figure.overview.profile",
     )
 
 
@@ -401,7 +371,6 @@ def test_a_run_with_failures_has_all_else_tells_and_is_mended_by_the_next(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out, whole = tmp_path / "out", tmp_path / "whole"
-    monkeypatch.setattr("groundstation.pipeline.many_flights.batch.painters_of", lambda *_: 2)
     with monkeypatch.context() as patch:
         expected = break_five(patch)
         with pytest.raises(SystemExit) as ended:
@@ -416,7 +385,7 @@ def test_a_run_with_failures_has_all_else_tells_and_is_mended_by_the_next(
     findings = load_document(place).findings
     told = {finding.code: finding for finding in findings if finding.code.startswith("internal.")}
     assert set(told) == set(expected) and {one.severity for one in told.values()} == {"warn"}
-    assert list(told) == list(expected), "in one order, however many paint"
+    assert list(told) == list(expected), "in the order of their making"
     page = (place / "report.html").read_text(encoding="utf-8")
     for finding in told.values():
         assert finding.text in page
@@ -434,13 +403,13 @@ def test_a_run_with_failures_has_all_else_tells_and_is_mended_by_the_next(
 
 
 def test_a_report_made_again_tells_what_fails_now_and_no_longer_what_failed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unpainted: None
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     save(tmp_path, ANSWERED, MANIFEST)
     put_failures(tmp_path, [Failure("tab", "raw", "old"), Failure("figure", "heading.taxi", "old")])
     before = (tmp_path / "summary.json").read_bytes()
     with monkeypatch.context() as patch:
-        patch.setitem(DRAWERS, "heading.taxi", fails)
+        patch.setitem(PLOTS, "heading.taxi", fails)
         assert [one.code for one in write_flight_report(tmp_path, with_pdf=False).failures] == [
             "internal.figure.heading.taxi"
         ]
@@ -462,12 +431,12 @@ def test_a_summary_without_failures_is_left_as_it_is(tmp_path: Path) -> None:
     assert re.search(r"ValueError: at 0x\.\.\.\)", (tmp_path / "summary.json").read_text(encoding="utf-8"))
 
 
-def test_a_plan_with_failures_has_all_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unpainted: None) -> None:
+def test_a_plan_with_failures_has_all_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from groundstation.pipeline.verbs.plan import run_plan
     from tests.test_plan import scenario
 
     monkeypatch.setitem(viewer_plan.PLAN_TABS, "placement", fails)
-    monkeypatch.setitem(DRAWERS, "control.paths", fails)
+    monkeypatch.setitem(PLOTS, "control.paths", fails)
     monkeypatch.setitem(sections.ON_THE_SESSION, "provenance", fails)
     done = run_plan("session", scenario(tmp_path), tmp_path / "out", with_pdf=False)
     assert (done.state, done.code) == ("incomplete", 1)
@@ -478,9 +447,7 @@ def test_a_plan_with_failures_has_all_else(tmp_path: Path, monkeypatch: pytest.M
     }
 
 
-def test_a_session_with_failures_has_all_else_and_is_run_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unpainted: None
-) -> None:
+def test_a_session_with_failures_has_all_else_and_is_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.cooperative import run_session
     from groundstation.simulation.session_log import write_session
@@ -492,7 +459,7 @@ def test_a_session_with_failures_has_all_else_and_is_run_again(
     logs, settings = sorted(tmp_path.glob("*.csv")), load_configuration(tmp_path / "settings.toml")
     with monkeypatch.context() as patch:
         patch.setattr(viewer_session, "cooperative", fails)
-        patch.setitem(DRAWERS, "cooperative.map", fails)
+        patch.setitem(PLOTS, "cooperative.map", fails)
         (done,) = run_session(logs, tmp_path / "out", settings, with_pdf=False)
         assert (done.state, done.code) == ("incomplete", 1)
     told = [one.code for one in load_document(Path(done.folder)).findings if one.code.startswith("internal.")]
@@ -506,7 +473,7 @@ def test_a_session_with_failures_has_all_else_and_is_run_again(
 
 
 def test_publishing_that_fails_is_no_log_and_leaves_the_rest(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, unpainted: None
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     logs = [tmp_path / f"{name}.csv" for name in "ab"]
     for number, log in enumerate(logs):

@@ -460,8 +460,6 @@ def _rows(name: str, answer: Any) -> list[tuple[Any, ...]]:
     return [(*key, row["count"], row["mean"], row["std"]) for key, row in answer.iterrows() if row["count"]]
 
 
-@pytest.mark.usefixtures("unpainted")
-@pytest.mark.usefixtures("unpainted")
 def test_simulated_logs_become_a_fleet(tmp_path: Path) -> None:
     logs = [REPOSITORY / "sample_logs" / f"taxi-{name}.csv" for name in ("good", "short")]
     run_many(logs, tmp_path, Configuration(), jobs=1, with_pdf=False)

@@ -35,7 +35,6 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.deviation_to_apply import Apply, asked_for
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.verbs.check import check_many
-from groundstation.reports.drawing import sketching
 from groundstation.reports.pdf import write_pdf
 from groundstation.reports.steer_card import MOST_ROWS, TEMPLATE, steer_card, write_exports
 from groundstation.results.deviation import (
@@ -60,7 +59,6 @@ from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer.recording import write_recording
 from tests import magnetic_example
-from tests.blank_figures import leave_blank
 from tests.recording_contents import Contents
 from tests.saved import load
 from tests.test_magnetic_run import analysed, figure_eight, simulated, system_3_alone
@@ -85,9 +83,8 @@ OWNER = {"method": "compass_table", "verdict": "accept", "flight_id": "F1", "air
 
 @pytest.fixture(scope="module", autouse=True)
 def short_runs() -> Iterator[None]:
-    """Runs of system 3 alone whose reports have no figures, a fifth of the work: no test here looks at more."""
-    with system_3_alone() as patch:
-        leave_blank(patch)
+    """Runs of system 3 alone, a fifth of the work: no test here looks at more."""
+    with system_3_alone():
         yield
 
 
@@ -649,8 +646,7 @@ def test_what_is_finished_is_not_done_again(first: Path, logs: tuple[Path, Path]
         (folder / name).unlink()
         assert plan(own).startswith(wanted), name
         (folder / name).write_bytes(content)
-    with sketching():
-        _outcome, told = run_stages(logs[0], out, own, with_pdf=False)
+    _outcome, told = run_stages(logs[0], out, own, with_pdf=False)
     assert told == {"reporting"}
     assert not (folder / STEER_CARD).exists() and (folder / DEVIATION_CSV).exists()
     assert STEER_CARD not in (folder / "report.html").read_text(encoding="utf-8")
@@ -659,7 +655,6 @@ def test_what_is_finished_is_not_done_again(first: Path, logs: tuple[Path, Path]
     assert (folder / STEER_CARD).read_bytes() == (first / STEER_CARD).read_bytes()
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_what_is_applied_is_part_of_what_is_remembered(first: Path, logs: tuple[Path, Path], tmp_path: Path) -> None:
     out, table = tmp_path / "out", tmp_path / "t.csv"
     table.write_text(table_text(), encoding="utf-8")
@@ -680,7 +675,6 @@ def test_what_is_applied_is_part_of_what_is_remembered(first: Path, logs: tuple[
 def test_a_run_elsewhere_has_the_files_and_loses_those_it_did_not_make(
     first: Path, logs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    leave_blank(monkeypatch)
     store = fsspec.filesystem("memory")
     store.store.clear()
     store.pseudo_dirs[:] = [""]

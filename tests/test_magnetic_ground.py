@@ -22,6 +22,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.markdown import escaped
 from groundstation.chapters.parts import Grid, Note
+from groundstation.chapters.plots import PLOTS
 from groundstation.chapters.wording import number
 from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.analysis import MAGNETIC_GROUND
@@ -33,8 +34,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration, load_
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight, sentence
 from groundstation.pipeline.one_flight.log import open_log
-from groundstation.reports.drawing import Drawing, sketching
-from groundstation.reports.figures import with_drawings
+from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.results import magnetic_ground as answers
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, Source
@@ -473,8 +473,7 @@ def test_the_report_shows_the_runs_without_system_3(tmp_path: Path) -> None:
     save(tmp_path, whole(), Manifest())
     section = magnetic(load(tmp_path).results)
     assert section is not None
-    with sketching():
-        section = with_drawings(section, load(tmp_path).results)
+    section = drawn_by(PLOTS, section, load(tmp_path).results)
     titles = [part.title for part in section.parts if isinstance(part, Grid | Drawing)]
     assert titles[:2] == ["Ground runs: error by heading", "Ground runs"]
     assert "Ground runs: coefficients" in [part.title for part in section.appendix if isinstance(part, Grid)]

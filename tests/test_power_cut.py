@@ -6,7 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -22,23 +22,16 @@ from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.files import load_manifest
 from groundstation.store.info import StoreInfo
 from groundstation.store.writer import StoreWriter
-from tests.blank_figures import blank_figures
 from tests.test_resume import SHORT, assert_equal_runs, copied, flight_in
 
 BY_CONTENT = (".rrd", ".mcap", ".parquet")  # no two recordings are equal to the byte
 KILLS = 40  # more than a run waits for the disk
 
 
-@pytest.fixture(autouse=True)
-def no_figures() -> Iterator[None]:
-    with blank_figures():
-        yield
-
-
 @pytest.fixture(scope="module")
 def finished(finished_run: Callable[..., Outcome]) -> Path:
     """OUT of a run of the short sample: shared, to be copied."""
-    return Path(finished_run(SHORT.stem, is_blank=True).folder).parent
+    return Path(finished_run(SHORT.stem).folder).parent
 
 
 def kinds(out: Path) -> dict[str, list[str]]:
@@ -195,7 +188,6 @@ from pathlib import Path
 from groundstation.base import to_disk
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
-from tests.blank_figures import blank_figures
 from tests.test_power_cut import SHORT
 
 left, real = [int(sys.argv[2])], to_disk.sync_file
@@ -209,8 +201,7 @@ def sync_or_die(path):
 to_disk.SIDE_BY_SIDE = 1
 for name in [name for name, module in sys.modules.items() if getattr(module, "sync_file", None) is real]:
     sys.modules[name].sync_file = sync_or_die
-with blank_figures():
-    run_many([SHORT], Path(sys.argv[1]), Configuration(), jobs=1)
+run_many([SHORT], Path(sys.argv[1]), Configuration(), jobs=1)
 """
 
 

@@ -27,8 +27,6 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event
-from groundstation.reports.drawing import sketching
-from tests.blank_figures import leave_blank
 from tests.test_resume import SETTINGS, SHORT, assert_equal_runs, tell_and_sleep
 
 SAMPLES = SHORT.parent
@@ -69,7 +67,6 @@ def fetched(url: str, target: Path) -> Path:
 def test_a_run_elsewhere_gives_what_a_run_here_gives(
     memory: str, logs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    leave_blank(monkeypatch)
     whole = tmp_path / "whole"
     run_many([logs], whole, Configuration(), jobs=1)
     source, out = sent(logs, f"{memory}logs"), f"{memory}out"
@@ -89,7 +86,6 @@ def test_a_run_elsewhere_gives_what_a_run_here_gives(
 def test_what_is_finished_elsewhere_is_not_done_again(
     memory: str, finished_run: Callable[..., Outcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    leave_blank(monkeypatch)
     out, source = f"{memory}out", f"{memory}logs"
     RemoteFolder(source).write(SHORT.name, SHORT.read_bytes())
     told: list[str] = []
@@ -104,13 +100,12 @@ def test_what_is_finished_elsewhere_is_not_done_again(
     assert "estimating" in told and "converting" not in told
     copy = fetched(out, tmp_path / "copy")
     (copy / ".lock").touch()
-    assert_equal_runs(copy, Path(finished_run(SHORT.stem, SETTINGS, is_blank=True).folder).parent)
+    assert_equal_runs(copy, Path(finished_run(SHORT.stem, SETTINGS).folder).parent)
 
 
 def test_a_flight_elsewhere_loses_its_pdf_and_keeps_what_somebody_put_there(
     memory: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    leave_blank(monkeypatch)
     out, source = f"{memory}out", f"{memory}logs"
     far = RemoteFolder(out)
     RemoteFolder(source).write(SHORT.name, SHORT.read_bytes())
@@ -163,8 +158,7 @@ def test_twins_elsewhere_are_run_once(memory: str) -> None:
         if event.text == "estimating":
             told.append(event.name)
 
-    with sketching():
-        outcomes = run_many([source.url], f"{memory}out", Configuration(), jobs=1, with_pdf=False, listen=listen)
+    outcomes = run_many([source.url], f"{memory}out", Configuration(), jobs=1, with_pdf=False, listen=listen)
     assert [one.state for one in outcomes][:2] == ["done", "skipped"]
     assert outcomes[1].text == f"b.csv: same content as {source.url}/a.csv, listed once"
     assert told.count("b.csv") == 0 and told.count("a.csv") == 1
@@ -209,7 +203,7 @@ def test_a_run_that_another_one_overtook_puts_nothing_in_place(memory: str) -> N
         if event.text == "estimating":
             out.write(".lock/1", other)
 
-    with sketching(), pytest.raises(GroundstationError, match=r"another run took over \(other\)"):
+    with pytest.raises(GroundstationError, match=r"another run took over \(other\)"):
         run_many([SHORT], out.url, Configuration(), jobs=1, with_pdf=False, only_results=True, listen=overtake)
     assert [name for name in out.names() if not name.startswith(".")] == [] and out.names(".lock") == ["1"]
 

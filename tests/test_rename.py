@@ -22,14 +22,14 @@ CHECKED = (
     *("estimators/heading/answer.py", "estimators/inertial/estimate.py"),
     *("chapters/heading.py", "chapters/inertial.py", "cli/check_table.py"),
     *("results/arrays/heading.py", "estimators/heading/figures.py"),
-    *("reports/figures/heading.py", "viewer/tabs/heading.py", "chapters/plots/comparison.py"),
+    *("chapters/plots/heading.py", "viewer/tabs/heading.py", "chapters/plots/comparison.py"),
 )
 ARRAYS = ("results/arrays/heading.py", "estimators/heading/figures.py")
 # Field, and the files that define and make it; those that read it keep the old name.
 RENAMED = (
     ("estimate_sd_deg", ("results/heading.py", "estimators/heading/answer.py"), "chapters/heading.py"),
     ("radial_error_rate_50_nmiph", ("results/inertial.py", "estimators/inertial/estimate.py"), "chapters/inertial.py"),
-    ("honest_half_width_deg", ARRAYS, "reports/figures/heading.py"),
+    ("honest_half_width_deg", ARRAYS, "chapters/plots/heading.py"),
     ("honest_half_width_deg", ARRAYS, "chapters/plots/comparison.py"),
     ("mean_deg", ARRAYS, "viewer/tabs/heading.py"),
     ("longest_s", ("base/ledger.py", "integrity/ledger.py"), "cli/check_table.py"),

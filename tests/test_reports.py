@@ -17,7 +17,6 @@ from groundstation.base.clock import Clock
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import DamageEntry, Ledger, ThresholdsUsed, Truncation
-from groundstation.reports import drawing
 from groundstation.reports.flight_report import PDF, REPORT, flight_document, flight_report_html
 from groundstation.reports.page import digest_of
 from groundstation.results.answer import by_analysis
@@ -118,7 +117,6 @@ def test_names_inside_the_page_are_unique_and_links_lead_somewhere(full: str) ->
     assert set(re.findall(r"url\(#([^)]*)\)", full)) <= set(names)
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_links_to_tables_exist(tmp_path: Path) -> None:
     page = Page(report(tmp_path, example(heading_result())))
     links = [value for tag, name, value in page.attributes if tag == "a" and name == "href" and value[:1] != "#"]
@@ -330,7 +328,6 @@ def test_modes_and_states_stand_in_a_figure(full: str) -> None:
     assert "Modes and states" in full and "ground contact by its weight on wheels" in full
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_every_chapter_has_its_own_anchor(tmp_path: Path) -> None:
     results = example(heading_result(), inertial_result(), forecast_result())
     save(tmp_path, results, MANIFEST)
@@ -338,18 +335,6 @@ def test_every_chapter_has_its_own_anchor(tmp_path: Path) -> None:
     keys = [section.key for section in document.sections]
     assert len(set(keys)) == len(keys) > 5
     assert "Contents" in flight_report_html(document)
-
-
-def test_gaps_break_lines_even_when_thinned() -> None:
-    class Axes:
-        def plot(self, x: np.ndarray, y: np.ndarray, **_: object) -> None:
-            self.x, self.y = x, y
-
-    y = np.arange(20_000.0)
-    y[7_001] = np.nan
-    axes = Axes()
-    drawing.line(axes, np.arange(20_000.0), y, "black", most=100)
-    assert len(axes.x) <= 102 and np.isnan(axes.y).sum() == 1
 
 
 def test_a_report_with_ins_errors_and_forecast_is_whole_and_small_enough(tmp_path: Path) -> None:
@@ -363,7 +348,6 @@ def test_a_report_with_ins_errors_and_forecast_is_whole_and_small_enough(tmp_pat
     assert {f"tables/{name}.csv" for name in ("inertial_states", "forecast_map", "forecast_growth")} <= links
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_settings_are_those_that_the_user_set(tmp_path: Path, full: str) -> None:
     assert "Settings: [heading]" not in full  # all as shipped; summary.json has them
     save(tmp_path, example(heading_result()), replace(MANIFEST, configuration={"heading": {"taxi_speed_min_mps": 6.0}}))

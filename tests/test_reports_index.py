@@ -7,16 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, INDEXED, answer_values
 from groundstation.reports.index import IndexRow, columns_of, failed_row, index_row, write_index
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
 from tests.report_example import MANIFEST, example, heading_result
 from tests.saved import load, write_flight_report
-
-pytestmark = pytest.mark.usefixtures("unpainted")  # an index holds nothing of a page but a link to it
 
 
 def row_of(folder: Path, results: FlightResults) -> IndexRow:

@@ -13,9 +13,9 @@ from groundstation.base.failures import failures, gathered_failures
 from groundstation.chapters.forecast import forecast
 from groundstation.chapters.inertial import inertial
 from groundstation.chapters.parts import Front
-from groundstation.reports.drawing import Drawing
-from groundstation.reports.figures import with_drawings
-from groundstation.reports.figures.overview import track_map
+from groundstation.chapters.plots import PLOTS
+from groundstation.chapters.plots.flight import track_map
+from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.reports.flight_report import flight_document
 from groundstation.results.corrected_position import corrected_position
 from groundstation.results.figures import FigureData
@@ -55,7 +55,7 @@ def drawings(results: FlightResults) -> list[Drawing]:
         section = chapter(results)
         assert section is not None
         whole = replace(section, parts=(*section.parts, *section.appendix))
-        found += [part for part in with_drawings(whole, results).parts if isinstance(part, Drawing)]
+        found += [part for part in drawn_by(PLOTS, whole, results).parts if isinstance(part, Drawing)]
     for drawing in found:
         assert ElementTree.fromstring(drawing.svg).tag.endswith("svg")
         assert drawing.caption and drawing.alt
@@ -88,7 +88,7 @@ def test_of_an_aided_ins_differences_and_its_own_filter_are_drawn() -> None:
     results = example(answer)
     section = inertial(results)
     assert section is not None
-    found = [part for part in with_drawings(section, results).parts if isinstance(part, Drawing)]
+    found = [part for part in drawn_by(PLOTS, section, results).parts if isinstance(part, Drawing)]
     assert [drawing.title for drawing in found] == [
         *("INS − GNSS, position", "INS − GNSS, velocity", "Innovations of the INS's own filter"),
     ]

@@ -9,10 +9,8 @@ import pytest
 from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Figure, Grid, Note, Section
-from groundstation.reports import drawing
-from groundstation.reports.drawing import Drawing, sketching
-from groundstation.reports.figures import with_drawings
-from groundstation.reports.live import Svg
+from groundstation.chapters.plots import PLOTS
+from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.reports.sections import flight_sections
 from groundstation.results.answer import by_analysis
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
@@ -22,7 +20,6 @@ from groundstation.results.flight import FlightResults, NotAssessable
 from groundstation.results.heading import Gate
 from groundstation.results.magnetic import ADVISORY, MagneticResult
 from groundstation.results.manifest import Manifest
-from tests.blank_figures import blank
 from tests.report_example import example
 from tests.saved import load
 from tests.test_magnetic_run import figure_eight
@@ -65,28 +62,16 @@ def whole(section: Section) -> Section:
     return replace(section, parts=(*section.parts, *section.appendix))
 
 
-def paint_magnetic_figures_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave the figures of the report's other chapters blank."""
-    paint = drawing.draw
-
-    def chosen(key: str, *rest: Any, **options: Any) -> Svg:
-        return (paint if key.startswith("magnetic") else blank)(key, *rest, **options)
-
-    monkeypatch.setattr(drawing, "draw", chosen)
-
-
-def test_the_chapter_stands_whole(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_chapter_stands_whole(folder: Path) -> None:
     section = chapter(load(folder).results)
     assert set(TABLES) <= {part.title for part in whole(section).parts if isinstance(part, Grid)}
     first = section.parts[0]
     assert isinstance(first, Note)
     assert (first.tone, first.text[:7]) == ("good", "Accept:")
     assert first.text.endswith(ADVISORY)
-    with sketching():
-        drawn = with_drawings(whole(section), load(folder).results)
+    drawn = drawn_by(PLOTS, whole(section), load(folder).results)
     titles = [part.title for part in drawn.parts if isinstance(part, Drawing)]
     assert {*FIGURES, "Modulus of the field"} <= set(titles)
-    paint_magnetic_figures_alone(monkeypatch)
     page = Page(report(folder, figure_eight()))
     assert "nan" not in page.text.lower().split()
     assert "None" not in page.text
@@ -149,8 +134,7 @@ def test_a_gate_that_informs_warns_in_report_and_recording_alike() -> None:
 )
 def test_a_chapter_whatever_is_absent(fields: dict[str, Any]) -> None:
     results = changed(**fields)
-    with sketching():
-        assert with_drawings(chapter(results), results).parts
+    assert drawn_by(PLOTS, chapter(results), results).parts
     assert "None" not in markdown(chapter(results))
 
 
@@ -166,13 +150,13 @@ def test_numbers_that_are_not_known_are_dashes() -> None:
 def test_a_page_without_figures_and_with_empty_ones(folder: Path) -> None:
     bare = replace(load(folder).results, figures=())
     assert [part for part in chapter(bare).parts if isinstance(part, Figure)]
-    assert not [part for part in with_drawings(chapter(bare), bare).parts if isinstance(part, Drawing)]
+    assert not [part for part in drawn_by(PLOTS, chapter(bare), bare).parts if isinstance(part, Drawing)]
     empty = [
         FigureData(figure.name, {key: column[:0] for key, column in figure.columns.items()}, figure.digits)
         for figure in load(folder).results.figures
     ]
     none = replace(bare, figures=empty)
-    assert not [part for part in with_drawings(chapter(none), none).parts if isinstance(part, Drawing)]
+    assert not [part for part in drawn_by(PLOTS, chapter(none), none).parts if isinstance(part, Drawing)]
 
 
 def test_the_report_names_the_files_that_are_there(folder: Path, tmp_path: Path) -> None:
@@ -180,8 +164,7 @@ def test_the_report_names_the_files_that_are_there(folder: Path, tmp_path: Path)
     (tmp_path / DEVIATION_CSV).write_text("", encoding="utf-8")
 
     def named() -> list[list[str]]:
-        with sketching():
-            sections = flight_sections(load(tmp_path))
+        sections = flight_sections(load(tmp_path))
         (section,) = (one for one in sections if one.key == "magnetic")
         return [list(part.files) for part in section.parts if isinstance(part, Note) and part.files]
 

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import wait
 from pathlib import Path
 
@@ -29,7 +29,6 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
-from tests.blank_figures import blank_figures
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 SHORT = SAMPLES / "taxi-short.csv"
@@ -54,14 +53,7 @@ def assert_equal_runs(one: Path, other: Path) -> None:
 @pytest.fixture(scope="module")
 def finished(finished_run: Callable[..., Outcome]) -> Path:
     """OUT of a run of the short sample: shared, to be copied."""
-    return Path(finished_run(SHORT.stem, is_blank=True).folder).parent
-
-
-@pytest.fixture(autouse=True)
-def no_figures() -> Iterator[None]:
-    """Nothing is asked of figures here: they are blank in every run that is compared."""
-    with blank_figures():
-        yield
+    return Path(finished_run(SHORT.stem).folder).parent
 
 
 def copied(finished: Path, target: Path) -> Path:
@@ -100,7 +92,7 @@ def test_what_is_finished_is_not_done_again(
     assert (planned.text, told) == ("finished, nothing to do", set())
     assert times(flight_in(out)) == before
     assert_equal_runs(out, finished)
-    first = finished_run(SHORT.stem, is_blank=True)
+    first = finished_run(SHORT.stem)
     assert (outcome.text, outcome.state, outcome.flight_id) == (first.text, first.state, first.flight_id)
 
 
@@ -115,7 +107,7 @@ def test_a_changed_setting_keeps_the_mcap_and_gives_what_a_new_run_gives(
     assert planned.text.startswith("to analyse again")
     assert "converting" not in told and {"estimating", "recording", "reporting"} <= told
     assert mcap.stat().st_ino == before
-    assert_equal_runs(out, Path(finished_run(SHORT.stem, SETTINGS, is_blank=True).folder).parent)
+    assert_equal_runs(out, Path(finished_run(SHORT.stem, SETTINGS).folder).parent)
     assert plan_many([SHORT], out, SETTINGS)[0].text == "finished, nothing to do"
 
 
@@ -220,7 +212,6 @@ def test_a_log_that_is_written_to_while_it_is_read_has_failed(tmp_path: Path) ->
     assert [path.name for path in (tmp_path / "out").iterdir() if path.is_dir()] == []
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_log_that_is_merely_touched_is_run(tmp_path: Path) -> None:
     log = tmp_path / SHORT.name
     shutil.copy(SHORT, log)
@@ -369,7 +360,6 @@ def ended_children() -> bool:
     return not multiprocessing.active_children()
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_time_limit_leaves_no_part_of_a_flight(tmp_path: Path) -> None:
     limited = _crew("", 1, 1, silent, 1.0)
     assert limited.func is side_by_side  # one log, too, is run in a process that can be ended

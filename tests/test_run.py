@@ -64,7 +64,6 @@ def test_the_index_lists_the_flight(good: Outcome) -> None:
     assert (Path(good.folder).parent / row["report"]).is_file()
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_the_mcap_gives_what_the_log_gave(good: Outcome, tmp_path: Path) -> None:
     mcap = Path(good.folder) / f"{good.flight_id}.mcap"
     (again,) = run_many([mcap], tmp_path / "out", Configuration(), only_results=True)
@@ -98,7 +97,6 @@ def test_the_report_is_made_again_from_the_saved_results_alone(good: Outcome, tm
     assert (folder / "report.html").read_bytes() == before
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_excluding_an_interval_changes_the_answer_and_is_kept(good: Outcome, tmp_path: Path) -> None:
     segment = load(Path(good.folder)).summary["results"]["heading"]["segments"][0]
     excluded = Interval(str(segment["start_s"]), str(segment["end_s"]), "for the test")
@@ -110,7 +108,6 @@ def test_excluding_an_interval_changes_the_answer_and_is_kept(good: Outcome, tmp
     assert json.loads((Path(outcome.folder) / "manifest.json").read_text(encoding="utf-8"))["configuration"]["exclude"]
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_folder_with_all_samples_gives_each_its_truth(tmp_path: Path) -> None:
     outcomes = run_many([SAMPLES], tmp_path / "out", Configuration(), jobs=1, only_results=True)
     by_name = {Path(outcome.source).stem: outcome for outcome in outcomes}
@@ -129,7 +126,6 @@ def test_a_folder_with_all_samples_gives_each_its_truth(tmp_path: Path) -> None:
     assert not list((tmp_path / "out").glob(".partial*"))
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_two_logs_of_one_flight_get_their_digests_and_twins_are_told(tmp_path: Path) -> None:
     text = "# start_utc: 2026-05-04T06:00:00Z\ntime_s,baro.pressure_altitude_m\n"
     rows = "".join(f"{second},100.0\n" for second in range(30))
@@ -144,7 +140,6 @@ def test_two_logs_of_one_flight_get_their_digests_and_twins_are_told(tmp_path: P
     assert "same content as" in outcomes[2].text
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_bad_log_never_stops_the_others(tmp_path: Path) -> None:
     (tmp_path / "bad.csv").write_bytes(b"time_s,ins.true_heading_deg\n")
     (tmp_path / "odd.csv").write_bytes(b"\xff\xfe\x00")
@@ -170,7 +165,6 @@ def mutated(data: bytes, rng: np.random.Generator) -> bytes:
     return bytes(changed)
 
 
-@pytest.mark.usefixtures("unpainted")
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_damaged_log_ends_in_one_line_or_in_results(tmp_path: Path, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -181,7 +175,6 @@ def test_a_damaged_log_ends_in_one_line_or_in_results(tmp_path: Path, seed: int)
     assert "internal error" not in outcome.text and "\n" not in outcome.text
 
 
-@pytest.mark.usefixtures("unpainted")
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_damaged_mcap_ends_in_one_line_or_in_results(good: Outcome, tmp_path: Path, seed: int) -> None:
     rng = np.random.default_rng(100 + seed)
@@ -199,7 +192,6 @@ def test_convert_writes_one_file_or_a_folder(tmp_path: Path) -> None:
     assert (tmp_path / "one.mcap").read_bytes() == (tmp_path / "many/taxi-good.mcap").read_bytes()
 
 
-@pytest.mark.usefixtures("unpainted")
 @pytest.mark.real_log
 @pytest.mark.parametrize(
     "name",
@@ -212,7 +204,6 @@ def test_a_taxi_that_never_reaches_the_speed_gate_is_not_assessable(tmp_path: Pa
     assert "6" in reasons["heading"] and "m/s" in reasons["heading"]
 
 
-@pytest.mark.usefixtures("unpainted")
 @pytest.mark.real_log
 @pytest.mark.parametrize("name", ["g1000/log_210623_141501_TEST1.csv", "g1000/log_220417_125002_LFQA.csv"])
 def test_straight_taxi_after_the_flight_alone_is_not_assessable(tmp_path: Path, name: str) -> None:
@@ -244,7 +235,6 @@ def test_copies_of_one_log_are_kept_once_however_many_run_at_a_time(tmp_path: Pa
     assert load(folder).summary["flight"]["source"]["name"] == "a.csv"
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_log_and_its_mcap_are_one_flight(tmp_path: Path) -> None:
     (tmp_path / "logs").mkdir()
     log = tmp_path / "logs/x.csv"
@@ -255,7 +245,6 @@ def test_a_log_and_its_mcap_are_one_flight(tmp_path: Path) -> None:
     assert outcomes[0].flight_id == f"NOTIME_{outcomes[0].sha256[:8]}"
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_damage_of_an_mcap_is_kept_with_it(good: Outcome, tmp_path: Path) -> None:
     whole = Path(good.folder) / f"{good.flight_id}.mcap"
     data = bytearray(whole.read_bytes())
@@ -277,7 +266,6 @@ def test_damage_of_an_mcap_is_kept_with_it(good: Outcome, tmp_path: Path) -> Non
     assert min(summary["completeness"].values()) < 1.0
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_killed_run_keeps_what_was_finished_and_can_go_on(tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = [
@@ -305,7 +293,6 @@ def test_a_killed_run_keeps_what_was_finished_and_can_go_on(tmp_path: Path) -> N
     assert len(index["rows"]) >= 2
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_broken_flight_folder_is_told_and_stops_nothing(good: Outcome, tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(Path(good.folder), out / good.flight_id)
@@ -319,7 +306,6 @@ def test_a_broken_flight_folder_is_told_and_stops_nothing(good: Outcome, tmp_pat
     assert any(path.name == "report.html" for path in written)
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_reports_again_make_the_index_again(good: Outcome, tmp_path: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(Path(good.folder), out / good.flight_id)
@@ -327,7 +313,6 @@ def test_reports_again_make_the_index_again(good: Outcome, tmp_path: Path) -> No
     assert good.flight_id in (out / "index.csv").read_text(encoding="utf-8")
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_rerun_leaves_notes_of_the_crew_alone(finished_run: Callable[..., Outcome], tmp_path: Path) -> None:
     outcome = finished_run("taxi-short")
     out = Path(shutil.copytree(Path(outcome.folder).parent, tmp_path / "out"))
@@ -344,7 +329,6 @@ def test_what_is_no_regular_file_is_refused(tmp_path: Path) -> None:
     assert outcome.code == 1 and "no regular file" in outcome.text
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_utc_intervals_of_a_flight_without_utc_are_a_finding(tmp_path: Path) -> None:
     interval = Interval("2026-05-04T06:00:00Z", "2026-05-04T06:01:00Z")
     outcome = run_flight(

@@ -136,7 +136,6 @@ def test_a_finished_session_is_not_run_again(
     assert "3 aircraft, centralised: 2 sigma_r" in told["text"]
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_another_setting_runs_it_again_in_its_place(out: Path, logs: Path, tmp_path: Path) -> None:
     copy = tmp_path / "out"
     shutil.copytree(out, copy)
@@ -152,7 +151,6 @@ def test_another_setting_runs_it_again_in_its_place(out: Path, logs: Path, tmp_p
     assert not (copy / IDENTITY / "report.pdf").exists()
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_mcaps_go_in_by_reference_in_any_order(out: Path, logs: Path, tmp_path: Path) -> None:
     mcaps = sorted((out / IDENTITY / "mcap").glob("*.mcap"), reverse=True)
     configuration = load_configuration(logs / "settings.toml")
@@ -186,7 +184,6 @@ def test_wrong_input_is_told_in_a_line(logs: Path, tmp_path: Path, capsys: pytes
     assert not (tmp_path / "a").exists()
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_log_that_cannot_be_read_stops_no_other(logs: Path, tmp_path: Path) -> None:
     bad = tmp_path / "C.csv"
     bad.write_bytes(b"\x00\x01nothing")
@@ -199,7 +196,6 @@ def test_a_log_that_cannot_be_read_stops_no_other(logs: Path, tmp_path: Path) ->
     assert ("session.unknown_source", "link.C") in codes
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_cut_log_loses_data_and_says_so(logs: Path, tmp_path: Path) -> None:
     first, second, third = csvs(logs)
     cut = tmp_path / third.name
@@ -471,7 +467,6 @@ def test_a_station_a_little_off_is_named_by_its_ranges() -> None:
     assert named(1000.0) == [simulated(SHORT).session.points[0].name]
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_run_into_the_same_folder_leaves_the_session_be(out: Path, tmp_path: Path) -> None:
     copy = tmp_path / "out"
     shutil.copytree(out, copy)

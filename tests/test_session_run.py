@@ -249,7 +249,6 @@ def test_any_number_of_processes_gives_equal_bytes(
             assert (tmp_path / name).read_bytes() == (out / name).read_bytes(), name
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_run_elsewhere_gives_the_session_too(
     out: Path, logs: Path, configuration: Configuration, tmp_path: Path
 ) -> None:
@@ -286,7 +285,6 @@ def test_a_run_elsewhere_gives_the_session_too(
     assert [row["flight_id"] for row in index if row["kind"] == "session"] == [IDENTITY]
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_the_session_grows_with_its_flights_and_one_of_the_verb_stays(
     logs: Path, configuration: Configuration, tmp_path: Path
 ) -> None:
@@ -303,7 +301,6 @@ def test_the_session_grows_with_its_flights_and_one_of_the_verb_stays(
     assert (by_hand / "manifest.json").read_bytes() == before
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_run_leaves_what_the_verb_made_of_the_same_logs(out: Path, logs: Path, tmp_path: Path) -> None:
     copy = tmp_path / "out"
     shutil.copytree(out, copy)
@@ -317,7 +314,6 @@ def test_a_run_leaves_what_the_verb_made_of_the_same_logs(out: Path, logs: Path,
     assert codes >= {"session.assumed_sigmas", "session.no_stations", "session.unknown_source"}
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_stations_files_that_cannot_be_used(logs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "logs"
     shutil.copytree(logs, folder)
@@ -365,7 +361,6 @@ def findings_of(folder: Path, configuration: Configuration, out: Path) -> dict[s
     return {finding.code: f"{finding.severity}: {finding.text}" for finding in found.findings}
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_bad_ranges_and_a_station_in_the_wrong_place(
     copied: Path, configuration: Configuration, tmp_path: Path
 ) -> None:
@@ -390,7 +385,6 @@ def test_bad_ranges_and_a_station_in_the_wrong_place(
     assert "to station N1: it is not where the ranges put it" in found["session.station_far"]
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_clock_a_week_off(copied: Path, configuration: Configuration, tmp_path: Path) -> None:
     log = copied / "example-C.csv"
     log.write_text(log.read_text().replace("2018-03-05T12:00:00.000Z", "2018-03-12T12:00:00.000Z"))
@@ -399,7 +393,6 @@ def test_a_clock_a_week_off(copied: Path, configuration: Configuration, tmp_path
     assert (tmp_path / "out" / IDENTITY).is_dir()
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_clock_that_leaps_and_an_aircraft_that_is_there_twice(
     copied: Path, configuration: Configuration, tmp_path: Path
 ) -> None:
@@ -415,7 +408,6 @@ def test_a_clock_that_leaps_and_an_aircraft_that_is_there_twice(
     assert found["session.same_aircraft"] == "warn: 2 logs of C: example-C.csv is used, second-C.csv left out"
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_logs_that_do_not_overlap_and_a_peer_without_a_log(
     copied: Path, configuration: Configuration, tmp_path: Path
 ) -> None:
@@ -436,7 +428,6 @@ def test_logs_that_do_not_overlap_and_a_peer_without_a_log(
     assert session_folders(tmp_path / "out") == []
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_links_without_dead_reckoning_are_no_session_and_no_error(
     copied: Path, configuration: Configuration, tmp_path: Path
 ) -> None:
@@ -451,7 +442,6 @@ def test_links_without_dead_reckoning_are_no_session_and_no_error(
     assert not session_folders(tmp_path / "out")
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_warning_of_the_session_reaches_the_exit_code(logs: Path, tmp_path: Path) -> None:
     call = ("run", *sorted(logs.glob("*.csv"))[:2], "-o", tmp_path / "out", "-q", "--no-pdf", "-j", "1")
     assert called(*call, "--fail-on", "fail") == 0

@@ -10,7 +10,6 @@ from groundstation.cli.main import main
 from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
 from groundstation.pipeline.verbs.compare import compare, session_errors
 from groundstation.pipeline.verbs.serve import recordings_in
-from groundstation.reports.drawing import sketching
 from groundstation.simulation.session_log import write_session
 from groundstation.viewer.fleet_catalog import SESSIONS, catalog_server
 from tests.recording_contents import Contents
@@ -29,8 +28,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Flights and their session, as ``run`` leaves them."""
     logs, folder = tmp_path_factory.mktemp("logs"), tmp_path_factory.mktemp("out")
     write_session(SHORT, logs, "example", SEED)
-    with sketching():
-        assert called("run", logs, "-o", folder, "--config", logs / "settings.toml", "-j", "1", "--no-pdf", "-q") == 0
+    assert called("run", logs, "-o", folder, "--config", logs / "settings.toml", "-j", "1", "--no-pdf", "-q") == 0
     return folder
 
 
@@ -66,8 +64,7 @@ def test_list_takes_a_flight_folder(out: Path, capsys: pytest.CaptureFixture[str
 
 
 def test_a_session_is_run_again_with_other_settings(session: Path, tmp_path: Path) -> None:
-    with sketching():
-        assert called("cooperative", session, "-o", tmp_path, "-q", "--no-pdf") == 0
+    assert called("cooperative", session, "-o", tmp_path, "-q", "--no-pdf") == 0
     (again,) = session_folders(tmp_path)
     one, other = (load(folder).results for folder in (session, again))
     assert again.name == session.name

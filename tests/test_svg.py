@@ -13,9 +13,8 @@ from groundstation.chapters.parts import Document, Figure, Front, Section
 from groundstation.chapters.plots import PLOTS
 from groundstation.plots.marks import Band, Cells, Curve, Dots, Histogram, Limit, Points, Spans, Told
 from groundstation.plots.plot import Axis, Panel, Plot, Row, Scale, one_panel
-from groundstation.reports.figures import drawing_of, drawn_by
+from groundstation.reports.drawing import drawing_of, drawn_by
 from groundstation.reports.live import page_data
-from groundstation.reports.painting import with_painted_figures
 from groundstation.reports.pdf import pdf_bytes
 from groundstation.reports.svg.colours import COLOURS
 from groundstation.reports.svg.path import dots, polyline
@@ -302,15 +301,11 @@ def test_legend_without_end_is_bounded() -> None:
     assert sum(text.startswith("line") for text in told) == 29
 
 
-def test_drawer_that_returns_a_plot_stands_beside_those_that_paint() -> None:
-    section = Section("a", "A", "", (Figure("made"),))
+def test_figure_of_a_chapter_is_drawn_by_the_name_that_the_chapter_gives() -> None:
+    section = Section("a", "A", "", (Figure("made"), Figure("none")))
     plot = replace(plot_of(DRAWN["curve"]), numbers=("overview",))
-
-    def tell() -> Document:
-        return Document("Report", "x", Front("x"), (drawn_by({"made": lambda _: plot}, section, None),))
-
-    (drawing,) = with_painted_figures(tell).sections[0].parts
-    assert drawing == replace(drawing_of(plot), name="made")
+    drawn = drawn_by({"made": lambda _: plot, "none": lambda _: None}, section, None)
+    assert drawn.parts == (drawing_of(plot, "made"),)
 
 
 def test_paper_has_the_text_of_a_picture_in_its_font() -> None:

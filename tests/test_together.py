@@ -133,7 +133,6 @@ def test_an_empty_or_unknown_file_is_left_out_and_the_others_close_up(
     assert {"gnss", "gnss.b"} <= set(found.info.ledger.topics)
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_where_one_log_is_left_it_is_a_plain_run_that_says_what_is_left_out(logs: Path, tmp_path: Path) -> None:
     odd = tmp_path / "odd.xyz"
     odd.write_bytes(b"")
@@ -171,7 +170,6 @@ def test_logs_of_two_days_are_refused_in_a_line(logs: Path, tmp_path: Path) -> N
     assert not (tmp_path / "y.mcap").exists()
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_run_together_gives_one_flight_that_says_how(logs: Path, tmp_path: Path) -> None:
     paths = [str(logs / name) for name in ("a.ulg", "b.ubx")]
     code, out, _err = groundstation("run", *paths, "--together", "-o", str(tmp_path / "out"), "--no-pdf")

@@ -131,7 +131,6 @@ def test_study_writes_page_and_tables(tmp_path: Path) -> None:
     assert groundstation("study", "magnetic", "-o", str(tmp_path), "--minutes", "1")[0] == 2
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_progress_as_json_lines_goes_to_stderr(tmp_path: Path) -> None:
     arguments = ["run", str(SAMPLES / "taxi-short.csv"), "-o", str(tmp_path / "out"), "--no-pdf", "--progress", "json"]
     code, _, err = groundstation(*arguments)
@@ -139,14 +138,12 @@ def test_progress_as_json_lines_goes_to_stderr(tmp_path: Path) -> None:
     assert code == 0 and [events[0]["event"], events[-1]["event"]] == ["begin", "end"]
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_fail_on_reaches_exit_4(tmp_path: Path) -> None:
     arguments = ["run", str(SAMPLES / "taxi-drift.csv"), "-o", str(tmp_path / "out"), "--no-pdf"]
     assert groundstation(*arguments)[0] == 0
     assert groundstation(*arguments, "--fail-on", "warn")[0] == 4
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_a_report_that_cannot_be_written_stops_no_other(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert groundstation("run", str(SAMPLES / "taxi-short.csv"), "-o", str(out), "--no-pdf")[0] == 0
@@ -160,7 +157,6 @@ def test_a_report_that_cannot_be_written_stops_no_other(tmp_path: Path) -> None:
     assert str(flight / "report.html") in text and (flight / "report.html").is_file()
 
 
-@pytest.mark.usefixtures("unpainted")
 def test_results_go_to_stdout_and_nothing_else_does(tmp_path: Path) -> None:
     logs = tmp_path / "logs"
     logs.mkdir()

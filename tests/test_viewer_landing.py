@@ -7,8 +7,8 @@ import pytest
 
 from groundstation.chapters.landing import landing
 from groundstation.chapters.markdown import markdown
-from groundstation.reports.drawing import Drawing
-from groundstation.reports.figures import with_drawings
+from groundstation.chapters.plots import PLOTS
+from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.results.answer import by_analysis
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.landing import LandingResult
@@ -51,7 +51,7 @@ def test_the_chapter_says_what_was_measured_and_what_was_not(with_site: FlightRe
 def test_every_figure_is_drawn(with_site: FlightResults) -> None:
     section = landing(with_site)
     assert section is not None
-    drawn = [part for part in with_drawings(section, with_site).parts if isinstance(part, Drawing)]
+    drawn = [part for part in drawn_by(PLOTS, section, with_site).parts if isinstance(part, Drawing)]
     assert [one.title for one in drawn] == ["Approach 1: deviations", "Approach 1: the final"]
     assert all("nan" not in one.svg for one in drawn)
 

@@ -1,26 +1,23 @@
 """The report of a folder of flights: one self-contained HTML file with every flight, and its PDF."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 from groundstation.base.failures import attempt, gathered_failures
 from groundstation.chapters.fleet import CHAPTERS, flights, front
 from groundstation.chapters.parts import Document, Front
+from groundstation.chapters.plots.fleet import FLEET_PLOTS
 from groundstation.chapters.shortened import shortened
-from groundstation.reports.figures import drawn_by
-from groundstation.reports.fleet import DRAWERS
+from groundstation.reports.drawing import drawn_by
 from groundstation.reports.flight_report import Written, write_pages
 from groundstation.reports.page import TEMPLATES, digest_of, render
-from groundstation.reports.painting import document_begun
 from groundstation.results.fleet import FleetResults
 
 PAGE = "summary.html"
 MOST_ROWS_ON_PAPER = 60
 
 
-def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True, painters: int = 1) -> Written:
+def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True) -> Written:
     """Write summary.html and summary.pdf into a folder of flights.
 
     Parameters
@@ -31,8 +28,6 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True,
         Equal results give equal bytes, whatever the time, the host or the order of the logs.
     with_pdf : bool
         Without it there is no summary.pdf afterwards.
-    painters : int
-        Processes that paint the figures, this one among them.
 
     Notes
     -----
@@ -45,36 +40,17 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True,
     OSError
         When a file cannot be written.
     """
-    with fleet_report_begun(out, fleet, with_pdf=with_pdf, painters=painters) as finish:
-        return finish()
-
-
-@contextmanager
-def fleet_report_begun(
-    out: Path, fleet: FleetResults, *, with_pdf: bool = True, painters: int = 1
-) -> Iterator[Callable[[], Written]]:
-    """Begin a report, parameters as of :func:`write_fleet_report`: the other painters paint while this process does
-    something else. Yields what finishes it. A part that fails by a defect is left out.
-    """
-    with gathered_failures(), document_begun(lambda: fleet_document(fleet), painters) as painting:
-
-        def finished() -> Written:
-            document = painting.finished()
-            return write_pages(
-                out / PAGE,
-                lambda shown: fleet_report_html(shown, fleet),
-                document,
-                on_paper(document),
-                with_pdf=with_pdf,
-            )
-
-        yield finished
+    with gathered_failures():
+        document = fleet_document(fleet)
+        return write_pages(
+            out / PAGE, lambda shown: fleet_report_html(shown, fleet), document, on_paper(document), with_pdf=with_pdf
+        )
 
 
 def fleet_document(fleet: FleetResults) -> Document:
     """Put the report of a fleet together, its tables at full length."""
     told = [attempt("chapter", name, build, fleet) for name, build in CHAPTERS.items()]
-    drawn = (attempt("chapter", one.key, drawn_by, DRAWERS, one, fleet) for one in told if one is not None)
+    drawn = (attempt("chapter", one.key, drawn_by, FLEET_PLOTS, one, fleet) for one in told if one is not None)
     sections = tuple(section for section in drawn if section is not None)
     top = attempt("chapter", "front", front.build, fleet) or Front("Fleet")
     return Document("Fleet report", top.title, top, sections)

@@ -1,8 +1,7 @@
 """The report of one flight: one self-contained HTML file and its PDF, made from the saved results alone."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,7 +13,6 @@ from groundstation.chapters.parts import Document, Front
 from groundstation.chapters.plan import is_plan
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.page import TEMPLATES, live_figures, render
-from groundstation.reports.painting import document_begun, with_painted_figures
 from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.reports.sections import flight_sections
 from groundstation.reports.steer_card import write_exports
@@ -43,10 +41,11 @@ class Written:
     failures: tuple[Failure, ...] = ()
 
 
-def write_flight_report(
-    folder: Path, answer_types: Mapping[str, type[Answer]], *, with_pdf: bool = True, painters: int = 1
-) -> Written:
+def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], *, with_pdf: bool = True) -> Written:
     """Write report.html and report.pdf into a flight folder; with a magnetic deviation its table and steer card too.
+
+    A part that fails by a defect is left out, and summary.json and the report tell it: those that failed elsewhere
+    until then, too.
 
     Parameters
     ----------
@@ -58,48 +57,26 @@ def write_flight_report(
     with_pdf : bool
         Without it there is neither report.pdf nor steer_card.pdf afterwards: those of an earlier run would tell of
         other results.
-    painters : int
-        Processes that paint the figures, this one among them.
 
     Raises
     ------
     UnreadableLogError
         When the folder has no saved results.
     """
-    with flight_report_begun(folder, answer_types, with_pdf=with_pdf, painters=painters) as finish:
-        return finish()
-
-
-@contextmanager
-def flight_report_begun(
-    folder: Path, answer_types: Mapping[str, type[Answer]], *, with_pdf: bool = True, painters: int = 1
-) -> Iterator[Callable[[], Written]]:
-    """Begin a report, parameters as of :func:`write_flight_report`: the other painters paint while this process does
-    something else. Yields what finishes it.
-
-    A part that fails by a defect is left out, and summary.json and the report tell it: those that failed elsewhere
-    until the report is finished, too.
-    """
     with gathered_failures():
         saved = load(folder, answer_types)
         # first: the report links to those that are there
         exports = attempt("report", "exports", partial(write_exports, saved, with_pdf=with_pdf), unless=(OSError,))
         written, problem = exports or ((), "")
-        with document_begun(lambda: sketched_document(saved), painters) as painting:
-
-            def finished() -> Written:
-                document = painting.finished()
-                is_changed = put_failures(folder, failures(), PARTS)
-                if is_changed:
-                    again = load(folder, answer_types)
-                    document = painting.told_again(lambda: sketched_document(again))
-                pages = write_pages(folder / REPORT, flight_report_html, document, document, with_pdf=with_pdf)
-                is_changed |= put_failures(folder, failures())
-                problems = "; ".join(filter(None, (pages.problem, problem)))
-                summary = (folder / SUMMARY,) if is_changed else ()
-                return Written((*pages.paths, *written, *summary), problems, failures())
-
-            yield finished
+        document = flight_document(saved)
+        is_changed = put_failures(folder, failures(), PARTS)
+        if is_changed:
+            document = flight_document(load(folder, answer_types))
+        pages = write_pages(folder / REPORT, flight_report_html, document, document, with_pdf=with_pdf)
+        is_changed |= put_failures(folder, failures())
+        problems = "; ".join(filter(None, (pages.problem, problem)))
+        summary = (folder / SUMMARY,) if is_changed else ()
+        return Written((*pages.paths, *written, *summary), problems, failures())
 
 
 def write_pages(
@@ -121,13 +98,8 @@ def write_pages(
     return Written(tuple(path for path in (page, pdf) if path.is_file()), problem, failures())
 
 
-def flight_document(saved: SavedFlight, painters: int = 1) -> Document:
-    """Put the report of one saved flight, a session of several or a plan, together; so many processes paint figures."""
-    return with_painted_figures(lambda: sketched_document(saved), painters)
-
-
-def sketched_document(saved: SavedFlight) -> Document:
-    """The report of a flight as it is told; within :func:`sketching` no figure is painted."""
+def flight_document(saved: SavedFlight) -> Document:
+    """Put the report of one saved flight, a session of several or a plan, together, its figures drawn."""
     kind = PLAN if is_plan(saved.results) else SESSION if is_session(saved.results) else "Flight report"
     top = attempt("chapter", "front", front, saved.results) or Front(saved.results.flight_id)
     return Document(kind, saved.results.flight_id, top, flight_sections(saved))

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.chapters.wording import clean
-from groundstation.reports.frames import Frame
-from groundstation.reports.live import Panel, page_data
+from groundstation.reports.live import Frame, Panel, page_data
 
 TEMPLATES = Path(__file__).parent / "templates"
 # Nothing may be loaded, nothing run but scripts that a template names by digest. SVG sets style attributes, hence

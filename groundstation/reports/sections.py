@@ -15,10 +15,11 @@ from groundstation.chapters.next_steps import next_steps
 from groundstation.chapters.overview import overview
 from groundstation.chapters.parts import Facts, Note, Part, Section, kept
 from groundstation.chapters.plan import is_plan
+from groundstation.chapters.plots import PLOTS
 from groundstation.chapters.provenance import provenance
 from groundstation.chapters.quality import quality
 from groundstation.chapters.sources import sources
-from groundstation.reports.figures import with_drawings
+from groundstation.reports.drawing import drawn_by
 from groundstation.results.files import SavedFlight
 from groundstation.results.flight import FlightResults
 
@@ -79,7 +80,7 @@ def _as_set(part: Part, configuration: Mapping[str, Any]) -> Part | None:
 
 def on_a_page(section: Section, saved: SavedFlight) -> Section:
     """The section as a report shows it: its figures drawn, of the files beside the report those that are there."""
-    drawn = with_drawings(section, saved.results)
+    drawn = drawn_by(PLOTS, section, saved.results)
     parts = (
         _of_files_there(part, saved.folder) if isinstance(part, Note) and part.files else part for part in drawn.parts
     )

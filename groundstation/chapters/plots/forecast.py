@@ -37,7 +37,7 @@ def growth(results: FlightResults) -> Plot | None:
         return None
     horizon, roles = data.horizon_min, method_roles(default)
     marks: list[AnyMark] = []
-    ordered = sorted(known, key=lambda name: -_last(data.rms_m[name]))
+    ordered = sorted(known, key=lambda name: (name == default, -_last(data.rms_m[name])))  # the shipped over the others
     for name in ordered:
         is_shipped = name == default
         text = label(f"{METHODS[name]}{' (shipped)' if is_shipped else ''}")
@@ -86,7 +86,7 @@ def _bands(rows: list[CalibrationRow]) -> Panel:
     marks: list[AnyMark] = []
     for shares, (nominal, role) in zip(inside.T, NOMINAL, strict=True):
         marks += [Limit(value=100.0 * nominal, role=role), *line_with_dots(horizon, 100.0 * shares, role)]
-    ticks = (0.0, 25.0, *(100.0 * nominal for nominal, _ in NOMINAL), 100.0)
+    ticks = (0.0, 25.0, *(100.0 * nominal for nominal, _ in NOMINAL))
     y = Axis("errors inside the band, %", low=0.0, high=105.0, ticks=ticks)
     return Panel(marks, Axis(HORIZON), y, title="Bands of 50, 68 and 95 %", legend="")
 

@@ -54,7 +54,9 @@ def deviations(results: FlightResults, of: str) -> Plot | None:
 def _deviation(own: LandingPath, guided: Floats, placed: Floats, dot_m: Floats, *, is_vertical: bool) -> Panel:
     distance_km, order = own.distance_m / M_PER_KM, np.argsort(own.distance_m)
     edge = dot_m[order]
-    marks: list[AnyMark] = [Band(x=distance_km[order], low=-edge, high=edge, role="answer", name="one dot")]
+    marks: list[AnyMark] = [
+        Band(x=distance_km[order], low=-edge, high=edge, role="answer", name="one dot", emphasis="faint")
+    ]
     for category, role in zip(CATEGORIES, CATEGORY_ROLES, strict=True):
         half = category.vertical_m if is_vertical else category.horizontal_m
         marks.append(Limit(value=-half, role=role, emphasis="thin"))
@@ -108,7 +110,9 @@ def final(results: FlightResults, of: str) -> Plot | None:
 def _from_above(one: Approach, own: LandingPath) -> Panel:
     distance, across = own.distance_m / M_PER_KM, own.across_m / M_PER_KM
     edge = DOTS_PER_FULL_SCALE * own.lateral_dot_m / M_PER_KM
-    marks: list[AnyMark] = [Band(x=distance, low=-edge, high=edge, role="answer", name="course sector")]
+    marks: list[AnyMark] = [
+        Band(x=distance, low=-edge, high=edge, role="answer", name="course sector", emphasis="faint")
+    ]
     marks.append(Limit(value=0.0, dash="", emphasis="thin"))
     length_km = (one.runway.length_m or 0.0) / M_PER_KM
     if length_km:

@@ -38,7 +38,7 @@ from groundstation.pipeline.many_flights.session import load_stations
 from groundstation.pipeline.many_flights.strangers import Strangers
 from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJob, Crew, in_turn, side_by_side
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.cores import cores, painters_of
+from groundstation.pipeline.one_flight.cores import cores
 from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
@@ -111,14 +111,12 @@ def run_many(
     logs = len(inputs) - len(skipped)
     bounds = bounds_of(configuration.isolation, timeout_s) if is_isolated else None
     crew = _crew(scheduler, jobs or cores(), logs, listen, timeout_s, bounds)
-    painters = 1 if scheduler else painters_of(jobs or cores(), logs)
     make = partial(
         Job,
         configuration=configuration,
         fail_on=fail_on,
         with_pdf=with_pdf,
         only_results=only_results,
-        painters=painters,
     )
     asked = Asked(
         Path(out),
@@ -129,7 +127,6 @@ def run_many(
         redo,
         only_results=only_results,
         store=store,
-        painters=jobs or cores(),
     )
     if not is_near:
         remote = [
@@ -188,7 +185,6 @@ def run_together(
             with_pdf=with_pdf,
             url=named,
             only_results=only_results,
-            painters=cores(),
         )
         asked = Asked(Path(out), configuration, None, fail_on, with_pdf, redo=True, only_results=only_results)
         return _run_here([job], asked, partial(in_turn, listen=listen), force, listen)
@@ -257,7 +253,6 @@ def _write_beside(out: Path, outcomes: Sequence[Outcome], asked: Asked, found: S
         with_pdf=asked.with_pdf,
         only_results=asked.only_results,
         found=found,
-        painters=asked.painters,
     )
 
 

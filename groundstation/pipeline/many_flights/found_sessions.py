@@ -37,8 +37,7 @@ class Asked:
     """How a run is to do its sessions; the fields are those of :class:`SessionJob`.
 
     ``stations`` is None where no file was named: then there may be one beside the logs. ``mcap_in`` gives the MCAP of a
-    flight folder. ``store`` is the table that takes the rows of the flights; empty without one. ``painters``
-    is how many processes paint the figures of the page on all flights.
+    flight folder. ``store`` is the table that takes the rows of the flights; empty without one.
     """
 
     out: Path
@@ -50,7 +49,6 @@ class Asked:
     mcap_in: Callable[[Path], Path] = lambda folder: file_in(folder, ".mcap")
     only_results: bool = False
     store: str = ""
-    painters: int = 1
     is_copy: bool = False
 
 

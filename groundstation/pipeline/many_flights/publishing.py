@@ -30,12 +30,11 @@ from groundstation.pipeline.many_flights.inputs import (
     session_folders,
 )
 from groundstation.pipeline.many_flights.installations import INSTALLATIONS, refresh_installations, show_installation
-from groundstation.pipeline.one_flight.cores import cores
 from groundstation.pipeline.one_flight.flight import REPORT_FILES
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.sealing import note
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
-from groundstation.reports.fleet_report import fleet_report_begun
+from groundstation.reports.fleet_report import write_fleet_report
 from groundstation.reports.index import IndexRow, Kind
 from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
 
@@ -55,15 +54,13 @@ def write_beside(
     with_pdf: bool = True,
     only_results: bool = False,
     found: Scan | None = None,
-    painters: int = 1,
     remade: Sequence[str] | None = None,
 ) -> tuple[Outcome, ...]:
     """Write everything that stands beside the flight folders; returns what could not be written or read.
 
     ``found`` is what :func:`groundstation.pipeline.many_flights.fleet_store.refresh` gave, where it was called already.
     With ``only_results`` the page and the recording of all flights are removed: they would tell of an earlier run.
-    ``painters`` is how many processes paint the figures of the page. ``remade`` are the flights whose reports are new;
-    left out: those of ``outcomes`` that were not finished before.
+    ``remade`` are the flights whose reports are new; left out: those of ``outcomes`` that were not finished before.
     """
     problems: list[Outcome] = []
     if remade is None:
@@ -79,7 +76,7 @@ def write_beside(
                     learn = partial(refresh_installations, out, found, remade)
                     shown = attempt("installations", "fleet", learn, unless=(OSError, GroundstationError))
                     restamp(out, shown or ())
-                    problems += _write_beside(out, outcomes, kept_rows, found, with_pdf, only_results, painters)
+                    problems += _write_beside(out, outcomes, kept_rows, found, with_pdf, only_results)
                     problems += [_beside(out, "failed", f"{out}: {one.text}", one.trace) for one in failures()]
                     break
                 except DamagedMonthError as error:
@@ -107,7 +104,6 @@ def _write_beside(
     found: Scan,
     with_pdf: bool,
     only_results: bool,
-    painters: int,
 ) -> list[Outcome]:
     """Write index, fleet, page and recording from the flights as they were found; returns what went wrong."""
     problems = list(write_index_of(out, outcomes, kept_rows, found))
@@ -117,12 +113,11 @@ def _write_beside(
         for name in (FLEET_PAGE, FLEET_PDF, FLEET_RECORDING):
             (out / name).unlink(missing_ok=True)
         return problems
-    with fleet_report_begun(out, fleet, with_pdf=with_pdf, painters=painters) as finish:
-        from groundstation.viewer.fleet import write_fleet_recording  # Rerun is loaded while the others paint
+    from groundstation.viewer.fleet import write_fleet_recording
 
-        recording = out / FLEET_RECORDING
-        attempt("recording", "fleet", write_fleet_recording, recording, fleet, unless=(OSError, GroundstationError))
-        problem = finish().problem
+    recording = out / FLEET_RECORDING
+    attempt("recording", "fleet", write_fleet_recording, recording, fleet, unless=(OSError, GroundstationError))
+    problem = write_fleet_report(out, fleet, with_pdf=with_pdf).problem
     return [*problems, _beside(out, "skipped", f"{out}: {problem}")] if problem else problems
 
 
@@ -195,7 +190,7 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
     for folder in [out] if is_flight else [*flight_folders(out), *session_folders(out), *plan_folders(out)]:
         try:
             with told_in_a_line(str(folder)):
-                written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf, painters=cores())
+                written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf)
                 note(folder, written.paths, removed=REPORT_FILES)
         except GroundstationError as error:
             if is_flight:
@@ -211,7 +206,7 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
         return paths, tuple(problems)
     told = {one.source for one in problems}
     remade = [folder.name for folder in flight_folders(out)]
-    beside = write_beside(out, (), rows_without_flight(out), with_pdf=with_pdf, painters=cores(), remade=remade)
+    beside = write_beside(out, (), rows_without_flight(out), with_pdf=with_pdf, remade=remade)
     unread = [one for one in beside if one.source not in told]
     return [*paths, *(out / name for name in FLEET_FILES if (out / name).exists())], (*problems, *unread)
 

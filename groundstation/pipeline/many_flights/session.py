@@ -40,7 +40,7 @@ from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.pipeline.one_flight.resume import versions
 from groundstation.pipeline.one_flight.sealing import note, seal, spoiled_files
-from groundstation.reports.flight_report import PDF, REPORT, flight_report_begun, write_flight_report
+from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
 from groundstation.results.file_names import MANIFEST
 from groundstation.results.files import load_document, load_manifest, put_failures, save, save_manifest
 from groundstation.results.flight import FlightResults, Source
@@ -78,8 +78,6 @@ class SessionJob:
         What is known of it before its logs are read.
     only_results : bool
         Whether there is neither a recording nor a report.
-    painters : int
-        How many processes paint the figures of its report.
     is_copy : bool
         Whether ``out`` is a copy of a folder elsewhere, which has most files by name alone.
     """
@@ -94,7 +92,6 @@ class SessionJob:
     is_found: bool = False
     notes: tuple[Finding, ...] = ()
     only_results: bool = False
-    painters: int = 1
     is_copy: bool = False
 
     @property
@@ -232,7 +229,7 @@ def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
     folder, resume, problem = kept.folder, kept.resume, ""
     if not kept.is_finished:
         with watch.stage("reporting"):
-            written = write_flight_report(folder, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters)
+            written = write_flight_report(folder, ANSWER_TYPES, with_pdf=job.with_pdf)
         problem = written.problem
         save_manifest(folder, replace(kept.manifest, resume=replace(resume, keys=job.keys())))
         note(folder, written.paths, removed=REPORT_FILES)
@@ -278,15 +275,13 @@ def _run_into(partial: Path, job: SessionJob, watch: Stopwatch) -> Outcome:
 
 def _show(partial: Path, assembled: AssembledSession, results: FlightResults, job: SessionJob, watch: Stopwatch) -> str:
     """Write the recording and the reports of saved results; returns what went wrong."""
-    report = flight_report_begun(partial, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters)
-    with watch.entered("reporting", report) as finish:
-        with watch.stage("recording"):  # while the other painters are at the report's figures
-            from groundstation.viewer.session import write_session_recording  # Rerun is loaded after they were forked
+    with watch.stage("recording"):
+        from groundstation.viewer.session import write_session_recording
 
-            path = partial / f"{results.flight_id}.rrd"
-            attempt("recording", "session", write_session_recording, path, assembled, results, unless=OF_THE_WORLD)
-        with watch.stage("reporting"):
-            return finish().problem
+        path = partial / f"{results.flight_id}.rrd"
+        attempt("recording", "session", write_session_recording, path, assembled, results, unless=OF_THE_WORLD)
+    with watch.stage("reporting"):
+        return write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf).problem
 
 
 def _flights(partial: Path, job: SessionJob) -> tuple[list[Flight], tuple[LogOfSession, ...], list[Finding]]:

@@ -5,7 +5,7 @@ import secrets
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial as bound
 from pathlib import Path, PurePosixPath
@@ -29,7 +29,7 @@ from groundstation.pipeline.one_flight.parts import part_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, keys_of, remember_reports
 from groundstation.pipeline.one_flight.sealing import note, seal
-from groundstation.reports.flight_report import PDF, REPORT, flight_report_begun, write_flight_report
+from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
 from groundstation.reports.steer_card import write_exports
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
@@ -62,14 +62,6 @@ class Stopwatch:
             yield
         finally:
             self.times_s[text] = self.times_s.get(text, 0.0) + time.perf_counter() - started
-
-    @contextmanager
-    def entered(self, text: str, context: AbstractContextManager[Inside]) -> Iterator[Inside]:
-        """A context that is entered as part of a stage; what is done within it has stages of its own."""
-        with ExitStack() as contexts:
-            with self.stage(text):
-                inside = contexts.enter_context(context)
-            yield inside
 
 
 def run_flight(job: Job, listen: Listener = silent) -> Outcome:
@@ -244,15 +236,13 @@ def _show(partial: Path, flight: Flight, results: FlightResults, job: Job, watch
     """Write the recording and the reports of saved results, where they are asked for; returns what went wrong."""
     if job.only_results:
         return _export(partial)
-    report = flight_report_begun(partial, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters)
-    with watch.entered("reporting", report) as finish:
-        with watch.stage("recording"):  # while the other painters are at the report's figures
-            from groundstation.viewer.recording import write_recording  # Rerun is loaded after they were forked
+    with watch.stage("recording"):
+        from groundstation.viewer.recording import write_recording
 
-            path = partial / f"{results.flight_id}.rrd"
-            attempt("recording", "flight", write_recording, path, flight, results, unless=OF_THE_WORLD)
-        with watch.stage("reporting"):
-            return finish().problem
+        path = partial / f"{results.flight_id}.rrd"
+        attempt("recording", "flight", write_recording, path, flight, results, unless=OF_THE_WORLD)
+    with watch.stage("reporting"):
+        return write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf).problem
 
 
 def _export(folder: Path) -> str:
@@ -275,7 +265,7 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
         note(finished.folder, [finished.folder / DEVIATION_CSV])
     elif job.step == "reports":
         with watch.stage("reporting"):
-            written = write_flight_report(finished.folder, ANSWER_TYPES, with_pdf=job.with_pdf, painters=job.painters)
+            written = write_flight_report(finished.folder, ANSWER_TYPES, with_pdf=job.with_pdf)
             problem = written.problem
             put_failures(finished.folder, failures())
             note(finished.folder, written.paths, removed=REPORT_FILES)

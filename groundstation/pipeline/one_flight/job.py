@@ -16,7 +16,7 @@ class Job:
 
     ``add_suffix``: two flights of one id get ``_<sha8>`` of their logs; ``step`` is what has to be done, with what the
     flight that is ``finished`` has for the rest; ``url`` is where the log is, if ``path`` is but a copy of it. With
-    ``only_results`` there is neither a recording nor a report. ``painters`` is how many processes paint its figures.
+    ``only_results`` there is neither a recording nor a report.
     Of several power-ups in the log, ``power_up`` is the only one to run; 0: all of them. ``parts`` are the consecutive
     logs that are run as one flight, the first of them its log.
     """
@@ -32,7 +32,6 @@ class Job:
     finished: Finished | None = None
     url: str = ""
     only_results: bool = False
-    painters: int = 1
     power_up: int = 0
     parts: tuple[PartOfRun, ...] = ()
 

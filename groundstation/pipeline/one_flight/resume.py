@@ -39,7 +39,7 @@ Step = Literal["everything", "analysis", "reports", "nothing"]  # what has to be
 _OF_RESULTS = (SUMMARY, f"{ARRAYS}/", f"{TABLES}/")
 PACKAGES = (
     *("mcap", "numpy", "pandas", "numba", "scipy", "pyarrow", "rerun-sdk"),
-    *("protobuf", "matplotlib", "typst", "pygeomag", "ppigrf"),
+    *("protobuf", "typst", "pygeomag", "ppigrf"),
 )
 
 

@@ -9,7 +9,6 @@ from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, re
 from groundstation.pipeline.many_flights.publishing import rows_without_flight, write_index_of
 from groundstation.pipeline.many_flights.session import SessionJob, load_stations, run_one
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.cores import cores
 from groundstation.pipeline.one_flight.log import Log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
@@ -56,7 +55,7 @@ def run_session(
     logs, failed = _opened(files, configuration)
     if not logs:
         return failed
-    job = SessionJob(logs, ground, out, configuration, fail_on, with_pdf, painters=cores())
+    job = SessionJob(logs, ground, out, configuration, fail_on, with_pdf)
     with alone_in(out):
         prepare(out)
         outcome = run_one(job, listen)

@@ -13,7 +13,6 @@ from groundstation.estimators.analyses import ANSWER_TYPES, PLANS
 from groundstation.estimators.plan import Plan, Planned
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, PLAN_MARK
 from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
-from groundstation.pipeline.one_flight.cores import cores
 from groundstation.pipeline.one_flight.flight import OF_THE_WORLD, Stopwatch, partial_folder, place, state_of
 from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.pipeline.one_flight.manifest import manifest_of
@@ -121,7 +120,7 @@ def _run_into(
         path = partial / f"{results.flight_id}.rrd"
         attempt("recording", "plan", write_plan_recording, path, results, unless=OF_THE_WORLD)
     with watch.stage("reporting"):
-        problem = write_flight_report(partial, ANSWER_TYPES, with_pdf=with_pdf, painters=cores()).problem
+        problem = write_flight_report(partial, ANSWER_TYPES, with_pdf=with_pdf).problem
     warned = (f"warning: {finding.text}" for finding in results.findings if finding.severity != "info")
     sentence = attempt("line", plan.name, plan.sentence, results.answers) or ""
     told = "; ".join(filter(None, (sentence, *warned, problem)))

@@ -21,7 +21,7 @@ from groundstation.plots.marks import (
 )
 from groundstation.plots.ranges import thin
 from groundstation.reports import live
-from groundstation.reports.frames import TIME, Frame, Samples
+from groundstation.reports.live import TIME, Frame, Samples
 from groundstation.reports.svg import colours
 from groundstation.reports.svg.boxes import PT_PER_MM, Box, Placed
 from groundstation.reports.svg.colours import NO_PLACES
@@ -153,7 +153,9 @@ def _curves(mark: AnyMark, box: Box) -> list[live.Curve]:
     colour, name = colours.COLOURS[mark.role], label(mark.name, MOST_OF_A_NAME)
     width = colours.LINE_PT[mark.emphasis]
     if isinstance(mark, Curve):
-        return [live.Curve("line", name, colour, width, bool(mark.dash), *_line(mark, box), NO_PLACES)]
+        share = colours.LINE[mark.emphasis]
+        stroke = colour if share == 1.0 else colours.with_alpha(colour, share)
+        return [live.Curve("line", name, stroke, width, bool(mark.dash), *_line(mark, box), NO_PLACES)]
     if isinstance(mark, Dots | Points):
         size = colours.DOT_PT[mark.emphasis] if isinstance(mark, Dots) else 3.0
         known = np.flatnonzero(_has_place(mark.x, box.x.scale) & _has_place(mark.y, box.y.scale))

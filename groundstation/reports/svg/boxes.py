@@ -7,14 +7,14 @@ import numpy as np
 
 from groundstation.plots.marks import Cells, Floats
 from groundstation.plots.plot import WIDTH_MM, Panel, Plot, Row
-from groundstation.reports.frames import MM_PER_INCH, TIME
+from groundstation.reports.live import TIME
 from groundstation.reports.svg import extents
 from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, label, lines_of, width_pt
 from groundstation.reports.svg.legend import LINE_PT, Entry, above, beside_pt, entries_of
 from groundstation.reports.svg.scales import Span
 from groundstation.reports.svg.ticks import Tick, own_ticks, ticks_of
 
-PT_PER_MM = 72.0 / MM_PER_INCH
+PT_PER_MM = 72.0 / 25.4
 WIDTH_PT = WIDTH_MM * PT_PER_MM
 TICK_PT, TO_TEXT_PT, TO_TITLE_PT = 3.0, 2.5, 3.5
 EDGE_PT, BETWEEN_PT, ROWS_PT = 11.0, 14.0, 11.0  # right of the last frame, between frames, between rows

@@ -40,6 +40,7 @@ SHADES = {
 LANE: dict[Emphasis, float] = {"faint": 0.3, "thin": 0.6, "usual": 1.0, "bold": 1.0}  # of a lane
 DOT: dict[Emphasis, float] = {"faint": 0.75, "thin": 0.75, "usual": 0.75, "bold": 1.0}  # of dots, which are many
 LIMIT_PT: dict[Emphasis, float] = {"faint": 0.6, "thin": 0.6, "usual": 0.9, "bold": 1.5}
+LINE: dict[Emphasis, float] = {"faint": 0.65, "thin": 1.0, "usual": 1.0, "bold": 1.0}  # opacity of a curve
 LINE_PT: dict[Emphasis, float] = {"faint": 0.5, "thin": 0.8, "usual": 1.1, "bold": 2.2}
 DOT_PT: dict[Emphasis, float] = {"faint": 1.3, "thin": 1.6, "usual": 1.8, "bold": 3.0}
 SHADE: dict[Emphasis, float] = {"faint": 0.10, "thin": 0.15, "usual": 0.19, "bold": 0.35}  # opacity of a band

@@ -57,7 +57,8 @@ def _curve(mark: Curve, box: Box) -> str:
     dash = colours.dashes(mark.dash)
     told = path.polyline(x, y, starts)
     ends = ROUND if path.NO_LENGTH in told else ""  # a sample between gaps is a dot
-    return _stroked(told, colours.COLOURS[mark.role], width, dash + ends)
+    look = dash + ends + colours.opacity("stroke", colours.LINE[mark.emphasis])
+    return _stroked(told, colours.COLOURS[mark.role], width, look)
 
 
 def stepped(x: Floats, y: Floats, starts: Any) -> tuple[Floats, Floats, Any]:

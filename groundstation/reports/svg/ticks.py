@@ -144,11 +144,25 @@ def _log(span: Span, low: float, high: float, length_pt: float, is_upright: bool
         if low * (1.0 - 1e-9) <= part * 10.0**power <= high * (1.0 + 1e-9)
     ]
     if len(places) < 2:
+        places = _of_few_decades(low, high, room / length_pt)
+    if len(places) < 2:
         return tuple(tick for tick in _linear(low, high, length_pt / 2.0, is_upright) if tick[0] >= low)
     texts = [of_decade(place) for place in places]
     if any(text[-1] in POWERS for text in texts):  # all as powers, or none
         texts = [of_decade(place, as_power=True) for place in places]
     return tuple(zip(places, texts, strict=True))
+
+
+def _of_few_decades(low: float, high: float, room: float) -> list[float]:
+    """Whole decades, then twos and fives of them, each where there is room: a share of the axis."""
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    kept: list[float] = []
+    for part in (1.0, 2.0, 5.0):
+        for place in (part * 10.0**power for power in powers):
+            apart = (abs(math.log(place / other)) / math.log(high / low) for other in kept)
+            if low <= place <= high and all(share >= room for share in apart):
+                kept.append(place)
+    return sorted(kept)
 
 
 def of_decade(value: float, *, as_power: bool = False) -> str:

@@ -1,4 +1,4 @@
-// Figures to zoom into: what reports/live.py took from the axes of each figure, drawn by uPlot in place of its picture.
+// Figures to zoom into: the panels of each plot (reports/svg/alive.py), drawn by uPlot in place of its picture.
 // What cannot be drawn so, a map, a forest, stays its picture: there the view is narrowed to what was chosen.
 "use strict";
 (() => {
@@ -8,7 +8,9 @@
     return Array.from(new Float32Array(bytes.buffer), (value) => (Number.isNaN(value) ? null : value));
   });
   const PX_PER_MM = 3.78, NARROW_PX = 560, TITLED_PX = 16, NEAR = 40;
-  const LEFT_PX = 66, NAMES_PX = 124, BESIDE_PX = 46; // room for the vertical axis: of a row's first panel, of the others
+  const LEFT_PX = 66, BESIDE_PX = 46, GAP_PX = 12, RIGHT_PX = 26; // room for the vertical axis: of a row's first panel, of the others
+  const FONT = "12px system-ui, sans-serif", DIGITS = 4; // of a value, within the range of its axis
+  const HINT = matchMedia("(pointer: fine)").matches ? "drag to zoom, double-click to go back" : "";
   const timed = []; // plots over flight time: their axes move together
   const colourOf = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const INKS = { "#1c2530": "--ink", "#6b7683": "--faint", "#cfe5dd": "--fill" };
@@ -24,13 +26,35 @@
     return (seconds < -0.5 ? "\u2212" : "") + text;
   };
   const plain = (value) => String(Number(value.toPrecision(5))).replace("-", "\u2212");
+  const decimalsOf = (step) => Math.min(Math.max(0, -Math.floor(Math.log10(Math.abs(step)) + 1e-9)), 12);
+  const within = (range, isLog) => {
+    // Values of an axis: those of a narrow range far from zero keep the digits that tell them apart.
+    const span = Math.abs(range[1] - range[0]), decimals = decimalsOf(span / 10 ** DIGITS || 1);
+    const isFar = !isLog && span > 0 && Math.max(...range.map(Math.abs)) > 10 * span;
+    return (value) => (isFar ? String(Number(value.toFixed(decimals))).replace("-", "\u2212") : plain(value));
+  };
+  const measure = document.createElement("canvas").getContext("2d");
+  const widthOf = (text) => {
+    measure.font = FONT;
+    return Math.ceil(measure.measureText(text).width);
+  };
   const told = (panel, value) => {
     if (value == null) return "";
-    if (!panel.time) return plain(value);
+    if (!panel.time) return within(panel.x, panel.log[0])(value);
     const tenths = Math.floor((((value % 1) + 1) % 1) * 10);
     return clock(Math.floor(value)) + (panel.x[1] - panel.x[0] < 600 ? `.${tenths}` : "");
   };
-  const STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 28800, 86400];
+  const STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 28800, 86400];
+
+  const clocks = (splits) => {
+    // Minutes and seconds beside ticks; with the fractions of a second by which they go on.
+    const decimals = splits.length > 1 ? decimalsOf(splits[1] - splits[0]) : 0;
+    return splits.map((value) => {
+      if (!decimals) return clock(value);
+      const text = Math.abs(value).toFixed(decimals), [seconds, rest] = text.split(".");
+      return `${value < 0 && Number(text) ? "\u2212" : ""}${clock(Number(seconds))}.${rest}`;
+    });
+  };
 
   const nameOf = (panel, curve) => {
     const isAlone = panel.curves.filter((one) => one.kind === "line" && arrays[one.x].length).length === 1;
@@ -133,31 +157,34 @@
     return null;
   }
 
-  function readout(row, panels, hasGrounds) {
-    // One line above the panels of a row: names, and under the cursor their values.
+  function readout(row, panels, isFirst) {
+    // One line above the panels of a row: names, and under the cursor their values; the first names the grounds, too.
     const line = row.appendChild(document.createElement("div")), entries = new Map();
     line.className = "readout";
     const add = (name, colour, kind) => {
       if (!name || entries.has(name)) return;
       const entry = line.appendChild(document.createElement("span"));
       entry.className = kind;
-      entry.append(Object.assign(document.createElement("i"), { style: `background:${shown(colour)}` }), name);
+      entry.append(Object.assign(document.createElement("i"), { style: `color:${shown(colour)}` }), name);
       entries.set(name, { entry, value: entry.appendChild(document.createElement("b")) });
     };
     for (const panel of panels) {
-      for (const curve of panel.curves) add(nameOf(panel, curve), curve.colour, curve.kind);
-      if (hasGrounds) for (const [, , colour, name] of panel.grounds) add(name, colour, "ground");
+      for (const curve of panel.curves) add(nameOf(panel, curve), curve.colour, curve.dashed ? "line dashed" : curve.kind);
+      if (isFirst) for (const [, , colour, name] of panel.grounds) add(name, colour, "ground");
     }
     const place = line.appendChild(document.createElement("b"));
-    place.className = "place";
+    const hint = isFirst ? HINT : "", showHint = (isShown) => place.classList.toggle("hint", isShown);
+    place.textContent = hint;
+    showHint(true);
     return (plot, panel, labels) => {
       const { idx, left } = plot.cursor, isOver = left >= 0 && left <= plot.over.clientWidth && idx != null;
       const x = isOver ? plot.posToVal(left, "x") : null;
-      place.textContent = isOver ? told(panel, x) : "";
+      place.textContent = isOver ? told(panel, x) : hint;
+      showHint(!isOver);
       const values = new Map();
       if (isOver) labels.forEach((name, at) => {
         const value = name && nearest(plot.data[at + 1], idx);
-        if (name && value != null) values.set(name, [...(values.get(name) || []), plain(value)]);
+        if (name && value != null) values.set(name, [...(values.get(name) || []), within(panel.y, panel.log[1])(value)]);
       });
       for (const [, , , name] of panel.grounds) entries.get(name)?.entry.classList.remove("here");
       for (const [low, high, , name] of panel.grounds) if (isOver && x >= low && x <= high) entries.get(name)?.entry.classList.add("here");
@@ -189,12 +216,37 @@
     }
   }
 
+  const decades = (low, high) => {
+    // Ticks of a logarithmic axis: 1, 2 and 5 of each decade, or the decades alone, or some of them.
+    const [first, last] = [Math.floor(Math.log10(low)), Math.ceil(Math.log10(high))], found = [];
+    const factors = high / low <= 1000 ? [1, 2, 5] : [1], step = Math.ceil((last - first) / 8);
+    for (let power = first; power <= last; power += 1) {
+      if (factors.length === 1 && (power - first) % step) continue;
+      for (const factor of factors) found.push(factor * 10 ** power);
+    }
+    const shownOnes = found.filter((value) => value >= low * (1 - 1e-9) && value <= high * (1 + 1e-9));
+    return shownOnes.length > 1 ? shownOnes : [low, high];
+  };
+  const splitsOf = (isLog) => (isLog ? { splits: (_, __, low, high) => decades(low, high), filter: (_, splits) => splits } : {});
+  const numbers = (splits, isLog) => {
+    // Beside ticks: with the decimals of the step between them.
+    const known = splits.filter((value) => value != null), decimals = known.length > 1 && !isLog ? decimalsOf(known[1] - known[0]) : null;
+    return splits.map((value) => (value == null ? "" : decimals === null ? plain(value) : value.toFixed(decimals).replace(/^-(?=.*[1-9])/, "\u2212").replace(/^-/, "")));
+  };
+  const roomBeside = (panel) => {
+    // For what stands beside an upright axis: names in full, or the longest number and the title.
+    if (panel.names.length) return Math.max(...panel.names.map(([, name]) => widthOf(name))) + GAP_PX;
+    const tell = within(panel.y, panel.log[1]), steps = [0, 0.2, 0.4, 0.6, 0.8, 1];
+    const longest = Math.max(...steps.map((share) => widthOf(tell(valueOf(panel.y, share, panel.log[1])))));
+    return Math.min(longest, 2 * LEFT_PX) + GAP_PX + (panel.titles[2] ? TITLED_PX + 4 : 0);
+  };
+
   const plots = [];
   function draw(box, panel, width, height, left, hasTimes, tell) {
     const { data, series, bands } = tables(panel);
     const labels = series.map((one) => one.label);
-    const line = { stroke: colourOf("--rule"), width: 1 }, font = "12px system-ui, sans-serif";
-    const axis = { stroke: colourOf("--ink"), grid: line, ticks: { ...line, size: 5 }, font, labelFont: font, labelSize: TITLED_PX + 4, labelGap: 0, gap: 3 };
+    const line = { stroke: colourOf("--rule"), width: 1 };
+    const axis = { stroke: colourOf("--ink"), grid: line, ticks: { ...line, size: 5 }, font: FONT, labelFont: FONT, labelSize: TITLED_PX + 4, labelGap: 0, gap: 3 };
     const scale = (range, log) => ({
       time: false, distr: log ? 3 : 1, dir: range[0] > range[1] ? -1 : 1,
       range: (_, min, max) => [min ?? Math.min(...range), max ?? Math.max(...range)],
@@ -202,11 +254,13 @@
     const names = new Map(panel.names);
     const upright = names.size
       ? { ...axis, grid: { show: false }, size: left, splits: () => [...names.keys()], values: (_, splits) => splits.map((place) => (left > BESIDE_PX ? names.get(place) : "")) }
-      : { ...axis, label: panel.titles[2] || null, size: left - (panel.titles[2] ? axis.labelSize : 0), space: 26, values: (_, splits) => splits.map((value) => (value == null ? "" : plain(value))) };
-    const along = panel.time ? { incrs: STEPS, space: 70, values: (_, splits) => splits.map(hasTimes ? clock : () => "") } : { space: 60 };
+      : { ...axis, label: panel.titles[2] || null, size: left - (panel.titles[2] ? axis.labelSize : 0), space: 26, ...splitsOf(panel.log[1]), values: (_, splits) => numbers(splits, panel.log[1]) };
+    const along = panel.time
+      ? { incrs: STEPS, space: 70, values: (_, splits) => (hasTimes ? clocks(splits) : splits.map(() => "")) }
+      : { space: 60, ...splitsOf(panel.log[0]), values: (_, splits) => numbers(splits, panel.log[0]) };
     const plot = new uPlot({
       width, height, bands,
-      padding: [6, 10, 0, 0],
+      padding: [6, RIGHT_PX, 0, 0],
       scales: { x: scale(panel.x, panel.log[0]), y: scale(panel.y, panel.log[1]) },
       series: [{}, ...series],
       axes: [{ ...axis, label: panel.titles[1] || null, size: hasTimes ? 24 : 4, ...along }, upright],
@@ -243,14 +297,15 @@
     box.className = "live";
     host.append(box);
     host.classList.add("is-live");
-    const first = panels.some((panel) => panel.names.length) ? NAMES_PX : LEFT_PX;
+    const isFirstOfRow = (panel) => panel === rows.get(Math.round(panel.place[1]))[0];
+    const first = Math.min(Math.max(LEFT_PX, ...panels.filter(isFirstOfRow).map(roomBeside)), 0.4 * room);
     for (const row of rows.values()) {
       const isFirst = box.childElementCount === 0, isLast = row.includes(panels[panels.length - 1]);
       const hasTimes = isLast || row.some((panel) => !panel.time || panel.titles[1]);
       const tell = readout(box, row, isFirst);
       const line = box.appendChild(document.createElement("div"));
       line.className = "live-row";
-      const lefts = row.map((panel, at) => (at && !isNarrow ? (panel.titles[2] ? LEFT_PX : BESIDE_PX) : first));
+      const lefts = row.map((panel, at) => (at && !isNarrow ? (panel.titles[2] ? Math.max(LEFT_PX, roomBeside(panel)) : BESIDE_PX) : first));
       const sum = row.reduce((total, panel) => total + panel.place[2], 0);
       const spare = room - lefts.reduce((total, left) => total + left, 0);
       row.forEach((panel, at) => {
@@ -285,16 +340,16 @@
     const [across, up] = [valueOf(frame.x, x, frame.log[0]), valueOf(frame.y, y, frame.log[1])];
     const name = frame.names.slice().sort((one, two) => Math.abs(one[0] - up) - Math.abs(two[0] - up))[0];
     const sample = frame.samples ? nearestSample(frame, x, y) : null;
-    const seen = [[frame.titles[1], told(frame, across)], name ? ["", name[1]] : [frame.titles[2], plain(up)]];
+    const seen = [[frame.titles[1], told(frame, across)], name ? ["", name[1]] : [frame.titles[2], within(frame.y, frame.log[1])(up)]];
     if (sample != null) seen.unshift([frame.of, frame.of === "flight time" ? clock(sample) : plain(sample)]);
     return seen;
   }
 
   function extent(frame, [left, low], [right, high]) {
     // What a narrowed view shows of the axes, whose own scales may lie outside it.
-    const within = (range, one, two, isLog) => [one, two].map((share) => valueOf(range, Math.min(Math.max(share, 0), 1), isLog));
-    const x = within(frame.x, left, right, frame.log[0]).map((value) => told(frame, value));
-    const y = within(frame.y, low, high, frame.log[1]).map(plain);
+    const ends = (range, one, two, isLog) => [one, two].map((share) => valueOf(range, Math.min(Math.max(share, 0), 1), isLog));
+    const x = ends(frame.x, left, right, frame.log[0]).map((value) => told(frame, value));
+    const y = ends(frame.y, low, high, frame.log[1]).map(within(frame.y, frame.log[1]));
     const seen = [[frame.titles[1], x.join(" \u2026 ")]];
     return frame.names.length ? seen : [...seen, [frame.titles[2], y.join(" \u2026 ")]];
   }
@@ -319,6 +374,7 @@
       const frame = frameAt([view[0] + view[2] / 2, view[1] + view[3] / 2]);
       const corners = [[view[0], view[1] + view[3]], [view[0] + view[2], view[1]]];
       say(frame && view[2] < width ? extent(frame, ...corners.map((place) => sharesIn(frame, place))) : []);
+      if (view[2] === width) line.append(Object.assign(document.createElement("b"), { className: "hint", textContent: HINT }));
     };
     const tell = (place) => {
       const frame = frameAt(place);
@@ -361,6 +417,7 @@
     });
     svg.addEventListener("pointerleave", rest);
     svg.addEventListener("dblclick", () => show([0, 0, width, height]));
+    rest();
   }
   for (const host of document.querySelectorAll(".plot[data-framed]")) picture(host, page.pictures[Number(host.dataset.framed)]);
 

@@ -23,7 +23,7 @@ def forest(fleet: FleetResults) -> Plot:
         marks.append(Limit(value=whole, is_upright=True, role="ink", dash="", emphasis="faint"))
     for place, row in enumerate(shown):
         own = finite(error[owner == row.aircraft])
-        marks.append(Dots(x=own, y=np.full(len(own), float(place)), role="unused"))
+        marks.append(Dots(x=own, y=np.full(len(own), float(place)), role="unused", emphasis="bold"))
         if row.mean_deg is not None:
             marks.append(Intervals(row=place, value=row.mean_deg, thick=row.confidence95_deg, role="answer"))
     names = [f"{label(row.aircraft, 20)}  ·  {plural(row.averaged, 'flight')}" for row in shown]
@@ -45,7 +45,7 @@ def rates(fleet: FleetResults) -> Plot:
     marks: list[AnyMark] = []
     for place, name in enumerate(shown):
         own = np.sort(np.asarray(found[name], dtype=np.float64))
-        marks.append(Dots(x=own, y=np.full(len(own), float(place)), role="ins"))
+        marks.append(Dots(x=own, y=np.full(len(own), float(place)), role="ins", emphasis="bold"))
         marks.append(Intervals(row=place, value=float(np.median(own)), symbol="diamond", role="ink"))
     low, high = log_limits(finite(*(found[name] for name in shown)))
     names = [f"{label(aircraft_name(name), 20)}  ·  {plural(len(found[name]), 'flight')}" for name in shown]
