@@ -22,7 +22,7 @@ MOST_CURVES = 150
 RATE, FIXED = "radial_rate_fit_nmiph", ("radial_largest_nmi", "radial_final_nmi")
 
 
-def write_acceptance_report(page: Path, found: Acceptance, *, with_pdf: bool = True) -> Written:
+def write_acceptance_report(page: Path, found: Acceptance) -> Written:
     """Write the page and, beside it, the PDF; equal acceptances give equal bytes.
 
     Raises
@@ -33,7 +33,7 @@ def write_acceptance_report(page: Path, found: Acceptance, *, with_pdf: bool = T
     beside = page.with_suffix(".json").name
     with gathered_failures():
         document = acceptance_document(found)
-        return write_pages(page, lambda shown: flight_report_html(shown, beside), document, document, with_pdf=with_pdf)
+        return write_pages(page, lambda shown: flight_report_html(shown, beside), document, document, with_pdf=True)
 
 
 def acceptance_document(found: Acceptance) -> Document:

@@ -1,4 +1,4 @@
-"""The report of a folder of flights: one self-contained HTML file with every flight, and its PDF."""
+"""The report of a folder of flights: one self-contained HTML file with every flight, and its PDF on demand."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,12 +16,12 @@ from groundstation.reports.page import TEMPLATES, digest_of, render
 from groundstation.reports.painting import document_begun
 from groundstation.results.fleet import FleetResults
 
-PAGE = "summary.html"
+PAGE, PDF = "summary.html", "summary.pdf"
 MOST_ROWS_ON_PAPER = 60
 
 
-def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True, painters: int = 1) -> Written:
-    """Write summary.html and summary.pdf into a folder of flights.
+def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = False, painters: int = 1) -> Written:
+    """Write summary.html into a folder of flights.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True,
     fleet : FleetResults
         Equal results give equal bytes, whatever the time, the host or the order of the logs.
     with_pdf : bool
-        Without it there is no summary.pdf afterwards.
+        Write summary.pdf too. Without it one that is there stays if the page is as it was.
     painters : int
         Processes that paint the figures, this one among them.
 
@@ -51,7 +51,7 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True,
 
 @contextmanager
 def fleet_report_begun(
-    out: Path, fleet: FleetResults, *, with_pdf: bool = True, painters: int = 1
+    out: Path, fleet: FleetResults, *, with_pdf: bool = False, painters: int = 1
 ) -> Iterator[Callable[[], Written]]:
     """Begin a report, parameters as of :func:`write_fleet_report`: the other painters paint while this process does
     something else. Yields what finishes it. A part that fails by a defect is left out.
@@ -66,6 +66,7 @@ def fleet_report_begun(
                 document,
                 on_paper(document),
                 with_pdf=with_pdf,
+                keeps_pdf=True,
             )
 
         yield finished

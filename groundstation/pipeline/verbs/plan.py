@@ -52,7 +52,7 @@ def run_plan(
     *,
     force: bool = False,
     fail_on: str = "none",
-    with_pdf: bool = True,
+    with_pdf: bool = False,
     listen: Listener = silent,
 ) -> Outcome:
     """Make a plan into ``<out>/<name of the scenario>/``; one of that name is made again.
