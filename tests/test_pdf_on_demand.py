@@ -19,9 +19,11 @@ from groundstation.pipeline.many_flights.publishing import report_again
 from groundstation.pipeline.many_flights.watching import watch
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.pipeline.verbs.plan import run_plan
 from groundstation.reports import sections
 from groundstation.results.files import load_manifest
 from tests.blank_figures import blank_figures
+from tests.test_plan import scenario
 from tests.test_resume import SHORT, copied, flight_in, stages, times
 
 PDFS = {"report.pdf", "summary.pdf"}
@@ -207,6 +209,35 @@ def test_no_pdf_is_what_happens_by_itself(tmp_path: Path) -> None:
         out = tmp_path / "-".join(options)
         assert called("run", SHORT, "-o", out, "-q", "-j", "1", *options) == (0, "", "")
         assert pdfs_in(out) == set()
+
+
+def test_a_plan_gets_its_pdf_and_is_not_made_again(tmp_path: Path) -> None:
+    file, out = scenario(tmp_path), tmp_path / "out"
+    made = run_plan("session", file, out)
+    folder = Path(made.folder)
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    del before[folder / "manifest.json"]
+    added = run_plan("session", file, out, with_pdf=True)
+    assert added.times_s.keys() == {"reporting"} and not added.was_finished and added.text == made.text
+    assert {path: path.read_bytes() for path in before} == before
+    pdf = (folder / "report.pdf").read_bytes()
+    for with_pdf in (True, False):
+        again = run_plan("session", file, out, with_pdf=with_pdf)
+        assert again.was_finished and again.text == made.text and (folder / "report.pdf").read_bytes() == pdf
+    assert run_plan("session", file, out, with_pdf=True, force=True).times_s.keys() > {"planning"}
+    assert (folder / "report.pdf").read_bytes() == pdf
+    (folder / "report.html").unlink()
+    assert run_plan("session", file, out).times_s.keys() > {"planning"}
+    assert not (folder / "report.pdf").exists()
+
+
+def test_a_plan_of_another_scenario_is_made_again(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    run_plan("session", scenario(tmp_path), out, with_pdf=True)
+    text = Path(scenario(tmp_path)).read_text(encoding="utf-8")
+    again = run_plan("session", scenario(tmp_path, text.replace("duration_s = 4", "duration_s = 5")), out)
+    assert not again.was_finished and pdfs_in(out) == set()
+    assert load_manifest(Path(again.folder)).configuration["scenario"]["duration_s"] == 5.0
 
 
 def test_a_watch_and_the_python_api_write_pdfs_where_they_are_asked_to(finished: Path, tmp_path: Path) -> None:
