@@ -1,7 +1,8 @@
 """Many flights: one and two worker processes, a Dask cluster beside them, memory of a worker, killed runs continued.
 
 ``bench_fleet.py [FLIGHTS]``, 500 without it: wall seconds; other programs slow all of them. ``bench_fleet.py FLIGHTS
-stages`` tells what one process spends on a flight, by stage, with everything and with results alone.
+stages`` tells what one process spends on a flight, by stage, with everything and with results alone. With ``--pdf``
+behind them PDFs are written too.
 """
 
 import filecmp
@@ -25,6 +26,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.verbs.synthesis import simulate_to
 
 COMMAND = [sys.executable, "-m", "groundstation"]
+PDF = [one for one in sys.argv[1:] if one == "--pdf"]
 FLIGHTS, DAMAGED_SHARE, AIRCRAFT = 500, 0.03, 5
 SCENARIOS = ("taxi-good", "taxi-short", "taxi-drift")
 KILLS, FLIGHTS_KILLED = 10, 20
@@ -82,7 +84,8 @@ def stages(logs: Path, root: Path, flights: int) -> None:
     for name, only_results in (("everything", False), ("results alone", True)):
         started = time.process_time()
         with mock.patch("time.perf_counter", time.process_time):  # what outcomes tell is then processor time
-            done = run_many([logs], root / name, Configuration(), jobs=1, only_results=only_results)
+            whole = {"only_results": True} if only_results else {"with_pdf": bool(PDF)}
+            done = run_many([logs], root / name, Configuration(), jobs=1, **whole)
         whole_s = time.process_time() - started
         spent: Counter[str] = Counter()
         for outcome in done:
@@ -122,7 +125,7 @@ def kills(logs: Path, whole: Path, root: Path) -> str:
     """Kill a run at random moments, continue it each time, and compare it with one that was left alone."""
     rng = random.Random(5)
     out = root / "killed"
-    command = [*COMMAND, "run", str(logs), "-o", str(out), "-j", "2", "-q"]
+    command = [*COMMAND, "run", str(logs), "-o", str(out), "-j", "2", "-q", *PDF]
     for _ in range(KILLS):
         process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.DEVNULL)
         time.sleep(rng.uniform(2.0, 9.0))
@@ -135,25 +138,33 @@ def kills(logs: Path, whole: Path, root: Path) -> str:
 
 def main() -> None:
     """Print all figures."""
-    flights = int(sys.argv[1]) if len(sys.argv) > 1 else FLIGHTS
+    flights = next((int(one) for one in sys.argv[1:] if one.isdigit()), FLIGHTS)
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
         size = make_logs(root / "logs", flights)
         print(f"{flights} flights, {size / 1e6:.0f} MB, {DAMAGED_SHARE:.0%} damaged", flush=True)
-        if sys.argv[2:] == ["stages"]:
+        if "stages" in sys.argv[2:]:
             stages(root / "logs", root, flights)
             return
         seconds = {}
         for jobs in (1, 2):
-            arguments = ["run", str(root / "logs"), "-o", str(root / f"j{jobs}"), "-j", str(jobs)]
+            arguments = ["run", str(root / "logs"), "-o", str(root / f"j{jobs}"), "-j", str(jobs), *PDF]
             seconds[jobs], peak_mb, told = timed(arguments)
             print(f"-j {jobs}    {seconds[jobs]:7.1f} s, largest process {peak_mb:.0f} MB; {told}", flush=True)
         print(f"two workers {seconds[1] / seconds[2]:.2f} times as fast as one, 1.8 wanted")
         print(f"-j 1 and -j 2: {different(root / 'j1', root / 'j2') or 'identical'}", flush=True)
-        again, _peak, _told = timed(["run", str(root / "logs"), "-o", str(root / "j2"), "-j", "2"])
+        again, _peak, _told = timed(["run", str(root / "logs"), "-o", str(root / "j2"), "-j", "2", *PDF])
         print(f"again   {again:7.1f} s, nothing to do", flush=True)
         with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-            arguments = ["run", str(root / "logs"), "-o", str(root / "dask"), "--scheduler", cluster.scheduler_address]
+            arguments = [
+                "run",
+                str(root / "logs"),
+                "-o",
+                str(root / "dask"),
+                "--scheduler",
+                cluster.scheduler_address,
+                *PDF,
+            ]
             dask_s, _peak, _told = timed(arguments)
         print(f"Dask    {dask_s:7.1f} s with two workers, {dask_s / seconds[2]:.2f} of -j 2", flush=True)
         print(f"Dask and -j 2: {different(root / 'dask', root / 'j2') or 'identical'}", flush=True)
@@ -161,7 +172,7 @@ def main() -> None:
         few.mkdir()
         for path in sorted((root / "logs").iterdir())[:FLIGHTS_KILLED]:
             (few / path.name).write_bytes(path.read_bytes())
-        timed(["run", str(few), "-o", str(root / "whole"), "-j", "2"])
+        timed(["run", str(few), "-o", str(root / "whole"), "-j", "2", *PDF])
         print(f"{KILLS} times killed and continued, {FLIGHTS_KILLED} flights: {kills(few, root / 'whole', root)}")
 
 

@@ -1,4 +1,4 @@
-"""`run` on one hour at 100 Hz: wall time by stage, peak memory, and compile time apart."""
+"""`run` on one hour at 100 Hz: wall time by stage, peak memory, and compile time apart; ``--pdf``: with PDFs."""
 
 import os
 import re
@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 COMMAND = [sys.executable, "-m", "groundstation"]
+PDF = [one for one in sys.argv[1:] if one == "--pdf"]
 
 
 def run_once(log: Path, out: Path, cache: Path) -> tuple[float, str]:
@@ -17,7 +18,11 @@ def run_once(log: Path, out: Path, cache: Path) -> tuple[float, str]:
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
     started = time.perf_counter()
     done = subprocess.run(
-        [*COMMAND, "run", str(log), "-o", str(out), "-v"], check=True, capture_output=True, text=True, env=environment
+        [*COMMAND, "run", str(log), "-o", str(out), "-v", *PDF],
+        check=True,
+        capture_output=True,
+        text=True,
+        env=environment,
     )
     return time.perf_counter() - started, done.stderr
 

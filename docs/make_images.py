@@ -56,6 +56,7 @@ def main() -> None:
         flight = shoot(LOG, home, TABS)
         groundstation("simulate", LONG_FLIGHT, "-o", str(home))
         shoot(home / f"{LONG_FLIGHT}.csv", home, LONG_TABS, PLAYHEAD_S)
+        groundstation("report", str(flight), "--pdf")
         pdf, page = flight / "report.pdf", home / "page"
         subprocess.run(["pdftoppm", "-r", "80", "-f", "1", "-l", "1", "-singlefile", "-png", pdf, page], check=True)
         save(page.with_suffix(".png").read_bytes(), "report")

@@ -13,6 +13,6 @@ def load(folder: Path) -> files.SavedFlight:
     return files.load(folder, ANSWER_TYPES)
 
 
-def write_flight_report(folder: Path, *, with_pdf: bool = True) -> Written:
+def write_flight_report(folder: Path, *, with_pdf: bool = False) -> Written:
     """The report of a flight folder."""
     return write(folder, ANSWER_TYPES, with_pdf=with_pdf)

@@ -199,15 +199,15 @@ def test_equal_folders_give_equal_pages(tmp_path: Path) -> None:
 def test_exit_code_is_that_of_a_limit_reached_only_where_asked(tmp_path: Path) -> None:
     save_fleet(tmp_path, [3.0] * 6)
     run = CliRunner()
-    call = ["report", str(tmp_path), "--standard", "app-g", "--no-pdf"]
+    call = ["report", str(tmp_path), "--standard", "app-g"]
     assert run.invoke(app, call).exit_code == 0
     assert run.invoke(app, [*call, "--fail-on", "fail"]).exit_code == 4
     (tmp_path / "few").mkdir()
     save_fleet(tmp_path / "few", [1.0])
-    few = ["report", str(tmp_path / "few"), "--standard", "app-g", "--no-pdf", "--fail-on"]
+    few = ["report", str(tmp_path / "few"), "--standard", "app-g", "--fail-on"]
     assert [run.invoke(app, [*few, level]).exit_code for level in ("fail", "warn")] == [0, 4]
     short = save_flight(tmp_path / "short", 1, 1.0, hours=0.05)  # no flight counts: nothing is shown
-    none = ["report", str(short.parent), "--standard", "app-g", "--no-pdf", "--fail-on"]
+    none = ["report", str(short.parent), "--standard", "app-g", "--fail-on"]
     assert [run.invoke(app, [*none, level]).exit_code for level in ("fail", "warn")] == [0, 4]
     (short / "summary.json").write_text("{")
     ended = run.invoke(app, [*none, "none"])

@@ -185,7 +185,7 @@ def test_limits_are_settings_and_not_in_keys_or_manifests(tmp_path: Path) -> Non
     configuration = load_configuration(file)
     assert configuration.isolation == Isolation(memory_mb=900.0) and configuration.to_dict() == {}
     source = Source("a", "b", 1, "c")
-    assert keys_of(source, configuration, with_pdf=True) == keys_of(source, Configuration(), with_pdf=True)
+    assert keys_of(source, configuration) == keys_of(source, Configuration())
     file.write_text("[isolation]\nmemory_mb = 1.0\n")
     with pytest.raises(SettingsError, match="memory_mb"):
         load_configuration(file)

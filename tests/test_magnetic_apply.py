@@ -5,6 +5,7 @@ import io
 import json
 import re
 import shutil
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -197,7 +198,7 @@ def test_a_magnetometer_turned_by_2_5_deg_is_put_right(tmp_path: Path) -> None:
     made = magnetic_example.make(hard_nt=(0.0, 0.0, 0.0), soft=mounted)
     results = analysed(made.flight, Configuration({"magnetic": {"alignment_sigma_deg": 0.3}}))
     save(tmp_path, results, Manifest())
-    paths, problem = write_exports(load(tmp_path), with_pdf=False)
+    paths, problem = write_exports(load(tmp_path), with_card=False)
     assert ([path.name for path in paths], problem) == ([DEVIATION_CSV], "")
     rows = list(csv.DictReader(io.StringIO((tmp_path / DEVIATION_CSV).read_text(encoding="utf-8"), newline="")))
     shown = rows[92]
@@ -487,16 +488,16 @@ def test_a_name_is_no_formula_and_comes_back(tmp_path: Path) -> None:
 
 def test_without_a_deviation_there_are_no_files_and_old_ones_go(tmp_path: Path) -> None:
     save(tmp_path, figure_eight(), Manifest())
-    write_exports(load(tmp_path), with_pdf=True)
+    write_exports(load(tmp_path))
     assert (tmp_path / DEVIATION_CSV).exists() and (tmp_path / STEER_CARD).exists()
     save(tmp_path, replace(figure_eight(), answers={}, figures=()), Manifest())
-    assert write_exports(load(tmp_path), with_pdf=True) == ((), "")
+    assert write_exports(load(tmp_path)) == ((), "")
     assert not (tmp_path / DEVIATION_CSV).exists() and not (tmp_path / STEER_CARD).exists()
 
 
 def test_arrays_that_are_missing_are_told(tmp_path: Path) -> None:
     save(tmp_path, replace(figure_eight(), figures=()), Manifest())
-    paths, problem = write_exports(load(tmp_path), with_pdf=False)
+    paths, problem = write_exports(load(tmp_path), with_card=False)
     assert (paths, problem[:26]) == ((), "deviation.csv: not written")
 
 
@@ -570,7 +571,7 @@ def test_a_damaged_answer_is_one_line_and_leaves_no_new_report(tmp_path: Path) -
     summary["results"]["magnetic"]["card"] = "?"
     (folder / SUMMARY).write_text(json.dumps(summary), encoding="utf-8")
     with pytest.raises(UnreadableLogError, match=r"results\.magnetic\.card"):
-        write_exports(load(folder), with_pdf=False)
+        write_exports(load(folder), with_card=False)
     answer = CliRunner().invoke(app, ["report", str(folder.parent)])
     assert answer.exit_code == 1
     (line,) = (line for line in answer.stderr.splitlines() if "results.magnetic.card" in line)
@@ -588,13 +589,12 @@ def test_the_template_of_the_card_reads_and_imports_nothing() -> None:
 # ---------------------------------------------------------------------------------------------- files of a run
 
 
-def run_stages(log: Path, out: Path, configuration: Configuration, with_pdf: bool = True) -> tuple[Outcome, set[str]]:
+def run_stages(log: Path, out: Path, configuration: Configuration) -> tuple[Outcome, set[str]]:
     told: set[str] = set()
     (outcome,) = run_many(
         [log],
         out,
         configuration,
-        with_pdf=with_pdf,
         listen=lambda event: told.update({event.text} if event.kind == "stage" else ()),
     )
     return outcome, told
@@ -646,13 +646,32 @@ def test_what_is_finished_is_not_done_again(first: Path, logs: tuple[Path, Path]
         (folder / name).unlink()
         assert plan(own).startswith(wanted), name
         (folder / name).write_bytes(content)
-    _outcome, told = run_stages(logs[0], out, own, with_pdf=False)
+    (folder / STEER_CARD).unlink()
+    _outcome, told = run_stages(logs[0], out, own)
     assert told == {"reporting"}
-    assert not (folder / STEER_CARD).exists() and (folder / DEVIATION_CSV).exists()
-    assert STEER_CARD not in (folder / "report.html").read_text(encoding="utf-8")
-    paths, problems = report_again(out)
+    assert (folder / STEER_CARD).read_bytes() == (first / STEER_CARD).read_bytes()
+    assert (folder / "report.html").read_bytes() == (first / "report.html").read_bytes()
+    paths, problems, _removed = report_again(out)
     assert {folder / STEER_CARD, folder / DEVIATION_CSV} <= set(paths) and not problems
     assert (folder / STEER_CARD).read_bytes() == (first / STEER_CARD).read_bytes()
+
+
+def test_a_page_leads_to_no_card_that_could_not_be_made(
+    logs: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "typst", None)
+        outcome, _told = run_stages(logs[0], out, Configuration())
+    folder = Path(outcome.folder)
+    assert outcome.code == 0 and f"{STEER_CARD}: not written, typst failed" in outcome.text
+    assert STEER_CARD not in (folder / "report.html").read_text(encoding="utf-8")
+    _outcome, told = run_stages(logs[0], out, Configuration())
+    assert told == {"reporting"} and (folder / STEER_CARD).is_file()
+    assert f'href="{STEER_CARD}"' in (folder / "report.html").read_text(encoding="utf-8")
+    (folder / DEVIATION_CSV).unlink()
+    run_many([logs[0]], out, Configuration(), only_results=True)
+    assert (folder / DEVIATION_CSV).is_file() and (folder / STEER_CARD).is_file(), "what there is of reports stays"
 
 
 def test_what_is_applied_is_part_of_what_is_remembered(first: Path, logs: tuple[Path, Path], tmp_path: Path) -> None:
@@ -661,13 +680,13 @@ def test_what_is_applied_is_part_of_what_is_remembered(first: Path, logs: tuple[
     shutil.copytree(first.parent, out, copy_function=shutil.copy2)
     folder = out / first.name
     before = mcap_in(folder).read_bytes()
-    outcome, told = run_stages(logs[0], out, Configuration(apply=asked_for(str(table))), with_pdf=False)
+    outcome, told = run_stages(logs[0], out, Configuration(apply=asked_for(str(table))))
     assert "estimating" in told and "converting" not in told and outcome.code == 0
     assert mcap_in(folder).read_bytes() != before
     assert json.loads((folder / "manifest.json").read_text())["configuration"]["apply"]["from"] == "F1"
     table.write_text(table_text(1.0), encoding="utf-8")
     assert plan_many([logs[0]], out, Configuration(apply=asked_for(str(table))))[0].text.startswith("to analyse again")
-    run_stages(logs[0], out, Configuration(), with_pdf=False)
+    run_stages(logs[0], out, Configuration())
     assert not mcap_in(folder).exists() and (folder / DEVIATION_CSV).exists()
     assert not list(out.glob(".partial-*"))
 
@@ -680,15 +699,18 @@ def test_a_run_elsewhere_has_the_files_and_loses_those_it_did_not_make(
     store.pseudo_dirs[:] = [""]
     far, out = RemoteFolder("memory://out"), "memory://out"
 
-    def run(configuration: Configuration, *, with_pdf: bool = True) -> set[str]:
+    def run(configuration: Configuration, *, with_pdf: bool = False) -> set[str]:
         run_many([logs[0]], out, configuration, jobs=1, with_pdf=with_pdf)
         return set(far.names(first.name))
 
     names = run(Configuration(apply=Apply()))
     assert {DEVIATION_CSV, STEER_CARD, mcap_in(first).name} <= names
     assert far.read(f"{first.name}/{DEVIATION_CSV}") == (first / DEVIATION_CSV).read_bytes()
-    assert names - run(Configuration(apply=Apply()), with_pdf=False) == {"report.pdf", STEER_CARD}
-    assert names - run(Configuration(), with_pdf=False) == {"report.pdf", STEER_CARD, mcap_in(first).name}
+    card = far.read(f"{first.name}/{STEER_CARD}")
+    assert run(Configuration(apply=Apply()), with_pdf=True) - names == {"report.pdf"}
+    assert far.read(f"{first.name}/{STEER_CARD}") == card
+    assert names - run(Configuration()) == {mcap_in(first).name}
+    assert "report.pdf" not in far.names(first.name)
 
 
 def test_the_mcap_of_a_flight_is_found_beside_it(first: Path, tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_plan_has_the_files_of_a_run_and_obeys_the_schema(made: Path) -> None:
     names = {path.name for path in made.iterdir()}
     assert names == {
-        *("summary.json", "manifest.json", "report.html", "report.pdf", "tables", "arrays"),
+        *("summary.json", "manifest.json", "report.html", "tables", "arrays"),
         *("mine.rrd", "plan.toml"),
     }
     summary = json.loads((made / "summary.json").read_text(encoding="utf-8"))
@@ -78,7 +78,7 @@ def test_a_plan_has_the_files_of_a_run_and_obeys_the_schema(made: Path) -> None:
 
 def test_equal_scenarios_give_equal_bytes(made: Path, tmp_path: Path) -> None:
     again = Path(run_plan("session", scenario(tmp_path), tmp_path / "out").folder)
-    for name in ("summary.json", "report.html", "report.pdf", "plan.toml"):
+    for name in ("summary.json", "report.html", "plan.toml"):
         assert (again / name).read_bytes() == (made / name).read_bytes(), name
     for table in sorted((made / "tables").iterdir()):
         assert (again / "tables" / table.name).read_bytes() == table.read_bytes(), table.name

@@ -38,7 +38,7 @@ def kinds(out: Path) -> dict[str, list[str]]:
     """Files of an OUT by what a run does for one that is emptied; of samples and datasets the first."""
     folder = flight_in(out)
     inside = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    (mcap,), reports = (name for name in inside if name.endswith(".mcap")), {"report.html", "report.pdf"}
+    (mcap,), reports = (name for name in inside if name.endswith(".mcap")), {"report.html"}
     everything = {"to run": {mcap}, "manifest": {"manifest.json"}, "summary": {"summary.json"}, "to report": reports}
     everything["to analyse"] = inside - set().union(*everything.values())
     found = {plan: [f"{folder.name}/{name}" for name in sorted(names)] for plan, names in everything.items()}
@@ -154,7 +154,9 @@ def test_what_is_reported_again_is_taken_down_and_nothing_else(finished: Path, t
     report_again(out)
     assert load_manifest(folder).files["report.html"].size_bytes == (folder / "report.html").stat().st_size
     assert plan_many([SHORT], out, Configuration())[0].text.startswith("to analyse"), "the recording is still lost"
-    report_again(out, with_pdf=False)
+    report_again(out, with_pdf=True)
+    assert "report.pdf" in load_manifest(folder).files
+    report_again(out)
     assert "report.pdf" not in load_manifest(folder).files
 
 

@@ -247,7 +247,7 @@ def test_what_is_read_along_with_a_reference_counts_in_what_a_run_need_not_do_ag
 
     def key(reference: Path) -> str:
         configuration = Configuration(references=References((reference,)))
-        return keys_of(source, configuration, with_pdf=False).conversion
+        return keys_of(source, configuration).conversion
 
     (inside,) = bag.glob("*.mcap")
     for reference, other in ((sbet, tmp_path / "smrmsg_20260504.out"), (bag, inside), (bag / "metadata.yaml", inside)):

@@ -109,12 +109,19 @@ def test_a_flight_elsewhere_loses_its_pdf_and_keeps_what_somebody_put_there(
     out, source = f"{memory}out", f"{memory}logs"
     far = RemoteFolder(out)
     RemoteFolder(source).write(SHORT.name, SHORT.read_bytes())
-    (done,) = run_many([source], out, Configuration(), jobs=1)
+    (done,) = run_many([source], out, Configuration(), jobs=1, with_pdf=True)
     far.write(f"{done.flight_id}/notes.txt", b"mine")
     assert json.loads(far.read(f"{done.flight_id}/manifest.json") or b"")["source"]["path"] == f"{source}/{SHORT.name}"
-    run_many([source], out, Configuration(), jobs=1, with_pdf=False)  # the reports alone
-    assert not {"report.pdf", "summary.pdf"} & {name.rpartition("/")[2] for name in far.files()}
-    run_many([source], out, SETTINGS, jobs=1, with_pdf=False)  # the analysis
+    pdfs = f"{done.flight_id}/report.pdf", "summary.pdf"
+    (content,) = {far.read(pdfs[0])} - {None}
+    run_many([source], out, Configuration(), jobs=1)  # nothing: they tell of what is there
+    assert far.read(pdfs[0]) == content and pdfs[1] in far.files()
+    far.remove(pdfs[0])
+    page = far.read(f"{done.flight_id}/report.html")
+    run_many([source], out, Configuration(), jobs=1, with_pdf=True)  # the PDF alone
+    assert far.read(pdfs[0]) == content and far.read(f"{done.flight_id}/report.html") == page
+    run_many([source], out, SETTINGS, jobs=1)  # the analysis
+    assert pdfs[0] not in far.files()
     assert far.read(f"{done.flight_id}/notes.txt") == b"mine"
 
 

@@ -225,7 +225,7 @@ def test_nothing_from_a_log_becomes_markup(tmp_path: Path) -> None:
 @pytest.mark.slow  # test_run.py tells it of a sample log
 def test_equal_input_gives_equal_bytes_in_any_process(tmp_path: Path) -> None:
     save(tmp_path, example(heading_result()), MANIFEST)
-    files = write_flight_report(tmp_path).paths
+    files = write_flight_report(tmp_path, with_pdf=True).paths
     assert [path.name for path in files] == [REPORT, PDF]
     first = [path.read_bytes() for path in files]
     (tmp_path / "manifest.json").write_text(
@@ -233,7 +233,7 @@ def test_equal_input_gives_equal_bytes_in_any_process(tmp_path: Path) -> None:
     )
     code = (
         "import sys; from pathlib import Path; from tests.saved import write_flight_report;"
-        "write_flight_report(Path(sys.argv[1]))"
+        "write_flight_report(Path(sys.argv[1]), with_pdf=True)"
     )
     matplotlibrc = tmp_path / "matplotlibrc"
     matplotlibrc.write_text("lines.linewidth: 7\nsvg.hashsalt: other\nfont.size: 20\n")

@@ -48,7 +48,7 @@ def packed(text: str) -> str:
 
 def paper(folder: Path, results: FlightResults) -> PdfReader:
     save(folder, results, MANIFEST)
-    written = write_flight_report(folder)
+    written = write_flight_report(folder, with_pdf=True)
     assert not written.problem
     return PdfReader(folder / PDF)
 
@@ -261,9 +261,9 @@ def test_without_typst_the_page_is_there_and_one_line_says_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, typst: ModuleType | None
 ) -> None:
     save(tmp_path, html.without_figures(example(heading_result())), MANIFEST)
-    assert write_flight_report(tmp_path).paths[1].is_file()
+    assert write_flight_report(tmp_path, with_pdf=True).paths[1].is_file()
     monkeypatch.setitem(sys.modules, "typst", typst)
-    written = write_flight_report(tmp_path)
+    written = write_flight_report(tmp_path, with_pdf=True)
     assert [path.name for path in written.paths] == [REPORT]
     assert "report.pdf: not written, typst" in written.problem and "\n" not in written.problem
     assert not (tmp_path / PDF).exists()  # the old one told of other results
@@ -283,20 +283,18 @@ def test_a_template_that_cannot_be_set_is_told(tmp_path: Path, monkeypatch: pyte
         write_pdf(document(), tmp_path / PDF)
 
 
-def test_a_run_without_pdf_leaves_none_and_report_makes_it_again(
+def test_a_report_makes_the_pdf_of_the_run_again_and_one_line_says_why_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log, out = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv", tmp_path / "out"
-    (outcome,) = run_many([log], out, Configuration())
+    (outcome,) = run_many([log], out, Configuration(), with_pdf=True)
     made = Path(outcome.folder) / PDF
     first = made.read_bytes()
-    run_many([log], out, Configuration(), with_pdf=False)
-    assert not made.exists() and (made.parent / REPORT).is_file()
-    paths, problems = report_again(out)
-    assert made in paths and not problems and made.read_bytes() == first
+    done = report_again(out, with_pdf=True)
+    assert made in done.written and not done.problems and not done.removed and made.read_bytes() == first
     monkeypatch.setitem(sys.modules, "typst", None)
-    problem, of_fleet = report_again(out)[1]
+    problem, of_fleet = report_again(out, with_pdf=True).problems
     assert problem.code == of_fleet.code == 0 and "summary.pdf: not written" in of_fleet.text
     assert problem.text.startswith(f"{made.parent.name}: report.pdf: not written")
-    outcome, _ = run_many([log], out, Configuration())
+    outcome, _ = run_many([log], out, Configuration(), with_pdf=True)
     assert outcome.state == "done" and "report.pdf: not written, typst failed" in outcome.text

@@ -70,7 +70,7 @@ def flight_in(out: Path) -> Path:
 
 
 def stages(
-    paths: list[Path], out: Path, configuration: Configuration, with_pdf: bool = True
+    paths: list[Path], out: Path, configuration: Configuration, with_pdf: bool = False
 ) -> tuple[Outcome, set[str]]:
     """The outcome of one log, and which stages were gone through."""
     told: set[str] = set()
@@ -142,15 +142,6 @@ def test_a_limit_of_the_ledger_redoes_everything(finished: Path) -> None:
     changed = Configuration({"thresholds": {"version": 1, "gaps": {"min_s": 0.7}}}, files={"thresholds": "ours.toml"})
     (planned,) = plan_many([SHORT], finished, changed)
     assert planned.text == "to run"
-
-
-def test_the_pdf_alone_is_made_again(finished: Path, tmp_path: Path) -> None:
-    out = copied(finished, tmp_path / "out")
-    _outcome, told = stages([SHORT], out, Configuration(), with_pdf=False)
-    assert told == {"reporting"} and not (flight_in(out) / "report.pdf").exists()
-    _outcome, told = stages([SHORT], out, Configuration())
-    assert told == {"reporting"}
-    assert_equal_runs(out, finished)
 
 
 @pytest.mark.parametrize(

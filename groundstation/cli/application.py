@@ -122,7 +122,13 @@ Together = Annotated[
     bool,
     typer.Option("--together", help="The logs are of one flight: put them on one clock, by GNSS time or by motion."),
 ]
-NoPdf = Annotated[bool, typer.Option("--no-pdf", help="Do not write report.pdf and steer_card.pdf.")]
+Pdf = Annotated[
+    bool,
+    typer.Option(
+        "--pdf/--no-pdf",
+        help="Write the reports as PDF too. A steer card and an acceptance are written as PDF in any case.",
+    ),
+]
 Only = Annotated[
     Literal["results"] | None,
     typer.Option(
@@ -224,6 +230,18 @@ ReferenceFiles = Annotated[
         readable=False,
     ),
 ]
+
+
+def refuse_pdf_of_results(only: str | None, *, pdf: bool) -> None:
+    """Refuse to make PDFs where no reports are asked for.
+
+    Raises
+    ------
+    UsageError
+        When both options are given.
+    """
+    if only == "results" and pdf:
+        raise UsageError("--only results", "--pdf", "one of them", "`report OUT --pdf` makes the reports later")
 
 
 def time_limit_s(given: float | None) -> float:

@@ -37,9 +37,7 @@ def serve(
     return DONE
 
 
-def acceptance(
-    out: Path, standard: str, output: Path | None, fail_on: FailOnMode, *, with_pdf: bool, quiet: bool, json: bool
-) -> int:
+def acceptance(out: Path, standard: str, output: Path | None, fail_on: FailOnMode, *, quiet: bool, json: bool) -> int:
     """Write the acceptance of the INS of a folder and print its front; 1 where a flight cannot be read.
 
     Else 4 where ``fail_on`` is reached: with ``warn`` also where nothing was judged that the standard asks for.
@@ -50,7 +48,7 @@ def acceptance(
     from groundstation.pipeline.many_flights.acceptance import accept_to
 
     with gathered_failures():
-        found, paths, problem = accept_to(out, standard, output, with_pdf=with_pdf)
+        found, paths, problem = accept_to(out, standard, output)
         lacking = failures()
     if json:
         tell(as_json(found.to_dict() | {"written": [str(path) for path in paths]}))

@@ -30,8 +30,8 @@ from groundstation.cli.application import (
     Isolate,
     Jobs,
     Json,
-    NoPdf,
     Only,
+    Pdf,
     PowerUp,
     Profile,
     Progress,
@@ -47,6 +47,7 @@ from groundstation.cli.application import (
     answers_with_exit_code,
     app,
     examples,
+    refuse_pdf_of_results,
     say,
     tell,
     tell_written,
@@ -116,7 +117,7 @@ def run(
             readable=False,
         ),
     ] = None,
-    no_pdf: NoPdf = False,
+    pdf: Pdf = False,
     only: Only = None,
     store: Store = "",
     redo: Annotated[bool, typer.Option("--redo", help="Repeat what an earlier run finished.")] = False,
@@ -140,6 +141,7 @@ def run(
     from groundstation.pipeline.many_flights.references import judged_by
     from groundstation.pipeline.one_flight.configuration import applying, installed_as, load_configuration
 
+    refuse_pdf_of_results(only, pdf=pdf)
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd, weather)
     is_one_log = together or (len(paths) == 1 and not Path(paths[0]).is_dir())
     settings = installed_as(applying(settings, apply), installation)
@@ -150,7 +152,7 @@ def run(
     if isolate and (dry_run or scheduler):
         raise UsageError("--isolate", "--dry-run or --scheduler", "--isolate without them")
     if dry_run:
-        plan = partial(plan_many, with_pdf=not no_pdf, only_results=only == "results")
+        plan = partial(plan_many, with_pdf=pdf, only_results=only == "results")
         planned = plan(paths, output, configuration, redo=redo, stations=stations)
         printing.outcomes(planned, as_json_text=json, quiet=quiet, is_plan=True)
         return DONE
@@ -174,7 +176,7 @@ def run(
                 configuration,
                 force=force,
                 fail_on=fail_on,
-                with_pdf=not no_pdf,
+                with_pdf=pdf,
                 only_results=only == "results",
                 listen=listen,
             )
@@ -209,25 +211,28 @@ def report(
             help="With --standard: exit 4 if it is failed (fail), or also if flights are too few to pass (warn).",
         ),
     ] = "none",
-    no_pdf: NoPdf = False,
+    pdf: Pdf = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
     """Make the reports and the index again from the saved results, without the logs; or the acceptance of the INS."""
     from groundstation.cli import printing
+    from groundstation.cli.text import printable
 
     if standard:
-        return fleets.acceptance(out, standard, output, fail_on, with_pdf=not no_pdf, quiet=quiet, json=json)
+        return fleets.acceptance(out, standard, output, fail_on, quiet=quiet, json=json)
     if output is not None or fail_on != "none":
         raise UsageError("report", "-o or --fail-on without --standard", "--standard NAME too")
     from groundstation.pipeline.many_flights.publishing import report_again
 
-    paths, problems = report_again(out, with_pdf=not no_pdf)
-    tell_written(paths, as_json_text=json, quiet=quiet)
-    for problem in problems:
+    done = report_again(out, with_pdf=pdf)
+    tell_written(done.written, as_json_text=json, quiet=quiet)
+    if done.removed and not quiet:
+        say(printable(printing.removed(done.removed)))
+    for problem in done.problems:
         say(f"{'error' if problem.code else 'warning'}: {problem.text}")
-    return printing.worst_code(problems)
+    return printing.worst_code(done.problems)
 
 
 @app.command(epilog=examples("view"))
@@ -299,7 +304,7 @@ def cooperative(
     config: ConfigFile = None,
     profile: Profile = None,
     fail_on: FailOn = "none",
-    no_pdf: NoPdf = False,
+    pdf: Pdf = False,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -324,7 +329,7 @@ def cooperative(
             stations=stations,
             force=force,
             fail_on=fail_on,
-            with_pdf=not no_pdf,
+            with_pdf=pdf,
             listen=listen,
         )
     printing.outcomes(outcomes, as_json_text=json, quiet=quiet, with_times=verbose)

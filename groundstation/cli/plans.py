@@ -11,7 +11,7 @@ from groundstation.cli.application import (
     FailOn,
     Force,
     Json,
-    NoPdf,
+    Pdf,
     Progress,
     Quiet,
     Verbose,
@@ -43,7 +43,7 @@ def session(
     output: Output = None,
     listed: Listed = False,
     fail_on: FailOn = "none",
-    no_pdf: NoPdf = False,
+    pdf: Pdf = False,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -51,7 +51,7 @@ def session(
     progress: Progress = "auto",
 ) -> int | None:
     """Plan how aircraft should move, within their bounds, for the accuracy of one of them."""
-    return _plan("session", scenario, output, listed, fail_on, no_pdf, force, quiet, verbose, json, progress)
+    return _plan("session", scenario, output, listed, fail_on, pdf, force, quiet, verbose, json, progress)
 
 
 @plans.command()
@@ -61,7 +61,7 @@ def landing(
     output: Output = None,
     listed: Listed = False,
     fail_on: FailOn = "none",
-    no_pdf: NoPdf = False,
+    pdf: Pdf = False,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -69,7 +69,7 @@ def landing(
     progress: Progress = "auto",
 ) -> int | None:
     """Plan an approach by ranges to reference points: which category's accuracy is met, and where."""
-    return _plan("landing", scenario, output, listed, fail_on, no_pdf, force, quiet, verbose, json, progress)
+    return _plan("landing", scenario, output, listed, fail_on, pdf, force, quiet, verbose, json, progress)
 
 
 def _plan(
@@ -78,7 +78,7 @@ def _plan(
     output: Path | None,
     listed: bool,
     fail_on: FailOn,
-    no_pdf: bool,
+    pdf: bool,
     force: bool,
     quiet: bool,
     verbose: bool,
@@ -99,6 +99,6 @@ def _plan(
     if scenario is None or output is None:
         raise UsageError(f"plan {kind}", "no FILE or no -o", "a scenario and a folder for the results")
     with listener("none" if quiet else progress) as listen:
-        outcome = run_plan(kind, scenario, output, force=force, fail_on=fail_on, with_pdf=not no_pdf, listen=listen)
+        outcome = run_plan(kind, scenario, output, force=force, fail_on=fail_on, with_pdf=pdf, listen=listen)
     printing.outcomes((outcome,), as_json_text=json, quiet=quiet, with_times=verbose)
     return outcome.code

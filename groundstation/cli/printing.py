@@ -111,6 +111,18 @@ def tell_errors(outcome: Outcome, *, with_traces: bool = False) -> None:
         say(trace.rstrip())
 
 
+def removed(pdfs: Sequence[Path]) -> str:
+    """Line on PDFs of an earlier run that a report without PDFs removed.
+
+    Examples
+    --------
+    >>> removed([Path("out/summary.pdf")]), removed([Path("out/summary.pdf"), Path("out/a/report.pdf")])
+    ('removed out/summary.pdf of an earlier run; --pdf makes it', 'removed 2 PDFs of an earlier run; --pdf makes them')
+    """
+    told, them = (str(pdfs[0]), "it") if len(pdfs) == 1 else (f"{len(pdfs)} PDFs", "them")
+    return f"removed {told} of an earlier run; --pdf makes {them}"
+
+
 def _names(done: Sequence[Outcome]) -> list[str]:
     """Logs by the names of their files; by their paths where two files have one name."""
     files = [outcome.source if outcome.is_session else log_name(Path(outcome.source)) for outcome in done]

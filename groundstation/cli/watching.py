@@ -15,8 +15,8 @@ from groundstation.cli.application import (
     Isolate,
     Jobs,
     Json,
-    NoPdf,
     Only,
+    Pdf,
     Profile,
     Progress,
     Quiet,
@@ -28,6 +28,7 @@ from groundstation.cli.application import (
     answers_with_exit_code,
     app,
     examples,
+    refuse_pdf_of_results,
     say,
     time_limit_s,
 )
@@ -69,7 +70,7 @@ def watch(
     timeout: Timeout = None,
     isolate: Isolate = False,
     fail_on: FailOn = "none",
-    no_pdf: NoPdf = False,
+    pdf: Pdf = False,
     only: Only = None,
     force: Force = False,
     quiet: Quiet = False,
@@ -88,6 +89,7 @@ def watch(
     from groundstation.pipeline.many_flights.watching import watch as looked_at
     from groundstation.pipeline.one_flight.configuration import load_configuration
 
+    refuse_pdf_of_results(only, pdf=pdf)
     timeout_s = time_limit_s(timeout)
     settings = load_configuration(config, aircraft, site, profile=profile, thresholds=thresholds, icds=icd)
     configuration = judged_by(settings, reference or (), is_one_log=False)
@@ -99,7 +101,7 @@ def watch(
             once=once,
             jobs=jobs,
             fail_on=fail_on,
-            with_pdf=not no_pdf,
+            with_pdf=pdf,
             stations=stations,
             force=force,
             only_results=only == "results",

@@ -187,8 +187,8 @@ class OpenLog(OpenFlight):
         layouts: dict[str, Any] = {"profile": Path(profile) if profile else None, "icds": self.configuration.icds}
         return OpenLog(self._conversion, load_configuration(document, **layouts))
 
-    def save(self, out: AnyPath, *, force: bool = False) -> "SavedRun":
-        """Run the log into ``out`` as the verb ``run`` does, and open the flight folder.
+    def save(self, out: AnyPath, *, force: bool = False, pdf: bool = False) -> "SavedRun":
+        """Run the log into ``out`` as the verb ``run`` does, with ``pdf`` as with its option, and open the folder.
 
         Raises
         ------
@@ -198,7 +198,8 @@ class OpenLog(OpenFlight):
         from groundstation.pipeline.many_flights.batch import run_many
 
         with told_in_a_line(str(out)):
-            outcome = run_many([self._conversion.log.path], Path(out), self.configuration, jobs=1, force=force)[0]
+            log = self._conversion.log.path
+            outcome = run_many([log], Path(out), self.configuration, jobs=1, force=force, with_pdf=pdf)[0]
             if not outcome.folder:
                 raise GroundstationError(str(out), outcome.text)
             return SavedRun(Path(outcome.folder))

@@ -12,7 +12,7 @@ from groundstation.reports.flight_report import ACCEPTANCE, Written, flight_repo
 from groundstation.results.acceptance import Acceptance
 
 
-def write_acceptance_report(page: Path, found: Acceptance, *, with_pdf: bool = True) -> Written:
+def write_acceptance_report(page: Path, found: Acceptance) -> Written:
     """Write the page and, beside it, the PDF; equal acceptances give equal bytes.
 
     Raises
@@ -23,7 +23,7 @@ def write_acceptance_report(page: Path, found: Acceptance, *, with_pdf: bool = T
     beside = page.with_suffix(".json").name
     with gathered_failures():
         document = acceptance_document(found)
-        return write_pages(page, lambda shown: flight_report_html(shown, beside), document, document, with_pdf=with_pdf)
+        return write_pages(page, lambda shown: flight_report_html(shown, beside), document, document, with_pdf=True)
 
 
 def acceptance_document(found: Acceptance) -> Document:

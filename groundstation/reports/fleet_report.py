@@ -1,4 +1,4 @@
-"""The report of a folder of flights: one self-contained HTML file with every flight, and its PDF."""
+"""The report of a folder of flights: one self-contained HTML file with every flight, and its PDF on demand."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,12 +13,12 @@ from groundstation.reports.flight_report import Written, write_pages
 from groundstation.reports.page import TEMPLATES, digest_of, render
 from groundstation.results.fleet import FleetResults
 
-PAGE = "summary.html"
+PAGE, PDF = "summary.html", "summary.pdf"
 MOST_ROWS_ON_PAPER = 60
 
 
-def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True) -> Written:
-    """Write summary.html and summary.pdf into a folder of flights.
+def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = False) -> Written:
+    """Write summary.html into a folder of flights.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True)
     fleet : FleetResults
         Equal results give equal bytes, whatever the time, the host or the order of the logs.
     with_pdf : bool
-        Without it there is no summary.pdf afterwards.
+        Write summary.pdf too. Without it one that is there stays if the page is as it was.
 
     Notes
     -----
@@ -43,7 +43,12 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = True)
     with gathered_failures():
         document = fleet_document(fleet)
         return write_pages(
-            out / PAGE, lambda shown: fleet_report_html(shown, fleet), document, on_paper(document), with_pdf=with_pdf
+            out / PAGE,
+            lambda shown: fleet_report_html(shown, fleet),
+            document,
+            on_paper(document),
+            with_pdf=with_pdf,
+            keeps_pdf=True,
         )
 
 

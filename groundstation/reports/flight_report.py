@@ -1,9 +1,8 @@
-"""The report of one flight: one self-contained HTML file and its PDF, made from the saved results alone."""
+"""The report of one flight: one self-contained HTML file, and its PDF on demand, made from the saved results alone."""
 
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 from groundstation.base.failures import Failure, attempt, failures, gathered_failures
@@ -18,7 +17,7 @@ from groundstation.reports.sections import flight_sections
 from groundstation.reports.steer_card import write_exports
 from groundstation.results.answer import Answer
 from groundstation.results.file_names import SUMMARY
-from groundstation.results.files import SavedFlight, load, put_failures, write_text
+from groundstation.results.files import SavedFlight, has_text, load, put_failures, write_text
 
 PARTS = "chapter", "figure", "report"  # of a report, by their kinds as failures tell them
 REPORT = "report.html"
@@ -41,8 +40,8 @@ class Written:
     failures: tuple[Failure, ...] = ()
 
 
-def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], *, with_pdf: bool = True) -> Written:
-    """Write report.html and report.pdf into a flight folder; with a magnetic deviation its table and steer card too.
+def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], *, with_pdf: bool = False) -> Written:
+    """Write report.html into a flight folder; with a magnetic deviation its table and steer card too.
 
     A part that fails by a defect is left out, and summary.json and the report tell it: those that failed elsewhere
     until then, too.
@@ -55,8 +54,7 @@ def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], 
     answer_types : mapping of analysis name to dataclass
         What its answers become.
     with_pdf : bool
-        Without it there is neither report.pdf nor steer_card.pdf afterwards: those of an earlier run would tell of
-        other results.
+        Write report.pdf too. Without it there is none afterwards: that of an earlier run would tell of other results.
 
     Raises
     ------
@@ -66,7 +64,7 @@ def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], 
     with gathered_failures():
         saved = load(folder, answer_types)
         # first: the report links to those that are there
-        exports = attempt("report", "exports", partial(write_exports, saved, with_pdf=with_pdf), unless=(OSError,))
+        exports = attempt("report", "exports", write_exports, saved, unless=(OSError,))
         written, problem = exports or ((), "")
         document = flight_document(saved)
         is_changed = put_failures(folder, failures(), PARTS)
@@ -79,23 +77,53 @@ def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], 
         return Written((*pages.paths, *written, *summary), problems, failures())
 
 
+def add_pdf(folder: Path, answer_types: Mapping[str, type[Answer]]) -> Written:
+    """Write report.pdf beside the page of a flight folder, parameters as of :func:`write_flight_report`.
+
+    The page and all else stay as they are, unless a part fails by a defect now: then both are written and tell it.
+    """
+    with gathered_failures():
+        document = flight_document(load(folder, answer_types))
+        if failures():
+            return write_flight_report(folder, answer_types, with_pdf=True)
+        path = folder / PDF
+        problem = _put_pdf(document, path)
+        return Written((path,) if path.is_file() else (), problem, failures())
+
+
 def write_pages(
-    page: Path, render: Callable[[Document], str], shown: Document, on_paper: Document, *, with_pdf: bool
+    page: Path,
+    render: Callable[[Document], str],
+    shown: Document,
+    on_paper: Document,
+    *,
+    with_pdf: bool,
+    keeps_pdf: bool = False,
 ) -> Written:
-    """Write a page and, beside it, a document as PDF; none of an earlier run stays."""
-    pdf, problem = page.with_suffix(".pdf"), ""
+    """Write a page and, with ``with_pdf``, a document as PDF beside it.
+
+    A PDF of an earlier run goes; with ``keeps_pdf`` that of an equal page stays.
+    """
+    pdf = page.with_suffix(".pdf")
     html = attempt("report", page.name, render, shown)
+    if not (keeps_pdf and html is not None and has_text(page, html)):
+        pdf.unlink(missing_ok=True)  # before the page is another one: a kill leaves no two that differ
     if html is None:
         page.unlink(missing_ok=True)
     else:
         write_text(page, html)
-    pdf.unlink(missing_ok=True)
-    if with_pdf:
-        try:
-            attempt("report", pdf.name, write_pdf, on_paper, pdf, unless=(OSError, PdfError))
-        except PdfError as error:
-            problem = str(error)
+    problem = _put_pdf(on_paper, pdf) if with_pdf else ""
     return Written(tuple(path for path in (page, pdf) if path.is_file()), problem, failures())
+
+
+def _put_pdf(document: Document, pdf: Path) -> str:
+    """Write a document as PDF in place of what is there; returns why there is none."""
+    pdf.unlink(missing_ok=True)
+    try:
+        attempt("report", pdf.name, write_pdf, document, pdf, unless=(OSError, PdfError))
+    except PdfError as error:
+        return str(error)
+    return ""
 
 
 def flight_document(saved: SavedFlight) -> Document:

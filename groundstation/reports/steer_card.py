@@ -54,8 +54,10 @@ class SteerCard:
     advisory: str = ADVISORY
 
 
-def write_exports(saved: SavedFlight, *, with_pdf: bool) -> tuple[tuple[Path, ...], str]:
+def write_exports(saved: SavedFlight, *, with_card: bool = True) -> tuple[tuple[Path, ...], str]:
     """Write deviation.csv and steer_card.pdf of a flight that has a magnetic deviation; others lose an old one.
+
+    Without ``with_card`` a card that is there stays.
 
     Returns
     -------
@@ -64,7 +66,7 @@ def write_exports(saved: SavedFlight, *, with_pdf: bool) -> tuple[tuple[Path, ..
     """
     answer = saved.results.answer(MagneticResult)
     table, card = saved.folder / DEVIATION_CSV, saved.folder / STEER_CARD
-    for path in (table, card):
+    for path in (table, card) if with_card or answer is None else (table,):
         path.unlink(missing_ok=True)
     if answer is None:
         return (), ""
@@ -75,7 +77,7 @@ def write_exports(saved: SavedFlight, *, with_pdf: bool) -> tuple[tuple[Path, ..
     else:
         write_text(table, text)
         paths.append(table)
-    if with_pdf:
+    if with_card:
         try:
             write_pdf(steer_card(saved.results, answer), card, TEMPLATE)
             paths.append(card)

@@ -110,6 +110,11 @@ def write_text(path: Path, text: str, *, is_synced: bool = True) -> None:
     write_bytes(path, text.encode("utf-8", "backslashreplace"), is_synced=is_synced)
 
 
+def has_text(path: Path, text: str) -> bool:
+    """Tell whether a file holds what :func:`write_text` would write."""
+    return path.is_file() and path.read_bytes() == text.encode("utf-8", "backslashreplace")
+
+
 def write_bytes(path: Path, content: bytes, *, is_synced: bool = True) -> None:
     """Write a file under a temporary name and move it into place: a kill never leaves half a file.
 

@@ -74,7 +74,6 @@ class Keys:
 
     conversion: str
     analysis: str
-    reports: str
 
 
 @dataclass(frozen=True)

@@ -88,15 +88,13 @@ def accept(out: Path, standard: str) -> Acceptance:
     )
 
 
-def accept_to(
-    out: Path, standard: str, folder: Path | None = None, *, with_pdf: bool = True
-) -> tuple[Acceptance, list[Path], str]:
+def accept_to(out: Path, standard: str, folder: Path | None = None) -> tuple[Acceptance, list[Path], str]:
     """Write an acceptance: page, PDF, JSON and the table of flights; ``folder`` left out, beside the flights.
 
     Returns
     -------
     Acceptance, list of Path, str
-        What was found, what was written, and why there is no PDF where one was asked for.
+        What was found, what was written, and why there is no PDF.
 
     Raises
     ------
@@ -109,7 +107,7 @@ def accept_to(
     found = accept(out, standard)
     target.mkdir(parents=True, exist_ok=True)
     stem = f"acceptance_{safe_part(found.name) or 'standard'}"
-    written = write_acceptance_report(target / f"{stem}.html", found, with_pdf=with_pdf)
+    written = write_acceptance_report(target / f"{stem}.html", found)
     write_text(target / f"{stem}.json", json_text(found.to_dict()))
     write_text(target / f"{stem}.csv", csv_text(flights_figure(found)))
     paths = [*written.paths, target / f"{stem}.json", target / f"{stem}.csv"]

@@ -53,7 +53,7 @@ def run_many(
     scheduler: str = "",
     force: bool = False,
     fail_on: str = "none",
-    with_pdf: bool = True,
+    with_pdf: bool = False,
     redo: bool = False,
     stations: Path | None = None,
     only_results: bool = False,
@@ -147,7 +147,7 @@ def run_together(
     *,
     force: bool = False,
     fail_on: str = "none",
-    with_pdf: bool = True,
+    with_pdf: bool = False,
     only_results: bool = False,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:

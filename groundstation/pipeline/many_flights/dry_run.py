@@ -22,6 +22,7 @@ PLANS: Mapping[str, str] = {
     "everything": "to run",
     "analysis": "to analyse again: a setting changed, a file is missing or a part failed; the MCAP stays",
     "reports": "to report again",
+    "pdf": "finished, its PDF to add",
     "nothing": "finished, nothing to do",
 }
 
@@ -31,7 +32,7 @@ def plan_many(
     out: Path | str,
     configuration: Configuration,
     *,
-    with_pdf: bool = True,
+    with_pdf: bool = False,
     redo: bool = False,
     stations: Path | None = None,
     only_results: bool = False,

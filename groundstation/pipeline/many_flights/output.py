@@ -15,6 +15,8 @@ from groundstation.pipeline.many_flights.remote import RemoteFolder
 from groundstation.pipeline.many_flights.remote_runs import BY_LOG, STAGING, array_files, remember_flight
 from groundstation.pipeline.one_flight.flight import is_made, place, remove
 from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
+from groundstation.reports.fleet_report import PDF as FLEET_PDF
 from groundstation.reports.flight_report import PDF, REPORT
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 
@@ -106,9 +108,9 @@ class RemoteOutput:
 
     def copy_all(self) -> None:
         """Make the copy of what is there already."""
-        index = self._out.read(OUT_FOLDER_MARK)
-        if index is not None:
-            (self.root / OUT_FOLDER_MARK).write_bytes(index)
+        for name in (OUT_FOLDER_MARK, FLEET_PAGE, FLEET_PDF):
+            if (content := self._out.read(name)) is not None:
+                (self.root / name).write_bytes(content)
         for name in self._out.names():
             if not name.startswith(".") and "." not in name:
                 self._copy(name)

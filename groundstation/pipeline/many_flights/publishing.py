@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
 from groundstation.base.failures import attempt, failures, gathered_failures
@@ -34,12 +35,13 @@ from groundstation.pipeline.one_flight.flight import REPORT_FILES
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.sealing import note
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
+from groundstation.reports.fleet_report import PDF as FLEET_PDF
 from groundstation.reports.fleet_report import write_fleet_report
 from groundstation.reports.index import IndexRow, Kind
 from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
 
 MOST_SKIPPED = 1000  # files that the index lists
-FLEET_RECORDING, FLEET_PDF = "fleet.rrd", str(Path(FLEET_PAGE).with_suffix(".pdf"))
+FLEET_RECORDING = "fleet.rrd"
 FLEET_FILES = (
     *(INDEX_JSON, INDEX_CSV, FLEET_PARQUET, FLIGHTS, SAMPLES, INSTALLATIONS),
     *(FLEET_RECORDING, FLEET_PAGE, FLEET_PDF),
@@ -51,7 +53,7 @@ def write_beside(
     outcomes: Sequence[Outcome],
     kept_rows: Sequence[IndexRow] = (),
     *,
-    with_pdf: bool = True,
+    with_pdf: bool = False,
     only_results: bool = False,
     found: Scan | None = None,
     remade: Sequence[str] | None = None,
@@ -167,27 +169,41 @@ def _listed(without_flight: Sequence[Outcome]) -> list[Outcome]:
     return [*others, *skipped[:MOST_SKIPPED], told]
 
 
-def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple[Outcome, ...]]:
-    """Make reports and index of an OUT (or the report of one flight folder) again from the saved results.
+class ReportedAgain(NamedTuple):
+    """What making reports again came to.
 
-    Returns
-    -------
-    list of Path, tuple of Outcome
-        What was written, and the flight folders that could not be read or have no PDF though one was asked for.
+    Parameters
+    ----------
+    written : list of Path
+    problems : tuple of Outcome
+        Flight folders that could not be read or have no PDF though one was asked for.
+    removed : list of Path
+        PDFs of an earlier run, which were not asked for.
+    """
+
+    written: list[Path]
+    problems: tuple[Outcome, ...]
+    removed: list[Path]
+
+
+def report_again(out: Path, *, with_pdf: bool = False) -> ReportedAgain:
+    """Make reports and index of an OUT (or the report of one flight folder) again from the saved results.
 
     Raises
     ------
     UsageError
         When the folder is not one that ``run`` made.
     """
-    from groundstation.reports.flight_report import write_flight_report
+    from groundstation.reports.flight_report import PDF, write_flight_report
 
     is_flight = (out / FLIGHT_FOLDER_MARK).is_file()
     if not is_flight and (not out.is_dir() or not (is_ours(out) or flight_folders(out))):
         raise UsageError(str(out), "no results", "a folder that `run` made")
     paths: list[Path] = []
     problems: list[Outcome] = []
-    for folder in [out] if is_flight else [*flight_folders(out), *session_folders(out), *plan_folders(out)]:
+    folders = [out] if is_flight else [*flight_folders(out), *session_folders(out), *plan_folders(out)]
+    pdfs = [path for path in (out / FLEET_PDF, *(folder / PDF for folder in folders)) if path.is_file()]
+    for folder in folders:
         try:
             with told_in_a_line(str(folder)):
                 written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf)
@@ -203,12 +219,20 @@ def report_again(out: Path, *, with_pdf: bool = True) -> tuple[list[Path], tuple
         problems += [_beside(folder, "incomplete", f"{folder.name}: {one.text}", one.trace) for one in written.failures]
     if is_flight:
         show_installation(out.absolute())
-        return paths, tuple(problems)
+        return ReportedAgain(paths, tuple(problems), _gone(pdfs, with_pdf=with_pdf))
+    if not with_pdf:
+        (out / FLEET_PDF).unlink(missing_ok=True)
     told = {one.source for one in problems}
     remade = [folder.name for folder in flight_folders(out)]
     beside = write_beside(out, (), rows_without_flight(out), with_pdf=with_pdf, remade=remade)
     unread = [one for one in beside if one.source not in told]
-    return [*paths, *(out / name for name in FLEET_FILES if (out / name).exists())], (*problems, *unread)
+    paths += [out / name for name in FLEET_FILES if (out / name).exists()]
+    return ReportedAgain(paths, (*problems, *unread), _gone(pdfs, with_pdf=with_pdf))
+
+
+def _gone(pdfs: Sequence[Path], *, with_pdf: bool) -> list[Path]:
+    """Those that are not there any more; none where PDFs were asked for: then it was told why."""
+    return [] if with_pdf else [path for path in pdfs if not path.exists()]
 
 
 def rows_without_flight(out: Path) -> list[IndexRow]:

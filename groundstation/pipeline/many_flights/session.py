@@ -31,6 +31,7 @@ from groundstation.pipeline.one_flight.flight import (
     Stopwatch,
     partial_folder,
     place,
+    report_finished,
     state_of,
 )
 from groundstation.pipeline.one_flight.identity import MAX_PART_CHARACTERS, flight_id, safe_part
@@ -39,10 +40,10 @@ from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.pipeline.one_flight.resume import versions
-from groundstation.pipeline.one_flight.sealing import note, seal, spoiled_files
+from groundstation.pipeline.one_flight.sealing import seal, spoiled_files
 from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
 from groundstation.results.file_names import MANIFEST
-from groundstation.results.files import load_document, load_manifest, put_failures, save, save_manifest
+from groundstation.results.files import load_document, load_manifest, put_failures, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.manifest import Keys, LogOfSession, Manifest, Resume
 from groundstation.tables.assemble import flight_from_batches
@@ -87,7 +88,7 @@ class SessionJob:
     out: Path
     configuration: Configuration
     fail_on: str = "none"
-    with_pdf: bool = True
+    with_pdf: bool = False
     redo: bool = False
     is_found: bool = False
     notes: tuple[Finding, ...] = ()
@@ -117,7 +118,7 @@ class SessionJob:
         used = {name: tables.get(name, {}) for name in session_tables()}
         conversion = _digest(logs, thresholds, self.configuration.profile, dict(versions()), platform.python_version())
         analysis = _digest(conversion, asdict(self.stations), used, [asdict(note) for note in self.notes])
-        return Keys(conversion, analysis, _digest(analysis, self.with_pdf))
+        return Keys(conversion, analysis)
 
 
 def _digest(*parts: object) -> str:
@@ -180,17 +181,21 @@ def sessions_of(out: Path) -> Iterator[tuple[Path, Manifest]]:
 
 
 class _Kept(NamedTuple):
-    """A session of the same logs and settings that an earlier run left; ``is_finished``: nothing of it is missing."""
+    """A session of the same logs and settings that an earlier run left, and what of its report is to be made."""
 
     folder: Path
-    manifest: Manifest
     resume: Resume
-    is_finished: bool
+    with_page: bool
+    with_pdf: bool
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether nothing of it is missing."""
+        return not self.with_page and not self.with_pdf
 
 
 def _kept(job: SessionJob) -> _Kept | None:
     keys = job.keys()
-    reports = (REPORT, PDF) if job.with_pdf else (REPORT,)
     for folder, manifest in sessions_of(job.out):
         resume = manifest.resume
         if resume is None or manifest.source.sha256 != job.sha256:
@@ -203,9 +208,12 @@ def _kept(job: SessionJob) -> _Kept | None:
             is_whole &= _is_whole(folder / f"{folder.name}.rrd", spoiled)
         if not is_of_the_verb and (job.redo or not is_whole):
             continue
-        is_told = is_of_the_verb or resume.keys.reports == keys.reports
-        has_reports = is_told and all(_is_whole(folder / name, spoiled) for name in reports)
-        return _Kept(folder, manifest, resume, job.only_results or has_reports)
+        if job.only_results:
+            return _Kept(folder, resume, with_page=False, with_pdf=False)
+        with_page = not _is_whole(folder / REPORT, spoiled)
+        has_pdf = PDF in manifest.files and _is_whole(folder / PDF, spoiled)
+        with_pdf = job.with_pdf or has_pdf if with_page else job.with_pdf and not has_pdf  # one that is there stays
+        return _Kept(folder, resume, with_page, with_pdf)
     return None
 
 
@@ -229,10 +237,7 @@ def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
     folder, resume, problem = kept.folder, kept.resume, ""
     if not kept.is_finished:
         with watch.stage("reporting"):
-            written = write_flight_report(folder, ANSWER_TYPES, with_pdf=job.with_pdf)
-        problem = written.problem
-        save_manifest(folder, replace(kept.manifest, resume=replace(resume, keys=job.keys())))
-        note(folder, written.paths, removed=REPORT_FILES)
+            problem = report_finished(folder, with_page=kept.with_page, with_pdf=kept.with_pdf)
     state = state_of(load_document(folder).findings, resume.has_lost_data, job.fail_on)
     found = _outcome(job, state, "; ".join(filter(None, (resume.text, problem))), folder, watch)
     return replace(found, was_finished=kept.is_finished)
@@ -243,7 +248,8 @@ def planned_session(job: SessionJob) -> Outcome:
     kept = _kept(job)
     if kept is None:
         return Outcome(job.name, "done", "session to run", is_session=True)
-    text = "session finished, nothing to do" if kept.is_finished else "session to report again"
+    to_do = "to report again" if kept.with_page else "finished, its PDF to add" if kept.with_pdf else ""
+    text = f"session {to_do or 'finished, nothing to do'}"
     return Outcome(job.name, "done", text, kept.folder.name, is_session=True, was_finished=kept.is_finished)
 
 

@@ -66,7 +66,7 @@ def watch(
     once: bool = False,
     jobs: int = 0,
     fail_on: str = "none",
-    with_pdf: bool = True,
+    with_pdf: bool = False,
     stations: Path | None = None,
     force: bool = False,
     only_results: bool = False,

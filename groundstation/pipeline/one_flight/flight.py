@@ -27,9 +27,9 @@ from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.parts import part_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
-from groundstation.pipeline.one_flight.resume import Finished, keys_of, remember_reports
+from groundstation.pipeline.one_flight.resume import Finished, keys_of
 from groundstation.pipeline.one_flight.sealing import note, seal
-from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
+from groundstation.reports.flight_report import PDF, REPORT, add_pdf, write_flight_report
 from groundstation.reports.steer_card import write_exports
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
@@ -74,7 +74,7 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
     """
     watch = Stopwatch(listen, job.path.name)
     try:
-        if job.finished is not None and job.step in ("nothing", "reports"):
+        if job.finished is not None and job.step in ("nothing", "pdf", "reports"):
             with gathered_failures():
                 return _run_reports(job, job.finished, watch)
         paths = [Path(part.path) for part in job.parts] or [job.path]
@@ -175,7 +175,7 @@ def _run(log: Log, version: Version, job: Job, partial: Path, watch: Stopwatch) 
         results = replace(results, findings=with_failures(results.findings, failures()))
         mcap.rename(partial / f"{identity}.mcap")
         text = sentence(results)
-        keys = keys_of(log.source, job.configuration, with_pdf=job.with_pdf, digests=log.digests)
+        keys = keys_of(log.source, job.configuration, digests=log.digests)
         resume = Resume(keys, text, converted.has_lost_data)
         settings = job.configuration.to_dict()
         manifest = manifest_of(results, settings, path=path, resume=resume, power_up=power_up, parts=parts)
@@ -250,7 +250,7 @@ def _export(folder: Path) -> str:
     from groundstation.results.files import load
 
     saved = load(folder, ANSWER_TYPES)
-    written = attempt("report", "exports", bound(write_exports, saved, with_pdf=False), unless=OF_THE_WORLD)
+    written = attempt("report", "exports", bound(write_exports, saved, with_card=False), unless=OF_THE_WORLD)
     return "" if written is None else written[1]
 
 
@@ -263,13 +263,13 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
         problem = _export(finished.folder)
         put_failures(finished.folder, failures())
         note(finished.folder, [finished.folder / DEVIATION_CSV])
-    elif job.step == "reports":
+    elif job.step != "nothing":
         with watch.stage("reporting"):
-            written = write_flight_report(finished.folder, ANSWER_TYPES, with_pdf=job.with_pdf)
-            problem = written.problem
-            put_failures(finished.folder, failures())
-            note(finished.folder, written.paths, removed=REPORT_FILES)
-            remember_reports(finished, with_pdf=job.with_pdf)
+            problem = report_finished(
+                finished.folder,
+                with_page=job.step == "reports",
+                with_pdf=job.with_pdf or PDF in finished.files,  # one that is there stays
+            )
     return Outcome(
         job.log,
         state_of(with_failures(finished.findings, failures()), finished.has_lost_data, job.fail_on),
@@ -283,6 +283,19 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
         power_up=job.power_up,
         parts=finished.parts,
     )
+
+
+def report_finished(folder: Path, *, with_page: bool, with_pdf: bool) -> str:
+    """Make the report of a finished folder again, or its PDF alone, and take it down; returns what went wrong."""
+    from groundstation.results.files import put_failures
+
+    if with_page:
+        written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf)
+    else:
+        written = add_pdf(folder, ANSWER_TYPES)
+    put_failures(folder, failures())
+    note(folder, written.paths, removed=REPORT_FILES)
+    return written.problem
 
 
 def _taken_over(finished: Finished, target: Path) -> Converted:

@@ -27,7 +27,7 @@ class Job:
     fail_on: str = "none"
     is_named: bool = True
     add_suffix: bool = False
-    with_pdf: bool = True
+    with_pdf: bool = False
     step: Step = "everything"
     finished: Finished | None = None
     url: str = ""
@@ -49,7 +49,7 @@ class Job:
         """Digest of its log and the keys of what is asked for; None when only its run can tell what is wrong."""
         try:
             source = open_log(self.path, self.configuration.profile_path, self.configuration.icds).source
-            return source.sha256, keys_of(source, self.configuration, with_pdf=self.with_pdf)
+            return source.sha256, keys_of(source, self.configuration)
         except Exception:
             return None
 
@@ -63,7 +63,7 @@ class Job:
     def keys_of(self, finished: Finished) -> Keys:
         """Keys of what is asked for of a flight of several logs, which are as they were."""
         digests = [part.sha256 for part in finished.parts]
-        return keys_of(finished.source, self.configuration, with_pdf=self.with_pdf, digests=digests)
+        return keys_of(finished.source, self.configuration, digests=digests)
 
     def of_parts(self, parts: Sequence[PartOfRun], *, add_suffix: bool = False) -> "Job":
         """The job of running consecutive logs as one flight."""

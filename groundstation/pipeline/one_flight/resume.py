@@ -1,8 +1,8 @@
 """What a run need not do again. A flight's manifest keeps a key for each stage; equal keys, equal results.
 
 A key is a digest of everything that goes into a stage: the content of the log and of its profile, the settings that the
-stage reads, and the versions. The conversion reads the thresholds, the analysis everything else that a user sets, the
-reports whether there is a PDF.
+stage reads, and the versions. The conversion reads the thresholds, the analysis everything else that a user sets. The
+reports of finished results are asked for by their files: report.pdf only where a PDF is asked for.
 """
 
 import hashlib
@@ -10,7 +10,7 @@ import json
 import os
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from importlib import metadata as installed
 from pathlib import Path
@@ -30,12 +30,12 @@ from groundstation.reports.flight_report import PDF, REPORT
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.document import SummaryDocument
 from groundstation.results.file_names import ARRAYS, SUMMARY, TABLES
-from groundstation.results.files import load_document, load_manifest, save_manifest
+from groundstation.results.files import load_document, load_manifest
 from groundstation.results.flight import Source
 from groundstation.results.manifest import Keys as Keys
 from groundstation.results.manifest import Manifest, PartOfRun, PowerUpOfRun
 
-Step = Literal["everything", "analysis", "reports", "nothing"]  # what has to be done for a log
+Step = Literal["everything", "analysis", "reports", "pdf", "nothing"]  # what has to be done for a log
 _OF_RESULTS = (SUMMARY, f"{ARRAYS}/", f"{TABLES}/")
 PACKAGES = (
     *("mcap", "numpy", "pandas", "numba", "scipy", "pyarrow", "rerun-sdk"),
@@ -106,7 +106,8 @@ class Finished:
     def step(self, keys: Keys, *, with_pdf: bool, only_results: bool = False) -> Step:
         """What has to be done for the results to be those of ``keys``.
 
-        A file that somebody took away, or that is not as the run left it, is made again.
+        A file that somebody took away, or that is not as the run left it, is made again; "pdf" is report.pdf alone.
+        One that is there stays, whether it is asked for or not: it tells of these results.
 
         With ``only_results`` neither recording nor reports are asked for; what there is of them stays. A part that
         failed is tried again.
@@ -122,10 +123,10 @@ class Finished:
         wanted = {DEVIATION_CSV} if self.has_deviation else set()
         if only_results:
             return "nothing" if wanted <= self.files else "reports"
-        wanted.add(REPORT)
-        if with_pdf:
-            wanted |= {PDF, *([STEER_CARD] if self.has_deviation else [])}
-        return "nothing" if keys.reports == self.keys.reports and wanted <= self.files else "reports"
+        wanted |= {REPORT, *([STEER_CARD] if self.has_deviation else [])}
+        if not wanted <= self.files:
+            return "reports"
+        return "pdf" if with_pdf and PDF not in self.files else "nothing"
 
     @property
     def _has_spoiled_results(self) -> bool:
@@ -145,7 +146,7 @@ def _version(package: str) -> str:
         return ""
 
 
-def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool, digests: Sequence[str] = ()) -> Keys:
+def keys_of(source: Source, configuration: Configuration, *, digests: Sequence[str] = ()) -> Keys:
     """Keys of the run of a log: its name counts too, as it stands in the results.
 
     ``digests`` are those of the consecutive files of one recording.
@@ -166,7 +167,7 @@ def keys_of(source: Source, configuration: Configuration, *, with_pdf: bool, dig
     apply = None if configuration.apply is None else asdict(configuration.apply)
     lessons = [] if configuration.lessons is None else [[asdict(one) for one in configuration.lessons]]
     analysis = _digest(conversion, tables, intervals, apply, configuration.weather, *lessons)
-    return Keys(conversion, analysis, _digest(analysis, with_pdf))
+    return Keys(conversion, analysis)
 
 
 def _digest(*parts: Any) -> str:
@@ -197,14 +198,6 @@ def _content_of(file: str, expected: str) -> str:
         raise GroundstationError(file, error.strerror or "cannot be read", expected) from error
 
 
-def remember_reports(flight: "Finished", *, with_pdf: bool) -> None:
-    """Take down that the reports of a finished flight were made again."""
-    manifest = load_manifest(flight.folder)
-    if manifest.resume is not None:
-        keys = replace(manifest.resume.keys, reports=_digest(flight.keys.analysis, with_pdf))
-        save_manifest(flight.folder, replace(manifest, resume=replace(manifest.resume, keys=keys)))
-
-
 def finished(folder: Path, sizes: Mapping[str, int] | None = None) -> Finished | None:
     """What a flight folder remembers; None when it is not whole, or was not made by such a run.
 
@@ -216,7 +209,8 @@ def finished(folder: Path, sizes: Mapping[str, int] | None = None) -> Finished |
     except (OSError, GroundstationError):
         return None
     spoiled = spoiled_files(folder, manifest, None if sizes is None else sizes.get)
-    return _finished(folder, frozenset(files) - spoiled, manifest, summary, spoiled)
+    unknown = {PDF} - manifest.files.keys() if manifest.files else set()  # a run was killed before it noted its size
+    return _finished(folder, frozenset(files) - spoiled - unknown, manifest, summary, spoiled)
 
 
 def _not_empty(folder: Path) -> set[str]:

@@ -23,7 +23,7 @@ def run_session(
     stations: Path | None = None,
     force: bool = False,
     fail_on: str = "none",
-    with_pdf: bool = True,
+    with_pdf: bool = False,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Analyse the logs of several aircraft together, into ``<out>/<session_id>/``.

@@ -1,27 +1,38 @@
 """Plans from beginning to end: a scenario becomes answers, recording and report in a folder of its own."""
 
 import hashlib
+import json
+import platform
 import shutil
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from groundstation.base.errors import UsageError
-from groundstation.base.failures import attempt, failures, gathered_failures, with_failures
+from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.base.failures import attempt, failures, gathered_failures, is_incomplete, with_failures
 from groundstation.base.findings import worst
 from groundstation.estimators.analyses import ANSWER_TYPES, PLANS
 from groundstation.estimators.plan import Plan, Planned
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, PLAN_MARK
 from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
-from groundstation.pipeline.one_flight.flight import OF_THE_WORLD, Stopwatch, partial_folder, place, state_of
+from groundstation.pipeline.one_flight.flight import (
+    OF_THE_WORLD,
+    Stopwatch,
+    partial_folder,
+    place,
+    report_finished,
+    state_of,
+)
 from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
-from groundstation.pipeline.one_flight.sealing import seal
-from groundstation.reports.flight_report import write_flight_report
-from groundstation.results.files import put_failures, save, write_text
+from groundstation.pipeline.one_flight.resume import versions
+from groundstation.pipeline.one_flight.sealing import seal, spoiled_files
+from groundstation.reports.flight_report import PDF, write_flight_report
+from groundstation.results.files import load_document, load_manifest, put_failures, save, write_text
 from groundstation.results.flight import FlightResults, Source
+from groundstation.results.manifest import Keys, Manifest, Resume
 from groundstation.studies.shipped_plans import LoadedPlan, load_plan, plan_names
 
 
@@ -51,10 +62,10 @@ def run_plan(
     *,
     force: bool = False,
     fail_on: str = "none",
-    with_pdf: bool = True,
+    with_pdf: bool = False,
     listen: Listener = silent,
 ) -> Outcome:
-    """Make a plan into ``<out>/<name of the scenario>/``; one of that name is made again.
+    """Make a plan into ``<out>/<name of the scenario>/``; of one that is finished only a PDF that is asked for.
 
     Parameters
     ----------
@@ -63,6 +74,8 @@ def run_plan(
     scenario : str or Path
         Name of a shipped scenario, or a TOML file.
     out : Path
+    force : bool
+        Use a folder that is something else's, and make a finished plan again.
 
     Raises
     ------
@@ -79,9 +92,57 @@ def run_plan(
     listen(Event("begin", total=1))
     with alone_in(out):
         prepare(out)
-        outcome = _run(plan, loaded, target, fail_on, with_pdf, Stopwatch(listen, loaded.name))
+        watch = Stopwatch(listen, loaded.name)
+        kept = None if force else _kept(target, _keys(plan, loaded))
+        if kept is None:
+            outcome = _run(plan, loaded, target, fail_on, with_pdf, watch)
+        else:
+            outcome = _finished(loaded, target, kept, fail_on, with_pdf, watch)
     listen(Event("end", loaded.name, outcome.text))
     return outcome
+
+
+def _keys(plan: Plan[Any], loaded: LoadedPlan[Any]) -> Keys:
+    """Equal keys, equal results: the scenario and the versions go in."""
+    told = plan.name, loaded.name, loaded.text, dict(versions()), platform.python_version()
+    key = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+    return Keys(key, key)
+
+
+def _kept(target: Path, keys: Keys) -> Manifest | None:
+    """The manifest of a finished plan of such keys; None where anything but its PDF is missing or was changed."""
+    try:
+        manifest, findings = load_manifest(target), load_document(target).findings
+    except GroundstationError:
+        return None
+    is_equal = manifest.resume is not None and manifest.resume.keys == keys
+    is_whole = not is_incomplete(findings) and spoiled_files(target, manifest) <= {PDF}
+    return manifest if is_equal and is_whole else None
+
+
+def _finished(
+    loaded: LoadedPlan[Any], target: Path, manifest: Manifest, fail_on: str, with_pdf: bool, watch: Stopwatch
+) -> Outcome:
+    """The outcome of a finished plan, to which a PDF is added where it is asked for and missing."""
+    has_pdf = PDF in manifest.files and not spoiled_files(target, manifest)
+    problem = ""
+    with gathered_failures():
+        if with_pdf and not has_pdf:
+            with watch.stage("reporting"):
+                problem = report_finished(target, with_page=False, with_pdf=True)
+        found = with_failures(load_document(target).findings, failures())
+        told = "; ".join(filter(None, (manifest.resume.text if manifest.resume else "", problem)))
+        return Outcome(
+            loaded.name,
+            state_of(found, False, fail_on),
+            told,
+            target.name,
+            str(target),
+            _digest(loaded),
+            watch.times_s,
+            was_finished=has_pdf or not with_pdf,
+            failures=failures(),
+        )
 
 
 def _run(
@@ -112,8 +173,12 @@ def _run_into(
     with watch.stage("planning"):
         planned = plan.run(loaded.scenario)
     results = _results(plan, loaded, planned, target.name)
+    warned = (f"warning: {finding.text}" for finding in results.findings if finding.severity != "info")
+    sentence = attempt("line", plan.name, plan.sentence, results.answers) or ""
+    text = "; ".join(filter(None, (sentence, *warned)))
     with watch.stage("saving"):
-        manifest = manifest_of(results, {"scenario": asdict(loaded.scenario)})
+        resume = Resume(_keys(plan, loaded), text, False)
+        manifest = manifest_of(results, {"scenario": asdict(loaded.scenario)}, resume=resume)
         save(partial, results, manifest)
         write_text(partial / PLAN_MARK, loaded.text)
     with watch.stage("recording"):
@@ -121,13 +186,11 @@ def _run_into(
         attempt("recording", "plan", write_plan_recording, path, results, unless=OF_THE_WORLD)
     with watch.stage("reporting"):
         problem = write_flight_report(partial, ANSWER_TYPES, with_pdf=with_pdf).problem
-    warned = (f"warning: {finding.text}" for finding in results.findings if finding.severity != "info")
-    sentence = attempt("line", plan.name, plan.sentence, results.answers) or ""
-    told = "; ".join(filter(None, (sentence, *warned, problem)))
     put_failures(partial, failures())
     seal(partial, manifest)
     place(partial, target)
     state = state_of(with_failures(results.findings, failures()), False, fail_on)
+    told = "; ".join(filter(None, (text, problem)))
     done = Outcome(loaded.name, state, told, results.flight_id, str(target), _digest(loaded), watch.times_s)
     return replace(done, failures=failures())
 

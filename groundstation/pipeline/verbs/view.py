@@ -64,7 +64,7 @@ def look_at(
         with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
             say(f"computing {path.name} ...")
             configuration = Configuration(profile=str(profile) if profile else None)
-            outcome = run_flight(Job(path, Path(folder), configuration, with_pdf=False, power_up=power_up))
+            outcome = run_flight(Job(path, Path(folder), configuration, power_up=power_up))
             if outcome.state == "failed":
                 where, _, found = outcome.text.partition(": ")
                 raise GroundstationError(where, found)
