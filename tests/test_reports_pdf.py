@@ -1,5 +1,6 @@
 """The report on paper: everything the page says, nothing of a log taken for markup, nothing outside the page."""
 
+import math
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -147,7 +148,9 @@ def texts_and_places(reader: PdfReader) -> tuple[list[str], list[tuple[float, fl
 
     def visit(text: str, page: list[float], line: list[float], _font: Any, size: float) -> None:
         if text.strip():
-            found.append((page[4] + line[4], size * abs(page[0] * line[0]), text))
+            across, up = line[0] * page[0] + line[1] * page[2], line[0] * page[1] + line[1] * page[3]
+            left = line[4] * page[0] + line[5] * page[2] + page[4]
+            found.append((left, size * math.hypot(across, up), text))
 
     return [page.extract_text(visitor_text=visit) for page in reader.pages], found
 
