@@ -1,6 +1,5 @@
 """The Python API: lazy, the same for a log and a flight folder, one line for every error."""
 
-import io
 import json
 import re
 import shutil
@@ -12,19 +11,18 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib.figure
-import matplotlib.image
 import numpy as np
 import pandas as pd
 import pytest
 
 import groundstation
 from groundstation.base.errors import GroundstationError, NotAssessableError, UnreadableLogError, UsageError
+from groundstation.chapters.parts import Figure
+from groundstation.chapters.plots import PLOTS
 from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.api import OpenLog, SavedRun
 from groundstation.pipeline.verbs.clip import Wanted, clip
-from groundstation.reports import drawing
-from groundstation.reports.drawing import Sketch
-from groundstation.reports.notebook_figure import figure_from
+from groundstation.reports.notebook.plots import name_of
 from groundstation.results.files import SavedFlight, save
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import Manifest
@@ -37,6 +35,15 @@ ROOT = Path(__file__).parents[1]
 SAMPLES = ROOT / "sample_logs"
 GOOD = SAMPLES / "taxi-good.csv"
 ROUNDED_DEG = 5e-5  # summary.json has four decimals of a degree
+NAMES = (
+    "series difference density convergence taxi forest spectrum components mean-speed growth calibration map-hindcast "
+    "inertial inertial-tilt inertial-radial inertial-innovations inertial-observability inertial-differences "
+    "inertial-own-innovations landing-beacons landing-space landing-accuracy landing-trials latency-search together "
+    "magnetic-deviation magnetic-held-out magnetic-track magnetic-branches magnetic-modulus magnetic-ground "
+    "landing-deviations landing-final landing-protection map profile attitude states gaps reference reference-track "
+    "reference-claims cooperative-map cooperative-errors cooperative-geometry cooperative-links control-paths "
+    "control-measures control-law placement-map placement-accuracy"
+)
 
 
 @pytest.fixture(scope="module")
@@ -194,25 +201,32 @@ def test_every_figure_of_the_report_can_be_had(flight: OpenLog) -> None:
         flight.figure("nonsense")
 
 
-def test_every_dot_is_seen_in_a_png() -> None:
-    def paint(figure: Any) -> None:
-        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        axes.axis("off")
-        axes.set(xlim=(0.0, 6.0), ylim=(0.0, 4.0))
-        drawing.dots(axes, [1.0, 3.0, 5.0], [2.0, 2.0, 2.0], drawing.INS, size=4.0)
-
-    shown = figure_from(Sketch(40.0, paint, 60.0))._repr_png_()
-    inked = matplotlib.image.imread(io.BytesIO(shown))[:, :, 0].min(axis=0) < 0.5
-    assert np.count_nonzero(np.diff(inked.astype(int)) == 1) == 3
+def test_names_of_figures_are_those_that_scripts_rely_on() -> None:
+    assert " ".join(name_of(Figure(name)) for name in PLOTS) == NAMES
+    assert name_of(Figure("reference.errors", "gnss position")) == "reference-gnss-position"
 
 
-def test_sketching_leaves_the_report_as_it_is(flight: OpenLog) -> None:
-    from groundstation.reports.figures import heading as heading_figures
+def test_matplotlib_comes_with_the_first_figure_and_never_pyplot(folder: Path) -> None:
+    code = (
+        "import sys, groundstation\n"
+        f"flight = groundstation.open({str(folder)!r})\n"
+        "flight.heading(), flight.results.to_frame('heading_samples'), flight.figures\n"
+        "print('matplotlib' in sys.modules)\n"
+        "flight.figure('density')._repr_png_()\n"
+        "print('matplotlib' in sys.modules, 'matplotlib.pyplot' in sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["False", "True False"]
 
-    before = heading_figures.density(flight.results)
-    with drawing.sketching():
-        assert heading_figures.density(flight.results).svg == "density"  # type: ignore[union-attr]
-    assert heading_figures.density(flight.results) == before
+
+def test_a_figure_may_be_changed_and_saved(flight: OpenLog, tmp_path: Path) -> None:
+    figure = flight.figure("density")
+    before = figure._repr_png_()
+    figure.axes[0].set_xlim(-5.0, 5.0)
+    assert figure._repr_png_() != before and flight.figure("density")._repr_png_() == before
+    for ending, start in ((".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")):
+        figure.savefig(tmp_path / f"density{ending}")
+        assert (tmp_path / f"density{ending}").read_bytes().startswith(start)
 
 
 def test_a_setting_changes_the_answer_and_not_the_flight(flight: OpenLog) -> None:

@@ -16,7 +16,9 @@ from groundstation.plots.plot import Axis, Panel, Plot, Row, Scale, one_panel
 from groundstation.reports.drawing import drawing_of, drawn_by
 from groundstation.reports.live import page_data
 from groundstation.reports.pdf import pdf_bytes
+from groundstation.reports.svg.boxes import TICK_PT, TO_TEXT_PT, TO_TITLE_PT, placed, widest
 from groundstation.reports.svg.colours import COLOURS
+from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT
 from groundstation.reports.svg.path import dots, polyline
 from groundstation.reports.svg.picture import picture_of
 from groundstation.reports.svg.thinning import shown_rows
@@ -346,3 +348,21 @@ def test_every_plot_of_a_chapter_is_a_picture_of_bounded_size(case: str) -> None
         assert len(picture) < 10_000 + 30_000 * marks
         has_symlog = any(panel.y.scale == "symlog" for panel in plot.panels)  # the page cannot tell values of one
         assert picture.panels or picture.frames or has_symlog
+
+
+def test_a_map_has_room_for_the_numbers_it_comes_to() -> None:
+    flat = Curve(x=np.array([0.0, 3e6]), y=np.array([0.0, 1.0]))
+    panel = Panel([flat], Axis("east, m"), Axis("north, m"), is_map=True)
+    ((one,), _) = placed(Plot("a", "A", "", "", one_panel(panel, 60.0)))
+    box = one.boxes[0]
+    assert widest(box.y_ticks) > 30.0
+    assert box.left >= TICK_PT + TO_TEXT_PT + widest(box.y_ticks) + TO_TITLE_PT + LINE_SHARE * SIZE_PT - 1e-9
+
+
+def test_windows_of_panels_that_share_an_axis_stand_above_each_other() -> None:
+    axis = Axis("flight time, min:s", "time", 0.0, 600.0, windows=((0.0, 60.0), (400.0, 600.0)))
+    curve = Curve(x=X, y=Y)
+    above = Panel([curve], axis, Axis("up", ranges=((0.0, 6.0), (12345.0, 12346.0))))
+    rows = (Row((above,), shares_x=True), Row((Panel([curve], axis, Axis("up")),)))
+    upper, lower = placed(Plot("a", "A", "", "", rows))[0]
+    assert [(box.left, box.right) for box in upper.boxes] == [(box.left, box.right) for box in lower.boxes]

@@ -22,7 +22,7 @@ from groundstation.results.magnetic_ground import GroundDeviation
 from groundstation.tables.table import Flight, Tables
 
 if TYPE_CHECKING:
-    from groundstation.reports.drawing import Drawing, Sketch
+    from groundstation.plots.plot import Plot
     from groundstation.results.files import SavedFlight
 
 AnyPath = str | PathLike[str]
@@ -138,10 +138,10 @@ class OpenFlight(ABC):
     @property
     def figures(self) -> dict[str, str]:
         """Names that :meth:`figure` takes, with their titles."""
-        return {name: drawing.title for name, (drawing, _) in self._sketches.items()}
+        return {name: plot.title for name, plot in self._plots.items()}
 
     def figure(self, name: str) -> Any:
-        """A figure of the report, painted by the same code.
+        """A figure of the report, for matplotlib.
 
         Parameters
         ----------
@@ -158,19 +158,19 @@ class OpenFlight(ABC):
         UsageError
             When this flight has no such figure.
         """
-        from groundstation.reports.notebook_figure import figure_from
+        showing = (plot for plot in self._plots.values() if name in plot.numbers)
+        plot = self._plots.get(name) or next(showing, None)
+        if plot is None:
+            raise UnknownNameError("figures", name, self._plots)
+        from groundstation.reports.notebook.figure import figure_of
 
-        showing = (sketch for drawing, sketch in self._sketches.values() if name in drawing.numbers)
-        sketch = self._sketches[name][1] if name in self._sketches else next(showing, None)
-        if sketch is None:
-            raise UnknownNameError("figures", name, self._sketches)
-        return figure_from(sketch)
+        return figure_of(plot)
 
     @cached_property
-    def _sketches(self) -> "dict[str, tuple[Drawing, Sketch]]":
-        from groundstation.reports.notebook_figure import sketches_of
+    def _plots(self) -> "dict[str, Plot]":
+        from groundstation.reports.notebook.plots import plots_of
 
-        return sketches_of(self._saved())
+        return plots_of(self._saved())
 
     def recording(self, path: AnyPath) -> Path:
         """Write the Rerun recording to a file and return its path; `groundstation view` and Rerun open it."""

@@ -37,6 +37,12 @@ def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
 
     A chapter that has nothing to say is left out, one of nothing but figures without arrays, and one that fails.
     """
+    chapters, appendices = told_sections(saved)
+    return (*_numbered(chapters, saved, count(1)), *_numbered(appendices, saved, ascii_uppercase))
+
+
+def told_sections(saved: SavedFlight) -> tuple[list[Section], list[Section]]:
+    """The chapters of :func:`flight_sections` and their appendices as they are told, no figure drawn."""
     results = saved.results
     is_flight = not (is_session(results) or is_plan(results))
     told = (
@@ -46,18 +52,18 @@ def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
     )
     chapters = [section for section in told if section is not None]
     workings = (_workings(section, saved.manifest.configuration) for section in chapters)
-    appendix = [*workings, *(_built(APPENDICES, results) if is_flight else ())]
+    appendices = [*workings, *(_built(APPENDICES, results) if is_flight else ())]
     shown = [replace(section, appendix=()) for section in chapters if not section.is_open]
-    return (*_numbered(shown, saved, count(1)), *_numbered(appendix, saved, ascii_uppercase))
+    return shown, [section for section in appendices if section is not None]
 
 
 def _built(builds: Mapping[str, Build], results: FlightResults) -> tuple[Section | None, ...]:
     return tuple(attempt("chapter", name, build, results) for name, build in builds.items())
 
 
-def _numbered(sections: Sequence[Section | None], saved: SavedFlight, numbers: Iterable[object]) -> tuple[Section, ...]:
+def _numbered(sections: Sequence[Section], saved: SavedFlight, numbers: Iterable[object]) -> tuple[Section, ...]:
     """The sections as a page shows them, those without parts left out."""
-    drawn = (attempt("chapter", section.key, on_a_page, section, saved) for section in sections if section is not None)
+    drawn = (attempt("chapter", section.key, on_a_page, section, saved) for section in sections)
     shown = (section for section in drawn if section is not None and section.parts)
     return tuple(replace(section, number=str(number)) for section, number in zip(shown, numbers, strict=False))
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -22,6 +23,7 @@ LEAST_PT, WINDOWS_PT, LEAST_WINDOW_PT = 24.0, 9.0 * PT_PER_MM, 20.0 * PT_PER_MM
 BAR_PT, TO_BAR_PT = 4.0 * PT_PER_MM, 10.0  # the scale of cells
 SCALE_PT = TO_BAR_PT + BAR_PT + 46.0
 MOST_OF_A_NAME, MOST_OF_A_TITLE = 44, 90
+_Rooms: TypeAlias = list[list[float]]  # of each panel, by rows
 
 
 @dataclass(frozen=True)
@@ -96,10 +98,7 @@ class _Told:
 
 def placed(plot: Plot) -> tuple[tuple[Placed, ...], float]:
     """All panels with their places, row by row, and the height of the picture in points."""
-    rows = _told(plot)
-    lefts, rights = _columns(plot, rows)
-    widths = [_widths(plot, row, lefts, rights) for row in range(len(rows))]
-    rows = _maps(plot, rows, widths)
+    rows, lefts, rights, widths = _with_room(plot)
     found: list[Placed] = []
     y = 4.0
     for number, (row, told) in enumerate(zip(plot.rows, rows, strict=True)):
@@ -108,13 +107,28 @@ def placed(plot: Plot) -> tuple[tuple[Placed, ...], float]:
         line: list[Placed] = []
         for column, one in enumerate(told):
             x += lefts[number][column] + (BETWEEN_PT if column else 0.0)
-            line.append(_placed(one, x, widths[number][column], height))
+            gap = max(_gap_pt(rows[place][column]) for place in _chain(plot, number, column))
+            line.append(_placed(one, x, widths[number][column], height, gap))
             x += widths[number][column] + rights[number][column]
         y += max((_above_pt(one) for one in line), default=0.0)
         found += [replace(one, boxes=tuple(replace(box, top=y) for box in one.boxes)) for one in line]
         y += height + max((_below_pt(one) for one in line), default=0.0)
         y += 0.0 if number == len(rows) - 1 else ROWS_PT if row.shares_x else 0.5 * ROWS_PT
     return tuple(found), y + 3.0
+
+
+def _with_room(plot: Plot) -> tuple[list[list[_Told]], _Rooms, _Rooms, _Rooms]:
+    """All panels, room left and right of them and their widths; maps leave room for the numbers that they come to."""
+    rows = _told(plot)
+    for _ in range(2):
+        lefts, rights = _columns(plot, rows)
+        widths = [_widths(plot, row, lefts, rights) for row in range(len(rows))]
+        grown = _maps(plot, rows, widths)
+        rows = [
+            [replace(one, left_pt=max(one.left_pt, other.left_pt)) for one, other in zip(*pair, strict=True)]
+            for pair in zip(rows, grown, strict=True)
+        ]
+    return grown, lefts, rights, widths
 
 
 def _told(plot: Plot) -> list[list[_Told]]:
@@ -128,8 +142,7 @@ def _told(plot: Plot) -> list[list[_Told]]:
             y = extents.y_spans(panel, len(extents.windows_of(panel, x)))
             ticks = tuple(_y_ticks(panel, span, row.height_mm * PT_PER_MM) for span in y)
             entries = entries_of(panel)
-            left = TICK_PT + TO_TEXT_PT + widest(ticks[0])
-            left += _title_pt(panel, row.height_mm * PT_PER_MM)
+            left = _left_pt(panel, ticks[0], row.height_mm * PT_PER_MM)
             right = beside_pt(entries) if panel.legend == "beside" else 0.0
             has_scale = _has_scale(row, column)
             right += SCALE_PT if has_scale else 0.0
@@ -167,6 +180,11 @@ def title_lines(title: str, room_pt: float) -> list[str]:
     return lines_of(label(title, MOST_OF_A_TITLE), room_pt) if title else []
 
 
+def _left_pt(panel: Panel, ticks: Sequence[Tick], height_pt: float) -> float:
+    """Room left of a panel for its numbers and its title."""
+    return TICK_PT + TO_TEXT_PT + widest(ticks) + _title_pt(panel, height_pt)
+
+
 def _title_pt(panel: Panel, height_pt: float) -> float:
     lines = len(title_lines(panel.y.title, height_pt + 16.0))
     return TO_TITLE_PT + LINE_SHARE * SIZE_PT * lines if lines else 0.0
@@ -184,7 +202,7 @@ def _has_scale(row: Row, column: int) -> bool:
     return here[0] is not None and (len(alike) < 2 or alike[0] != alike[1])
 
 
-def _columns(plot: Plot, rows: list[list[_Told]]) -> tuple[list[list[float]], list[list[float]]]:
+def _columns(plot: Plot, rows: list[list[_Told]]) -> tuple[_Rooms, _Rooms]:
     """Room left and right of each panel: equal for those above each other, rows alike in their panels."""
     keys = [_shares(row) for row in plot.rows]
     lefts = [
@@ -224,13 +242,13 @@ def _alike(keys: Sequence[tuple[float, ...]], row: int, column: int) -> list[int
     return [other for other, key in enumerate(keys) if key and (key == keys[row] or not column)]
 
 
-def _widths(plot: Plot, row: int, lefts: list[list[float]], rights: list[list[float]]) -> list[float]:
+def _widths(plot: Plot, row: int, lefts: _Rooms, rights: _Rooms) -> list[float]:
     shares = _shares(plot.rows[row])
     room = WIDTH_PT - EDGE_PT - sum(lefts[row]) - sum(rights[row]) - BETWEEN_PT * (len(shares) - 1)
     return [max(room * share / sum(shares), LEAST_PT) for share in shares]
 
 
-def _maps(plot: Plot, rows: list[list[_Told]], widths: list[list[float]]) -> list[list[_Told]]:
+def _maps(plot: Plot, rows: list[list[_Told]], widths: _Rooms) -> list[list[_Told]]:
     """Panels with both axes of maps at one scale; what shares the axis of a map is shown as far as it is."""
     rows = [list(row) for row in rows]
     for number, row in enumerate(plot.rows):
@@ -239,18 +257,24 @@ def _maps(plot: Plot, rows: list[list[_Told]], widths: list[list[float]]) -> lis
                 continue
             x, y = extents.equal(told.x, told.y[0], widths[number][column], row.height_mm * PT_PER_MM)
             ticks = _y_ticks(told.panel, y, row.height_mm * PT_PER_MM)
-            rows[number][column] = replace(told, x=x, y=(y,), y_ticks=(ticks,))
+            left = _left_pt(told.panel, ticks, row.height_mm * PT_PER_MM)
+            rows[number][column] = replace(told, x=x, y=(y,), y_ticks=(ticks,), left_pt=left)
             for place in _chain(plot, number, column):
                 rows[place][column] = replace(rows[place][column], x=x)
     return rows
 
 
-def _placed(told: _Told, left: float, width: float, height: float) -> Placed:
+def _gap_pt(told: _Told) -> float:
+    """Room between the windows of a panel, for the numbers of those with a range of their own."""
+    has_own = len(set(told.y)) > 1
+    return max(WINDOWS_PT, max(map(widest, told.y_ticks[1:])) + 10.0) if has_own else WINDOWS_PT
+
+
+def _placed(told: _Told, left: float, width: float, height: float, gap: float) -> Placed:
     panel = told.panel
     windows = extents.windows_of(panel, told.x)
     lengths = np.array([window.high - window.low for window in windows])
     has_own = len(set(told.y)) > 1
-    gap = max(WINDOWS_PT, max(map(widest, told.y_ticks[1:])) + 10.0) if has_own else WINDOWS_PT
     room = width - gap * (len(windows) - 1)
     widths = np.maximum(np.abs(lengths) / np.abs(lengths).sum() * room, min(LEAST_WINDOW_PT, room / len(windows)))
     widths *= room / widths.sum()

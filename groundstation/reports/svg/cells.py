@@ -29,19 +29,19 @@ def cells_shape(mark: Cells, box: Box) -> str:
     parts = []
     for step in np.unique(levels[levels >= 0]).tolist():
         left, right, low, high = _blocks(levels >= step)
-        parts.append(
-            f'<path d="{path.boxes(across[left], across[right], down[low], down[high])}" fill="{_colour(step)}"/>'
-        )
+        blocks = path.boxes(across[left], across[right], down[low], down[high])
+        parts.append(f'<path d="{blocks}" fill="{colour_of_step(step)}"/>')
     return f'<g shape-rendering="crispEdges">{"".join(parts)}</g>'
 
 
-def _colour(step: int) -> str:
+def colour_of_step(step: int) -> str:
+    """One of the colours of a scale, from the lowest."""
     return viridis((step + 0.5) / STEPS)
 
 
 def _levels(mark: Cells, values: Floats) -> NDArray[np.int64]:
     """The number of the colour of each cell, -1 for none."""
-    shares = np.clip(_scale(mark).shares(values), 0.0, 1.0)
+    shares = np.clip(span_of_colours(mark).shares(values), 0.0, 1.0)
     if mark.is_log:
         shares = np.where(values <= 0.0, 0.0, shares)
     known = np.isfinite(shares)
@@ -49,7 +49,8 @@ def _levels(mark: Cells, values: Floats) -> NDArray[np.int64]:
     return np.where(known, found, -1)
 
 
-def _scale(mark: Cells) -> Span:
+def span_of_colours(mark: Cells) -> Span:
+    """The scale of the colours of cells with its ends."""
     return span_of("log" if mark.is_log else "linear", mark.low, mark.high, NO_PLACES, is_tight=True)
 
 
@@ -69,12 +70,12 @@ def _blocks(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:
 
 def scale_beside(mark: Cells, box: Box) -> str:
     """The scale of colours right of a frame, with its ticks and title."""
-    span = _scale(mark)
+    span = span_of_colours(mark)
     left, step = box.right + TO_BAR_PT, box.height / STEPS
     parts = []
     for place in range(STEPS):  # each over the one before
         edge = np.array([left]), np.array([left + BAR_PT]), np.array([box.top]), np.array([box.bottom - place * step])
-        parts.append(f'<path d="{path.boxes(*edge)}" fill="{_colour(place)}"/>')
+        parts.append(f'<path d="{path.boxes(*edge)}" fill="{colour_of_step(place)}"/>')
     right, widest, marks = left + BAR_PT, 0.0, []
     for value, text in ticks_of(span, box.height, is_upright=True):
         y = box.bottom - box.height * span.share(value)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from groundstation.plots.marks import AnyMark, Cells, Floats, Limit, Outlines, Points, Spans
+from groundstation.plots.marks import AnyMark, Cells, Floats, Spans
 from groundstation.plots.plot import Plot
 from groundstation.reports.live import Svg
 from groundstation.reports.svg import boxes as b
@@ -18,15 +18,14 @@ from groundstation.reports.svg import legend
 from groundstation.reports.svg.alive import frames_of, panels_of
 from groundstation.reports.svg.boxes import Box, Placed, placed
 from groundstation.reports.svg.cells import scale_beside
-from groundstation.reports.svg.colours import COLOURS, EDGE, FAINT, GRID, INK, PAPER
+from groundstation.reports.svg.colours import EDGE, FAINT, GRID, INK, PAPER
 from groundstation.reports.svg.extents import has_rows, names_of
-from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, TITLE_PT, label, lines_of, middle, width_pt, written
+from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, TITLE_PT, label, lines_of, middle, written
+from groundstation.reports.svg.labels import HALO_PT, labels_of
 from groundstation.reports.svg.shapes import is_within, shape
 from groundstation.reports.svg.ticks import Tick
 
-MOST_LABELS, MOST_OF_A_LABEL = 60, 24
-LABEL_SHARE = 0.66  # of the width: where the label of a line across begins
-HALO = f' stroke="{PAPER}" stroke-width="2.4" paint-order="stroke"'
+HALO = f' stroke="{PAPER}" stroke-width="{HALO_PT:g}" paint-order="stroke"'
 _NOT_IN_AN_ID = re.compile(r"[^A-Za-z0-9_-]+")
 
 
@@ -140,65 +139,9 @@ def _nothing(box: Box) -> str:
 
 
 def _labels(box: Box) -> str:
-    """Labels of points and outlines beside their places, each where it covers no other if there is room."""
-    wanted: list[tuple[float, float, str, str, bool]] = []
-    for mark in box.panel.marks:
-        if isinstance(mark, Points):
-            places = zip(box.across(mark.x).tolist(), box.down(mark.y).tolist(), mark.labels, strict=False)
-            wanted += [(x, y, text, COLOURS[mark.role], False) for x, y, text in places]
-        elif isinstance(mark, Outlines):
-            for ring, text in zip(mark.rings, mark.labels, strict=False):
-                corners = np.column_stack([box.across(ring[:-1, 0]), box.down(ring[:-1, 1])])
-                corners = corners[np.isfinite(corners).all(axis=1)]
-                if len(corners):
-                    middle_x, middle_y = corners.mean(axis=0).tolist()
-                    wanted.append((middle_x, middle_y, text, FAINT, True))
-    taken: list[tuple[float, float, float, float]] = []
-    parts = [_beside(mark, box) for mark in box.panel.marks if isinstance(mark, Limit) and mark.label]
-    inside = [one for one in wanted if box.left <= one[0] <= box.right and box.top <= one[1] <= box.bottom and one[2]]
-    for x, y, text, colour, is_middle in inside[:MOST_LABELS]:
-        shown = label(text, MOST_OF_A_LABEL)
-        left, base = _free(x, y, width_pt(shown), taken, box, is_middle)
-        parts.append(written(shown, left, base, look=f' fill="{colour}"{HALO}'))
-    return "".join(parts)
-
-
-def _beside(mark: Limit, box: Box) -> str:
-    """The label of a line across the frame: above it, or right of an upright one."""
-    shown = label(mark.label, MOST_OF_A_LABEL)
-    place = float((box.across if mark.is_upright else box.down)(np.array([mark.value]))[0])
-    low, high = (box.left, box.right) if mark.is_upright else (box.top, box.bottom)
-    if not low <= place <= high:
-        return ""
-    along = box.left + min(LABEL_SHARE * box.width, max(box.width - width_pt(shown) - 2.0, 0.0))
-    x, y = (place + 2.0, box.top + SIZE_PT) if mark.is_upright else (along, place - 2.0)
-    return written(shown, x, y, look=f' fill="{COLOURS[mark.role]}"{HALO}')
-
-
-def _free(
-    x: float, y: float, wide: float, taken: list[tuple[float, float, float, float]], box: Box, is_middle: bool
-) -> tuple[float, float]:
-    """Left end and base line of a label: above its place, below, right or left of it, where no other stands."""
-    high = SIZE_PT
-    above, below, level = y - 4.5, y + 4.0 + 2 * middle(), y + middle()
-    tries = [(x - 0.5 * wide, above), (x - 0.5 * wide, below), (x + 5.0, level), (x - 5.0 - wide, level)]
-    if is_middle:
-        tries.insert(0, (x - 0.5 * wide, level))
-    tries += [(x - 0.5 * wide, above - high), (x - 0.5 * wide, below + high)]
-    tries += [(x + 3.0, above), (x - 3.0 - wide, above), (x + 3.0, below), (x - 3.0 - wide, below)]
-    bounds = [(left, base - high, left + wide, base + 0.2 * high) for left, base in tries]
-    is_free = [_inside(one, box) and not any(_meet(one, other) for other in taken) for one in bounds]
-    place = is_free.index(True) if True in is_free else 0
-    taken.append(bounds[place])
-    return tries[place]
-
-
-def _inside(one: tuple[float, float, float, float], box: Box) -> bool:
-    return one[0] >= box.left - 20.0 and one[2] <= box.right + b.EDGE_PT and one[1] >= box.top and one[3] <= box.bottom
-
-
-def _meet(one: tuple[float, float, float, float], other: tuple[float, float, float, float]) -> bool:
-    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+    """Labels in a frame, about their letters a halo of paper."""
+    told = (written(one.text, one.left, one.base, look=f' fill="{one.colour}"{HALO}') for one in labels_of(box))
+    return "".join(told)
 
 
 def _around(one: Placed) -> str:
