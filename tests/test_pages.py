@@ -59,7 +59,7 @@ def flight(case: str) -> Callable[[Path], Path]:
 
     def write(folder: Path) -> Path:
         save(folder, CASES[case](), MANIFEST)
-        write_flight_report(folder, with_pdf=False)
+        write_flight_report(folder)
         return folder / "report.html"
 
     return write
@@ -67,7 +67,7 @@ def flight(case: str) -> Callable[[Path], Path]:
 
 def fleet(folder: Path) -> Path:
     """Write the report of many flights."""
-    write_fleet_report(folder, fleet_of(30, ("A12", "B7"), samples=200), with_pdf=False)
+    write_fleet_report(folder, fleet_of(30, ("A12", "B7"), samples=200))
     return folder / "summary.html"
 
 
@@ -83,7 +83,7 @@ def comparison(folder: Path) -> Path:
 def acceptance(folder: Path) -> Path:
     """Write the page of an acceptance."""
     save_fleet(folder, [0.4, 0.5, 0.6, 0.7, 1.2])
-    write_acceptance_report(folder / "acceptance.html", accept(folder, "app-g"), with_pdf=False)
+    write_acceptance_report(folder / "acceptance.html", accept(folder, "app-g"))
     return folder / "acceptance.html"
 
 
