@@ -16,8 +16,8 @@ from groundstation.estimators.heading.interval import (
     fixed_noise_estimate,
     sample_weights,
 )
-from groundstation.estimators.heading.posterior import mixture_quantile
 from groundstation.estimators.heading.priors import PRIOR_MEAN, PRIOR_SIGMA
+from groundstation.methods.intervals import mixture_quantile
 from groundstation.simulation.processes import damped_oscillation, gauss_markov
 
 DENSE_TOLERANCE = 1e-8  # relative: rounding of two ways to the same number

@@ -26,21 +26,17 @@ from groundstation.estimators.heading.references import (
     runway_checks,
     shrunk_drift,
 )
-from groundstation.estimators.heading.samples import (
-    Samples,
-    distinct_epochs,
-    pair_samples,
-    window_slope,
-    without_arm,
-)
+from groundstation.estimators.heading.samples import Samples, pair_samples, window_slope, without_arm
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.estimators.heading.standstill import effective_samples, find_standstill, speed_bound_mps
+from groundstation.estimators.heading.standstill import find_standstill, speed_bound_mps
 from groundstation.estimators.heading.steps import heading_steps
 from groundstation.estimators.heading.verdict import decide, explain
 from groundstation.estimators.known import AircraftData, Interval, Runway, SiteData, Stand
+from groundstation.methods.intervals import effective_samples
 from groundstation.results.heading import Gate
 from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.taxi import TaxiCase, noiseless, simulate_taxi, table_of, taxi_flight
+from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.table import Flight, Table
 
 SETTINGS = HeadingSettings()

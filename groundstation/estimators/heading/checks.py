@@ -11,7 +11,7 @@ from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.estimators.heading.lines import fitted_lines, window_bounds
 from groundstation.estimators.heading.samples import Samples
-from groundstation.estimators.heading.standstill import effective_samples
+from groundstation.methods.intervals import effective_samples
 from groundstation.results.heading import Standstill, TaxiSegment
 
 FloatArray = NDArray[np.float64]

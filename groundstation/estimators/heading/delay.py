@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.known import AircraftData
-from groundstation.estimators.latency.settings import BOUND95
+from groundstation.methods.intervals import BOUND95
 from groundstation.results.latency import Latencies
 
 

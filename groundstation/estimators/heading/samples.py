@@ -15,6 +15,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.estimators.heading.lines import fitted_lines, window_bounds
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.results.reasons import NO_CONTACT
+from groundstation.tables.epochs import MOVING_MPS, distinct_epochs
 from groundstation.tables.sources import sources_of_kind, why_without_gnss
 from groundstation.tables.table import Flight, Table
 
@@ -23,7 +24,6 @@ TextArray = NDArray[np.str_]
 
 USED = "used"
 GATE_TEXT = "U20"
-MOVING_MPS = 1.0
 GEOMETRY_FIELDS = ("gdop", "pdop", "hdop")
 GEOMETRY_NAMES = {"gdop": "GDOP", "pdop": "PDOP", "hdop": "HDOP"}
 VELOCITY_SIGMA = "velocity sigma"
@@ -189,26 +189,6 @@ def logged_ground(flight: Flight, time_ns: Int64Array) -> Proof:
             wheels = table.values("weight_on_wheels")[known] > 0.5
             return Proof(wheels[np.maximum(index, 0)] & (index >= 0), "weight on wheels")
     return Proof(np.zeros(len(time_ns), dtype=bool), "")
-
-
-def distinct_epochs(table: Table) -> Table:
-    """GNSS rows with a velocity, each receiver epoch once.
-
-    Rows of one time are one epoch. A recorder that runs faster than the receiver writes each epoch several times:
-    a row that repeats the velocity (and position) before it is dropped while moving; and everywhere where more than
-    a fifth of the moving rows are such repetitions. A receiver that holds its velocity at standstill is left alone.
-    """
-    table = table.take(table.valid("velocity_north_mps", "velocity_east_mps")).unique_times()
-    if len(table) < 2:
-        return table
-    fields = [
-        name for name in ("velocity_north_mps", "velocity_east_mps", "latitude_deg", "longitude_deg") if table.has(name)
-    ]
-    repeated = np.zeros(len(table), dtype=bool)
-    repeated[1:] = np.all([np.diff(table.values(name)) == 0.0 for name in fields], axis=0)
-    moving = np.hypot(table.values("velocity_north_mps"), table.values("velocity_east_mps")) > MOVING_MPS
-    is_recorder_faster = moving.any() and float(np.mean(repeated[moving])) > 0.2
-    return table.take(~(repeated & (moving | is_recorder_faster)))
 
 
 def window_slope(at: FloatArray, time_s: FloatArray, values: FloatArray, window_s: float) -> FloatArray:

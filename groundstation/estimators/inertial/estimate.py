@@ -9,7 +9,6 @@ from groundstation.base.findings import Finding
 from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import M_PER_NAUTICAL_MILE
-from groundstation.estimators.fleet.ins_errors import slope_through_origin
 from groundstation.estimators.inertial import figures
 from groundstation.estimators.inertial.azimuth import estimate_azimuth
 from groundstation.estimators.inertial.coupled import CoupledRun
@@ -30,6 +29,7 @@ from groundstation.estimators.inertial.outages import Bridged, bridge_outages
 from groundstation.estimators.inertial.seams import PATIENCE_S
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import QUANTILES
+from groundstation.methods.intervals import slope_through_origin
 from groundstation.results.inertial import ChannelResult, InertialResult, NavigationStart, StateEstimate
 from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight

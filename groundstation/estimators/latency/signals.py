@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import direction_of, unwrap
-from groundstation.estimators.heading.samples import distinct_epochs
 from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.estimators.latency.windows import Series
 from groundstation.results.latency import Quantity
+from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.sources import sources_of_kind
 from groundstation.tables.table import Flight, Table
 

@@ -13,14 +13,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
 from groundstation.estimators.heading.delay import known_delay
 from groundstation.estimators.heading.gating import gate_samples
-from groundstation.estimators.heading.samples import (
-    USED,
-    HeadingValues,
-    OnGround,
-    Samples,
-    distinct_epochs,
-    pair_samples,
-)
+from groundstation.estimators.heading.samples import USED, HeadingValues, OnGround, Samples, pair_samples
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.known import AircraftData, Interval
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
@@ -28,6 +21,7 @@ from groundstation.estimators.magnetic.readings import NO_DATE, PLACE_WANTED
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import DeclinationUsed
 from groundstation.results.magnetic_ground import LeftOut
+from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.headings import FARTHEST_POSITION_S
 from groundstation.tables.phases import ground_mask
 from groundstation.tables.resample import join

@@ -10,12 +10,12 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column, Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.heading.samples import distinct_epochs
 from groundstation.estimators.inertial.estimate import Estimation
 from groundstation.estimators.inertial.figures import moved
 from groundstation.estimators.inertial.model import POSITION, VELOCITY
 from groundstation.estimators.known import Known
 from groundstation.results.heading import HeadingResult
+from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.headings import true_heading
 from groundstation.tables.table import Flight, Table
 
