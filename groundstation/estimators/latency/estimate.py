@@ -7,11 +7,11 @@ import numpy as np
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.inertial.kind import AIDED, HALF
-from groundstation.estimators.latency.fit import DelayFit, fit_delay
-from groundstation.estimators.latency.settings import LatencySettings
 from groundstation.estimators.latency.signals import NotComparableError, compare, pairs_of
-from groundstation.estimators.latency.windows import cut_windows, too_few_windows
 from groundstation.methods.intervals import BOUND95
+from groundstation.methods.lag.fit import DelayFit, fit_delay
+from groundstation.methods.lag.settings import LatencySettings
+from groundstation.methods.lag.windows import cut_windows, too_few_windows
 from groundstation.results.arrays.flight import LatencySearch
 from groundstation.results.figures import FigureData
 from groundstation.results.latency import Latencies, Latency, Quantity
