@@ -31,7 +31,7 @@ def _run(flight: "Flight", known: Known, settings: InertialSettings) -> Found[In
     from groundstation.estimators.inertial.aided import compare_aided
     from groundstation.estimators.inertial.estimate import estimate_compared
     from groundstation.estimators.inertial.examine import compared_with_kind
-    from groundstation.estimators.inertial.kind import UNAIDED
+    from groundstation.tables.ins_kind import UNAIDED
 
     compared, kind = compared_with_kind(flight, known, settings)
     if kind[0] != UNAIDED:
@@ -57,7 +57,8 @@ def _examine(flight: "Flight", known: Known, settings: InertialSettings) -> tupl
 def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -> Found[ForecastResult]:
     from groundstation.estimators.inertial.estimate import Estimation
     from groundstation.estimators.inertial.forecast import assess_forecast
-    from groundstation.estimators.inertial.kind import AIDED, WHY_NOT
+    from groundstation.estimators.inertial.kind import WHY_NOT
+    from groundstation.tables.ins_kind import AIDED
 
     estimation = known.workings_of(Estimation)
     if estimation is None:

@@ -21,7 +21,7 @@ from groundstation.estimators.inertial.filter import (
     run_filter,
     smooth,
 )
-from groundstation.estimators.inertial.kind import UNAIDED, kind_of
+from groundstation.estimators.inertial.kind import kind_of
 from groundstation.estimators.inertial.model import POSITION, STATES, ChannelModel, FloatArray
 from groundstation.estimators.inertial.navigation_start import navigation_start, stated_start
 from groundstation.estimators.inertial.noise import InsNoise, choose_class
@@ -31,6 +31,7 @@ from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import QUANTILES
 from groundstation.methods.intervals import slope_through_origin
 from groundstation.results.inertial import ChannelResult, InertialResult, NavigationStart, StateEstimate
+from groundstation.tables.ins_kind import UNAIDED
 from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight
 
