@@ -7,12 +7,6 @@ import numpy as np
 
 from groundstation.estimators.heading.answer import build_answer
 from groundstation.estimators.heading.delay import known_delay
-from groundstation.estimators.heading.samples import (
-    HeadingOf,
-    OnGround,
-    choose_topics,
-    logged_heading,
-)
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.heading.solution import solve
 from groundstation.estimators.heading.standstill import find_standstill
@@ -20,6 +14,8 @@ from groundstation.estimators.heading.steady import steady_prior
 from groundstation.estimators.heading.steps import heading_steps
 from groundstation.estimators.heading.taxi import straight_taxi
 from groundstation.estimators.known import AircraftData, SiteData
+from groundstation.methods.taxi.pair import choose_pair
+from groundstation.methods.taxi.samples import HeadingOf, OnGround, logged_heading
 from groundstation.results.heading import HeadingResult, HeadingStep
 from groundstation.results.latency import Latencies
 from groundstation.tables.phases import Phases
@@ -82,7 +78,7 @@ def estimate_heading_error(
     """
     settings, aircraft = settings or HeadingSettings(), aircraft or AircraftData()
     site, request = site or SiteData(), request or HeadingRequest()
-    ins_topic, gnss_topic = choose_topics(flight, request)
+    ins_topic, gnss_topic = choose_pair(flight, request.ins_topic, request.gnss_topic)
     delay = known_delay((ins_topic, gnss_topic), latencies, aircraft, settings)
     antenna = straight_taxi(
         *(flight, ins_topic, gnss_topic),

@@ -5,7 +5,7 @@ from typing import Literal
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number
-from groundstation.estimators.known import Interval
+from groundstation.methods.taxi.intervals import Interval
 
 RateKind = Literal["slope", "raw"]
 Runs = Literal["auto", "before_take_off", "all_ground"]

@@ -20,11 +20,11 @@ from groundstation.estimators.heading.interval import (
 )
 from groundstation.estimators.heading.posterior import ErrorPosterior
 from groundstation.estimators.heading.recursion import Running, run_recursion
-from groundstation.estimators.heading.samples import Samples, without_arm
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.standstill import StandstillData
 from groundstation.estimators.heading.steady import SteadyPrior
 from groundstation.estimators.known import AircraftData
+from groundstation.methods.taxi.samples import Samples, without_arm
 from groundstation.results.heading import HeadingStep, TaxiSegment
 
 FloatArray = NDArray[np.float64]

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from groundstation.base.angles import unwrap
 from groundstation.base.quantiles import length_quantile
 from groundstation.base.records import BoolArray
-from groundstation.estimators.heading.lines import window_bounds
-from groundstation.estimators.heading.samples import Samples
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.methods.intervals import effective_samples
+from groundstation.methods.moving_lines import window_bounds
+from groundstation.methods.taxi.samples import Samples
 from groundstation.results.heading import Standstill
 
 FloatArray = NDArray[np.float64]

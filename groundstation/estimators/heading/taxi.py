@@ -3,9 +3,9 @@
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
-from groundstation.estimators.heading.gating import gate_samples
-from groundstation.estimators.heading.samples import HeadingOf, OnGround, Samples, pair_samples
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.methods.taxi.gating import gate_samples
+from groundstation.methods.taxi.samples import HeadingOf, OnGround, Samples, pair_samples
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight
 
@@ -39,7 +39,7 @@ def straight_taxi(
             with_later_runs=with_later_runs,
             gnss_latency_s=gnss_latency_s,
         )
-        return gate_samples(paired, settings, request, phases)
+        return gate_samples(paired, settings, request.intervals, phases)
 
     antenna = gated(with_later_runs=settings.runs == "all_ground")
     if settings.runs == "auto" and antenna.is_used.sum() * antenna.interval_s < settings.taxi_min_s:

@@ -12,12 +12,13 @@ from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
 from groundstation.estimators.heading.delay import known_delay
-from groundstation.estimators.heading.gating import gate_samples
-from groundstation.estimators.heading.samples import USED, HeadingValues, OnGround, Samples, pair_samples
-from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.estimators.known import AircraftData, Interval
+from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
 from groundstation.estimators.magnetic.readings import NO_DATE, PLACE_WANTED
+from groundstation.methods.taxi.gating import gate_samples
+from groundstation.methods.taxi.intervals import Interval
+from groundstation.methods.taxi.samples import USED, HeadingValues, OnGround, Samples, pair_samples
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import DeclinationUsed
 from groundstation.results.magnetic_ground import LeftOut
@@ -109,7 +110,7 @@ def gated(
     except NotAssessableError as error:
         raise NotAssessableError(ANALYSIS, error.found, error.expected, error.next_step) from error
     intervals = tuple(Interval(start_s, end_s) for start_s, end_s in excluded_s)
-    return _settled(gate_samples(samples, heading, HeadingRequest(intervals=intervals)), settings)
+    return _settled(gate_samples(samples, heading, intervals), settings)
 
 
 def _settled(samples: Samples, settings: MagneticGroundSettings) -> Samples:

@@ -13,8 +13,6 @@ from groundstation.base.angles import FloatArray, mean_heading, unwrap, wrap_180
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.estimators.heading.interval import Differences, Regressor, error_posterior
-from groundstation.estimators.heading.lines import fitted_lines, window_bounds
-from groundstation.estimators.heading.samples import OnGround, Samples
 from groundstation.estimators.heading.solution import take_samples
 from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.compass_table import CENTRES_DEG
@@ -37,6 +35,8 @@ from groundstation.estimators.magnetic.ground_fit import (
     widest_gap_deg,
 )
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
+from groundstation.methods.moving_lines import fitted_lines, window_bounds
+from groundstation.methods.taxi.samples import OnGround, Samples
 from groundstation.results.arrays.magnetic import GroundRunCurve, GroundRunEpochs
 from groundstation.results.figures import FigureData
 from groundstation.results.latency import Latencies
