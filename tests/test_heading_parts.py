@@ -1,7 +1,7 @@
 """Parts of the heading estimator: recursion, pairing, gates, standstill, arm, checks, references, verdict."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,7 @@ from groundstation.methods.intervals import effective_samples
 from groundstation.methods.taxi.gating import gate_samples, intervals_without_epoch
 from groundstation.methods.taxi.intervals import Interval
 from groundstation.methods.taxi.samples import Samples, pair_samples, window_slope, without_arm
+from groundstation.methods.taxi.settings import GroundLimits
 from groundstation.results.heading import Gate
 from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.taxi import TaxiCase, noiseless, simulate_taxi, table_of, taxi_flight
@@ -609,3 +610,8 @@ def test_every_failed_required_gate_is_told_the_plain_ones_first() -> None:
     text = explain(verdict, against, 0.62, 0.1)
     told = ("before take-off", "outliers", "precision e", "scatter", "skewness", "Not to be entered: -0.6 deg")
     assert [text.index(part) for part in told] == sorted(text.index(part) for part in told)
+
+
+def test_limits_of_other_headings_are_those_of_system_1() -> None:
+    for field in fields(GroundLimits):
+        assert getattr(GroundLimits(), field.name) == getattr(HeadingSettings(), field.name), field.name

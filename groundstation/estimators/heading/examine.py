@@ -5,10 +5,9 @@ from itertools import groupby
 import numpy as np
 
 from groundstation.estimators.analysis import Shortfall
-from groundstation.estimators.heading.delay import known_delay
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.heading.standstill import find_standstill
-from groundstation.estimators.heading.taxi import straight_taxi
+from groundstation.estimators.heading.taxi import delay_of, straight_taxi
 from groundstation.estimators.heading.verdict import STANDSTILL_GATE, Figures, build_gates
 from groundstation.estimators.heading.wording import told
 from groundstation.estimators.known import Known
@@ -36,7 +35,7 @@ def examine_heading(flight: Flight, known: Known, settings: HeadingSettings) -> 
         raise known.intervals_problem
     request = HeadingRequest(intervals=known.intervals)
     topics = choose_pair(flight, request.ins_topic, request.gnss_topic)
-    delay = known_delay(topics, known.answer(Latencies), known.aircraft, settings)
+    delay = delay_of(topics, known.answer(Latencies), known.aircraft, settings)
     samples = straight_taxi(
         *(flight, *topics),
         settings=settings,

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -316,3 +316,11 @@ def without_arm(samples: Samples, arm_m: float, error_deg: float = 0.0) -> Sampl
         north_mps=samples.north_mps + sideways * np.sin(heading_rad),
         east_mps=samples.east_mps - sideways * np.cos(heading_rad),
     )
+
+
+def take_samples(samples: Samples, mask: BoolArray | NDArray[np.intp]) -> Samples:
+    """The rows of every array that a mask or positions select."""
+    arrays: dict[str, Any] = {
+        name: value[mask] for name, value in vars(samples).items() if isinstance(value, np.ndarray)
+    }
+    return replace(samples, **arrays)

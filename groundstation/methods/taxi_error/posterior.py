@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.estimators.heading import noise
-from groundstation.estimators.heading.priors import PRIOR_MEAN, SPREAD
 from groundstation.methods.intervals import mixture_quantile
+from groundstation.methods.taxi_error import noise
+from groundstation.methods.taxi_error.priors import PRIOR_MEAN, SPREAD
 
 FloatArray = NDArray[np.float64]
 
