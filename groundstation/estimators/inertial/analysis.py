@@ -7,9 +7,9 @@ import numpy as np
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.analysis import Analysis, Found, RestsOn, Shortfall
 from groundstation.estimators.inertial.columns import FORECAST_COLUMNS, INERTIAL_COLUMNS
-from groundstation.estimators.inertial.noise import choose_class
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.known import AircraftData, Known
+from groundstation.methods.ins_noise import choose_class
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.inertial import InertialResult
@@ -71,7 +71,7 @@ def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -
 
 
 def _check(settings: InertialSettings, aircraft: AircraftData) -> None:
-    choose_class(settings, aircraft.ins_class)
+    choose_class(settings.ins_class, aircraft.ins_class)
 
 
 def _rests_on(flight: "Flight", result: InertialResult) -> RestsOn:

@@ -22,9 +22,9 @@ from groundstation.estimators.inertial.craft_motion import CraftMotion, latitude
 from groundstation.estimators.inertial.differences import Differences, only_used
 from groundstation.estimators.inertial.filter import Epochs, measurement_variances, patience_of
 from groundstation.estimators.inertial.model import POSITION, VELOCITY, FloatArray
-from groundstation.estimators.inertial.noise import InsNoise
 from groundstation.estimators.inertial.seams import Fixes, fixes_since, returns_of
 from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.methods.ins_noise import InsNoise
 from groundstation.methods.kalman import filter as kalman
 from groundstation.methods.kalman.arrays import NO_STEP, REJECTED, Lines
 from groundstation.methods.kalman.rates import Rates

@@ -24,11 +24,11 @@ from groundstation.estimators.inertial.filter import (
 from groundstation.estimators.inertial.kind import kind_of
 from groundstation.estimators.inertial.model import POSITION, STATES, ChannelModel, FloatArray
 from groundstation.estimators.inertial.navigation_start import navigation_start, stated_start
-from groundstation.estimators.inertial.noise import InsNoise, choose_class
 from groundstation.estimators.inertial.outages import Bridged, bridge_outages
 from groundstation.estimators.inertial.seams import PATIENCE_S
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import QUANTILES
+from groundstation.methods.ins_noise import InsNoise, choose_class
 from groundstation.methods.intervals import slope_through_origin
 from groundstation.results.inertial import ChannelResult, InertialResult, NavigationStart, StateEstimate
 from groundstation.tables.ins_kind import UNAIDED
@@ -122,7 +122,7 @@ def estimate_compared(
     nav_start_utc: str = "",
 ) -> Estimation:
     """Estimate the errors of an INS that is compared with GNSS already; ``kind`` and the reason for it are known."""
-    noise, origin = choose_class(settings, aircraft_class, said_of(flight, compared.ins_topic, "ins_class"))
+    noise, origin = choose_class(settings.ins_class, aircraft_class, said_of(flight, compared.ins_topic, "ins_class"))
     model = ChannelModel.at(*_mean_place(compared), noise.beta_per_s, settings.transition)
     used = only_used(compared.epochs, settings)
     run = run_filter(used, model, noise, gate=settings.gate_sigmas**2, initial=initial_of(used, noise))

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.estimators.inertial.channel_group import ChannelGroup, Part
 from groundstation.estimators.inertial.model import POSITION, SIZE, VELOCITY, ChannelModel, FloatArray
-from groundstation.estimators.inertial.noise import InsNoise
 from groundstation.estimators.inertial.seams import PATIENCE_S, Seam
 from groundstation.estimators.inertial.steps import Steps
+from groundstation.methods.ins_noise import InsNoise
 from groundstation.methods.kalman import filter as kalman
 from groundstation.methods.kalman import smoother
 from groundstation.methods.kalman.arrays import REJECTED, Drive
