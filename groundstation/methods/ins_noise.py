@@ -1,4 +1,4 @@
-"""Noise parameters by INS class (TOML in ins_classes/): what the filter believes of the gyros, of GNSS and of the start."""
+"""Noise parameters by INS class (TOML in ins_classes/): what the filter believes of gyros, GNSS and the start."""
 
 import math
 from dataclasses import dataclass, field, replace
