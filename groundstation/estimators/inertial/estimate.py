@@ -1,5 +1,6 @@
 """The estimator of INS errors: from the tables of a flight to states, what they rest on, and the corrected track."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
@@ -28,12 +29,13 @@ from groundstation.estimators.inertial.outages import Bridged, bridge_outages
 from groundstation.estimators.inertial.seams import PATIENCE_S
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import QUANTILES
+from groundstation.estimators.inertial.tracks import corrected_tracks
 from groundstation.methods.ins_noise import InsNoise, choose_class
 from groundstation.methods.intervals import slope_through_origin
 from groundstation.results.inertial import ChannelResult, InertialResult, NavigationStart, StateEstimate
 from groundstation.tables.ins_kind import UNAIDED
 from groundstation.tables.sources import said_of
-from groundstation.tables.table import Flight
+from groundstation.tables.table import Flight, Table
 
 TITLES = {
     "position": "position error",
@@ -64,6 +66,10 @@ class Estimation:
     result: InertialResult
     findings: tuple[Finding, ...]
     coupled: CoupledRun | None = None
+
+    def tracks(self, start_ns: int) -> Iterator[tuple[str, Table]]:
+        """Tracks of the INS less its errors (:class:`groundstation.tables.tracks.HasTracks`)."""
+        return corrected_tracks(self.compared, self.run, self.smoothed, self.corrected_error_m, start_ns)
 
 
 def estimate_ins_errors(
