@@ -19,14 +19,14 @@ import numpy as np  # noqa: E402
 from filterpy.kalman import KalmanFilter  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
-from groundstation.estimators.kalman.filter import (  # noqa: E402
+from groundstation.methods.kalman.filter import (  # noqa: E402
     FilterRun,
     Kept,
     Measurements,
     Start,
     run_filter,
 )
-from groundstation.estimators.kalman.transition import Transition  # noqa: E402
+from groundstation.methods.kalman.transition import Transition  # noqa: E402
 
 Array = NDArray[np.float64]
 SEED = 1960

@@ -13,7 +13,7 @@ from groundstation.base.records import Column
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import MPS2_PER_G, NS_PER_S
 from groundstation.estimators.magnetic.attitude import field_in_body, levelled_heading_deg
-from groundstation.estimators.magnetic.harmonics import fit
+from groundstation.methods.harmonics import fit
 from groundstation.results.heading import HeadingResult
 from groundstation.tables.phases import Interval, Phases
 from groundstation.tables.table import Flight, Table

@@ -7,13 +7,14 @@ import pytest
 
 from groundstation.estimators.fleet import answer
 from groundstation.estimators.fleet.aircraft import mean_over_flights
-from groundstation.estimators.fleet.calibration import calibrate, share_interval
+from groundstation.estimators.fleet.calibration import calibrate
 from groundstation.estimators.fleet.changes import ChangeSettings, control_chart, find_changes
 from groundstation.estimators.fleet.density import MOST_BINS, densities_of, histogram_of
 from groundstation.estimators.fleet.deviation import deviations
 from groundstation.estimators.fleet.moments import Moments, merged, moments_of
 from groundstation.estimators.fleet.outliers import find_outliers
 from groundstation.estimators.fleet.skill import SkillMerger, SkillOfFlight
+from groundstation.methods.intervals import share_interval
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
 from groundstation.results.figures import FigureData
 from tests.fleet_example import flights_table

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from groundstation.estimators.heading import noise
-from groundstation.estimators.heading.interval import (
+from groundstation.methods.intervals import mixture_quantile
+from groundstation.methods.taxi_error import noise
+from groundstation.methods.taxi_error.interval import (
     NO_STANDSTILL,
     Differences,
     Regressor,
@@ -16,8 +17,7 @@ from groundstation.estimators.heading.interval import (
     fixed_noise_estimate,
     sample_weights,
 )
-from groundstation.estimators.heading.posterior import mixture_quantile
-from groundstation.estimators.heading.priors import PRIOR_MEAN, PRIOR_SIGMA
+from groundstation.methods.taxi_error.priors import PRIOR_MEAN, PRIOR_SIGMA
 from groundstation.simulation.processes import damped_oscillation, gauss_markov
 
 DENSE_TOLERANCE = 1e-8  # relative: rounding of two ways to the same number

@@ -1,7 +1,7 @@
 """Parts of the heading estimator: recursion, pairing, gates, standstill, arm, checks, references, verdict."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,6 @@ from groundstation.base.toml_settings import settings_from
 from groundstation.estimators.heading.arms import know_arm
 from groundstation.estimators.heading.checks import about_running_line
 from groundstation.estimators.heading.estimate import estimate_heading_error
-from groundstation.estimators.heading.gating import gate_samples, intervals_without_epoch, unused_intervals
 from groundstation.estimators.heading.normality import kurtosis_z, normality, skewness_z
 from groundstation.estimators.heading.recursion import run_recursion
 from groundstation.estimators.heading.references import (
@@ -26,21 +25,20 @@ from groundstation.estimators.heading.references import (
     runway_checks,
     shrunk_drift,
 )
-from groundstation.estimators.heading.samples import (
-    Samples,
-    distinct_epochs,
-    pair_samples,
-    window_slope,
-    without_arm,
-)
-from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.estimators.heading.standstill import effective_samples, find_standstill, speed_bound_mps
+from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.estimators.heading.standstill import find_standstill, speed_bound_mps
 from groundstation.estimators.heading.steps import heading_steps
 from groundstation.estimators.heading.verdict import decide, explain
-from groundstation.estimators.known import AircraftData, Interval, Runway, SiteData, Stand
+from groundstation.estimators.known import AircraftData, Runway, SiteData, Stand
+from groundstation.methods.intervals import effective_samples
+from groundstation.methods.taxi.gating import gate_samples, intervals_without_epoch
+from groundstation.methods.taxi.intervals import Interval
+from groundstation.methods.taxi.samples import Samples, pair_samples, window_slope, without_arm
+from groundstation.methods.taxi.settings import GroundLimits
 from groundstation.results.heading import Gate
 from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.taxi import TaxiCase, noiseless, simulate_taxi, table_of, taxi_flight
+from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.table import Flight, Table
 
 SETTINGS = HeadingSettings()
@@ -50,7 +48,7 @@ TWO_TURNS = TaxiCase(segments_s=(30.0, 30.0, 30.0), turns_deg=(90.0, -100.0), an
 
 def paired(case: TaxiCase, seed: int = 0, settings: HeadingSettings = SETTINGS) -> Samples:
     flight = taxi_flight(simulate_taxi(case, np.random.default_rng(seed)))
-    return gate_samples(pair_samples(flight, "ins", "gnss", settings=settings), settings, HeadingRequest())
+    return gate_samples(pair_samples(flight, "ins", "gnss", settings=settings), settings)
 
 
 def simple_samples(time_s: np.ndarray, north: np.ndarray, east: np.ndarray, heading: np.ndarray) -> Samples:
@@ -155,14 +153,14 @@ def test_gates_name_the_reason() -> None:
 def test_geometry_integrity_and_intervals_take_samples_out() -> None:
     flight = taxi_flight(simulate_taxi(TWO_TURNS, np.random.default_rng(0)))
     pair = pair_samples(flight, "ins", "gnss", settings=SETTINGS)
-    plain = gate_samples(pair, SETTINGS, HeadingRequest())
+    plain = gate_samples(pair, SETTINGS)
     used = np.flatnonzero(plain.is_used)
     geometry, integrity = pair.geometry.copy(), pair.integrity.copy()
     geometry[used[:50]] = 2.3
     integrity[used[50:80]] = 0.0
     start, end = float(pair.time_s[used[100]]), float(pair.time_s[used[119]])
-    request = HeadingRequest(intervals=(Interval(start, end, "exclude"),))
-    gated = gate_samples(replace(pair, geometry=geometry, integrity=integrity), SETTINGS, request)
+    excluded = (Interval(start, end, "exclude"),)
+    gated = gate_samples(replace(pair, geometry=geometry, integrity=integrity), SETTINGS, excluded)
     assert (gated.gate[used[:50]] == "geometry").all()
     assert (gated.gate[used[50:80]] == "integrity").all()
     assert (gated.gate[used[100:120]] == "excluded").all()
@@ -171,21 +169,21 @@ def test_geometry_integrity_and_intervals_take_samples_out() -> None:
 def test_forced_interval_overrides_speed_and_turn() -> None:
     flight = taxi_flight(simulate_taxi(TWO_TURNS, np.random.default_rng(0)))
     pair = pair_samples(flight, "ins", "gnss", settings=SETTINGS)
-    plain = gate_samples(pair, SETTINGS, HeadingRequest())
+    plain = gate_samples(pair, SETTINGS)
     slow = plain.time_s[plain.gate == "too slow"][-100]
-    forced = gate_samples(pair, SETTINGS, HeadingRequest(intervals=(Interval(slow - 1.0, slow + 1.0, "force"),)))
+    forced = gate_samples(pair, SETTINGS, (Interval(slow - 1.0, slow + 1.0, "force"),))
     assert forced.is_used.sum() > plain.is_used.sum()
 
 
 def test_outliers_of_tens_of_degrees_are_left_out_and_nothing_else() -> None:
     flight = taxi_flight(simulate_taxi(TWO_TURNS, np.random.default_rng(0)))
     pair = pair_samples(flight, "ins", "gnss", settings=SETTINGS)
-    plain = gate_samples(pair, SETTINGS, HeadingRequest())
+    plain = gate_samples(pair, SETTINGS)
     assert (plain.gate == "outlier").sum() == 0
     hit = np.flatnonzero(plain.is_used)[[20, 200, 201]]
     north, east = pair.north_mps.copy(), pair.east_mps.copy()
     north[hit], east[hit] = north[hit] - 0.5 * east[hit], east[hit] + 0.5 * north[hit]
-    gated = gate_samples(replace(pair, north_mps=north, east_mps=east), SETTINGS, HeadingRequest())
+    gated = gate_samples(replace(pair, north_mps=north, east_mps=east), SETTINGS)
     assert np.flatnonzero(gated.gate == "outlier").tolist() == hit.tolist()
 
 
@@ -195,7 +193,7 @@ def test_gnss_gap_closes_the_segment() -> None:
     seconds = flight.seconds(gnss.time_ns)
     cut = gnss.take((seconds < 110.0) | (seconds > 111.0))
     flight = replace(flight, tables={**flight.tables, "gnss": cut})
-    samples = gate_samples(pair_samples(flight, "ins", "gnss", settings=SETTINGS), SETTINGS, HeadingRequest())
+    samples = gate_samples(pair_samples(flight, "ins", "gnss", settings=SETTINGS), SETTINGS)
     before, after = samples.segment[samples.time_s < 110.0].max(), samples.segment[samples.time_s > 111.0].max()
     assert after == before + 1
 
@@ -229,9 +227,8 @@ def test_intervals_that_touch_no_epoch_are_told() -> None:
     first, second, last = float(samples.time_s[0]), float(samples.time_s[1]), float(samples.time_s[-1])
     touching = Interval(first, first)
     between, after = Interval(first + 0.01, second - 0.01, "force"), Interval(last + 1.0, last + 2.0)
-    request = HeadingRequest(intervals=(touching, between, after))
-    assert unused_intervals(samples, request) == (between, after)
-    assert unused_intervals(samples, HeadingRequest()) == ()
+    assert intervals_without_epoch(samples.time_s, (touching, between, after)) == (between, after)
+    assert intervals_without_epoch(samples.time_s, ()) == ()
     assert intervals_without_epoch(np.zeros(0), (touching,)) == (touching,)
 
 
@@ -317,7 +314,7 @@ def test_late_gnss_velocities_are_found_from_turns() -> None:
     run = simulate_taxi(noiseless(TWO_TURNS), np.random.default_rng(0))
     flight = taxi_flight(replace(run, gnss_time_s=run.gnss_time_s + 0.2))
     settings = HeadingSettings(offset_prior_sigma_s=1.0)
-    samples = gate_samples(pair_samples(flight, "ins", "gnss", settings=settings), settings, HeadingRequest())
+    samples = gate_samples(pair_samples(flight, "ins", "gnss", settings=settings), settings)
     found = know_arm(samples, AircraftData(antenna_arm_m=4.0), settings)
     assert found.offset_s == pytest.approx(0.2, abs=0.02)
 
@@ -343,7 +340,7 @@ def test_turns_that_the_method_does_not_hold_for_leave_the_arm_as_it_was() -> No
 def test_arm_is_not_read_from_a_slow_log() -> None:
     flight = taxi_flight(simulate_taxi(TWO_TURNS, np.random.default_rng(0)))
     slow = replace(flight, tables={**flight.tables, "gnss": flight["gnss"].take(slice(0, None, 10))})
-    samples = gate_samples(pair_samples(slow, "ins", "gnss", settings=SETTINGS), SETTINGS, HeadingRequest())
+    samples = gate_samples(pair_samples(slow, "ins", "gnss", settings=SETTINGS), SETTINGS)
     assert know_arm(samples, AircraftData(), SETTINGS).origin == "not observable"
 
 
@@ -613,3 +610,8 @@ def test_every_failed_required_gate_is_told_the_plain_ones_first() -> None:
     text = explain(verdict, against, 0.62, 0.1)
     told = ("before take-off", "outliers", "precision e", "scatter", "skewness", "Not to be entered: -0.6 deg")
     assert [text.index(part) for part in told] == sorted(text.index(part) for part in told)
+
+
+def test_limits_of_other_headings_are_those_of_system_1() -> None:
+    for field in fields(GroundLimits):
+        assert getattr(GroundLimits(), field.name) == getattr(HeadingSettings(), field.name), field.name

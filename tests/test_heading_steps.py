@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from groundstation.base.angles import wrap_360
-from groundstation.estimators.heading import interval
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.solution import MOST_STEPS, STEP_SIGMA_DEG, _before
+from groundstation.methods.taxi_error import interval
 from groundstation.results.heading import HeadingStep
 from groundstation.simulation.taxi import TaxiCase, simulate_taxi, table_of, taxi_flight
 from groundstation.tables.table import Flight

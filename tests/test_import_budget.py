@@ -70,7 +70,7 @@ def test_compiled_loops_are_found_again_without_their_compiler(suffix: str, tmp_
 BY_RATES = """
 import sys
 import numpy as np
-from groundstation.estimators.kalman.rates import Rates
+from groundstation.methods.kalman.rates import Rates
 rates = Rates(2, np.array([0]), np.array([1]))
 rates.transition(np.ones((3, 1)), np.ones(3), np.ones(2))
 rates.carried(np.ones((4, 1)), 1.0, 2, np.ones(2))

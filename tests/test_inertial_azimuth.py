@@ -10,8 +10,8 @@ from groundstation.estimators.inertial.azimuth import estimate_azimuth
 from groundstation.estimators.inertial.differences import Differences, drag_per_s
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, run_filter
 from groundstation.estimators.inertial.model import ChannelModel, FloatArray
-from groundstation.estimators.inertial.noise import InsNoise
 from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.methods.ins_noise import InsNoise
 from groundstation.results.inertial import AzimuthEstimate
 from groundstation.simulation.inertial_family import FamilySettings, GnssNoise, simulate_family
 from groundstation.simulation.ins_class import load_ins_class

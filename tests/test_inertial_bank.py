@@ -13,9 +13,9 @@ from groundstation.estimators.inertial.estimate import estimate_ins_errors
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, initial_of, run_filter
 from groundstation.estimators.inertial.hindcast import hindcast
 from groundstation.estimators.inertial.leads import leads_of, past_mean, start_epochs
-from groundstation.estimators.inertial.noise import BankFactors, Calibration, GnssNoise, load_class
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import claimed_sigma
+from groundstation.methods.ins_noise import BankFactors, Calibration, GnssNoise, load_class
 from tests.inertial_flights import batch_of, flight_of
 
 SETTINGS = InertialSettings()

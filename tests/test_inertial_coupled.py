@@ -32,9 +32,9 @@ from groundstation.estimators.inertial.model import (
     FloatArray,
     normal_gravity_mps2,
 )
-from groundstation.estimators.inertial.noise import GnssNoise, InsNoise
 from groundstation.estimators.inertial.seams import PATIENCE_S
 from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.methods.ins_noise import GnssNoise, InsNoise
 from groundstation.simulation.inertial_family import ErrorBatch, FamilySettings, simulate_family
 from groundstation.simulation.ins_errors import SensorErrors, TrueMotion, propagate
 

@@ -26,11 +26,11 @@ from groundstation.estimators.inertial.model import (
     VELOCITY,
     ChannelModel,
 )
-from groundstation.estimators.inertial.noise import GnssNoise, InsNoise
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.start_covariance import WITH_COVARIANCE, start_covariance
 from groundstation.estimators.inertial.starts import start_states
-from groundstation.estimators.kalman import smoother
+from groundstation.methods.ins_noise import GnssNoise, InsNoise
+from groundstation.methods.kalman import smoother
 from groundstation.simulation.channel_truth import RADIUS_M
 from groundstation.studies.forecast_consistency import consistency_table, matched_run
 

@@ -10,9 +10,9 @@ from groundstation.estimators.inertial.channel_group import ChannelGroup
 from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, Initial, run_filter, smooth
 from groundstation.estimators.inertial.model import POSITION, FloatArray
-from groundstation.estimators.inertial.noise import InsNoise
 from groundstation.estimators.inertial.seams import FACTOR_MAX, PATIENCE_S, factor_of, fixes_since, returns_of
 from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.methods.ins_noise import InsNoise
 from groundstation.simulation.inertial_family import ErrorBatch, simulate_family
 from groundstation.studies.forecast_cases import NO_GATE, differences_of, epochs_of, full_case, model_of
 from groundstation.tables.table import Flight

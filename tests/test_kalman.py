@@ -8,8 +8,8 @@ from scipy.linalg import block_diag, expm
 from scipy.stats import chi2
 
 from groundstation.base.angles import FloatArray
-from groundstation.estimators.kalman.arrays import ABSENT, REJECTED, USED
-from groundstation.estimators.kalman.filter import (
+from groundstation.methods.kalman.arrays import ABSENT, REJECTED, USED
+from groundstation.methods.kalman.filter import (
     FilterRun,
     Gate,
     Kept,
@@ -17,8 +17,8 @@ from groundstation.estimators.kalman.filter import (
     Start,
     run_filter,
 )
-from groundstation.estimators.kalman.smoother import smooth
-from groundstation.estimators.kalman.transition import Transition
+from groundstation.methods.kalman.smoother import smooth
+from groundstation.methods.kalman.transition import Transition
 
 ROUNDING = 1e-9  # of sigmas: double precision over some hundred products
 BATCH_ROUNDING = 1e-7  # of sigmas: the normal equations of 40 epochs

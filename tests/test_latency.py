@@ -18,8 +18,8 @@ from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.known import AircraftData
 from groundstation.estimators.latency.analysis import LATENCY
 from groundstation.estimators.latency.estimate import estimate_latencies
-from groundstation.estimators.latency.settings import LatencySettings
-from groundstation.estimators.latency.windows import Series
+from groundstation.methods.lag.settings import LatencySettings
+from groundstation.methods.lag.windows import Series
 from groundstation.pipeline.one_flight.analyse import Answered, known_of, run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log

@@ -24,11 +24,11 @@ from groundstation.chapters.markdown import escaped
 from groundstation.chapters.parts import Grid, Note
 from groundstation.chapters.plots import PLOTS
 from groundstation.chapters.wording import number
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.analysis import MAGNETIC_GROUND
 from groundstation.estimators.magnetic.ground_fit import fit_curve
 from groundstation.estimators.magnetic.ground_runs import estimate_ground_deviation
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
+from groundstation.methods import harmonics
 from groundstation.pipeline.one_flight.analyse import Answered, Given, analyse, known_of, run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.pipeline.one_flight.convert import convert_log

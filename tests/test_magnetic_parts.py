@@ -7,7 +7,6 @@ import pytest
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.errors import SettingsError
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.alignment import align
 from groundstation.estimators.magnetic.apply import corrected_by_coefficients, corrected_by_iron, corrected_by_table
 from groundstation.estimators.magnetic.attitude import field_in_body, levelled_heading_deg
@@ -20,6 +19,7 @@ from groundstation.estimators.magnetic.modulus import fit_modulus
 from groundstation.estimators.magnetic.poisson import EarthField
 from groundstation.estimators.magnetic.readings import Readings
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.methods import harmonics
 from groundstation.results.magnetic import Method, MethodName
 from tests.magnetic_example import correlated, taxi_heading
 

@@ -17,9 +17,9 @@ from groundstation.base.ledger import Ledger
 from groundstation.chapters.front import front
 from groundstation.estimators.analyses import FLIGHT_ANALYSES
 from groundstation.estimators.inertial.analysis import INERTIAL
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.analysis import MAGNETIC
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.methods import harmonics
 from groundstation.pipeline.many_flights.fleet_columns import answer_values
 from groundstation.pipeline.one_flight import analyse as pipeline
 from groundstation.pipeline.one_flight.analyse import Given, analyse, known_of, run_analyses

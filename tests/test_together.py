@@ -12,11 +12,10 @@ from groundstation.base.records import Column, RecordBatch
 from groundstation.base.units import NS_PER_S
 from groundstation.chapters.together import together as chapter
 from groundstation.estimators.analyses import ANSWER_TYPES
-from groundstation.estimators.heading.samples import choose_topics
-from groundstation.estimators.heading.settings import HeadingRequest
 from groundstation.estimators.latency.signals import pairs_of
 from groundstation.estimators.overview import overview
 from groundstation.estimators.two_clocks.relation import NotOneFlightError
+from groundstation.methods.taxi.pair import choose_pair
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
@@ -87,7 +86,7 @@ def test_a_receivers_track_in_a_later_log_is_no_heading(logs: Path, tmp_path: Pa
         flight = read_flight(target, join_logs([open_log(logs / name) for name in names], target))
         ins, other = ("ins", "ins.b") if names[0] == "a.ulg" else ("ins.b", "ins")
         assert f"heading_is_track.{other}.true_heading_deg" in flight.metadata
-        assert choose_topics(flight, HeadingRequest())[0] == ins
+        assert choose_pair(flight)[0] == ins
 
 
 def test_the_first_logs_times_and_values_are_as_without_the_others(

@@ -1,6 +1,5 @@
 """What is known of a flight besides its tables: aircraft, airfield, the user's intervals, earlier answers."""
 
-import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,6 +9,7 @@ from typing import Any, Literal, TypeVar
 from groundstation.base.errors import GroundstationError, SettingsError
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.toml_settings import check_ranges, number, required_number
+from groundstation.methods.taxi.intervals import Interval
 from groundstation.results.answer import A, Answers, answer_of
 from groundstation.results.installation import Lesson
 from groundstation.tables.phases import Phases
@@ -192,19 +192,6 @@ class SiteData:
         if self.stand:
             return next((stand for stand in self.stands if stand.name == self.stand), None)
         return self.stands[0] if len(self.stands) == 1 else None
-
-
-@dataclass(frozen=True)
-class Interval:
-    """Flight seconds that a file excludes from the estimate, or forces into it."""
-
-    start_s: float
-    end_s: float
-    use: Literal["exclude", "force"] = "exclude"
-
-    def __post_init__(self) -> None:
-        if not (math.isfinite(self.start_s) and math.isfinite(self.end_s)):
-            raise SettingsError("interval", f"{self.start_s:g} to {self.end_s:g} s", "finite flight seconds")
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from groundstation.estimators.control.laws import Session, integral_law, local_l
 from groundstation.estimators.control.placement import plan_placement
 from groundstation.estimators.control.plan import plan_session
 from groundstation.estimators.control.scenario import LOCAL_CRITERIA, SessionPlan
-from groundstation.estimators.cooperative.consistency import nees_limits
+from groundstation.methods.intervals import nees_limits
 from groundstation.results.control import UNCONTROLLED, ControlPlan
 from groundstation.results.figures import FigureData
 from groundstation.results.placement import PlacementPlan

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from groundstation.chapters.parts import Section
-from groundstation.estimators.cooperative.consistency import DIVERGED, nees_limits
+from groundstation.estimators.cooperative.consistency import DIVERGED
+from groundstation.methods.intervals import nees_limits
 from groundstation.results.figures import FigureData
 from groundstation.studies.cooperative_cases import FACTOR, Case
 from groundstation.studies.cooperative_runs import Outcome, diverges

@@ -9,7 +9,7 @@ from groundstation.base.units import MPS2_PER_G
 from groundstation.estimators.inertial.differences import Differences, drag_per_s
 from groundstation.estimators.inertial.filter import STANDARD_GATE, Epochs
 from groundstation.estimators.inertial.model import ChannelModel
-from groundstation.estimators.inertial.noise import GnssNoise, InsNoise, load_class
+from groundstation.methods.ins_noise import GnssNoise, InsNoise, load_class
 from groundstation.simulation.channel_truth import RADIUS_M
 from groundstation.simulation.inertial_family import ErrorBatch, FamilySettings
 from groundstation.simulation.inertial_family import GnssNoise as SimulatedGnss

@@ -9,7 +9,7 @@ from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.units import MPS2_PER_G
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, run_filter
 from groundstation.estimators.inertial.model import SIZE, ChannelModel
-from groundstation.estimators.inertial.noise import GnssNoise
+from groundstation.methods.ins_noise import GnssNoise
 from groundstation.results.figures import FigureData
 from groundstation.simulation.channel_truth import POSITION, RADIUS_M, VELOCITY, channel_truth
 from groundstation.simulation.ins_class import load_ins_class

@@ -33,7 +33,7 @@ from groundstation.estimators.inertial.model import POSITION, RANDOM_DRIFT
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import QUANTILES, claimed_sigma
 from groundstation.estimators.inertial.start_covariance import lead_growth
-from groundstation.estimators.kalman import filter as kalman
+from groundstation.methods.kalman import filter as kalman
 from groundstation.results.figures import FigureData
 from groundstation.simulation.inertial_family import simulate_family
 from groundstation.studies.forecast_cases import Case, differences_of, epochs_of, model_of

@@ -9,11 +9,11 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.records import frozen
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.apply import corrected_by_iron, corrected_by_table
 from groundstation.estimators.magnetic.compass_table import CENTRES_DEG, filled_on_circle
 from groundstation.estimators.magnetic.estimate import estimate_deviation
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.methods import harmonics
 from groundstation.results.arrays.magnetic import MagneticSamples, MagneticTable
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.heading import HeadingResult

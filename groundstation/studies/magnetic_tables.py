@@ -9,7 +9,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray, frozen
-from groundstation.estimators.fleet.calibration import share_interval
+from groundstation.methods.intervals import share_interval
 from groundstation.results.figures import FigureData
 from groundstation.results.magnetic import LETTERS
 from groundstation.studies.magnetic_bias import bank_at, power_law, power_law_above_floor

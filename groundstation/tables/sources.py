@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
+from groundstation.tables.ins_kind import AIDED, HALF
 from groundstation.tables.table import Flight, Table
 
 TOGETHER = "together"  # key of the metadata of a flight of several logs
@@ -13,7 +14,6 @@ WHOLE_SHARE = 0.8  # of the longest: a source that covers less is for want of a 
 FASTEST_HZ = 10.0  # a faster source says no more of a motion
 SURER = 1.5  # times: a smaller difference of the stated sigma is none
 NEEDS = {"gnss": ("velocity_north_mps", "velocity_east_mps"), "ins": ("roll_deg", "pitch_deg")}
-AIDED, HALF = "gnss_aided", 0.5
 FIX_FIELDS = ("latitude_deg", "velocity_north_mps", "ground_speed_mps")  # a receiver with a fix logs one of them
 NEVER_A_FIX = "GNSS never had a fix"
 

@@ -87,7 +87,7 @@ def bases(kind: str) -> tuple[str, ...]:
         "landing-plan": lambda: _shipped("plans/landing"),
         "session-plan": lambda: _shipped("plans/session"),
         "standard": lambda: _shipped("estimators/fleet/standards"),
-        "noise-class": lambda: _shipped("estimators/inertial/classes"),
+        "noise-class": lambda: _shipped("methods/ins_classes"),
         "ins-class": lambda: _shipped("simulation/ins_classes"),
     }[kind]()
 
@@ -192,7 +192,7 @@ LOADERS: dict[str, Callable[[Path], Any]] = {
     "landing-plan": _plan("landing"),
     "session-plan": _plan("session"),
     "standard": _load("groundstation.pipeline.many_flights.acceptance", "read_standard"),
-    "noise-class": _load("groundstation.estimators.inertial.noise", "load_class", by_name=True),
+    "noise-class": _load("groundstation.methods.ins_noise", "load_class", by_name=True),
     "ins-class": _load("groundstation.simulation.ins_class", "load_ins_class", by_name=True),
 }
 KINDS = tuple(LOADERS)

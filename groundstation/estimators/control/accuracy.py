@@ -16,9 +16,9 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.compile import compiled
 from groundstation.base.records import Int64Array, frozen
 from groundstation.estimators.control.scenario import SessionPlan
-from groundstation.estimators.cooperative.transition import discretise, local_dynamics
-from groundstation.estimators.kalman.filter import FilterRun, Measurements, Start, run_filter
-from groundstation.estimators.kalman.transition import Transition
+from groundstation.methods.kalman.filter import FilterRun, Measurements, Start, run_filter
+from groundstation.methods.kalman.transition import Transition
+from groundstation.methods.link_dynamics import discretise, local_dynamics
 
 STATES = 7
 NORTH, EAST, HEIGHT, CLOCK = 0, 1, 4, 5

@@ -26,9 +26,10 @@ from groundstation.estimators.cooperative.arrays import (
     Numbers,
 )
 from groundstation.estimators.cooperative.judging import LEAP_M
-from groundstation.estimators.cooperative.motion import ROOMS, place, step
+from groundstation.estimators.cooperative.motion import place, step
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.estimators.cooperative.vehicles import Step, View
+from groundstation.methods.link_dynamics import ROOMS
 from groundstation.tables.session import DeadReckoning, Frame
 
 RAD_PER_ARCSEC = float(np.deg2rad(1.0 / 3600.0))

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.records import BoolArray
 from groundstation.estimators.cooperative.tracks import Track
 from groundstation.tables.session import DeadReckoning, Odometry
@@ -83,19 +82,3 @@ def normalised(error: FloatArray, covariance: FloatArray) -> FloatArray:
         solved = np.linalg.solve(covariance[known], error[known][..., None])[..., 0]
         out[known] = (error[known] * solved).sum(axis=1)
     return out
-
-
-def nees_limits(freedom: int, independent: int, share: float = 0.95) -> tuple[float, float]:
-    """Limits of the mean of ``independent`` normalised squared errors of ``freedom`` degrees: ``share`` lie inside.
-
-    Examples
-    --------
-    >>> low, high = nees_limits(2, 100)
-    >>> round(low, 2), round(high, 2)
-    (1.63, 2.41)
-    """
-    total = freedom * independent
-    low, high = (
-        float(chi_square_quantile(part, total)) / independent for part in (0.5 - 0.5 * share, 0.5 + 0.5 * share)
-    )
-    return low, high

@@ -38,11 +38,11 @@ from groundstation.estimators.cooperative.arrays import Items, Log, rows_for
 from groundstation.estimators.cooperative.error_map import blocks, spectral_radius, unit_rows, windows
 from groundstation.estimators.cooperative.events import Prepared
 from groundstation.estimators.cooperative.messages import Broadcast
-from groundstation.estimators.cooperative.motion import ROOMS
 from groundstation.estimators.cooperative.plain.split_covariance import WEIGHTS
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.estimators.cooperative.timeline import timeline
 from groundstation.estimators.cooperative.tracks import AlgorithmRun, counted, finished, log_for
+from groundstation.methods.link_dynamics import ROOMS
 from groundstation.tables.session import NO_SLOT
 
 NUMBERS = {"neighbour_exact": EXACT, "ranked": RANKED, "modified": MODIFIED, "split_intersection": SPLIT}

@@ -10,11 +10,12 @@ from groundstation.base.findings import Finding
 from groundstation.estimators.cooperative import figures
 from groundstation.estimators.cooperative.algorithms import run_algorithm
 from groundstation.estimators.cooperative.arrays import KINDS, PEER, POINT, USED
-from groundstation.estimators.cooperative.consistency import Judgement, judge, nees_limits
+from groundstation.estimators.cooperative.consistency import Judgement, judge
 from groundstation.estimators.cooperative.events import Prepared, prepare, require_vehicles
 from groundstation.estimators.cooperative.geometry import Geometry, Truth, bound_of, geometry_of
 from groundstation.estimators.cooperative.settings import ALGORITHMS, CooperativeSettings
 from groundstation.estimators.cooperative.tracks import AlgorithmRun
+from groundstation.methods.intervals import nees_limits
 from groundstation.results.cooperative import AlgorithmRow, CooperativeResult, GeometryRow, LinkRow, VehicleRow
 from groundstation.tables.session import Session
 

@@ -23,10 +23,11 @@ from groundstation.estimators.cooperative.arrays import (
     rows_for,
 )
 from groundstation.estimators.cooperative.judging import count_rejection, write_down
-from groundstation.estimators.cooperative.motion import ROOMS, place, position, step
+from groundstation.estimators.cooperative.motion import place, position, step
 from groundstation.estimators.cooperative.observation import observe
-from groundstation.estimators.kalman.arrays import Pattern
-from groundstation.estimators.kalman.kernels import predict_covariance, predicted_variance, update_covariance
+from groundstation.methods.kalman.arrays import Pattern
+from groundstation.methods.kalman.kernels import predict_covariance, predicted_variance, update_covariance
+from groundstation.methods.link_dynamics import ROOMS
 
 KNOWN_WRONG_SIGMAS = 3.0
 SAME_TIME_S = 1e-12

@@ -1,8 +1,6 @@
 """Compiled motion of an aircraft's error states, and where its antenna is.
 
-Two models, both linear: in a local frame (7 states) and in the global one (13 or 15). Source: Van Loan, Computing
-integrals involving the matrix exponential, IEEE Transactions on Automatic Control 23(3), 1978 (the integral of
-exp(F s) Q exp(F' s); both are summed as power series here: their terms follow from one another); Titterton and Weston,
+Two models, both linear: in a local frame (7 states) and in the global one (13 or 15). Source: Titterton and Weston,
 Strapdown Inertial Navigation Technology, 2nd ed. 2004, section 12.3 (dynamics of the thirteen states).
 """
 
@@ -25,61 +23,10 @@ from groundstation.estimators.cooperative.arrays import (
     Fleet,
     FloatArray,
 )
+from groundstation.methods.link_dynamics import fill_step
 
-TERMS, FEWEST_TERMS = 40, 4
-SMALLEST = 1e-16  # of a term of the transition: its largest entry is 1 or more
 SAME_TIME_S, SAME_STEP_S = 1e-9, 1e-12
-ROOMS = 11  # matrices of n by n that a step works in; the last three keep the last step of aircraft in a local frame
 KEPT_STEP, KEPT_PHI, KEPT_NOISE = 8, 9, 10  # all aircraft of a session have one model there
-
-
-@part
-def discretise(
-    n: int, F: FloatArray, q: FloatArray, step_s: float, phi: FloatArray, noise: FloatArray, room: FloatArray
-) -> None:
-    """Transition and covariance of the noise of a step of dx/dt = F x + w; entries of F that are zero cost nothing.
-
-    Phi = sum (F h)^k / k!; Q = sum L_k h^(k+1) / (k+1)! with L_0 = diag(q), L_(k+1) = F L_k + L_k F'. A step may go
-    back; then the noise means nothing.
-    """
-    term, level, moved = room[0], room[1], room[2]
-    for i in range(n):
-        for j in range(n):
-            term[i, j] = level[i, j] = phi[i, j] = noise[i, j] = 0.0
-        term[i, i] = phi[i, i] = 1.0
-        level[i, i] = q[i]
-        noise[i, i] = q[i] * step_s
-    factor = step_s
-    for k in range(1, TERMS):
-        largest = 0.0
-        _times(n, F, term, moved)
-        for i in range(n):
-            for j in range(n):
-                value = moved[i, j] * step_s / k
-                term[i, j] = value
-                phi[i, j] += value
-                largest = max(largest, abs(value))
-        _times(n, F, level, moved)
-        factor *= step_s / (k + 1)
-        for i in range(n):
-            for j in range(n):
-                level[i, j] = moved[i, j] + moved[j, i]
-                noise[i, j] += level[i, j] * factor
-        if k >= FEWEST_TERMS and largest < SMALLEST:
-            break
-
-
-@part
-def _times(n: int, F: FloatArray, matrix: FloatArray, product: FloatArray) -> None:
-    """product <- F matrix."""
-    for i in range(n):
-        for j in range(n):
-            product[i, j] = 0.0
-        for m in range(n):
-            a = F[i, m]
-            if a != 0.0:
-                for j in range(n):
-                    product[i, j] += a * matrix[m, j]
 
 
 @part
@@ -239,7 +186,7 @@ def step(
     else:
         if abs(room[KEPT_STEP, 0, 0] - (to_s - from_s)) > SAME_STEP_S or abs(to_s - from_s) <= SAME_STEP_S:
             fill_dynamics(fleet, who, fleet.first[who], F)
-            discretise(n, F, fleet.density[who], to_s - from_s, room[KEPT_PHI], room[KEPT_NOISE], room)
+            fill_step(n, F, fleet.density[who], to_s - from_s, room[KEPT_PHI], room[KEPT_NOISE], room)
             room[KEPT_STEP, 0, 0] = to_s - from_s
         for i in range(n):
             for j in range(n):
@@ -269,9 +216,9 @@ def _over_epochs(
         epoch = min(max(first_not_before(fleet, who, 0.5 * (at_s + next_s)) - 1, 0), max(count - 2, 0))
         fill_dynamics(fleet, who, first + epoch, F)
         if is_first:
-            discretise(n, F, fleet.density[who], next_s - at_s, phi, noise, room)
+            fill_step(n, F, fleet.density[who], next_s - at_s, phi, noise, room)
         else:
-            discretise(n, F, fleet.density[who], next_s - at_s, one, q, room)
+            fill_step(n, F, fleet.density[who], next_s - at_s, one, q, room)
             compose(n, one, q, phi, noise, w)
         if is_last:
             return

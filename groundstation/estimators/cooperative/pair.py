@@ -22,8 +22,9 @@ from groundstation.estimators.cooperative.arrays import (
 )
 from groundstation.estimators.cooperative.joint import SAME_TIME_S
 from groundstation.estimators.cooperative.judging import count_rejection, write_down
-from groundstation.estimators.cooperative.motion import ROOMS, place, position, step, turn_covariance, turn_rows
+from groundstation.estimators.cooperative.motion import place, position, step, turn_covariance, turn_rows
 from groundstation.estimators.cooperative.observation import observe
+from groundstation.methods.link_dynamics import ROOMS
 
 
 class Members(NamedTuple):

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
-from groundstation.estimators.magnetic.harmonics import OVER_CIRCLE
+from groundstation.methods.harmonics import OVER_CIRCLE
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import DeviationRow
 from groundstation.results.magnetic import LETTERS

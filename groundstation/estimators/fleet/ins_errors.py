@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from groundstation.base.geodesy import continuous_longitude_deg, curvature_radii_m
 from groundstation.base.records import frozen
 from groundstation.base.units import M_PER_NAUTICAL_MILE
+from groundstation.methods.intervals import slope_through_origin
 
 FloatArray = NDArray[np.float64]
 MOVING_MPS = 10.0  # slower, the track does not say which way is along
@@ -47,17 +48,6 @@ class InsErrors:
             found["along_largest_nmi"] = float(np.nanmax(np.abs(self.along_nmi)))
             found["cross_largest_nmi"] = float(np.nanmax(np.abs(self.cross_nmi)))
         return found
-
-
-def slope_through_origin(hours: FloatArray, error: FloatArray, weight: FloatArray) -> float:
-    """Time-position fit: error = slope times hours by least squares.
-
-    Examples
-    --------
-    >>> slope_through_origin(np.array([1.0, 2.0]), np.array([0.5, 1.0]), np.ones(2))
-    0.5
-    """
-    return float(np.sum(weight * hours * error) / np.sum(weight * hours**2))
 
 
 def ins_errors(

@@ -66,8 +66,8 @@ def _steps(result: HeadingResult) -> tuple[Finding, ...]:
 
 def _findings_of_what_was_set(flight: "Flight", heading: HeadingResult, known: Known) -> tuple[Finding, ...]:
     """Findings on the user's references and intervals: what contradicts the log, or touches none of its samples."""
-    from groundstation.estimators.heading.gating import intervals_without_epoch
     from groundstation.estimators.heading.references import reference_findings
+    from groundstation.methods.taxi.gating import intervals_without_epoch
 
     lines = reference_findings(heading, flight.metadata, known.site)
     findings = [Finding("warn", "heading.reference", line) for line in lines]

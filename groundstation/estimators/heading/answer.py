@@ -9,7 +9,6 @@ from groundstation.base.normal import NORMAL_95
 from groundstation.estimators.heading import figures as drawn
 from groundstation.estimators.heading.checks import disagreement, held_seconds, variance_ratio
 from groundstation.estimators.heading.normality import normality
-from groundstation.estimators.heading.posterior import ErrorPosterior
 from groundstation.estimators.heading.references import (
     drift_prior,
     mode_changes,
@@ -23,6 +22,7 @@ from groundstation.estimators.heading.standstill import StandstillData
 from groundstation.estimators.heading.steady import SteadyPrior
 from groundstation.estimators.heading.verdict import Figures, build_gates, decide, explain, round_to_step
 from groundstation.estimators.known import AircraftData, SiteData
+from groundstation.methods.taxi_error.posterior import ErrorPosterior
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult, IntervalPart, Standstill
 from groundstation.tables.sources import said_of

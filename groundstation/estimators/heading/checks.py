@@ -9,9 +9,9 @@ from groundstation.base.angles import unwrap
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.units import DEG_PER_RAD
-from groundstation.estimators.heading.lines import fitted_lines, window_bounds
-from groundstation.estimators.heading.samples import Samples
-from groundstation.estimators.heading.standstill import effective_samples
+from groundstation.methods.intervals import effective_samples
+from groundstation.methods.moving_lines import fitted_lines, window_bounds
+from groundstation.methods.taxi.samples import Samples
 from groundstation.results.heading import Standstill, TaxiSegment
 
 FloatArray = NDArray[np.float64]

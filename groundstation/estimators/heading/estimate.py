@@ -6,20 +6,15 @@ from dataclasses import replace
 import numpy as np
 
 from groundstation.estimators.heading.answer import build_answer
-from groundstation.estimators.heading.delay import known_delay
-from groundstation.estimators.heading.samples import (
-    HeadingOf,
-    OnGround,
-    choose_topics,
-    logged_heading,
-)
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.heading.solution import solve
 from groundstation.estimators.heading.standstill import find_standstill
 from groundstation.estimators.heading.steady import steady_prior
 from groundstation.estimators.heading.steps import heading_steps
-from groundstation.estimators.heading.taxi import straight_taxi
+from groundstation.estimators.heading.taxi import delay_of, straight_taxi
 from groundstation.estimators.known import AircraftData, SiteData
+from groundstation.methods.taxi.pair import choose_pair
+from groundstation.methods.taxi.samples import HeadingOf, OnGround, logged_heading
 from groundstation.results.heading import HeadingResult, HeadingStep
 from groundstation.results.latency import Latencies
 from groundstation.tables.phases import Phases
@@ -82,8 +77,8 @@ def estimate_heading_error(
     """
     settings, aircraft = settings or HeadingSettings(), aircraft or AircraftData()
     site, request = site or SiteData(), request or HeadingRequest()
-    ins_topic, gnss_topic = choose_topics(flight, request)
-    delay = known_delay((ins_topic, gnss_topic), latencies, aircraft, settings)
+    ins_topic, gnss_topic = choose_pair(flight, request.ins_topic, request.gnss_topic)
+    delay = delay_of((ins_topic, gnss_topic), latencies, aircraft, settings)
     antenna = straight_taxi(
         *(flight, ins_topic, gnss_topic),
         settings=settings,
@@ -98,8 +93,10 @@ def estimate_heading_error(
     steady = steady_prior(flight, span_s, aircraft, settings, site, weather)
     steps = _steps(flight, ins_topic, heading, (standstill.start_s(antenna), span_s[1]), settings)
     offset_s = max(settings.offset_prior_sigma_s, settings.offset_prior_intervals * antenna.interval_s)
+    if delay:  # what its latency leaves of the prior
+        offset_s = min(offset_s, delay.sigma_s)
     at_rate = replace(settings, offset_prior_sigma_s=offset_s)  # a slow receiver is later, and differs more
-    solution = solve(antenna, standstill, aircraft, delay.narrowed(at_rate) if delay else at_rate, steady, steps)
+    solution = solve(antenna, standstill, aircraft, at_rate, steady, steps)
     result = build_answer(flight, (ins_topic, gnss_topic), solution, standstill, settings, aircraft, site, steady)
     if delay is None:
         return result

@@ -5,14 +5,14 @@ from itertools import groupby
 import numpy as np
 
 from groundstation.estimators.analysis import Shortfall
-from groundstation.estimators.heading.delay import known_delay
-from groundstation.estimators.heading.samples import Samples, choose_topics
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.heading.standstill import find_standstill
-from groundstation.estimators.heading.taxi import straight_taxi
+from groundstation.estimators.heading.taxi import delay_of, straight_taxi
 from groundstation.estimators.heading.verdict import STANDSTILL_GATE, Figures, build_gates
 from groundstation.estimators.heading.wording import told
 from groundstation.estimators.known import Known
+from groundstation.methods.taxi.pair import choose_pair
+from groundstation.methods.taxi.samples import Samples
 from groundstation.results.latency import Latencies
 from groundstation.tables.headings import true_heading
 from groundstation.tables.phases import ground_mask
@@ -34,8 +34,8 @@ def examine_heading(flight: Flight, known: Known, settings: HeadingSettings) -> 
     if known.intervals_problem:
         raise known.intervals_problem
     request = HeadingRequest(intervals=known.intervals)
-    topics = choose_topics(flight, request)
-    delay = known_delay(topics, known.answer(Latencies), known.aircraft, settings)
+    topics = choose_pair(flight, request.ins_topic, request.gnss_topic)
+    delay = delay_of(topics, known.answer(Latencies), known.aircraft, settings)
     samples = straight_taxi(
         *(flight, *topics),
         settings=settings,

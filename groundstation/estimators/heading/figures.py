@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
 from groundstation.estimators.heading.recursion import Running
-from groundstation.estimators.heading.samples import Samples
 from groundstation.estimators.heading.standstill import StandstillData
+from groundstation.methods.taxi.samples import Samples
 from groundstation.results.arrays.heading import (
     HeadingDistribution,
     HeadingGrowth,

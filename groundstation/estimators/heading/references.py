@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from groundstation.base.angles import mean_heading, unwrap, wrap_180, wrap_360
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import ARCMIN_PER_DEG
-from groundstation.estimators.heading.samples import Samples
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.heading.standstill import effective_samples
-from groundstation.estimators.inertial.noise import class_names, load_class
 from groundstation.estimators.known import SiteData
+from groundstation.methods.ins_noise import class_names, load_class
+from groundstation.methods.intervals import effective_samples
+from groundstation.methods.taxi.samples import Samples
 from groundstation.results.heading import HeadingResult, OnboardComparison, RunwayCheck
 from groundstation.tables.table import Flight
 

@@ -5,9 +5,9 @@ from typing import Literal
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number
-from groundstation.estimators.known import Interval
+from groundstation.methods.taxi.intervals import Interval
+from groundstation.methods.taxi.settings import RateKind
 
-RateKind = Literal["slope", "raw"]
 Runs = Literal["auto", "before_take_off", "all_ground"]
 UseLatency = Literal["when_observed", "never"]
 LEAST_DRAWS = 100  # of a posterior of eleven parameters

@@ -1,7 +1,6 @@
 """The estimate itself: from gated samples to the error, its posterior, drift, segments and directions."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +8,13 @@ from numpy.typing import NDArray
 from groundstation.base.angles import mean_heading, wrap_180, wrap_360
 from groundstation.base.records import BoolArray
 from groundstation.estimators.heading.arms import ArmKnowledge, know_arm, straight_regressors
-from groundstation.estimators.heading.interval import (
+from groundstation.estimators.heading.recursion import Running, run_recursion
+from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.estimators.heading.standstill import StandstillData
+from groundstation.estimators.heading.steady import SteadyPrior
+from groundstation.estimators.known import AircraftData
+from groundstation.methods.taxi.samples import Samples, take_samples, without_arm
+from groundstation.methods.taxi_error.interval import (
     Differences,
     Regressor,
     StandstillVelocities,
@@ -18,13 +23,7 @@ from groundstation.estimators.heading.interval import (
     sample_weights,
     without_apart,
 )
-from groundstation.estimators.heading.posterior import ErrorPosterior
-from groundstation.estimators.heading.recursion import Running, run_recursion
-from groundstation.estimators.heading.samples import Samples, without_arm
-from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.heading.standstill import StandstillData
-from groundstation.estimators.heading.steady import SteadyPrior
-from groundstation.estimators.known import AircraftData
+from groundstation.methods.taxi_error.posterior import ErrorPosterior
 from groundstation.results.heading import HeadingStep, TaxiSegment
 
 FloatArray = NDArray[np.float64]
@@ -100,14 +99,6 @@ def _centred(difference_deg: FloatArray) -> FloatArray:
     """Differences without a jump at +-180 deg: wrapped about their own direction."""
     centre = float(wrap_180(mean_heading(difference_deg)))
     return np.asarray(centre + wrap_180(difference_deg - centre))
-
-
-def take_samples(samples: Samples, mask: BoolArray | NDArray[np.intp]) -> Samples:
-    """The rows of every array that a mask or positions select."""
-    arrays: dict[str, Any] = {
-        name: value[mask] for name, value in vars(samples).items() if isinstance(value, np.ndarray)
-    }
-    return replace(samples, **arrays)
 
 
 def _differences(

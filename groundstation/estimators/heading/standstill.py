@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from groundstation.base.angles import unwrap
 from groundstation.base.quantiles import length_quantile
 from groundstation.base.records import BoolArray
-from groundstation.estimators.heading.lines import window_bounds
-from groundstation.estimators.heading.samples import Samples
 from groundstation.estimators.heading.settings import HeadingSettings
+from groundstation.methods.intervals import effective_samples
+from groundstation.methods.moving_lines import window_bounds
+from groundstation.methods.taxi.samples import Samples
 from groundstation.results.heading import Standstill
 
 FloatArray = NDArray[np.float64]
@@ -139,29 +140,6 @@ def _is_informative(samples: Samples, still: BoolArray) -> bool:
     north, east = samples.north_mps[still], samples.east_mps[still]
     changed = (np.diff(north) != 0.0) | (np.diff(east) != 0.0)
     return bool(np.mean(changed) > 0.5 and len(np.unique(north)) + len(np.unique(east)) > 6)
-
-
-def effective_samples(values: FloatArray, about: float | None = None) -> float:
-    """Number of independent samples that give the mean the same variance: n / (1 + 2 sum of autocorrelations).
-
-    The sum ends at the first pair of lags whose sum is not positive. ``about`` is the true mean where it is known, else
-    that of the samples: errors that are claimed to have none are one another's repetition where they share one.
-
-    Source: C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992), section 3.3 (initial
-    positive sequence).
-    """
-    count = len(values)
-    centred = values - (np.mean(values) if about is None else about)
-    variance = float(np.mean(centred**2))
-    if count < 4 or variance <= 0.0:
-        return float(count)
-    size = 2 ** int(np.ceil(np.log2(2 * count)))
-    spectrum = np.abs(np.fft.rfft(centred, size)) ** 2
-    correlation = np.fft.irfft(spectrum, size)[:count] / (count * variance)
-    pairs = correlation[0 : count - 1 : 2] + correlation[1:count:2]
-    end = int(np.argmax(pairs <= 0.0)) if bool(np.any(pairs <= 0.0)) else len(pairs)
-    factor = max(2.0 * float(np.sum(pairs[:end])) - 1.0, 1.0 / count)
-    return float(np.clip(count / factor, 1.0, count))
 
 
 def speed_bound_mps(length_mps: float, sigma_mps: float) -> float:

@@ -3,9 +3,12 @@
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
-from groundstation.estimators.heading.gating import gate_samples
-from groundstation.estimators.heading.samples import HeadingOf, OnGround, Samples, pair_samples
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.estimators.known import AircraftData
+from groundstation.methods.taxi.delay import KnownDelay, known_delay
+from groundstation.methods.taxi.gating import gate_samples
+from groundstation.methods.taxi.samples import HeadingOf, OnGround, Samples, pair_samples
+from groundstation.results.latency import Latencies
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight
 
@@ -39,7 +42,7 @@ def straight_taxi(
             with_later_runs=with_later_runs,
             gnss_latency_s=gnss_latency_s,
         )
-        return gate_samples(paired, settings, request, phases)
+        return gate_samples(paired, settings, request.intervals, phases)
 
     antenna = gated(with_later_runs=settings.runs == "all_ground")
     if settings.runs == "auto" and antenna.is_used.sum() * antenna.interval_s < settings.taxi_min_s:
@@ -50,6 +53,14 @@ def straight_taxi(
         raise NotAssessableError("heading", _why_nothing_is_used(antenna, settings))
     _refuse_too_little(antenna, settings)
     return antenna
+
+
+def delay_of(
+    pair: tuple[str, str], latencies: Latencies | None, aircraft: AircraftData, settings: HeadingSettings
+) -> KnownDelay | None:
+    """Latency of GNSS behind the INS to take out; None where nothing is known, or the estimate not wanted."""
+    found = latencies if settings.use_latency == "when_observed" else None
+    return known_delay(pair, found, aircraft.gnss_latency_s, aircraft.gnss_latency_sigma_s)
 
 
 def _refuse_too_little(samples: Samples, settings: HeadingSettings) -> None:

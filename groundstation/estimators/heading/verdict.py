@@ -8,11 +8,11 @@ import numpy as np
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.checks import Disagreement, VarianceRatio
-from groundstation.estimators.heading.gating import NOT_TAXI, is_straight_and_fast
 from groundstation.estimators.heading.normality import Normality, normality_limits
-from groundstation.estimators.heading.samples import VELOCITY_SIGMA, Samples
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.wording import told
+from groundstation.methods.taxi.gating import NOT_TAXI, is_straight_and_fast
+from groundstation.methods.taxi.samples import VELOCITY_SIGMA, Samples
 from groundstation.results.heading import Bound, Gate, HeadingResult, HeadingStep, Standstill, Verdict, judged_gate
 from groundstation.results.rules import Rejudged
 

@@ -7,9 +7,9 @@ import numpy as np
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.analysis import Analysis, Found, RestsOn, Shortfall
 from groundstation.estimators.inertial.columns import FORECAST_COLUMNS, INERTIAL_COLUMNS
-from groundstation.estimators.inertial.noise import choose_class
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.known import AircraftData, Known
+from groundstation.methods.ins_noise import choose_class
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.inertial import InertialResult
@@ -31,7 +31,7 @@ def _run(flight: "Flight", known: Known, settings: InertialSettings) -> Found[In
     from groundstation.estimators.inertial.aided import compare_aided
     from groundstation.estimators.inertial.estimate import estimate_compared
     from groundstation.estimators.inertial.examine import compared_with_kind
-    from groundstation.estimators.inertial.kind import UNAIDED
+    from groundstation.tables.ins_kind import UNAIDED
 
     compared, kind = compared_with_kind(flight, known, settings)
     if kind[0] != UNAIDED:
@@ -57,7 +57,8 @@ def _examine(flight: "Flight", known: Known, settings: InertialSettings) -> tupl
 def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -> Found[ForecastResult]:
     from groundstation.estimators.inertial.estimate import Estimation
     from groundstation.estimators.inertial.forecast import assess_forecast
-    from groundstation.estimators.inertial.kind import AIDED, WHY_NOT
+    from groundstation.estimators.inertial.kind import WHY_NOT
+    from groundstation.tables.ins_kind import AIDED
 
     estimation = known.workings_of(Estimation)
     if estimation is None:
@@ -70,7 +71,7 @@ def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -
 
 
 def _check(settings: InertialSettings, aircraft: AircraftData) -> None:
-    choose_class(settings, aircraft.ins_class)
+    choose_class(settings.ins_class, aircraft.ins_class)
 
 
 def _rests_on(flight: "Flight", result: InertialResult) -> RestsOn:

@@ -14,7 +14,6 @@ from groundstation.base.records import BoolArray
 from groundstation.estimators.inertial.differences import Differences
 from groundstation.estimators.inertial.filter import Epochs, FilterRun, run_filter
 from groundstation.estimators.inertial.model import VELOCITY, FloatArray
-from groundstation.estimators.inertial.noise import RADPS_PER_DPH
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.velocity_changes import (
     AZIMUTH,
@@ -28,6 +27,7 @@ from groundstation.estimators.inertial.velocity_changes import (
     quiet_intervals,
     turned,
 )
+from groundstation.methods.ins_noise import RADPS_PER_DPH
 from groundstation.results.inertial import AzimuthEstimate, EarlyAzimuth
 
 ITERATIONS = 3  # what the filter had taken for tilt in earlier turns shrinks by ten or more each time

@@ -9,9 +9,9 @@ from groundstation.base.records import BoolArray, Int64Array
 from groundstation.estimators.inertial.model import POSITION, SIZE, VELOCITY, FloatArray
 from groundstation.estimators.inertial.seams import Fixes, Seam, fixes_since, returns_of
 from groundstation.estimators.inertial.steps import Steps
-from groundstation.estimators.kalman import filter as kalman
-from groundstation.estimators.kalman.arrays import NO_STEP, REJECTED, USED, Drive, Lines
-from groundstation.estimators.kalman.transition import Transition
+from groundstation.methods.kalman import filter as kalman
+from groundstation.methods.kalman.arrays import NO_STEP, REJECTED, USED, Drive, Lines
+from groundstation.methods.kalman.transition import Transition
 
 MOST_SEAMS = 50  # each costs a run; a class that fits its INS so badly is told by the count
 RESET_POSITION_M, RESET_VELOCITY_MPS = 2e4, 20.0  # what a reset of the INS may change; tilt and drift are kept

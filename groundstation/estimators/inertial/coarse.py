@@ -8,8 +8,8 @@ from groundstation.base.records import frozen
 from groundstation.estimators.inertial.differences import mean_in
 from groundstation.estimators.inertial.filter import Epochs, FilterRun
 from groundstation.estimators.inertial.model import FloatArray
-from groundstation.estimators.inertial.noise import InsNoise
-from groundstation.estimators.kalman.arrays import USED
+from groundstation.methods.ins_noise import InsNoise
+from groundstation.methods.kalman.arrays import USED
 
 COARSE_S = 10.0  # a Schuler period has 500 of them
 

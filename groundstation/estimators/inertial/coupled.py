@@ -22,13 +22,13 @@ from groundstation.estimators.inertial.craft_motion import CraftMotion, latitude
 from groundstation.estimators.inertial.differences import Differences, only_used
 from groundstation.estimators.inertial.filter import Epochs, measurement_variances, patience_of
 from groundstation.estimators.inertial.model import POSITION, VELOCITY, FloatArray
-from groundstation.estimators.inertial.noise import InsNoise
 from groundstation.estimators.inertial.seams import Fixes, fixes_since, returns_of
 from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.estimators.kalman import filter as kalman
-from groundstation.estimators.kalman.arrays import NO_STEP, REJECTED, Lines
-from groundstation.estimators.kalman.rates import Rates
-from groundstation.estimators.kalman.transition import Transition
+from groundstation.methods.ins_noise import InsNoise
+from groundstation.methods.kalman import filter as kalman
+from groundstation.methods.kalman.arrays import NO_STEP, REJECTED, Lines
+from groundstation.methods.kalman.rates import Rates
+from groundstation.methods.kalman.transition import Transition
 
 # The six states of each channel (model.STATES), the azimuth error and its constant drift, the accelerometer biases.
 NORTH, EAST = 0, 6

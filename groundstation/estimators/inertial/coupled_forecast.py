@@ -19,8 +19,8 @@ from groundstation.estimators.inertial.craft_motion import CraftMotion
 from groundstation.estimators.inertial.hindcast import Hindcast
 from groundstation.estimators.inertial.model import POSITION, FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.estimators.kalman import filter as kalman
-from groundstation.estimators.kalman.arrays import REJECTED
+from groundstation.methods.kalman import filter as kalman
+from groundstation.methods.kalman.arrays import REJECTED
 from groundstation.results.forecast import HORIZONS_MIN, CoupledRow
 
 VARIANCE_STEP_S = 60.0  # of covariances carried forward: 0.07 of a Schuler radian

@@ -15,6 +15,7 @@ from groundstation.estimators.inertial import screening
 from groundstation.estimators.inertial.filter import Epochs
 from groundstation.estimators.inertial.model import FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.tables.ins_kind import aided_share
 from groundstation.tables.resample import join
 from groundstation.tables.sources import is_joined, sources_of_kind, why_without_gnss
 from groundstation.tables.table import Flight, Table
@@ -178,7 +179,7 @@ def differences(
     )
     return Differences(
         *(ins_topic, gnss_topic, epochs, latitude, longitude, _altitude(at), ins_velocity),
-        aided_share=_aided_share(ins),
+        aided_share=aided_share(ins),
         findings=tuple(findings),
         heading_deg=at.values("true_heading_deg") if at.has("true_heading_deg") else None,
     )
@@ -243,12 +244,6 @@ def _navigating(ins: Table) -> tuple[Table, Int64Array]:
     again = keep & ~np.concatenate([[True], keep[:-1]])
     again &= np.cumsum(keep) > 1  # the first sample of all is no return
     return ins.take(keep), ins.time_ns[again]
-
-
-def _aided_share(ins: Table) -> float:
-    modes = ins.text("mode")
-    stated = modes != ""
-    return float(np.mean(modes[stated] == "gnss_aided")) if stated.any() else 0.0
 
 
 def _altitude(table: Table) -> FloatArray:

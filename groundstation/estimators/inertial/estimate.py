@@ -1,5 +1,6 @@
 """The estimator of INS errors: from the tables of a flight to states, what they rest on, and the corrected track."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
@@ -9,7 +10,6 @@ from groundstation.base.findings import Finding
 from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import M_PER_NAUTICAL_MILE
-from groundstation.estimators.fleet.ins_errors import slope_through_origin
 from groundstation.estimators.inertial import figures
 from groundstation.estimators.inertial.azimuth import estimate_azimuth
 from groundstation.estimators.inertial.coupled import CoupledRun
@@ -22,17 +22,20 @@ from groundstation.estimators.inertial.filter import (
     run_filter,
     smooth,
 )
-from groundstation.estimators.inertial.kind import UNAIDED, kind_of
+from groundstation.estimators.inertial.kind import kind_of
 from groundstation.estimators.inertial.model import POSITION, STATES, ChannelModel, FloatArray
 from groundstation.estimators.inertial.navigation_start import navigation_start, stated_start
-from groundstation.estimators.inertial.noise import InsNoise, choose_class
 from groundstation.estimators.inertial.outages import Bridged, bridge_outages
 from groundstation.estimators.inertial.seams import PATIENCE_S
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import QUANTILES
+from groundstation.estimators.inertial.tracks import corrected_tracks
+from groundstation.methods.ins_noise import InsNoise, choose_class
+from groundstation.methods.intervals import slope_through_origin
 from groundstation.results.inertial import ChannelResult, InertialResult, NavigationStart, StateEstimate
+from groundstation.tables.ins_kind import UNAIDED
 from groundstation.tables.sources import said_of
-from groundstation.tables.table import Flight
+from groundstation.tables.table import Flight, Table
 
 TITLES = {
     "position": "position error",
@@ -63,6 +66,10 @@ class Estimation:
     result: InertialResult
     findings: tuple[Finding, ...]
     coupled: CoupledRun | None = None
+
+    def tracks(self, start_ns: int) -> Iterator[tuple[str, Table]]:
+        """Tracks of the INS less its errors (:class:`groundstation.tables.tracks.HasTracks`)."""
+        return corrected_tracks(self.compared, self.run, self.smoothed, self.corrected_error_m, start_ns)
 
 
 def estimate_ins_errors(
@@ -121,7 +128,7 @@ def estimate_compared(
     nav_start_utc: str = "",
 ) -> Estimation:
     """Estimate the errors of an INS that is compared with GNSS already; ``kind`` and the reason for it are known."""
-    noise, origin = choose_class(settings, aircraft_class, said_of(flight, compared.ins_topic, "ins_class"))
+    noise, origin = choose_class(settings.ins_class, aircraft_class, said_of(flight, compared.ins_topic, "ins_class"))
     model = ChannelModel.at(*_mean_place(compared), noise.beta_per_s, settings.transition)
     used = only_used(compared.epochs, settings)
     run = run_filter(used, model, noise, gate=settings.gate_sigmas**2, initial=initial_of(used, noise))

@@ -11,8 +11,8 @@ from groundstation.estimators.inertial.differences import Differences
 from groundstation.estimators.inertial.filter import FilterRun, Smoothed
 from groundstation.estimators.inertial.hindcast import Hindcast
 from groundstation.estimators.inertial.model import POSITION, VELOCITY, FloatArray
-from groundstation.estimators.inertial.noise import RADPS2_PER_DPHPH, RADPS_PER_DPH
 from groundstation.estimators.inertial.skill import Claimed
+from groundstation.methods.ins_noise import RADPS2_PER_DPHPH, RADPS_PER_DPH
 from groundstation.results.arrays.forecast import (
     FanOfChannel,
     ForecastClassic,

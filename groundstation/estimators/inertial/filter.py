@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.estimators.inertial.channel_group import ChannelGroup, Part
 from groundstation.estimators.inertial.model import POSITION, SIZE, VELOCITY, ChannelModel, FloatArray
-from groundstation.estimators.inertial.noise import InsNoise
 from groundstation.estimators.inertial.seams import PATIENCE_S, Seam
 from groundstation.estimators.inertial.steps import Steps
-from groundstation.estimators.kalman import filter as kalman
-from groundstation.estimators.kalman import smoother
-from groundstation.estimators.kalman.arrays import REJECTED, Drive
+from groundstation.methods.ins_noise import InsNoise
+from groundstation.methods.kalman import filter as kalman
+from groundstation.methods.kalman import smoother
+from groundstation.methods.kalman.arrays import REJECTED, Drive
 
 FIRST_SAMPLES = 15
 ROOM_OF_THE_GATE = 3.0  # times the sigma of a single measurement

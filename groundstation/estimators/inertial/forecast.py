@@ -15,7 +15,6 @@ from groundstation.estimators.inertial.estimate import Estimation
 from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.gaps import gap_rows
 from groundstation.estimators.inertial.hindcast import Hindcast, hindcast
-from groundstation.estimators.inertial.kind import UNKNOWN
 from groundstation.estimators.inertial.leads import leads_of, start_epochs
 from groundstation.estimators.inertial.model import POSITION, FloatArray
 from groundstation.estimators.inertial.replay import LEAST_STARTS, Plan, map_grid, plan_replay
@@ -23,6 +22,7 @@ from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.skill import calibration_rows, claimed_sigma, skill_rows
 from groundstation.results.figures import FigureData
 from groundstation.results.forecast import METHODS, ClassicStart, ForecastResult, PhaseRow
+from groundstation.tables.ins_kind import UNKNOWN
 
 PhaseOf = Callable[[FloatArray], NDArray[np.str_]]
 

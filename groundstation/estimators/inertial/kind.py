@@ -6,11 +6,10 @@ import numpy as np
 
 from groundstation.estimators.inertial.differences import Differences
 from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.tables.ins_kind import AIDED, HALF, UNAIDED, UNKNOWN
 
-UNAIDED, AIDED, UNKNOWN = "unaided", "gnss_aided", "unknown"
 WHY_NOT = {AIDED: "GNSS corrects this INS already", UNKNOWN: "it is not known whether GNSS corrects this INS"}
 STATED = (UNAIDED, AIDED)
-HALF = 0.5
 MINUTE_S, LEAST_MINUTES = 60.0, 5.0
 AT_REST_MPS = 5.0
 DRIFT_MPS = 0.005  # an INS that stays below has not drifted: 0.01 nmi/h

@@ -7,9 +7,9 @@ import numpy as np
 from groundstation.base.records import Int64Array
 from groundstation.estimators.inertial.filter import Epochs, FilterRun
 from groundstation.estimators.inertial.model import POSITION, SIZE, VELOCITY, ChannelModel, FloatArray
-from groundstation.estimators.kalman.arrays import Drive
-from groundstation.estimators.kalman.filter import forecast
-from groundstation.estimators.kalman.transition import Transition
+from groundstation.methods.kalman.arrays import Drive
+from groundstation.methods.kalman.filter import forecast
+from groundstation.methods.kalman.transition import Transition
 
 NEAREST_S = 1.0
 PAST_FROM_S = 1800.0  # outages replayed from here on tell of later ones

@@ -10,7 +10,7 @@ from groundstation.base.findings import Finding
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.inertial.differences import UNUSED_MODES, Differences
-from groundstation.estimators.inertial.noise import GnssNoise
+from groundstation.methods.ins_noise import GnssNoise
 from groundstation.results.inertial import NavigationStart
 from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight

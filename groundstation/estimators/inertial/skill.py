@@ -11,9 +11,9 @@ from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.hindcast import Hindcast
 from groundstation.estimators.inertial.leads import MEMORY_S, past_mean
 from groundstation.estimators.inertial.model import FloatArray
-from groundstation.estimators.inertial.noise import ScaleName
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.start_covariance import WITH_COVARIANCE, lead_growth, start_covariance
+from groundstation.methods.ins_noise import ScaleName
 from groundstation.results.forecast import CalibrationRow, SkillRow
 
 QUANTILES = {50: 0.6744897501960817, 68: 0.9944578832097532, 95: 1.959963984540054}  # of the normal, two-sided

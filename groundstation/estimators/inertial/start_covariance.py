@@ -15,7 +15,7 @@ from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.model import POSITION, SIZE, FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.inertial.starts import windows_of
-from groundstation.estimators.kalman.smoother import lag_covariances
+from groundstation.methods.kalman.smoother import lag_covariances
 
 WINDOW_METHODS = ("windows", "drift_windows", "consistent_windows")
 WITH_COVARIANCE = ("last_estimate", *WINDOW_METHODS, "smoothed_start")

@@ -16,7 +16,7 @@ from groundstation.estimators.inertial.model import (
     FloatArray,
 )
 from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.estimators.kalman.smoother import smooth_lags
+from groundstation.methods.kalman.smoother import smooth_lags
 
 LAG_STEP_S = 20.0  # of the sums over past estimates that are carried forward one by one
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from groundstation.base.records import Int64Array
 from groundstation.estimators.inertial.model import ChannelModel, FloatArray
-from groundstation.estimators.inertial.noise import InsNoise
 from groundstation.estimators.inertial.seams import Seam
-from groundstation.estimators.kalman.transition import distinct_steps
+from groundstation.methods.ins_noise import InsNoise
+from groundstation.methods.kalman.transition import distinct_steps
 
 TIME_RESOLUTION_S = 1e-4  # intervals that agree to this share one transition
 MOST_TRANSITIONS = 4096  # distinct intervals kept exactly; jittered clocks are rounded more coarsely beyond

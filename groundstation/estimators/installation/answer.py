@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from groundstation.base.angles import wrap_180
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.units import ARCMIN_PER_DEG
-from groundstation.estimators.heading.posterior import mixture_quantile
 from groundstation.estimators.heading.verdict import WHOLE, is_mostly_steady, round_to_step
 from groundstation.estimators.installation.model import Belief, Mixture, doubts, installed, predict
 from groundstation.estimators.installation.settings import InstallationSettings
+from groundstation.methods.intervals import mixture_quantile
 from groundstation.results.heading import IntervalPart
 from groundstation.results.installation import InstallationResult, Lesson
 

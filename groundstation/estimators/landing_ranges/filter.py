@@ -6,10 +6,10 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import frozen
-from groundstation.estimators.kalman.transition import Transition
 from groundstation.estimators.landing_ranges.model import CLOCK, PLACE, ErrorModel, error_model
 from groundstation.estimators.landing_ranges.moving_point import fly_moving_point
 from groundstation.estimators.landing_ranges.scenario import RangeApproach
+from groundstation.methods.kalman.transition import Transition
 from groundstation.results.landing_categories import axis_95_m, radius_95_m
 
 OUTPUT_STEP_S = 0.25

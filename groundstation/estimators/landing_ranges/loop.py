@@ -4,8 +4,8 @@ import numpy as np
 
 from groundstation.base.compile import compiled
 from groundstation.base.records import Int64Array
-from groundstation.estimators.kalman.arrays import FloatArray, Pattern, States
-from groundstation.estimators.kalman.kernels import (
+from groundstation.methods.kalman.arrays import FloatArray, Pattern, States
+from groundstation.methods.kalman.kernels import (
     add_noise,
     correct_states,
     predict_covariance,

@@ -11,8 +11,8 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import frozen
-from groundstation.estimators.cooperative.transition import discretise, local_dynamics
 from groundstation.estimators.landing_ranges.scenario import RangeApproach
+from groundstation.methods.link_dynamics import discretise, local_dynamics
 
 OWN, PLACE, CLOCK = slice(0, 7), (0, 1, 4), 5  # the place's along, right and up errors are the states PLACE
 

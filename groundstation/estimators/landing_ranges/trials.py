@@ -6,10 +6,10 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import frozen
-from groundstation.estimators.cooperative.consistency import nees_limits
 from groundstation.estimators.landing_ranges.filter import filter_ranges, nominal_readings, with_errors
 from groundstation.estimators.landing_ranges.model import PLACE, ErrorModel, error_model
 from groundstation.estimators.landing_ranges.scenario import RangeApproach
+from groundstation.methods.intervals import nees_limits
 
 FREEDOM = 3
 

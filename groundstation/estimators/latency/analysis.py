@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from groundstation.base.findings import Finding
 from groundstation.estimators.analysis import Analysis, Found
 from groundstation.estimators.known import Known
-from groundstation.estimators.latency.settings import LatencySettings
+from groundstation.methods.lag.settings import LatencySettings
 from groundstation.results.inertial import InertialResult
 from groundstation.results.latency import Latencies
 

@@ -6,14 +6,15 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
-from groundstation.estimators.inertial.kind import AIDED, HALF
-from groundstation.estimators.latency.fit import DelayFit, fit_delay
-from groundstation.estimators.latency.settings import BOUND95, LatencySettings
 from groundstation.estimators.latency.signals import NotComparableError, compare, pairs_of
-from groundstation.estimators.latency.windows import cut_windows, too_few_windows
+from groundstation.methods.intervals import BOUND95
+from groundstation.methods.lag.fit import DelayFit, fit_delay
+from groundstation.methods.lag.settings import LatencySettings
+from groundstation.methods.lag.windows import cut_windows, too_few_windows
 from groundstation.results.arrays.flight import LatencySearch
 from groundstation.results.figures import FigureData
 from groundstation.results.latency import Latencies, Latency, Quantity
+from groundstation.tables.ins_kind import AIDED, is_mostly_aided
 from groundstation.tables.table import Flight, Table
 
 Pair = tuple[str, str, Quantity]
@@ -130,9 +131,7 @@ def _why_not(quantity: Quantity, fit: DelayFit, settings: LatencySettings) -> st
 
 
 def _is_aided(unit: Table, kinds: Mapping[str, str]) -> bool:
-    modes = unit.text("mode")
-    stated = modes != ""
-    return kinds.get(unit.topic) == AIDED or (bool(stated.any()) and float(np.mean(modes[stated] == AIDED)) > HALF)
+    return kinds.get(unit.topic) == AIDED or is_mostly_aided(unit)
 
 
 def _figure(fits: list[tuple[Latency, DelayFit]]) -> tuple[FigureData, ...]:

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import direction_of, unwrap
-from groundstation.estimators.heading.samples import distinct_epochs
-from groundstation.estimators.latency.settings import LatencySettings
-from groundstation.estimators.latency.windows import Series
+from groundstation.methods.lag.motion import SLOW_MPS, rotation_n_from_b
+from groundstation.methods.lag.settings import LatencySettings
+from groundstation.methods.lag.windows import Series
 from groundstation.results.latency import Quantity
+from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.sources import sources_of_kind
 from groundstation.tables.table import Flight, Table
 
@@ -21,7 +22,6 @@ FIELD = ("field_forward_nt", "field_right_nt", "field_down_nt")
 ATTITUDE = ("roll_deg", "pitch_deg")
 HEADINGS = ("true_heading_deg", "magnetic_heading_deg")
 LEAST_SAMPLES, LEAST_NODES = 10, 3
-SLOW_MPS = 3.0  # the track of a slower aircraft does not show where the nose points
 
 
 @dataclass(frozen=True)
@@ -260,16 +260,3 @@ def _rotation(columns: dict[str, FloatArray], heading_deg: FloatArray) -> FloatA
     level = np.zeros(len(heading_deg))
     tilt = [columns.get(name, level) for name in ATTITUDE]
     return rotation_n_from_b(np.column_stack([*tilt, heading_deg]))
-
-
-def rotation_n_from_b(attitude_deg: FloatArray) -> FloatArray:
-    """Rotations, shape (m, 3, 3), by roll, pitch and heading, shape (m, 3); angles that are not known are zero."""
-    roll, pitch, yaw = np.deg2rad(np.nan_to_num(attitude_deg)).T
-    (sr, cr), (sp, cp), (sy, cy) = ((np.sin(part), np.cos(part)) for part in (roll, pitch, yaw))
-    return np.array(
-        [
-            [cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy],
-            [cp * sy, sr * sp * sy + cr * cy, cr * sp * sy - sr * cy],
-            [-sp, sr * cp, cr * cp],
-        ]
-    ).transpose(2, 0, 1)

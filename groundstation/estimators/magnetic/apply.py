@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.attitude import levelled_heading_deg
 from groundstation.estimators.magnetic.compass_table import CENTRES_DEG
 from groundstation.estimators.magnetic.iron import iron_of
+from groundstation.methods import harmonics
 from groundstation.results.magnetic import LETTERS, PoissonParameters
 
 

@@ -10,12 +10,12 @@ import numpy as np
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
 from groundstation.estimators.heading.estimate import estimate_heading_error
-from groundstation.estimators.heading.samples import choose_topics
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.estimators.magnetic.entered import corrections_entered
 from groundstation.estimators.magnetic.gyros import GyroDrift, gyro_drift
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.methods.taxi.pair import choose_pair
 from groundstation.results.arrays.heading import HeadingSamples
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.heading import HeadingResult
@@ -191,7 +191,9 @@ def _speed_min_mps(part: Flight, basis: HeadingBasis, settings: MagneticSettings
     """Least speed by the velocity error allowed for, or by that which the receiver states where it is larger."""
     stated = np.zeros(0)
     with suppress(NotAssessableError):  # said when system 1 is run
-        stated = part[choose_topics(part, basis.request)[1]].values("velocity_sigma_mps")
+        stated = part[choose_pair(part, basis.request.ins_topic, basis.request.gnss_topic)[1]].values(
+            "velocity_sigma_mps"
+        )
     stated = stated[np.isfinite(stated)]
     error_mps = max(settings.gnss_velocity_error_mps, float(np.median(stated)) if stated.size else 0.0)
     return min(least_speed_mps(error_mps, settings.track_error_max_deg), NO_LIMIT_MPS)

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180
 from groundstation.base.records import BoolArray
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.manoeuvre import BINS
+from groundstation.methods import harmonics
 
 CENTRES_DEG: FloatArray = np.arange(BINS, dtype=np.float64) + 0.5
 fit_to_circle = harmonics.fit_to(CENTRES_DEG)

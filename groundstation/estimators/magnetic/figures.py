@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.records import BoolArray
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.apply import corrected_by_table
 from groundstation.estimators.magnetic.compass_table import CENTRES_DEG
 from groundstation.estimators.magnetic.manoeuvre import Figure
 from groundstation.estimators.magnetic.methods import Fits
 from groundstation.estimators.magnetic.poisson import corrected_heading_deg
 from groundstation.estimators.magnetic.readings import Readings
+from groundstation.methods import harmonics
 from groundstation.results.arrays.magnetic import (
     BodyField,
     MagneticCurves,

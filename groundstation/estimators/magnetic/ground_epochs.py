@@ -11,23 +11,18 @@ from groundstation.base.angles import FloatArray, mean_heading, wrap_180, wrap_3
 from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.heading.delay import known_delay
-from groundstation.estimators.heading.gating import gate_samples
-from groundstation.estimators.heading.samples import (
-    USED,
-    HeadingValues,
-    OnGround,
-    Samples,
-    distinct_epochs,
-    pair_samples,
-)
-from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.estimators.known import AircraftData, Interval
+from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
 from groundstation.estimators.magnetic.readings import NO_DATE, PLACE_WANTED
+from groundstation.methods.taxi.delay import known_delay
+from groundstation.methods.taxi.gating import gate_samples
+from groundstation.methods.taxi.intervals import Interval
+from groundstation.methods.taxi.samples import USED, HeadingValues, OnGround, Samples, pair_samples
+from groundstation.methods.taxi.settings import GroundLimits
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import DeclinationUsed
 from groundstation.results.magnetic_ground import LeftOut
+from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.headings import FARTHEST_POSITION_S
 from groundstation.tables.phases import ground_mask
 from groundstation.tables.resample import join
@@ -95,18 +90,18 @@ def gated(
     excluded_s: Sequence[tuple[float, float]],
 ) -> Samples:
     """Epochs on the ground with the magnetic heading in the place of the true one, gated as system 1 gates taxi."""
-    heading = HeadingSettings(
+    limits = GroundLimits(
         taxi_speed_min_mps=settings.speed_min_mps,
         taxi_speed_max_mps=settings.speed_max_mps,
         turn_rate_max_dps=settings.turn_rate_max_dps,
         turn_rate_window_s=settings.turn_rate_window_s,
         segment_turn_deg=settings.heading_change_max_deg,
     )
-    delay = known_delay(topics, latencies, aircraft, heading)
+    delay = known_delay(topics, latencies, aircraft.gnss_latency_s, aircraft.gnss_latency_sigma_s)
     try:
         samples = pair_samples(
             *(flight, *topics),
-            settings=heading,
+            settings=limits,
             on_ground=on_ground or (lambda time_ns: ground_mask(flight, time_ns)),
             heading=lambda topic: HeadingValues(flight[topic].values("magnetic_heading_deg"), "magnetic heading"),
             with_later_runs=True,
@@ -115,7 +110,7 @@ def gated(
     except NotAssessableError as error:
         raise NotAssessableError(ANALYSIS, error.found, error.expected, error.next_step) from error
     intervals = tuple(Interval(start_s, end_s) for start_s, end_s in excluded_s)
-    return _settled(gate_samples(samples, heading, HeadingRequest(intervals=intervals)), settings)
+    return _settled(gate_samples(samples, limits, intervals), settings)
 
 
 def _settled(samples: Samples, settings: MagneticGroundSettings) -> Samples:

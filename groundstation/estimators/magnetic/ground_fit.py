@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180, wrap_360
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
+from groundstation.methods import harmonics
 from groundstation.results.magnetic import LETTERS
 from groundstation.results.magnetic_ground import AlongAxis, GroundCoefficient, GroundRun, Repeat
 

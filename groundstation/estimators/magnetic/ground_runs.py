@@ -12,10 +12,6 @@ import numpy as np
 from groundstation.base.angles import FloatArray, mean_heading, unwrap, wrap_180, wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.units import DEG_PER_RAD
-from groundstation.estimators.heading.interval import Differences, Regressor, error_posterior
-from groundstation.estimators.heading.lines import fitted_lines, window_bounds
-from groundstation.estimators.heading.samples import OnGround, Samples
-from groundstation.estimators.heading.solution import take_samples
 from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.compass_table import CENTRES_DEG
 from groundstation.estimators.magnetic.ground_epochs import (
@@ -37,6 +33,9 @@ from groundstation.estimators.magnetic.ground_fit import (
     widest_gap_deg,
 )
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
+from groundstation.methods.moving_lines import fitted_lines, window_bounds
+from groundstation.methods.taxi.samples import OnGround, Samples, take_samples
+from groundstation.methods.taxi_error.interval import Differences, Regressor, error_posterior
 from groundstation.results.arrays.magnetic import GroundRunCurve, GroundRunEpochs
 from groundstation.results.figures import FigureData
 from groundstation.results.latency import Latencies

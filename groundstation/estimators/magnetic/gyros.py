@@ -8,8 +8,8 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.base.records import BoolArray
 from groundstation.base.units import DEG_PER_RAD
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.attitude import field_in_body
+from groundstation.methods import harmonics
 from groundstation.results.magnetic import Vector
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight, Table

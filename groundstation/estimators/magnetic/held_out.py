@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.records import BoolArray
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.alignment import S_PER_H
 from groundstation.estimators.magnetic.apply import corrected_by_table
 from groundstation.estimators.magnetic.compass_table import CompassTable, bin_of
@@ -16,6 +15,7 @@ from groundstation.estimators.magnetic.manoeuvre import Figure
 from groundstation.estimators.magnetic.poisson import IronFit, corrected_heading_deg
 from groundstation.estimators.magnetic.readings import Readings
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.methods import harmonics
 from groundstation.results.magnetic import Alignment, HeldOut
 
 SECTOR_DEG = 30.0

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.compass_table import CompassTable, fit_to_circle
 from groundstation.estimators.magnetic.held_out import (
     LONGEST_STEP_S,
@@ -22,6 +21,7 @@ from groundstation.estimators.magnetic.modulus import PARAMETERS, fit_modulus
 from groundstation.estimators.magnetic.poisson import EarthField, IronFit, fit_iron
 from groundstation.estimators.magnetic.readings import Readings
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.methods import harmonics
 from groundstation.results.magnetic import LETTERS, Method, MethodName
 
 NO_CIRCULAR = (

@@ -3,10 +3,10 @@
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.iron import Iron
 from groundstation.estimators.magnetic.poisson import EarthField, IronFit
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.methods import harmonics
 
 PARAMETERS = 6
 NAMES = ("p", "q", "r", "a", "e", "b")

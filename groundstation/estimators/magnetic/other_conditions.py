@@ -12,12 +12,12 @@ from groundstation.base.angles import FloatArray, mean_heading, wrap_180
 from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.attitude import field_in_body, levelled_heading_deg
 from groundstation.estimators.magnetic.compass_table import fit_to_circle
 from groundstation.estimators.magnetic.iron import HEADINGS_DEG, Iron, derivatives, heading_errors
 from groundstation.estimators.magnetic.poisson import EarthField, IronFit
 from groundstation.estimators.magnetic.readings import Readings
+from groundstation.methods import harmonics
 from groundstation.results.magnetic import MethodName, OtherCondition, Vector
 from groundstation.tables.table import Flight
 

@@ -6,11 +6,11 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.declination import HORIZONTAL_SIGMA_NT, NORTH_EAST_DOWN_SIGMA_NT
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.attitude import field_in_body, levelled_heading_deg
 from groundstation.estimators.magnetic.iron import Iron
 from groundstation.estimators.magnetic.readings import Readings
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.methods import harmonics
 
 AXES = 3
 MAD_SIGMA = 1.4826  # median of absolute values -> standard deviation of a normal distribution

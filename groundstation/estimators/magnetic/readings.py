@@ -10,11 +10,11 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.inertial.kind import AIDED, HALF
 from groundstation.estimators.magnetic.attitude import levelled_heading_deg
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.latency import Latencies
 from groundstation.tables.headings import FARTHEST_POSITION_S
+from groundstation.tables.ins_kind import AIDED, is_mostly_aided
 from groundstation.tables.resample import join, values_at
 from groundstation.tables.sources import sources_of_kind
 from groundstation.tables.table import Flight, Table
@@ -92,10 +92,7 @@ def why_not_independent(flight: Flight, ins_topic: str, kinds: dict[str, str], s
         return f"the reader derived the true heading of {ins_topic} from {derived}: it is no independent reference"
     if settings.trusts_aided_heading:
         return ""
-    modes = flight[ins_topic].text("mode")
-    stated = modes != ""
-    by_mode = bool(stated.any()) and float(np.mean(modes[stated] == AIDED)) > HALF
-    if by_mode or kinds.get(ins_topic) == AIDED:
+    if is_mostly_aided(flight[ins_topic]) or kinds.get(ins_topic) == AIDED:
         return (
             f"other sensors correct {ins_topic}, a magnetometer perhaps among them: its heading is no independent "
             "reference unless trusts_aided_heading states where it comes from"

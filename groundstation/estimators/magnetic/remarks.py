@@ -5,12 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from groundstation.base.angles import wrap_180
-from groundstation.estimators.inertial.kind import UNAIDED
 from groundstation.estimators.magnetic.entered import corrections_entered
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.arrays.magnetic import MagneticTable
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.magnetic import MagneticResult
+from groundstation.tables.ins_kind import UNAIDED
 from groundstation.tables.table import Flight
 
 WORTH_TELLING_DEG, LATENCY_TOLD_S = 0.1, 0.001

@@ -4,11 +4,11 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.records import BoolArray
-from groundstation.estimators.magnetic import harmonics
 from groundstation.estimators.magnetic.apply import corrected_by_table
 from groundstation.estimators.magnetic.compass_table import CENTRES_DEG, bin_of, build_table
 from groundstation.estimators.magnetic.manoeuvre import Figure
 from groundstation.estimators.magnetic.readings import Readings
+from groundstation.methods import harmonics
 from groundstation.results.magnetic import LETTERS, CardRow, Swing
 
 

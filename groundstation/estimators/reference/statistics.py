@@ -9,8 +9,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.quantiles import chi_square_quantile, student_quantile
 from groundstation.base.records import BoolArray
-from groundstation.estimators.fleet.calibration import share_interval
-from groundstation.estimators.heading.standstill import effective_samples
+from groundstation.methods.intervals import effective_samples, share_interval
 from groundstation.results.reference import ClaimState, Spread
 
 BIAS = 4.7  # by which the estimate about the mean of the samples is too large for slow errors (Monte Carlo below)

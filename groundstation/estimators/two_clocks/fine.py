@@ -7,12 +7,12 @@ import numpy as np
 from groundstation.base.angles import FloatArray, direction_of, unwrap
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.quantiles import student_quantile
-from groundstation.estimators.latency.fit import DelayFit, fit_delay
-from groundstation.estimators.latency.settings import LatencySettings
-from groundstation.estimators.latency.signals import SLOW_MPS, rotation_n_from_b
-from groundstation.estimators.latency.windows import Series, Windows, cut_windows, too_few_windows
 from groundstation.estimators.two_clocks.channels import Pair, Side, averaged, running_mean
 from groundstation.estimators.two_clocks.settings import TwoClocksSettings
+from groundstation.methods.lag.fit import DelayFit, fit_delay
+from groundstation.methods.lag.motion import SLOW_MPS, rotation_n_from_b
+from groundstation.methods.lag.settings import LatencySettings
+from groundstation.methods.lag.windows import Series, Windows, cut_windows, too_few_windows
 
 REFERENCE_STEP_S, OTHER_STEP_S, SLOW_S = 0.1, 0.4, 0.35
 NOISY_WIDTH_S = 1.0  # means over so long where both are GNSS: else the noise draws the fit to where it is least

@@ -20,8 +20,9 @@ from groundstation.estimators.analyses import FLIGHT_ANALYSES
 from groundstation.estimators.analysis import Analysis, Found, in_order_of_need
 from groundstation.estimators.damage import damage_finding
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.known import Interval, Known
+from groundstation.estimators.known import Known
 from groundstation.integrity.ledger import gaps_of
+from groundstation.methods.taxi.intervals import Interval
 from groundstation.pipeline.one_flight import configuration as configured
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.intervals import seconds_of

@@ -27,7 +27,7 @@ from groundstation.base.records import HEADING_IS_TRACK, BoolArray, Column, Dama
 from groundstation.base.signals import TOPICS, is_canonical, kind_of
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.inertial.noise import class_names
+from groundstation.methods.ins_noise import class_names
 from groundstation.tables.headings import positions_for
 from groundstation.tables.phases import ALWAYS_ON_GROUND, YES
 from groundstation.tables.table import Flight

@@ -15,8 +15,8 @@ from groundstation.estimators.cooperative.plain.observation import Row, rows_of
 from groundstation.estimators.cooperative.plain.steps import Event, Recorder, steps
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.estimators.cooperative.tracks import AlgorithmRun
-from groundstation.estimators.kalman.arrays import Pattern
-from groundstation.estimators.kalman.kernels import add_noise, predict_covariance, update_covariance
+from groundstation.methods.kalman.arrays import Pattern
+from groundstation.methods.kalman.kernels import add_noise, predict_covariance, update_covariance
 
 
 class _Joint:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from groundstation.base.units import ARCMIN_PER_DEG
-from groundstation.estimators.heading import noise
+from groundstation.methods.taxi_error import noise
 
 # Priors: each parameter is log-normal. (median, sigma of the natural logarithm): two sigma either side reach over
 # 0.007-0.37 m/s, 0.007-0.12 m/s, 0.36-44 s, 0.05-3 deg, 0.1-1.3 Hz, 0.012-0.99, 0.003-0.2 deg, 0.2-5 times,

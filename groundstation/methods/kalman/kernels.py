@@ -27,7 +27,7 @@ G. J. Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, c
 
 from groundstation.base.compile import inlined
 from groundstation.base.records import Int64Array
-from groundstation.estimators.kalman.arrays import FloatArray, Pattern, States
+from groundstation.methods.kalman.arrays import FloatArray, Pattern, States
 
 
 @inlined

@@ -1,4 +1,4 @@
-"""Noise parameters per INS class: what the filter believes of the gyros, of GNSS and of the start. TOML in classes/."""
+"""Noise parameters by INS class (TOML in ins_classes/): what the filter believes of gyros, GNSS and the start."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -7,18 +7,17 @@ from typing import Literal
 
 import numpy as np
 
+from groundstation.base.angles import FloatArray
 from groundstation.base.errors import SettingsError
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.toml_settings import number, settings_from
-from groundstation.estimators.inertial.model import FloatArray
-from groundstation.estimators.inertial.settings import InertialSettings
 
 RADPS_PER_DPH = math.pi / 180.0 / 3600.0
 RADPS2_PER_DPHPH = RADPS_PER_DPH / 3600.0
 S_PER_H = 3600.0
 DEFAULT_CLASS = "navigation"
 ScaleName = Literal["separate", "bank", "coupled"]
-_CLASSES = ShippedToml("groundstation.estimators.inertial", "classes", "ins_class")
+_CLASSES = ShippedToml("groundstation.methods", "ins_classes", "ins_class")
 
 
 @dataclass(frozen=True)
@@ -226,7 +225,7 @@ def load_class(name: str) -> InsNoise:
     return settings_from(InsNoise, {"name": file.name} | file.table, file.where)
 
 
-def choose_class(settings: InertialSettings, aircraft_class: str = "", logged_class: str = "") -> tuple[InsNoise, str]:
+def choose_class(asked_for: str, aircraft_class: str = "", logged_class: str = "") -> tuple[InsNoise, str]:
     """Noise parameters: of the settings, else of the aircraft file, else of the log, else navigation; and who chose.
 
     A log may name any INS: of its names only those of shipped classes are taken.
@@ -236,8 +235,8 @@ def choose_class(settings: InertialSettings, aircraft_class: str = "", logged_cl
     SettingsError
         For a class that does not exist.
     """
-    if settings.ins_class != "auto":
-        return load_class(settings.ins_class), "settings"
+    if asked_for != "auto":
+        return load_class(asked_for), "settings"
     if aircraft_class:
         return load_class(aircraft_class), "aircraft file"
     if logged_class.lower() in class_names():

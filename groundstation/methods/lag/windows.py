@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray
-from groundstation.estimators.latency.settings import LatencySettings
+from groundstation.methods.lag.settings import LatencySettings
 
 FloatArray = NDArray[np.float64]
 SIGMA_OF_MEDIAN = 1.4826  # of normal errors: sigma over the median of their sizes

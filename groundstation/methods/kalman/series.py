@@ -8,7 +8,7 @@ method 1: good for small steps and nothing else.
 
 from groundstation.base.compile import in_place
 from groundstation.base.records import Int64Array
-from groundstation.estimators.kalman.arrays import FloatArray
+from groundstation.methods.kalman.arrays import FloatArray
 
 ORDER = 4
 

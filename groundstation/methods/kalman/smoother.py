@@ -5,8 +5,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from groundstation.base.records import Int64Array, frozen
-from groundstation.estimators.kalman.arrays import Back, Dynamics, FloatArray, Lines, Record, Schedule, States
-from groundstation.estimators.kalman.filter import FilterRun
+from groundstation.methods.kalman.arrays import Back, Dynamics, FloatArray, Lines, Record, Schedule, States
+from groundstation.methods.kalman.filter import FilterRun
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ def smooth(run: FilterRun, begin: int = 0, end: int | None = None) -> Smoothed:
 
     Source: Rauch, Tung, Striebel, 1965, in the form of Bryson and Frazier (Bierman, 1973).
     """
-    from groundstation.estimators.kalman import smoother_runs
+    from groundstation.methods.kalman import smoother_runs
 
     last = len(run.schedule.step) - 1 if end is None else end
     x, variance = np.full(run.x.shape, np.nan), np.full(run.x.shape[:2], np.nan)
@@ -41,7 +41,7 @@ def smooth(run: FilterRun, begin: int = 0, end: int | None = None) -> Smoothed:
 
 def smooth_lags(run: FilterRun, begin: Int64Array, end: Int64Array) -> FloatArray:
     """Smooth epoch ``begin[i]`` with the data up to ``end[i]``, for each i: states alone, shape (s, states, c)."""
-    from groundstation.estimators.kalman import smoother_runs
+    from groundstation.methods.kalman import smoother_runs
 
     past = np.empty((len(begin), *run.x.shape[1:]))
     smoother_runs.run_fixed_lag(*_history(run), _index(begin), _index(end), past)
@@ -57,7 +57,7 @@ def lag_covariances(run: FilterRun, begin: Int64Array, end: Int64Array) -> tuple
     closed : ndarray, shape (s, states, states)
         Product of (I - K h) F from begin to end: error at end that an error at begin leaves.
     """
-    from groundstation.estimators.kalman import smoother_runs
+    from groundstation.methods.kalman import smoother_runs
 
     smoothed, closed = (np.empty((len(begin), *run.P.shape[1:])) for _ in range(2))
     smoother_runs.run_lag_covariance(*_history(run), _index(begin), _index(end), smoothed, closed)

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.records import BoolArray
-from groundstation.estimators.heading.samples import GATE_TEXT, USED, Samples
-from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.estimators.known import Interval
+from groundstation.methods.taxi.intervals import Interval
+from groundstation.methods.taxi.samples import GATE_TEXT, USED, Samples
+from groundstation.methods.taxi.settings import TaxiLimits
 from groundstation.tables.phases import Phases
 
 NOT_TAXI = ("take-off run", "landing roll")  # phases, and reasons: power and wind crab the aircraft
@@ -18,7 +18,7 @@ CHANGING_MPS2 = 0.5  # a change of speed that is a run's, and not taxi's
 
 
 def gate_samples(
-    samples: Samples, settings: HeadingSettings, request: HeadingRequest, phases: Phases | None = None
+    samples: Samples, settings: TaxiLimits, intervals: Sequence[Interval] = (), phases: Phases | None = None
 ) -> Samples:
     """Say of every epoch why it is used or not, and number the straight segments.
 
@@ -35,7 +35,7 @@ def gate_samples(
         gate[~(np.abs(samples.rate_dps) <= settings.turn_rate_max_dps)] = "turning"
     gate[~(speed > settings.taxi_speed_min_mps)] = "too slow"
     gate[speed > settings.taxi_speed_max_mps] = "too fast"
-    for interval in request.intervals:
+    for interval in intervals:
         inside = (samples.time_s >= interval.start_s) & (samples.time_s <= interval.end_s)
         if interval.use == "force":
             gate[inside] = USED
@@ -45,7 +45,7 @@ def gate_samples(
         gate[~samples.on_ground] = "not proven ground"
         gate[~samples.on_ground & (speed > settings.taxi_speed_max_mps)] = "airborne"
     gate[~np.isfinite(samples.heading_deg)] = "no heading"
-    for interval in request.intervals:
+    for interval in intervals:
         inside = (samples.time_s >= interval.start_s) & (samples.time_s <= interval.end_s)
         if interval.use == "exclude":
             gate[inside] = "excluded"
@@ -68,17 +68,6 @@ def _not_taxi(samples: Samples, phases: Phases) -> Iterator[tuple[str, BoolArray
         yield name, mask
 
 
-def unused_intervals(samples: Samples, request: HeadingRequest) -> tuple[Interval, ...]:
-    """Intervals of the request that touch no sample: they changed nothing.
-
-    Parameters
-    ----------
-    samples : Samples
-        As paired: the ground part of the flight, so that an interval in the air counts as unused.
-    """
-    return intervals_without_epoch(samples.time_s, request.intervals)
-
-
 def intervals_without_epoch(time_s: NDArray[np.float64], intervals: Sequence[Interval]) -> tuple[Interval, ...]:
     """Intervals, both ends included, that hold none of the times: outside the flight, or in a gap.
 
@@ -95,14 +84,14 @@ def intervals_without_epoch(time_s: NDArray[np.float64], intervals: Sequence[Int
     return tuple(part for part in intervals if not ((time_s >= part.start_s) & (time_s <= part.end_s)).any())
 
 
-def is_straight_and_fast(samples: Samples, settings: HeadingSettings) -> BoolArray:
+def is_straight_and_fast(samples: Samples, settings: TaxiLimits) -> BoolArray:
     """Epochs of straight taxi by speed and rate of heading alone, shape (n,)."""
     speed = samples.speed_mps
     is_straight = np.abs(np.nan_to_num(samples.rate_dps, nan=np.inf)) <= settings.turn_rate_max_dps
     return is_straight & (speed > settings.taxi_speed_min_mps) & (speed <= settings.taxi_speed_max_mps)
 
 
-def _outliers(samples: Samples, settings: HeadingSettings) -> BoolArray:
+def _outliers(samples: Samples, settings: TaxiLimits) -> BoolArray:
     """Differences far from the running median of 5 s, in robust sigmas of the straight and fast samples.
 
     Six robust sigmas and at least a floor: no sample of a normal process is ever touched, so coverage is not.
@@ -123,7 +112,7 @@ def _outliers(samples: Samples, settings: HeadingSettings) -> BoolArray:
     return out
 
 
-def _segments(samples: Samples, used: BoolArray, settings: HeadingSettings) -> NDArray[np.int64]:
+def _segments(samples: Samples, used: BoolArray, settings: TaxiLimits) -> NDArray[np.int64]:
     """Number the straight segments: a GNSS gap, a turn or a long unused stretch ends one."""
     segment = np.zeros(len(samples), dtype=np.int64)
     index = np.flatnonzero(used)

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.estimators.heading import noise
-from groundstation.estimators.heading.priors import PRIOR_MEAN, SPREAD
+from groundstation.methods.intervals import mixture_quantile
+from groundstation.methods.taxi_error import noise
+from groundstation.methods.taxi_error.priors import PRIOR_MEAN, SPREAD
 
 FloatArray = NDArray[np.float64]
 
@@ -112,23 +113,3 @@ def even_draws(points: FloatArray, weight: FloatArray, count: int) -> FloatArray
     """Draws with equal weights, shape (count, p), from weighted ones: systematic resampling."""
     places = (np.arange(count) + 0.5) / count
     return np.asarray(points[np.minimum(np.searchsorted(np.cumsum(weight), places), len(weight) - 1)])
-
-
-def mixture_quantile(probability: float, mean: FloatArray, sigma: FloatArray, weight: FloatArray) -> float:
-    """Quantile of a mixture of normal distributions, by bisection.
-
-    Examples
-    --------
-    >>> round(mixture_quantile(0.975, np.zeros(2), np.array([1.0, 1.0]), np.array([0.3, 0.7])), 3)
-    1.96
-    """
-    from scipy.special import ndtr
-
-    low, high = float(np.min(mean - 12.0 * sigma)), float(np.max(mean + 12.0 * sigma))
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if float(weight @ ndtr((middle - mean) / sigma)) < probability:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)

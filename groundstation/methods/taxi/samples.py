@@ -2,20 +2,20 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import direction_of, interpolate_heading, unwrap, wrap_180
 from groundstation.base.errors import NotAssessableError
-from groundstation.base.records import HEADING_IS_TRACK, BoolArray, Int64Array
+from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.heading.lines import fitted_lines, window_bounds
-from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.methods.moving_lines import fitted_lines, window_bounds
+from groundstation.methods.taxi.settings import TaxiLimits
 from groundstation.results.reasons import NO_CONTACT
-from groundstation.tables.sources import sources_of_kind, why_without_gnss
+from groundstation.tables.epochs import MOVING_MPS, distinct_epochs
 from groundstation.tables.table import Flight, Table
 
 FloatArray = NDArray[np.float64]
@@ -23,7 +23,6 @@ TextArray = NDArray[np.str_]
 
 USED = "used"
 GATE_TEXT = "U20"
-MOVING_MPS = 1.0
 GEOMETRY_FIELDS = ("gdop", "pdop", "hdop")
 GEOMETRY_NAMES = {"gdop": "GDOP", "pdop": "PDOP", "hdop": "HDOP"}
 VELOCITY_SIGMA = "velocity sigma"
@@ -136,41 +135,6 @@ class Samples:
         return float(np.median(np.diff(self.time_s))) if len(self) > 1 else 0.0
 
 
-def choose_topics(flight: Flight, request: HeadingRequest) -> tuple[str, str]:
-    """The INS and GNSS topics to use: the ones asked for, else the first that have what is needed.
-
-    Raises
-    ------
-    NotAssessableError
-        When there is no pair.
-    """
-    with_heading = [
-        topic
-        for field in ("true_heading_deg", "magnetic_heading_deg")
-        for topic in sources_of_kind(flight, "ins")
-        if flight[topic].has(field)
-    ]
-    independent = [topic for topic in with_heading if not _is_track(flight, topic)]
-    ins = request.ins_topic or next(iter(independent or with_heading), "")
-    velocities = ("velocity_north_mps", "velocity_east_mps")
-    gnss = request.gnss_topic or next(
-        (topic for topic in sources_of_kind(flight, "gnss") if flight[topic].has(*velocities)), ""
-    )
-    if ins not in flight:
-        raise NotAssessableError("heading", f"no topic {ins}" if ins else "no INS heading in the log")
-    if gnss not in flight:
-        raise NotAssessableError("heading", f"no topic {gnss}" if gnss else why_without_gnss(flight, "velocity"))
-    if _is_track(flight, ins):
-        text = f"the heading of {ins} is the receiver's own track: their difference is zero whatever the nose does"
-        raise NotAssessableError("heading", text)
-    return ins, gnss
-
-
-def _is_track(flight: Flight, topic: str) -> bool:
-    """Whether its heading is a receiver's own track: no measurement of where the nose points."""
-    return f"{HEADING_IS_TRACK}.{topic}.true_heading_deg" in flight.metadata
-
-
 def logged_heading(flight: Flight, ins_topic: str) -> HeadingValues:
     """True heading as the INS wrote it."""
     table = flight[ins_topic]
@@ -189,26 +153,6 @@ def logged_ground(flight: Flight, time_ns: Int64Array) -> Proof:
             wheels = table.values("weight_on_wheels")[known] > 0.5
             return Proof(wheels[np.maximum(index, 0)] & (index >= 0), "weight on wheels")
     return Proof(np.zeros(len(time_ns), dtype=bool), "")
-
-
-def distinct_epochs(table: Table) -> Table:
-    """GNSS rows with a velocity, each receiver epoch once.
-
-    Rows of one time are one epoch. A recorder that runs faster than the receiver writes each epoch several times:
-    a row that repeats the velocity (and position) before it is dropped while moving; and everywhere where more than
-    a fifth of the moving rows are such repetitions. A receiver that holds its velocity at standstill is left alone.
-    """
-    table = table.take(table.valid("velocity_north_mps", "velocity_east_mps")).unique_times()
-    if len(table) < 2:
-        return table
-    fields = [
-        name for name in ("velocity_north_mps", "velocity_east_mps", "latitude_deg", "longitude_deg") if table.has(name)
-    ]
-    repeated = np.zeros(len(table), dtype=bool)
-    repeated[1:] = np.all([np.diff(table.values(name)) == 0.0 for name in fields], axis=0)
-    moving = np.hypot(table.values("velocity_north_mps"), table.values("velocity_east_mps")) > MOVING_MPS
-    is_recorder_faster = moving.any() and float(np.mean(repeated[moving])) > 0.2
-    return table.take(~(repeated & (moving | is_recorder_faster)))
 
 
 def window_slope(at: FloatArray, time_s: FloatArray, values: FloatArray, window_s: float) -> FloatArray:
@@ -230,7 +174,7 @@ def pair_samples(
     ins_topic: str,
     gnss_topic: str,
     *,
-    settings: HeadingSettings,
+    settings: TaxiLimits,
     on_ground: OnGround | None = None,
     heading: HeadingOf | None = None,
     with_later_runs: bool = False,
@@ -281,7 +225,7 @@ def pair_samples(
     )
 
 
-def _geometry(gnss: Table, settings: HeadingSettings) -> tuple[FloatArray, str]:
+def _geometry(gnss: Table, settings: TaxiLimits) -> tuple[FloatArray, str]:
     """Dilution of precision of each epoch and its name; without any, in motion, the sigma that the receiver states.
 
     That sigma is the dilution of precision times the noise of the ranges' rates. At standstill the noise is measured.
@@ -298,7 +242,7 @@ def _geometry(gnss: Table, settings: HeadingSettings) -> tuple[FloatArray, str]:
 
 
 def _ground_part(
-    gnss: Table, on_ground: BoolArray, is_proven: bool, settings: HeadingSettings, with_later_runs: bool
+    gnss: Table, on_ground: BoolArray, is_proven: bool, settings: TaxiLimits, with_later_runs: bool
 ) -> tuple[NDArray[np.int64], BoolArray]:
     """Numbers of the epochs to pair, and which of them are later than lift-off."""
     before = _before_lift_off(gnss, on_ground, is_proven, settings)
@@ -309,7 +253,7 @@ def _ground_part(
     return index, index >= before.stop
 
 
-def _before_lift_off(gnss: Table, on_ground: BoolArray, is_proven: bool, settings: HeadingSettings) -> slice:
+def _before_lift_off(gnss: Table, on_ground: BoolArray, is_proven: bool, settings: TaxiLimits) -> slice:
     speed = np.hypot(gnss.values("velocity_north_mps"), gnss.values("velocity_east_mps"))
     fast = np.flatnonzero(speed > settings.lift_off_speed_mps)
     if not is_proven:
@@ -327,7 +271,7 @@ def _before_lift_off(gnss: Table, on_ground: BoolArray, is_proven: bool, setting
     return slice(int(contact[0]), len(gnss))
 
 
-def _no_ground_reason(settings: HeadingSettings) -> str:
+def _no_ground_reason(settings: TaxiLimits) -> str:
     return (
         "no GNSS epoch before lift-off: the log begins in the air (no ground contact is logged, and its first epoch is "
         f"faster than {settings.lift_off_speed_mps:g} m/s)"
@@ -372,3 +316,11 @@ def without_arm(samples: Samples, arm_m: float, error_deg: float = 0.0) -> Sampl
         north_mps=samples.north_mps + sideways * np.sin(heading_rad),
         east_mps=samples.east_mps - sideways * np.cos(heading_rad),
     )
+
+
+def take_samples(samples: Samples, mask: BoolArray | NDArray[np.intp]) -> Samples:
+    """The rows of every array that a mask or positions select."""
+    arrays: dict[str, Any] = {
+        name: value[mask] for name, value in vars(samples).items() if isinstance(value, np.ndarray)
+    }
+    return replace(samples, **arrays)

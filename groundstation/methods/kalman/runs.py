@@ -4,7 +4,7 @@ import numpy as np
 
 from groundstation.base.compile import in_place
 from groundstation.base.records import Int64Array
-from groundstation.estimators.kalman.arrays import (
+from groundstation.methods.kalman.arrays import (
     ABSENT,
     REJECTED,
     USED,
@@ -20,7 +20,7 @@ from groundstation.estimators.kalman.arrays import (
     Schedule,
     States,
 )
-from groundstation.estimators.kalman.kernels import (
+from groundstation.methods.kalman.kernels import (
     add_noise,
     predict_covariance,
     predict_states,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from groundstation.base.records import Int64Array, frozen
-from groundstation.estimators.kalman.arrays import (
+from groundstation.methods.kalman.arrays import (
     NO_STEP,
     REJECTED,
     USED,
@@ -26,7 +26,7 @@ from groundstation.estimators.kalman.arrays import (
     Rules,
     Schedule,
 )
-from groundstation.estimators.kalman.transition import NONE, Transition
+from groundstation.methods.kalman.transition import NONE, Transition
 
 
 @dataclass(frozen=True)
@@ -276,7 +276,7 @@ def run_filter(
     >>> run.x[:, 0, 0].round(3).tolist(), run.mark.tolist(), run.rejected
     ([0.5, 1.25, 1.25], [1, 1, -1], 1)
     """
-    from groundstation.estimators.kalman import runs
+    from groundstation.methods.kalman import runs
 
     size, n = transition.size, len(np.asarray(step))
     lines, kept = measurements.lines, kept or Kept()
@@ -361,7 +361,7 @@ def forecast(
     -------
     ndarray, shape (k // every, c, s)
     """
-    from groundstation.estimators.kalman import runs
+    from groundstation.methods.kalman import runs
 
     x = np.array(start, order="C")
     built_up = np.zeros((len(step) // every, *x.shape[1:]))

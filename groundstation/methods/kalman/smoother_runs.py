@@ -14,7 +14,7 @@ H. E. Rauch, F. Tung, C. T. Striebel, Maximum likelihood estimates of linear dyn
 
 from groundstation.base.compile import in_place, inlined
 from groundstation.base.records import Int64Array
-from groundstation.estimators.kalman.arrays import (
+from groundstation.methods.kalman.arrays import (
     USED,
     Back,
     Dynamics,

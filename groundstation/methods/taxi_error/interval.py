@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_360
 from groundstation.base.units import ARCMIN_PER_DEG, DEG_PER_RAD
-from groundstation.estimators.heading import noise
-from groundstation.estimators.heading.posterior import ErrorPosterior, even_draws
-from groundstation.estimators.heading.priors import PRIOR_MEAN, PRIOR_SIGMA, SPREAD
-from groundstation.estimators.heading.sampling import find_mode, sample
+from groundstation.methods.taxi_error import noise
+from groundstation.methods.taxi_error.posterior import ErrorPosterior, even_draws
+from groundstation.methods.taxi_error.priors import PRIOR_MEAN, PRIOR_SIGMA, SPREAD
+from groundstation.methods.taxi_error.sampling import find_mode, sample
 
 FloatArray = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from groundstation.base.records import Int64Array, frozen
-from groundstation.estimators.kalman.arrays import Dynamics, FloatArray, Pattern, States
+from groundstation.methods.kalman.arrays import Dynamics, FloatArray, Pattern, States
 
 NONE = frozen(np.zeros(0, dtype=np.int64))
 

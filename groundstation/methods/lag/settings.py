@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 from groundstation.base.toml_settings import check_ranges, number
 
-BOUND95 = 1.959963984540054  # standard errors, of the normal distribution
-
 
 @dataclass(frozen=True)
 class LatencySettings:

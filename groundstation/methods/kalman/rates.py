@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.records import Int64Array, frozen
-from groundstation.estimators.kalman.arrays import FloatArray
-from groundstation.estimators.kalman.transition import Transition
+from groundstation.methods.kalman.arrays import FloatArray
+from groundstation.methods.kalman.transition import Transition
 
 ORDER = 4
 
@@ -53,7 +53,7 @@ class Rates:
         >>> falling.dynamics.F.tolist(), falling.dynamics.after.tolist()
         ([[1.0, 2.0]], [[1.0, 1.0]])
         """
-        from groundstation.estimators.kalman import series
+        from groundstation.methods.kalman import series
 
         rows, columns = self.reach()
         entries = np.empty((len(seconds), len(rows)))
@@ -72,7 +72,7 @@ class Rates:
             Entries of A over each step.
         start : ndarray, shape (n,)
         """
-        from groundstation.estimators.kalman import series
+        from groundstation.methods.kalman import series
 
         out, x = np.empty((len(values) // every, self.size)), np.array(start, dtype=np.float64)
         entries, scratch = frozen(np.ascontiguousarray(values)), np.empty((2, self.size))

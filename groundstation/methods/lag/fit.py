@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.quantiles import student_quantile
-from groundstation.estimators.latency.settings import LatencySettings
-from groundstation.estimators.latency.windows import Noise, Series, Whitened, Windows, noise_of, reweighted, spread_of
+from groundstation.methods.lag.settings import LatencySettings
+from groundstation.methods.lag.windows import Noise, Series, Whitened, Windows, noise_of, reweighted, spread_of
 
 FloatArray = NDArray[np.float64]
 MOST_STEPS, LONGEST_STEP_S, CONVERGED_S = 12, 0.3, 1e-4

@@ -1,0 +1,97 @@
+"""Intervals and sizes of samples that several systems state."""
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+from groundstation.base.quantiles import chi_square_quantile, share_quantile
+
+
+def share_interval(inside: float, checks: float, confidence: float = 0.95) -> tuple[float, float]:
+    """Exact interval of a share; of correlated checks both numbers are effective ones.
+
+    Source: Clopper, Pearson, Biometrika 26 (1934), 404-413.
+
+    Examples
+    --------
+    >>> [round(bound, 4) for bound in share_interval(19, 20)]
+    [0.7513, 0.9987]
+    >>> share_interval(0, 0)
+    (0.0, 1.0)
+    """
+    tail = 0.5 * (1.0 - confidence)
+    low = share_quantile(tail, inside, checks - inside + 1) if inside > 0.0 else 0.0
+    high = share_quantile(1.0 - tail, inside + 1, checks - inside) if inside < checks else 1.0
+    return low, high
+
+
+def nees_limits(freedom: int, independent: int, share: float = 0.95) -> tuple[float, float]:
+    """Limits of the mean of ``independent`` normalised squared errors of ``freedom`` degrees: ``share`` lie inside.
+
+    Examples
+    --------
+    >>> low, high = nees_limits(2, 100)
+    >>> round(low, 2), round(high, 2)
+    (1.63, 2.41)
+    """
+    total = freedom * independent
+    low, high = (
+        float(chi_square_quantile(part, total)) / independent for part in (0.5 - 0.5 * share, 0.5 + 0.5 * share)
+    )
+    return low, high
+
+
+def effective_samples(values: FloatArray, about: float | None = None) -> float:
+    """Number of independent samples that give the mean the same variance: n / (1 + 2 sum of autocorrelations).
+
+    The sum ends at the first pair of lags whose sum is not positive. ``about`` is the true mean where it is known, else
+    that of the samples: errors that are claimed to have none are one another's repetition where they share one.
+
+    Source: C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992), section 3.3 (initial
+    positive sequence).
+    """
+    count = len(values)
+    centred = values - (np.mean(values) if about is None else about)
+    variance = float(np.mean(centred**2))
+    if count < 4 or variance <= 0.0:
+        return float(count)
+    size = 2 ** int(np.ceil(np.log2(2 * count)))
+    spectrum = np.abs(np.fft.rfft(centred, size)) ** 2
+    correlation = np.fft.irfft(spectrum, size)[:count] / (count * variance)
+    pairs = correlation[0 : count - 1 : 2] + correlation[1:count:2]
+    end = int(np.argmax(pairs <= 0.0)) if bool(np.any(pairs <= 0.0)) else len(pairs)
+    factor = max(2.0 * float(np.sum(pairs[:end])) - 1.0, 1.0 / count)
+    return float(np.clip(count / factor, 1.0, count))
+
+
+def slope_through_origin(hours: FloatArray, error: FloatArray, weight: FloatArray) -> float:
+    """Time-position fit: error = slope times hours by least squares.
+
+    Examples
+    --------
+    >>> slope_through_origin(np.array([1.0, 2.0]), np.array([0.5, 1.0]), np.ones(2))
+    0.5
+    """
+    return float(np.sum(weight * hours * error) / np.sum(weight * hours**2))
+
+
+BOUND95 = 1.959963984540054  # standard errors, of the normal distribution
+
+
+def mixture_quantile(probability: float, mean: FloatArray, sigma: FloatArray, weight: FloatArray) -> float:
+    """Quantile of a mixture of normal distributions, by bisection.
+
+    Examples
+    --------
+    >>> round(mixture_quantile(0.975, np.zeros(2), np.array([1.0, 1.0]), np.array([0.3, 0.7])), 3)
+    1.96
+    """
+    from scipy.special import ndtr
+
+    low, high = float(np.min(mean - 12.0 * sigma)), float(np.max(mean + 12.0 * sigma))
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if float(weight @ ndtr((middle - mean) / sigma)) < probability:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)

@@ -1,0 +1,37 @@
+"""The latency of GNSS behind the INS where it is known before the turns of the taxi are looked at."""
+
+from dataclasses import dataclass
+
+from groundstation.methods.intervals import BOUND95
+from groundstation.results.latency import Latencies
+
+
+@dataclass(frozen=True)
+class KnownDelay:
+    """By how much GNSS is later than the INS, its sigma, and whence: ``aircraft file`` or ``motion``."""
+
+    latency_s: float
+    sigma_s: float
+    origin: str
+
+
+def known_delay(
+    pair: tuple[str, str], latencies: Latencies | None, stated_s: float | None, stated_sigma_s: float
+) -> KnownDelay | None:
+    """The latency to take out of a pair of INS and GNSS; None where nothing is known of it.
+
+    Parameters
+    ----------
+    pair : INS and GNSS topic
+    latencies : Latencies, optional
+        Those found on this flight.
+    stated_s, stated_sigma_s : float or None, float
+        What the aircraft file states: it stands above them.
+    """
+    if stated_s is not None:
+        return KnownDelay(stated_s, stated_sigma_s, "aircraft file")
+    found = latencies.observed(*pair) if latencies else None
+    if found is None or found.latency_s is None or found.confidence95_s is None:
+        return None
+    low, high = found.confidence95_s
+    return KnownDelay(found.latency_s, 0.5 * (high - low) / BOUND95, "motion")

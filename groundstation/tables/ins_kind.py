@@ -1,0 +1,20 @@
+"""Whether GNSS corrects an INS, as far as its log says: kinds of INS, and how often its mode says so."""
+
+import numpy as np
+
+from groundstation.tables.table import Table
+
+UNAIDED, AIDED, UNKNOWN = "unaided", "gnss_aided", "unknown"
+HALF = 0.5
+
+
+def aided_share(table: Table) -> float:
+    """Share of the samples with a mode whose mode is ``gnss_aided``; 0 where none has a mode."""
+    modes = table.text("mode")
+    stated = modes != ""
+    return float(np.mean(modes[stated] == AIDED)) if stated.any() else 0.0
+
+
+def is_mostly_aided(table: Table) -> bool:
+    """Tell whether the mode of an INS is ``gnss_aided`` more than half of the time that it is logged."""
+    return aided_share(table) > HALF
