@@ -28,6 +28,7 @@ from groundstation.results.files import load_manifest
 from groundstation.results.flight import FlightResults
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_log import write_session
+from tests.blank_figures import leave_blank
 from tests.cooperative_example import believed, truth_of
 from tests.recording_contents import Contents
 from tests.saved import load
@@ -134,6 +135,31 @@ def test_a_finished_session_is_not_run_again(
     (told,) = json.loads(capsys.readouterr().out)
     assert (told["state"], told["flight_id"]) == ("done", IDENTITY)
     assert "3 aircraft, centralised: 2 sigma_r" in told["text"]
+
+
+def test_a_finished_session_gets_its_pdf_and_keeps_it(
+    out: Path, logs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    leave_blank(monkeypatch)
+    copy = tmp_path / "out"
+    shutil.copytree(out, copy)
+    folder = copy / IDENTITY
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    del before[folder / "manifest.json"]
+
+    def was_finished(*more: str) -> bool:
+        assert called(*of(logs, copy, "--json", *more)) == 0
+        return bool(json.loads(capsys.readouterr().out)[0]["was_finished"])
+
+    assert not was_finished("--pdf")
+    assert {path: path.read_bytes() for path in before} == before
+    pdf = (folder / "report.pdf").read_bytes()
+    assert "report.pdf" in load_manifest(folder).files
+    assert was_finished("--pdf") and was_finished() and (folder / "report.pdf").read_bytes() == pdf
+    (folder / "report.pdf").write_bytes(pdf[:100])
+    assert was_finished() and not was_finished("--pdf") and (folder / "report.pdf").read_bytes() == pdf
+    done = report_again(copy)
+    assert done.removed == [folder / "report.pdf"] and not done.removed[0].exists()
 
 
 @pytest.mark.usefixtures("unpainted")
