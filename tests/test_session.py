@@ -136,6 +136,30 @@ def test_a_finished_session_is_not_run_again(
     assert "3 aircraft, centralised: 2 sigma_r" in told["text"]
 
 
+def test_a_finished_session_gets_its_pdf_and_keeps_it(
+    out: Path, logs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copy = tmp_path / "out"
+    shutil.copytree(out, copy)
+    folder = copy / IDENTITY
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    del before[folder / "manifest.json"]
+
+    def was_finished(*more: str) -> bool:
+        assert called(*of(logs, copy, "--json", *more)) == 0
+        return bool(json.loads(capsys.readouterr().out)[0]["was_finished"])
+
+    assert not was_finished("--pdf")
+    assert {path: path.read_bytes() for path in before} == before
+    pdf = (folder / "report.pdf").read_bytes()
+    assert "report.pdf" in load_manifest(folder).files
+    assert was_finished("--pdf") and was_finished() and (folder / "report.pdf").read_bytes() == pdf
+    (folder / "report.pdf").write_bytes(pdf[:100])
+    assert was_finished() and not was_finished("--pdf") and (folder / "report.pdf").read_bytes() == pdf
+    done = report_again(copy)
+    assert done.removed == [folder / "report.pdf"] and not done.removed[0].exists()
+
+
 def test_another_setting_runs_it_again_in_its_place(out: Path, logs: Path, tmp_path: Path) -> None:
     copy = tmp_path / "out"
     shutil.copytree(out, copy)
