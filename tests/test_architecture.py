@@ -1,6 +1,7 @@
 """Data flows one way: the rooms' import table, read off the syntax trees (imports inside functions count)."""
 
 import ast
+import re
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -33,6 +34,8 @@ MAY_IMPORT: dict[str, set[str]] = {
 }
 PARTS_OF_THE_PIPELINE = ("one_flight", "many_flights", "verbs", "")  # each imports those before it; "": the Python API
 ONLY_ROOM_OF = {"mcap": "store", "google": "store", "foxglove_schemas_protobuf": "store", "rerun": "viewer"}
+NOT_PUBLIC = re.compile(r"/?(rerun_|rerun-[a-z]+-|re_viewer|RERUN_|rerun\.(.*\.)?_)")
+OF_TUPLES = ("_replace", "_fields", "_asdict", "_make")  # public methods of named tuples, which cannot have others
 ONLY_ROOM_OF |= {"AcraNetwork": "tests", "chapter10": "tests"}  # oracles; the first is GPL
 
 
@@ -100,7 +103,27 @@ def test_package_imports_nothing_at_module_level() -> None:
 def test_numba_is_imported_by_its_wrapper_alone() -> None:
     for path in modules():
         names = {name.partition(".")[0] for name, _ in imports_of(path)}
-        assert "numba" not in names or path in (PACKAGE / "base" / "compile.py", PACKAGE / "base" / "drafts.py"), path
+        assert "numba" not in names or path == PACKAGE / "base" / "compile.py", path
+
+
+def test_what_of_rerun_is_not_public_stands_in_one_file() -> None:
+    """Modules beside ``rerun`` and their files, and underscored names of objects that are not of this package."""
+    found: dict[Path, set[str]] = {}
+    for path in modules():
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        docstrings = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        names = {name for name, _ in imports_of(path) if NOT_PUBLIC.match(name)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docstrings:
+                names |= {node.value} if NOT_PUBLIC.match(node.value) else set()
+            elif isinstance(node, ast.Attribute) and room_of(path) == "viewer" and node.attr not in OF_TUPLES:
+                is_own = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")
+                names |= {node.attr} if re.match("_[a-z]", node.attr) and not is_own else set()
+        if names:
+            found[path] = names
+    inner = PACKAGE / "viewer" / "inner.py"
+    assert found.keys() == {inner}, found
+    assert {"rerun_bindings", "_from_native", "rerun_cli", "/re_viewer.js"} <= found[inner]
 
 
 def test_no_file_imports_itself_through_others() -> None:

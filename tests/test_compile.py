@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from groundstation.base import compile as compiling
-from groundstation.base.compile import SMALL_BYTES, Loop, compiled, in_place, scanner
+from groundstation.base.compile import SMALL_BYTES, Loop, compiled, in_place, scanner, why_nothing_is_kept
 from groundstation.base.machine_code import KeptCode, digest_of, forms_of
 from groundstation.base.own_files import hand_of_others, read_own, write_own
 
@@ -85,9 +85,19 @@ def _narrow(low: float) -> float:
 @in_place
 def inside(values: np.ndarray, limits: Limits) -> int:
     """How many values, taken in steps, lie between the limits."""
-    found = 0
-    for k in range(0, len(values), limits.steps[0]):
+    found = k = 0
+    while k < len(values):
         found += limits.low < values[k] < limits.highs[k]
+        k += limits.steps[0]
+    return found
+
+
+@in_place
+def in_steps(values: np.ndarray, step: int) -> float:
+    """Sum of every so many values; a step of 0 is an error."""
+    found = 0.0
+    for k in range(0, len(values), step):
+        found += values[k]
     return found
 
 
@@ -101,7 +111,8 @@ def mean(values: np.ndarray) -> float:
 def kept_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of compiled code of its own, and loops that have found nothing yet."""
     monkeypatch.setattr(compiling, "_cache_folder", lambda: tmp_path)
-    for loop in (total, is_above, inside, sign, beyond, count_of):
+    monkeypatch.setattr(compiling, "_refused", [])
+    for loop in (total, is_above, inside, in_steps, sign, beyond, count_of):
         monkeypatch.setattr(loop, "_linked", {})
         monkeypatch.setattr(loop, "_is_missing", {})
     return tmp_path
@@ -166,6 +177,13 @@ def test_a_few_bytes_are_gone_through_in_plain_python_until_there_is_code(
     assert count(7) == 7 and ran == [SMALL_BYTES]
 
 
+def test_a_loop_that_may_fail_is_left_to_numba_which_tells_the_error(kept_here: Path) -> None:
+    assert in_steps(np.arange(5.0), 2) == 6.0
+    with pytest.raises(ValueError, match="zero"):
+        in_steps(np.arange(5.0), 0)
+    assert not list(kept_here.glob("*.machine_code"))
+
+
 def test_arrays_with_gaps_are_left_to_numba(kept_here: Path) -> None:
     table = np.arange(24).reshape(4, 6)
     assert total(table[:, ::2], 0, np.zeros(4)) == WEIGHT * table[:, ::2].sum()
@@ -198,6 +216,42 @@ def test_an_array_that_is_not_even_read_may_be_read_only(kept_here: Path, monkey
     assert beyond(table, 1) == 2
     (linked,) = beyond._linked.values()
     assert not linked.would_write((table, 1))
+
+
+NOT_DOCUMENTED = ("_nrt", "no_cfunc_wrapper", "forceinline")  # options of numba, but one that it sets itself
+
+
+@pytest.mark.parametrize("changed", ["its options", "its text of a loop", "llvmlite"])
+def test_a_numba_that_lacks_what_it_does_not_document_gives_the_same_answers(
+    kept_here: Path, monkeypatch: pytest.MonkeyPatch, changed: str
+) -> None:
+    from llvmlite import binding
+    from numba.core.ccallback import CFunc
+    from numba.core.cpu import CPUTargetOptions
+    from numba.core.dispatcher import Dispatcher
+
+    if changed == "its options":
+        for name in NOT_DOCUMENTED:
+            monkeypatch.delattr(next(one for one in CPUTargetOptions.__mro__ if name in vars(one)), name)
+    elif changed == "its text of a loop":
+        monkeypatch.delattr(CFunc, "inspect_llvm")
+    else:
+        monkeypatch.delattr(binding, "JITLibraryBuilder")
+    monkeypatch.delattr(Dispatcher, "stats")
+    assert why_nothing_is_kept() == ""
+    monkeypatch.setattr(compiling, "PLAIN_S", 0.0)
+    for loop in (total, inside, count_of, sign, mean, _weighted):
+        for compiled_before in ("_part", "_ordinary"):
+            monkeypatch.delitem(vars(loop), compiled_before, raising=False)
+    table, sums, values = np.arange(12).reshape(4, 3), np.zeros(4), np.arange(10.0)
+    assert total(table, 1, sums) == WEIGHT * table[1:].sum()
+    assert sums.tolist() == [0.0, *table[1:].sum(axis=1)]
+    assert inside(values, Limits(2.0, values + 1.0, (3, 0))) == 3
+    assert count_of(np.ones(5, np.uint8), 1, np.array([2])) == 5 * 2 * WEIGHT
+    assert sign(-1) == -1.0 and mean(values) == 4.5
+    assert not list(kept_here.glob("*.machine_code"))
+    assert why_nothing_is_kept().startswith("compiled code is not kept (total: ")
+    assert total._ordinary.signatures
 
 
 def test_a_loop_is_pickled_by_its_name(kept_here: Path) -> None:
@@ -234,7 +288,7 @@ def test_what_a_loop_calls_and_its_constants_tell_its_code_apart(monkeypatch: py
     before = digest_of(total.py_func, ())
     monkeypatch.setitem(globals(), "WEIGHT", 4)
     of_another_weight = digest_of(total.py_func, ())
-    monkeypatch.setitem(globals(), "_weighted", Loop(lambda value: value, {"_nrt": False}))
+    monkeypatch.setitem(globals(), "_weighted", Loop(lambda value: value))
     assert len({before, of_another_weight, digest_of(total.py_func, ())}) == 3
     before = digest_of(_narrow.py_func, ())
     monkeypatch.setitem(globals(), "Limits", NamedTuple("Limits", [("highs", float), ("low", float)]))

@@ -10,12 +10,13 @@ from typer.testing import CliRunner
 
 from groundstation.cli.main import app
 from tests.dataflash_writer import flight_log
+from tests.receiver_writer import nmea_log
 from tests.telemetry_writer import telemetry
 from tests.ulog_writer import small_flight
 
 SAMPLE = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv"
 NOT_NEEDED = (  # to look at a log, check or convert it
-    *("numba", "scipy", "pandas", "matplotlib", "jinja2", "typst", "rerun", "pydantic", "h5py", "distributed"),
+    *("numba", "scipy", "pandas", "matplotlib", "jinja2", "typst", "rerun", "h5py", "distributed"),
     *("groundstation.estimators", "groundstation.tables.phases", "groundstation.reports", "groundstation.viewer"),
     *("groundstation.simulation", "groundstation.chapters.by_answer", "groundstation.pipeline.many_flights.batch"),
 )
@@ -57,10 +58,11 @@ def test_a_log_is_opened_without_what_it_does_not_need() -> None:
     assert loaded(BY_OPEN, str(SAMPLE), names=(*NOT_NEEDED, "pyarrow.csv", "typer")) == []
 
 
-@pytest.mark.parametrize("suffix", ["ulg", "BIN", "tlog"])
+@pytest.mark.parametrize("suffix", ["ulg", "BIN", "tlog", "nmea"])
 def test_compiled_loops_are_found_again_without_their_compiler(suffix: str, tmp_path: Path) -> None:
     log = tmp_path / f"flight.{suffix}"
     made = {"ulg": lambda: small_flight().data, "BIN": lambda: flight_log().content, "tlog": lambda: telemetry().data}
+    made |= {"nmea": nmea_log}
     log.write_bytes(made[suffix]())
     convert = ["convert", str(log), "-q", "--force", "-o", str(tmp_path / "out.mcap")]
     assert CliRunner().invoke(app, convert).exit_code == 0  # compiles, where that was not done before
@@ -91,15 +93,17 @@ def test_a_run_and_its_report_do_without_pandas(verb: str, tmp_path: Path) -> No
     assert loaded(BY_VERB, *again, names=("pandas", "numba", "scipy.linalg", "scipy.optimize")) == []
 
 
-def test_pandas_is_found_where_it_is_needed() -> None:
+def test_pandas_is_found_by_everybody_but_pyarrow_in_its_first_look() -> None:
     program = """
 import sys, pyarrow as pa
-from groundstation.base.without_pandas import spare_pandas, with_pandas
+from importlib.util import find_spec
+from groundstation.base.without_pandas import spare_pandas
 spare_pandas()
-pa.array(["text"])
+assert find_spec("pandas") is not None
+pa.array(["text"]), pa.scalar(3.0)
 assert "pandas" not in sys.modules
-with with_pandas():
-    import ppigrf
+import ppigrf
+assert "pandas" in sys.modules
 assert pa.table(dict(x=[3.0])).to_pandas()["x"].sum() == 3.0
 """
     assert loaded(program, names=("pandas",)) == ["pandas"]
@@ -111,5 +115,10 @@ def test_a_reader_of_others_finds_pandas(tmp_path: Path, monkeypatch: pytest.Mon
     (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: other\nVersion: 1.0\n")
     (folder / "entry_points.txt").write_text("[groundstation.readers]\nother = other\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    program = "import sys\nfrom groundstation.base.without_pandas import spare_pandas\nspare_pandas()\nimport pandas\n"
+    program = """
+import sys, pyarrow
+from groundstation.base.without_pandas import spare_pandas
+spare_pandas()
+pyarrow.array([1])
+"""
     assert loaded(program, names=("pandas",)) == ["pandas"]

@@ -16,7 +16,6 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.catalog import CatalogClient
 from rerun.chunk import RrdReader
-from rerun_bindings import CatalogClientInternal
 from typer.testing import CliRunner
 
 from groundstation.base.errors import GroundstationError, UsageError
@@ -26,6 +25,7 @@ from groundstation.results.file_names import SUMMARY
 from groundstation.viewer.catalog_table import COLUMNS
 from groundstation.viewer.fleet import FLIGHTS_TEXT
 from groundstation.viewer.fleet_catalog import FLEET, FLIGHTS, Catalog, catalog_server, reachable
+from groundstation.viewer.inner import catalog_client
 from groundstation.viewer.properties import send_properties
 from groundstation.viewer.recorder import FLIGHT_TIME
 from groundstation.viewer.recording import save_stream, send_layout
@@ -64,7 +64,7 @@ def client_of(url: str) -> CatalogClient:
     """The client of a notebook; without datafusion, which it asks for but does not use to list."""
     if find_spec("datafusion") is not None:
         return CatalogClient(url)
-    return CatalogClient._from_internal(CatalogClientInternal(url, None, None))
+    return catalog_client(url)
 
 
 @contextmanager

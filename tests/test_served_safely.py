@@ -14,12 +14,10 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 import rerun as rr
-from rerun.catalog import CatalogClient
-from rerun_bindings import CatalogClientInternal
 
 from groundstation.base.errors import GroundstationError
 from groundstation.pipeline.verbs.view import look_at
-from groundstation.viewer import launch, verification
+from groundstation.viewer import inner, launch, verification
 from groundstation.viewer.fleet_catalog import catalog_server
 from groundstation.viewer.gate import Gate, request_of
 from groundstation.viewer.own_page import page_files, page_server
@@ -192,7 +190,7 @@ def test_the_page_and_its_recording_answer_their_own_names_alone(page: str, soun
 
 @pytest.mark.slow
 def test_the_files_of_the_page_are_there() -> None:
-    files = page_files(launch.viewer_executable(), launch.viewer_environment(os.environ))
+    files = page_files(inner.viewer_executable(), launch.viewer_environment(os.environ))
     assert b"Rerun" in files["/"][1] and files["/re_viewer_bg.wasm"][1].startswith(b"\0asm")
 
 
@@ -204,7 +202,7 @@ def test_the_catalog_is_closed_to_other_origins(sound: Path) -> None:
         status, _, content = asked(address, "GET", "/", Host="pages.example", Origin=STRANGER)
         assert (status, content) == (421, b"")
         assert asked(address, "GET", "/", Host=f"localhost:{address.rpartition(':')[2]}")[0] != 421
-        gates = CatalogClient._from_internal(CatalogClientInternal(catalog.url, None, None))
+        gates = inner.catalog_client(catalog.url)
         assert gates.get_dataset("flights").segment_ids() == ["sound"]  # a program comes in
 
 

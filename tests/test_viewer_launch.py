@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from groundstation.base.errors import GroundstationError
-from groundstation.viewer import launch
-from groundstation.viewer.launch import open_viewer, viewer_command, viewer_executable
+from groundstation.viewer import inner, launch
+from groundstation.viewer.inner import viewer_executable
+from groundstation.viewer.launch import open_viewer, viewer_command
 
 
 def test_the_viewer_is_the_one_of_the_wheel() -> None:
@@ -32,7 +33,7 @@ def test_a_missing_recording_is_one_line(tmp_path: Path) -> None:
 
 
 def test_an_installation_without_viewer_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(launch.importlib.util, "find_spec", lambda _: None)
+    monkeypatch.setattr(inner.importlib.util, "find_spec", lambda _: None)
     with pytest.raises(GroundstationError, match="rerun-sdk"):
         viewer_executable()
 

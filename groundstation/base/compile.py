@@ -4,14 +4,16 @@ A loop is compiled at its first call, and numba imported then. What was compiled
 can be written, else into the user's cache folder, else it is compiled again in each process; ``numba.njit(cache=True)``
 alone raises at import in a read-only install without a home. It is loaded as code: a folder that another user owns or
 may write serves neither here nor for numba, which pickles what it keeps. Loops over numbers and arrays are kept as
-machine code of their own (``base.machine_code``), and found again without numba. Where nothing is kept, plain Python
-goes through the bytes of a small log: it has done so before a compiler has started.
+machine code of their own (``base.machine_code``), and found again without numba; where another version of numba does
+not give that, they are compiled like any others. Where nothing is kept, plain Python goes through the bytes of a small
+log: it has done so before a compiler has started.
 Keep compiled functions scalar: small matrix products inside njit take 7-10 s to compile.
 """
 
 import os
 import tempfile
 from collections.abc import Callable
+from dis import get_instructions
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from threading import RLock
@@ -21,7 +23,6 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from groundstation.base.drafts import drafts
 from groundstation.base.machine_code import (
     INTEGER,
     SUFFIX,
@@ -42,6 +43,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 SMALL_BYTES = 65_536  # of a log: plain Python takes up to a second for so many, and a compiler several
 _BESIDE = Path(__file__).parent / "__pycache__"
 PLAIN_S = 1.0  # of a process for one loop: after that it is compiled, however few bytes come
+_ANEW = "each process compiles its loops anew"
 _LOCK = RLock()  # numba and its linker are told one thing at a time
 
 
@@ -91,61 +93,91 @@ def keeps_nothing() -> bool:
 def why_nothing_is_kept() -> str:
     """Say why compiled code is kept nowhere; empty where it is."""
     if _cache_folder() is not None:
-        return ""
+        return f"compiled code is not kept ({_refused[0]}): {_ANEW}" if _refused else ""
     folder = _own_choice()
     if folder is None:
         reason = "no home folder"
     else:
         reason = f"{folder}: {(hand_of_others(folder) if folder.exists() else '') or 'it cannot be written'}"
-    return f"compiled code is not kept ({reason}): each process compiles its loops anew"
+    return f"compiled code is not kept ({reason}): {_ANEW}"
 
 
-def _njit(numba: Any) -> Callable[..., Any]:
-    """Its stubs do not know all of its options."""
-    return cast(Callable[..., Any], numba.njit)
+# Options of numba that it does not document: whatever goes wrong with them, a loop is compiled without.
+_BARE = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_INSIDE_EACH = {"forceinline": True}
+_refused: list[str] = []  # why loops of this process are compiled without them
+
+
+def _compiled_by_numba(function: Callable[..., Any], **options: bool) -> Any:
+    import numba
+
+    with _LOCK:
+        # its stubs do not know all of its options
+        return cast(Callable[..., Any], numba.njit)(nogil=True, error_model="numpy", **options)(function)
 
 
 class Loop:
-    """A function that is compiled when it is first called, by Python or by another one that is compiled."""
+    """A function that is compiled when it is first called, by Python or by another one that is compiled.
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, bool], small_bytes: int = 0) -> None:
-        self.py_func, self._options, self._small_bytes = function, options, small_bytes
+    Parameters
+    ----------
+    function : callable
+    is_kept : bool
+        Whether its machine code may be kept: it makes no array, and answers with a number or nothing.
+    is_inlined : bool
+        Whether its code is put into each loop that calls it.
+    small_bytes : int
+        Of its first argument: up to so many are gone through in plain Python where no machine code is kept.
+    """
+
+    def __init__(
+        self, function: Callable[..., Any], is_kept: bool = False, is_inlined: bool = False, small_bytes: int = 0
+    ) -> None:
+        self.py_func, self._is_inlined, self._small_bytes = function, is_inlined, small_bytes
         self._plain_s, self._is_missing = 0.0, dict[tuple[Form, ...], bool]()
-        self._is_kept = options.get("_nrt", True) is False and can_answer(function)
+        self._is_kept = is_kept and can_answer(function)
         self._linked: dict[tuple[Form, ...], Linked | None] = {}
         update_wrapper(self, function)
 
     @cached_property
-    def _called(self) -> Any:
-        """The function as numba has it for calls from Python, kept in its cache."""
+    def _ordinary(self) -> Any:
+        """The function as numba has it for calls from Python, by what it documents alone, kept in its cache."""
+        function = self._calling(lambda loop: loop._ordinary)
         if _cache_folder() is not None:  # numba reads NUMBA_CACHE_DIR at its import
-            kept = self._dispatcher(is_cached=True)
-            if not hand_of_others(Path(kept.stats.cache_path)):
+            kept = _compiled_by_numba(function, cache=True)
+            place = getattr(getattr(kept, "stats", None), "cache_path", None)
+            if place is not None and not hand_of_others(Path(place)):
                 return kept
-        return self._dispatcher(is_cached=False)
+        return _compiled_by_numba(function)
 
     @cached_property
     def _part(self) -> Any:
-        """The function as numba has it inside others, with whose code it is kept; from Python a call crashes."""
-        return self._dispatcher(is_cached=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+        """The function as numba has it inside others, with whose code it is kept; from Python a call crashes.
 
-    def _dispatcher(self, is_cached: bool, **options: bool) -> Any:
-        import numba
+        There is no code that takes its arguments from Python, which takes longer to compile than the function itself
+        when those are tuples of arrays, and no counting of references to what it is handed.
+        """
+        options = _BARE | (_INSIDE_EACH if self._is_inlined else {})
+        return _compiled_by_numba(self._calling(lambda loop: loop._part), **options)
 
-        with _LOCK:
-            options = self._options | options
-            return _njit(numba)(cache=is_cached, nogil=True, error_model="numpy", **options)(self.py_func)
+    @cached_property
+    def _plain(self) -> Any:
+        """The function in plain Python, and those that it calls."""
+        return self._calling(lambda loop: loop._plain)
 
-    @property
-    def _numba_type_(self) -> Any:
-        """What numba takes it for where another compiled function calls it."""
-        return self._part._numba_type_
+    def _calling(self, instead: Callable[["Loop"], Any]) -> FunctionType:
+        """The function with something else in the place of each loop that it calls."""
+        function, names = self.py_func, dict(self.py_func.__globals__)
+        for step in get_instructions(function):  # its names alone are not enough: np.mean is none of a loop "mean"
+            if step.opname == "LOAD_GLOBAL" and isinstance(called := names.get(step.argval), Loop):
+                names[step.argval] = instead(called)
+        return FunctionType(function.__code__, names, function.__name__, function.__defaults__, function.__closure__)
 
     def __call__(self, *arguments: Any) -> Any:
         """Run it: kept machine code where there is any, else what numba compiles."""
         forms = forms_of(arguments) if self._is_kept else None
         if forms is None:
-            return self._called(*arguments)
+            return self._ordinary(*arguments)
         if forms not in self._linked:
             if self._small_bytes and self._is_soon_done(forms, arguments):
                 return self._run_plain(arguments)
@@ -154,7 +186,7 @@ class Loop:
                     self._linked[forms] = self._found(forms)
         linked = self._linked[forms]
         if linked is None or linked.would_write(arguments):  # to an array that is read-only: numba refuses it by name
-            return self._called(*arguments)
+            return self._ordinary(*arguments)
         return linked(*arguments)
 
     def _is_soon_done(self, forms: tuple[Form, ...], arguments: tuple[Any, ...]) -> bool:
@@ -165,10 +197,6 @@ class Loop:
             folder = _cache_folder()
             self._is_missing[forms] = folder is None or KeptCode(folder, self.py_func, forms).read() is None
         return self._is_missing[forms]
-
-    @cached_property
-    def _plain(self) -> Any:
-        return _in_plain_python(self.py_func, {})
 
     def _run_plain(self, arguments: tuple[Any, ...]) -> Any:
         """The same by Python, and the time that it took."""
@@ -186,82 +214,58 @@ class Loop:
     def _found(self, forms: tuple[Form, ...]) -> Linked | None:
         """Machine code for such arguments, kept before or compiled now; None where there cannot be any."""
         folder = _cache_folder()
-        if folder is None:
+        kept = None if folder is None else KeptCode(folder, self.py_func, forms)
+        try:
+            code = kept.read() if kept else None
+            is_new = code is None
+            code = self._machine_code(forms) if code is None else code
+            found = None if code is None else linked(code, self.py_func, forms)
+        except Exception as error:  # of a numba or llvmlite other than those known: what they document does, and slower
+            _refused.append(f"{self.py_func.__qualname__}: {' '.join(str(error).split())[:160]}")
             return None
-        kept = KeptCode(folder, self.py_func, forms)
-        code = kept.read()
-        if code is None:
-            code = self._machine_code(forms)
-            if code is None:
-                return None
+        if kept and is_new and code is not None and found is not None:
             kept.write(code)
-        return linked(code, self.py_func, forms)
+        return found
 
     def _machine_code(self, forms: tuple[Form, ...]) -> bytes | None:
-        """Compile the loop for such arguments, with an entry that takes plain C values."""
+        """Compile the loop for such arguments, with an entry that takes and gives plain C values."""
         import numba
-        from numba.core import config
-        from numba.np.arrayobj import get_cfarray_intrinsic
 
-        if getattr(config, "DISABLE_JIT", False):
+        if getattr(numba.config, "DISABLE_JIT", False):
             return None
-        names: dict[str, Any] = {"kernel": self._part, "array": get_cfarray_intrinsic("C", None)}
+        names: dict[str, Any] = {"kernel": self._part, "array": cast(Any, numba).carray}
         source, kinds = entry_source(self.py_func, forms)
         exec(source, names | kinds, names)
-        types: list[Any] = [numba.types.CPointer(numba.int64 if answers_with_integer(self.py_func) else numba.float64)]
+        types: list[Any] = []
         for form in plain_forms(forms):
             if isinstance(form, str):
                 types.append(numba.int64 if form == INTEGER else numba.float64)
             else:
                 types += [numba.types.CPointer(numba.from_dtype(np.dtype(form[0]))), *[numba.int64] * form[1]]
-        options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
-        with drafts():
-            entry = _njit(numba)(tuple(types), nogil=True, error_model="numpy", **options)(names["entry"])
-        (compiled,) = entry.overloads.values()
-        name = compiled.fndesc.llvm_func_name
-        return object_file(compiled.library.optimised(name), name, forms)
-
-
-def _in_plain_python(function: Any, made: dict[Any, Any]) -> Any:
-    """A function with plain ones in the place of the loops that it calls."""
-    if function not in made:
-        names = dict(function.__globals__)
-        made[function] = FunctionType(function.__code__, names, function.__name__, function.__defaults__)
-        for name in function.__code__.co_names:
-            if isinstance(names.get(name), Loop):
-                names[name] = _in_plain_python(names[name].py_func, made)
-    return made[function]
+        answer = numba.int64 if answers_with_integer(self.py_func) else numba.float64
+        with _LOCK:
+            entry = numba.cfunc(answer(*types), error_model="numpy")(names["entry"])
+        return object_file(entry.inspect_llvm(), entry.native_name, forms)
 
 
 def compiled(function: Function) -> Function:
     """Compile a scalar-loop function with numba at its first call (no Python objects, errors as in numpy)."""
-    return _compile(function)
+    return cast(Function, Loop(function))
 
 
 def in_place(function: Function) -> Function:
-    """The same for a loop that makes no array: without the counting of references to those that it is handed, which
-    took up to 40 % of the time of loops that hand on tuples of them."""
-    return _compile(function, _nrt=False)
+    """The same for a loop that makes no array: its machine code is kept, without the counting of references to the
+    arrays that it is handed, which took up to 40 % of the time of loops that hand on tuples of them."""
+    return cast(Function, Loop(function, is_kept=True))
 
 
 def scanner(function: Function) -> Function:
     """Like ``in_place``, for a loop over the bytes of a log, its first argument: up to SMALL_BYTES of them are gone
     through in plain Python where no machine code is kept. No number in it may go beyond 64 bits: numpy's and Python's
     differ there from compiled ones."""
-    return _compile(function, SMALL_BYTES, _nrt=False)
-
-
-def part(function: Function) -> Function:
-    """Like ``in_place``, for what only other compiled loops call: without the code that takes its arguments from
-    Python, which takes longer to compile than the function itself when those are tuples of arrays. From Python a call
-    crashes."""
-    return _compile(function, _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    return cast(Function, Loop(function, is_kept=True, small_bytes=SMALL_BYTES))
 
 
 def inlined(function: Function) -> Function:
     """Like ``in_place``, for a small part of other compiled loops: its code is put into each and no call is made."""
-    return _compile(function, _nrt=False, forceinline=True)
-
-
-def _compile(function: Function, small_bytes: int = 0, **options: bool) -> Function:
-    return cast(Function, Loop(function, options, small_bytes))
+    return cast(Function, Loop(function, is_kept=True, is_inlined=True))

@@ -12,7 +12,6 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.geodesy import SEMI_MAJOR_M
 from groundstation.base.records import frozen
 from groundstation.base.timescales import utc_ns_to_iso
-from groundstation.base.without_pandas import with_pandas
 
 MODEL_YEARS = range(2010, 2030, 5)  # base years of the sets that pygeomag brings; each serves five years
 IGRF, IGRF_FIRST_YEAR = "IGRF-14", 1970  # the reference field goes back to 1900, recorders do not
@@ -157,8 +156,7 @@ def _world_magnetic_model(moment: datetime) -> _Model:
 
 
 def _reference_field(moment: datetime) -> _Model:
-    with with_pandas():
-        from ppigrf import igrf
+    from ppigrf import igrf  # imports pandas: for old flights alone
 
     def field(latitude: FloatArray, longitude: FloatArray, km: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         off_pole = np.clip(latitude, -POLE_DEG, POLE_DEG)

@@ -24,8 +24,7 @@ INTEGER, NUMBER = "integer", "number"
 _DTYPES = ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "bool"]
 ARRAY_DTYPES = {np.dtype(name): name for name in _DTYPES}  # in the byte order of this machine
 ENTRY, SUFFIX = "groundstation_entry", ".machine_code"
-LAYOUT = 3  # of what is kept
-OWN_ARGUMENTS = 3  # of an entry, before those of its loop: numba's answer and error, and where the result goes
+LAYOUT = 4  # of what is kept
 _RESULTS: dict[Any, type] = {int: ctypes.c_int64, bool: ctypes.c_int64, float: ctypes.c_double, None: ctypes.c_int64}
 _NO_BYTES = ctypes.c_char * 0
 _NUMBERS = count()  # every library has a name of its own
@@ -98,10 +97,10 @@ def entry_source(function: Callable[..., Any], forms: Sequence[Form]) -> tuple[s
     --------
     >>> def total(table, first) -> int: ...
     >>> print(entry_source(total, (("int64", 2), "integer"))[0])
-    def entry(result, a0, a0_0, a0_1, a1):
-        result[0] = kernel(array(a0, (a0_0, a0_1,)), a1)
+    def entry(a0, a0_0, a0_1, a1):
+        return kernel(array(a0, (a0_0, a0_1,)), a1)
     """
-    taken, kinds = ["result"], dict[str, type]()
+    taken, kinds = list[str](), dict[str, type]()
 
     def handed(form: Form, name: str) -> str:
         if isinstance(form, Group):
@@ -115,8 +114,8 @@ def entry_source(function: Callable[..., Any], forms: Sequence[Form]) -> tuple[s
         return f"array({name}, ({', '.join(lengths)},))" if lengths else name
 
     call = f"kernel({', '.join(handed(form, f'a{at}') for at, form in enumerate(forms))})"
-    answer = "" if _annotation(function) is None else "result[0] = "
-    return f"def entry({', '.join(taken)}):\n    {answer}{call}", kinds
+    answer = f"{call}\n    return 0" if _annotation(function) is None else f"return {call}"
+    return f"def entry({', '.join(taken)}):\n    {answer}", kinds
 
 
 def plain_forms(forms: Sequence[Form]) -> Iterator[str | tuple[str, int]]:
@@ -200,7 +199,7 @@ def _linker() -> Any:
     return binding.create_lljit_compiler()
 
 
-def object_file(module: Any, entry: str, forms: Sequence[Form]) -> bytes | None:
+def object_file(text: str, entry: str, forms: Sequence[Form]) -> bytes | None:
     """What is kept of a module of LLVM; None where its entry may call what only numba's process has.
 
     It is a byte for each number and array that the entry takes, 1 for an array that it may write to, and an object
@@ -210,19 +209,27 @@ def object_file(module: Any, entry: str, forms: Sequence[Form]) -> bytes | None:
 
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
+    module = binding.parse_assembly(text)
+    for one in (*module.functions, *module.global_variables):
+        if not one.is_declaration and one.name != entry:
+            one.linkage = "internal"
     module.get_function(entry).name = ENTRY
-    if _calls_out(module):
-        return None
     machine = binding.Target.from_default_triple().create_target_machine(
         cpu=binding.get_host_cpu_name(), features=binding.get_host_cpu_features().flatten(), opt=3, reloc="pic"
     )
+    tuning = binding.create_pipeline_tuning_options(speed_level=3)
+    tuning.loop_vectorization = tuning.slp_vectorization = True
+    passes = binding.create_pass_builder(machine, tuning)
+    passes.getModulePassManager().run(module, passes)
+    if _calls_out(module):
+        return None
     code: bytes = machine.emit_object(module)
     return _written(module, forms) + code
 
 
 def _written(module: Any, forms: Sequence[Form]) -> bytes:
     """Which arrays LLVM could not prove to be left as they are, in the order of :func:`plain_forms`."""
-    arguments = list(module.get_function(ENTRY).arguments)[OWN_ARGUMENTS:]
+    arguments = list(module.get_function(ENTRY).arguments)
     may_write = []
     for form in plain_forms(forms):
         dimensions = 0 if isinstance(form, str) else form[1]
@@ -271,14 +278,14 @@ class Linked:
     ) -> None:
         self._library = library  # the code lives as long as this
         self._written = written
-        kinds: list[Any] = [ctypes.c_void_p] * OWN_ARGUMENTS
+        kinds: list[Any] = []
         for form in plain:
             if isinstance(form, str):
                 kinds.append(ctypes.c_int64 if form == INTEGER else ctypes.c_double)
             else:
                 kinds += [ctypes.c_void_p, *[ctypes.c_int64] * form[1]]
-        self._entry = ctypes.CFUNCTYPE(ctypes.c_int32, *kinds)(self._library[ENTRY])
-        self._result_type, self._annotation = _RESULTS[_annotation(function)], _annotation(function)
+        self._entry = ctypes.CFUNCTYPE(_RESULTS[_annotation(function)], *kinds)(self._library[ENTRY])
+        self._annotation = _annotation(function)
 
     def would_write(self, arguments: Sequence[Any]) -> bool:
         """Whether one of the arrays that the loop may write to is read-only."""
@@ -287,16 +294,14 @@ class Linked:
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the loop; the arrays that it writes to must be writable."""
-        result, nothing, error = self._result_type(), ctypes.c_void_p(), ctypes.c_void_p()
-        values: list[Any] = [ctypes.byref(nothing), ctypes.byref(error), ctypes.byref(result)]
+        values: list[Any] = []
         for one in _plain(arguments):
             if isinstance(one, np.ndarray):
                 values += (_address(one), *one.shape)
             else:
                 values.append(one)
-        if self._entry(*values):
-            raise RuntimeError("a compiled loop has failed")
-        return None if self._annotation is None else self._annotation(result.value)
+        answer = self._entry(*values)
+        return None if self._annotation is None else self._annotation(answer)
 
 
 def _address(array: Any) -> int:

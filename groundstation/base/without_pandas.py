@@ -1,19 +1,22 @@
-"""Processes that work through flights do without pandas, which pyarrow would import with the first text that it takes.
+"""pyarrow looks for pandas once in a process, and is told then that there is none.
 
-pyarrow, and Rerun by it, look for pandas to know a Series when they see one: 0.2 s of every run, report and worker
-process, none of which has a Series. For processes of the command line alone: in a notebook everybody's pandas is there.
+pyarrow imports pandas with the first text, number or array that it takes from Python, to know a Series when it sees
+one: more than all else that a run, a report or a worker process imports, none of which has a Series. It offers no
+switch. Our own conversions go by buffers where that is enough (``base.arrow_values``), so ``info``, ``check`` and
+``convert`` never ask; Rerun hands pyarrow Python's values for every recording, so whatever draws one does. What stands
+in the way of pandas stands there for that one question: a later ``import pandas`` finds it, and ``to_pandas`` works.
+For processes of the command line alone: in a notebook everybody's pandas is there, and given to pyarrow.
 """
 
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from functools import cache
 from types import ModuleType
 
 
 @cache
 def _has_readers_of_others() -> bool:
-    """Whether somebody added a format: such a reader may import pandas whenever it likes."""
+    """Whether somebody added a format: such a reader may hand pyarrow what it has from pandas."""
     from importlib.metadata import entry_points
 
     return any(not one.value.startswith("groundstation.") for one in entry_points(group="groundstation.readers"))
@@ -24,24 +27,18 @@ class _NoPandas:
 
     @staticmethod
     def find_spec(name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> None:
-        if name == "pandas" and not _has_readers_of_others():
-            raise ModuleNotFoundError("this process does without pandas", name=name)
+        if name == "pandas":
+            raise ModuleNotFoundError("pyarrow does without pandas here", name=name)
 
 
 def spare_pandas() -> None:
-    """From now on this process has no pandas, but within :func:`with_pandas`; one that is loaded stays."""
-    if _NoPandas not in sys.meta_path:
-        sys.meta_path.insert(0, _NoPandas)
+    """From now on pyarrow of this process does without pandas; one that is loaded, or asked for already, stays."""
+    if "pandas" in sys.modules or _has_readers_of_others():
+        return
+    import pyarrow as pa
 
-
-@contextmanager
-def with_pandas() -> Iterator[None]:
-    """Import here what imports pandas."""
-    is_spared = _NoPandas in sys.meta_path
-    if is_spared:
-        sys.meta_path.remove(_NoPandas)
+    sys.meta_path.insert(0, _NoPandas)
     try:
-        yield
+        pa.array([""])  # here it looks
     finally:
-        if is_spared:
-            spare_pandas()
+        sys.meta_path.remove(_NoPandas)

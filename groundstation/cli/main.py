@@ -58,7 +58,7 @@ from groundstation.cli.application import (
 __all__ = ["app", "fleets", "flights", "main", "plans", "rules", "simulated", "single_logs", "watching"]
 
 
-WITHOUT_PANDAS = frozenset(("run", "watch", "report", "view", "compare", "cooperative"))
+DRAWING = frozenset(("run", "watch", "report", "view", "compare", "cooperative"))  # verbs that write recordings
 
 
 def _version(is_asked: bool) -> None:
@@ -341,8 +341,9 @@ def main(arguments: Any = None) -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a code page that lacks a sign loses no answer
-    if arguments is None and sys.argv[1:2] and sys.argv[1] in WITHOUT_PANDAS and "--scheduler" not in sys.argv:
-        spare_pandas()  # a process of its own; what Dask imports is Dask's affair
+    is_own_process = arguments is None and {"--scheduler", "--help", "-h"}.isdisjoint(sys.argv)
+    if is_own_process and sys.argv[1:2] and sys.argv[1] in DRAWING:
+        spare_pandas()  # what Dask imports is Dask's affair
     _application_for(sys.argv[1:] if arguments is None else arguments)(arguments)
 
 

@@ -8,14 +8,14 @@ another).
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.compile import in_place, part
+from groundstation.base.compile import in_place
 
 TERMS, FEWEST_TERMS = 40, 4
 SMALLEST = 1e-16  # of a term of the transition: its largest entry is 1 or more
 ROOMS = 11  # matrices of n by n that a step works in; the last three keep the last step of aircraft in a local frame
 
 
-@part
+@in_place
 def fill_step(
     n: int, F: FloatArray, q: FloatArray, step_s: float, phi: FloatArray, noise: FloatArray, room: FloatArray
 ) -> None:
@@ -51,7 +51,7 @@ def fill_step(
             break
 
 
-@part
+@in_place
 def _times(n: int, F: FloatArray, matrix: FloatArray, product: FloatArray) -> None:
     """product <- F matrix."""
     for i in range(n):

@@ -9,11 +9,12 @@ from pathlib import Path
 import rerun.blueprint as rrb
 from rerun.blueprint.table import CardLayout, Column, PreviewCell, PreviewsConfig, TableLayout
 
+from groundstation.viewer.inner import OF_THE_CATALOG, SEGMENT
 from groundstation.viewer.properties import FLIGHT
 from groundstation.viewer.recorder import FLIGHT_TIME
 from groundstation.viewer.views import plot
 
-SEGMENT, LINK = "rerun_segment_id", "recording link"
+LINK = "recording link"
 APPLICATION = "groundstation table"
 # Property and its title, in the order of the columns; those that no recording has are left out.
 COLUMNS = (
@@ -35,11 +36,6 @@ COLUMNS = (
     (f"{FLIGHT}:findings_warn", "warnings"),
     (f"{FLIGHT}:source", "log"),
     (f"{FLIGHT}:version", "groundstation"),
-)
-# What the catalog itself tells of a recording: behind the menu of columns.
-OF_THE_CATALOG = (
-    *("rerun_layer_names", "rerun_storage_urls", "rerun_last_updated_at", "rerun_num_chunks", "rerun_size_bytes"),
-    *("rerun_registration_status", "rerun_registration_time", "rerun_schema_sha256"),
 )
 ON_CARDS = 8  # columns that a card shows, the first that there are
 

@@ -10,8 +10,7 @@ from typing import Any
 from groundstation.base.errors import GroundstationError
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
-
-ASSET = "RERUN_NOTEBOOK_ASSET"
+from groundstation.viewer.inner import NOTEBOOK, NOTEBOOK_ASSET, NOTEBOOK_ASSET_HERE
 
 
 def is_notebook() -> bool:
@@ -23,8 +22,8 @@ def is_notebook() -> bool:
 def inline_viewer(flight: Flight, results: FlightResults, *, width: int | str, height: int | str) -> Any:
     """A viewer for a notebook cell with the recording of one flight in it: the same logging as into a file.
 
-    The viewer's own files come from this machine, not from the Internet, unless ``RERUN_NOTEBOOK_ASSET`` says
-    otherwise.
+    The viewer's own files come from this machine, not from the Internet, unless the environment
+    (``NOTEBOOK_ASSET``) says otherwise.
 
     Parameters
     ----------
@@ -43,13 +42,13 @@ def inline_viewer(flight: Flight, results: FlightResults, *, width: int | str, h
     GroundstationError
         When rerun-notebook is not installed, or Rerun refused the data.
     """
-    if importlib.util.find_spec("rerun_notebook") is None:
+    if importlib.util.find_spec(NOTEBOOK) is None:
         raise GroundstationError(
             "the recording in a notebook",
             "rerun-notebook is not installed",
             next_step="pip install 'groundstation[notebook]', or show(inline=False) for a window",
         )
-    os.environ.setdefault(ASSET, "serve-local")
+    os.environ.setdefault(NOTEBOOK_ASSET, NOTEBOOK_ASSET_HERE)
     with contextlib.redirect_stdout(io.StringIO()):  # it tells where it serves, which is nobody's business here
         from rerun.notebook import Viewer
 

@@ -1,13 +1,64 @@
-"""The names of Rerun that are not public, all in this file; each with the reason for it and what to do without."""
+"""What of Rerun is not public, all in this file: names, places and what its programs say; each with the reason for it.
 
+Here, and nowhere else, is what to look through when ``rerun-sdk`` goes to another minor version. Rerun is imported
+inside the functions: opening its viewer does without.
+"""
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-import rerun as rr
-import rerun.blueprint as rrb
-import rerun_bindings
+from groundstation.base.errors import GroundstationError
 
 if TYPE_CHECKING:
+    import rerun as rr
+    import rerun.blueprint as rrb
     from rerun.catalog import CatalogClient
+
+# What the page of the web viewer asks for.
+PAGE_FILES = ("/", "/re_viewer.js", "/re_viewer_bg.wasm", "/favicon.ico", "/sw.js")
+LENGTH_HEADER = "rerun-final-length"  # of /re_viewer_bg.wasm: by it the page shows how much has come
+_PAGE_ADDRESS = re.compile(r"http://127\.0\.0\.1:(\d+)")
+NOTEBOOK = "rerun_notebook"  # the package that rerun.notebook imports: asked for before, to say how it is installed
+NOTEBOOK_ASSET = "RERUN_NOTEBOOK_ASSET"  # the environment's word on where the viewer in a cell comes from
+NOTEBOOK_ASSET_HERE = "serve-local"  # from this machine; left out, from the Internet
+SEGMENT = "rerun_segment_id"  # the column of its name in the table of a catalog
+# Further columns of that table: what the catalog itself tells of a recording.
+OF_THE_CATALOG = (
+    *("rerun_layer_names", "rerun_storage_urls", "rerun_last_updated_at", "rerun_num_chunks", "rerun_size_bytes"),
+    *("rerun_registration_status", "rerun_registration_time", "rerun_schema_sha256"),
+)
+
+
+def viewer_executable() -> Path:
+    """Path of the viewer shipped in the wheel: Rerun looks on PATH, where an unactivated environment has nothing.
+
+    Raises
+    ------
+    GroundstationError
+        When the installation lacks it.
+    """
+    package = importlib.util.find_spec("rerun_cli")
+    folder = Path(package.origin).parent if package is not None and package.origin is not None else Path()
+    name = "rerun.exe" if sys.platform == "win32" else "rerun"
+    for place in (folder / "Rerun.app" / "Contents" / "MacOS" / "Rerun", folder / name):
+        if place.is_file():
+            return place
+    raise GroundstationError("the Rerun viewer", f"nothing in {folder}", "the executable of rerun-sdk", "reinstall it")
+
+
+def page_port(line: str) -> int | None:
+    """The port of the web viewer's page, where a line of the viewer's log tells it: nothing else does.
+
+    Examples
+    --------
+    >>> page_port("[INFO] Hosting a web-viewer at http://127.0.0.1:9090?url=x"), page_port("listening on :9876")
+    (9090, None)
+    """
+    told = _PAGE_ADDRESS.search(line)
+    return int(told[1]) if told and "web-viewer" in line else None
 
 
 def catalog_client(url: str) -> "CatalogClient":
@@ -18,11 +69,14 @@ def catalog_client(url: str) -> "CatalogClient":
     return CatalogClient._from_internal(CatalogClientInternal(url, None, None))
 
 
-def send_blueprint(stream: rr.RecordingStream, blueprint: rrb.Blueprint) -> None:
+def send_blueprint(stream: "rr.RecordingStream", blueprint: "rrb.Blueprint") -> None:
     """Send a layout to a stream, as its own method does, and close the stream that it is made in.
 
     Rerun 0.41 leaves that one open: two threads and their buffers stay for each recording of a process.
     """
+    import rerun as rr
+    import rerun_bindings
+
     made = rr.RecordingStream._from_native(
         rerun_bindings.new_blueprint(
             application_id=str(rr.get_application_id(stream)),
@@ -42,4 +96,6 @@ def send_blueprint(stream: rr.RecordingStream, blueprint: rrb.Blueprint) -> None
 
 def forget_closed() -> None:
     """End the threads and free the buffers of streams that nobody holds any more; without it they stay."""
+    import rerun_bindings
+
     rerun_bindings.flush_and_cleanup_orphaned_recordings()

@@ -1,6 +1,5 @@
 """Open a recording in the viewer that the rerun-sdk wheel ships, native or in a browser."""
 
-import importlib.util
 import os
 import socket
 import subprocess
@@ -11,26 +10,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError
+from groundstation.viewer.inner import viewer_executable
 from groundstation.viewer.own_name import LOCAL
 
 WEB_PORT = 9090
-
-
-def viewer_executable() -> Path:
-    """Path of the viewer shipped in the wheel: Rerun looks on PATH, where an unactivated environment has nothing.
-
-    Raises
-    ------
-    GroundstationError
-        When the installation lacks it.
-    """
-    package = importlib.util.find_spec("rerun_cli")
-    folder = Path(package.origin).parent if package is not None and package.origin is not None else Path()
-    name = "rerun.exe" if sys.platform == "win32" else "rerun"
-    for place in (folder / "Rerun.app" / "Contents" / "MacOS" / "Rerun", folder / name):
-        if place.is_file():
-            return place
-    raise GroundstationError("the Rerun viewer", f"nothing in {folder}", "the executable of rerun-sdk", "reinstall it")
 
 
 def require_display(environment: Mapping[str, str], platform: str = sys.platform) -> None:

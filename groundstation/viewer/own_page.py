@@ -20,13 +20,12 @@ from socketserver import TCPServer
 from urllib.parse import quote, unquote, urlsplit
 
 from groundstation.base.errors import GroundstationError
+from groundstation.viewer.inner import LENGTH_HEADER, PAGE_FILES, page_port
 from groundstation.viewer.own_name import LOCAL, is_own_name
 
-FILES = ("/", "/re_viewer.js", "/re_viewer_bg.wasm", "/favicon.ico", "/sw.js")
 BINARY = "application/octet-stream"
 NOWHERE = "http://127.0.0.1:9/none.rrd"  # a recording elsewhere: Rerun then serves its page and no data
 PATIENCE_S = 30.0
-_PAGE = re.compile(r"http://127\.0\.0\.1:(\d+)")
 _RANGE = re.compile(r"bytes=(\d+)-(\d*)$")
 
 
@@ -56,7 +55,7 @@ def page_files(executable: Path, environment: Mapping[str, str]) -> dict[str, tu
         )
         try:
             port = _told_port(process, Path(folder) / "log")
-            return {path: _fetched(port, path) for path in FILES}
+            return {path: _fetched(port, path) for path in PAGE_FILES}
         except OSError as error:
             raise GroundstationError("the Rerun web viewer", f"does not serve its page ({error})") from error
         finally:
@@ -71,9 +70,8 @@ def _told_port(process: "subprocess.Popen[bytes]", log: Path) -> int:
     while time.monotonic() < deadline and process.poll() is None:
         text = log.read_text(errors="replace")
         for line in text.splitlines():
-            page = _PAGE.search(line)
-            if page and "web-viewer" in line:
-                return int(page[1])
+            if (port := page_port(line)) is not None:
+                return port
         time.sleep(0.05)
     raise GroundstationError("the Rerun web viewer", f"did not start: {text.strip()[-200:] or 'no output'}")
 
@@ -167,7 +165,7 @@ class _Visitor(BaseHTTPRequestHandler):
             self._answer(http.HTTPStatus.FOUND, 0, Location=f"/?url={quote(recording, safe=':/[]')}")
         elif asked.path in self.server.files:
             kind, content = self.server.files[asked.path]
-            self._answer(http.HTTPStatus.OK, len(content), Content_Type=kind, rerun_final_length=str(len(content)))
+            self._answer(http.HTTPStatus.OK, len(content), Content_Type=kind, **{LENGTH_HEADER: str(len(content))})
             with suppress(OSError):  # a visitor who leaves
                 self.wfile.write(content)
         elif unquote(asked.path) == f"/{self.server.recording.name}":

@@ -5,7 +5,7 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
-from groundstation.viewer.launch import viewer_executable
+from groundstation.viewer.inner import viewer_executable
 
 MOST_AT_ONCE = 50  # paths on one command line
 PATIENCE_S = 60.0  # for so many; 2 MB take 0.04 s

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from groundstation.base.compile import in_place, part
+from groundstation.base.compile import in_place
 from groundstation.base.records import Int64Array
 from groundstation.estimators.cooperative.alone_arrays import (
     EXACT,
@@ -95,7 +95,7 @@ def run_alone(
                 )
 
 
-@part
+@in_place
 def _keep(fleet: Fleet, own: Own, who: int, log: Log) -> None:
     at = log.counts[OUTPUTS]
     for i in range(fleet.size[who]):
@@ -105,7 +105,7 @@ def _keep(fleet: Fleet, own: Own, who: int, log: Log) -> None:
     log.counts[OUTPUTS] += 1
 
 
-@part
+@in_place
 def _move(fleet: Fleet, own: Own, who: int, to_s: float, room: Room) -> None:
     """A vehicle's filter at another time."""
     if abs(to_s - own.time_s[who]) < SAME_TIME_S:
@@ -124,7 +124,7 @@ def _move(fleet: Fleet, own: Own, who: int, to_s: float, room: Room) -> None:
     own.time_s[who] = to_s
 
 
-@part
+@in_place
 def _copy(
     n: int,
     x: FloatArray,
@@ -147,7 +147,7 @@ def _copy(
             to_map_rows[i, c] = map_rows[i, c]
 
 
-@part
+@in_place
 def _remember(fleet: Fleet, own: Own, past: Past, slot: int) -> None:
     """A new slot begins: keep what all filters are now, over the oldest of those kept."""
     at = past.begun[0] % len(past.slot)
@@ -168,7 +168,7 @@ def _remember(fleet: Fleet, own: Own, past: Past, slot: int) -> None:
         )
 
 
-@part
+@in_place
 def _listen(
     fleet: Fleet,
     events: Events,
@@ -230,7 +230,7 @@ def _listen(
     return int(entry)
 
 
-@part
+@in_place
 def _tell(
     fleet: Fleet,
     source: int,
@@ -267,7 +267,7 @@ def _tell(
             heard.shared[entry, a, b] = np.float64(np.float32(total))
 
 
-@part
+@in_place
 def _is_used(events: Events, event: int, method: Method, log: Log) -> bool:
     """Ranked filters hear those of a higher rank alone."""
     if events.kind[event] != PEER or (method.algorithm != RANKED and method.algorithm != MODIFIED):
@@ -278,7 +278,7 @@ def _is_used(events: Events, event: int, method: Method, log: Log) -> bool:
     return False
 
 
-@part
+@in_place
 def _use(
     fleet: Fleet,
     points: Points,
@@ -324,7 +324,7 @@ def _use(
         update(fleet, events, who, kept, method, own, heard, batch, room)
 
 
-@part
+@in_place
 def _copy_row(batch: Batch, one: int, other: int) -> None:
     batch.event[other], batch.heard[other] = batch.event[one], batch.heard[one]
     for i in range(batch.h.shape[1]):
@@ -337,7 +337,7 @@ def _copy_row(batch: Batch, one: int, other: int) -> None:
     batch.brought[other] = batch.brought[one]
 
 
-@part
+@in_place
 def _linearise(
     fleet: Fleet,
     points: Points,
@@ -386,7 +386,7 @@ def _linearise(
     return count
 
 
-@part
+@in_place
 def _bring(
     points: Points, events: Events, event: int, by: int, method: Method, heard: Heard, batch: Batch, to: int
 ) -> None:
@@ -409,7 +409,7 @@ def _bring(
     batch.brought[to] = max(brought, 0.0)
 
 
-@part
+@in_place
 def _passes(
     fleet: Fleet,
     events: Events,

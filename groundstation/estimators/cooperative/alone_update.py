@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from groundstation.base.compile import part
+from groundstation.base.compile import in_place
 from groundstation.estimators.cooperative.alone_arrays import (
     EXACT,
     MODIFIED,
@@ -25,7 +25,7 @@ from groundstation.estimators.cooperative.plain.split_covariance import ROUNDING
 JACOBI_SWEEPS = 8  # each doubles the digits once it has any
 
 
-@part
+@in_place
 def solve(count: int, width: int, A: FloatArray, B: FloatArray) -> None:
     """B <- A^-1 B by elimination with the largest pivots; A (count, count) is spoiled, B is (count, width)."""
     for c in range(count):
@@ -52,7 +52,7 @@ def solve(count: int, width: int, A: FloatArray, B: FloatArray) -> None:
             B[c, j] /= A[c, c]
 
 
-@part
+@in_place
 def _mix(
     fleet: Fleet, who: int, count: int, own: Own, heard: Heard, batch: Batch, first: int, mixed: FloatArray
 ) -> None:
@@ -76,7 +76,7 @@ def _mix(
                         mixed[row - first, c] += told * heard.map_rows[by, i, c]
 
 
-@part
+@in_place
 def _correct_map(n: int, count: int, gain: FloatArray, mixed: FloatArray, map_rows: FloatArray) -> None:
     """Rows of the map after an update; gain (count, n)."""
     for row in range(count):
@@ -86,7 +86,7 @@ def _correct_map(n: int, count: int, gain: FloatArray, mixed: FloatArray, map_ro
                     map_rows[i, c] -= gain[row, i] * mixed[row, c]
 
 
-@part
+@in_place
 def update(
     fleet: Fleet,
     events: Events,
@@ -149,7 +149,7 @@ def update(
     _correct_map(n, count, gain, room.mixed, own.map_rows[who])
 
 
-@part
+@in_place
 def _told_shared(row: int, c: int, heard: Heard, batch: Batch) -> float:
     """Covariance of what a row's source told with the error c of the points."""
     total = 0.0
@@ -159,7 +159,7 @@ def _told_shared(row: int, c: int, heard: Heard, batch: Batch) -> float:
     return total
 
 
-@part
+@in_place
 def _common(events: Events, r: int, s: int, method: Method, heard: Heard, batch: Batch, cross: FloatArray) -> float:
     """Covariance of the noise of two rows: all of it for one neighbour's two, else (modified) through the points."""
     one, two, total = batch.event[r], batch.event[s], 0.0
@@ -178,7 +178,7 @@ def _common(events: Events, r: int, s: int, method: Method, heard: Heard, batch:
     return total
 
 
-@part
+@in_place
 def _between(heard: Heard, one: int, two: int, cross: FloatArray) -> None:
     """Fill ``cross[0]`` with the covariance of the errors in two messages of one sender: root times root.
 
@@ -198,7 +198,7 @@ def _between(heard: Heard, one: int, two: int, cross: FloatArray) -> None:
                 cross[0, a, b] += cross[1, a, c] * cross[2, c, b]
 
 
-@part
+@in_place
 def _root(covariance: FloatArray, root: FloatArray, A: FloatArray, V: FloatArray) -> None:
     """Symmetric square root of a 4 x 4 covariance by Jacobi rotations; an eigenvalue that rounding left below 0 is 0.
 
@@ -228,7 +228,7 @@ def _root(covariance: FloatArray, root: FloatArray, A: FloatArray, V: FloatArray
                 root[i, j] += V[i, k] * np.sqrt(max(A[k, k], 0.0)) * V[j, k]
 
 
-@part
+@in_place
 def _correct_shared(
     n: int,
     count: int,
@@ -250,7 +250,7 @@ def _correct_shared(
                 shared[i, c] -= gain[row, i] * brought[row]
 
 
-@part
+@in_place
 def split_update(
     fleet: Fleet, who: int, row: int, method: Method, own: Own, heard: Heard, batch: Batch, room: Room
 ) -> None:
@@ -293,7 +293,7 @@ def split_update(
     _correct_map(n, 1, room.right, room.mixed, own.map_rows[who])
 
 
-@part
+@in_place
 def _best_weight(
     n: int,
     h: FloatArray,

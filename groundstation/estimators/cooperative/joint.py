@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundstation.base.compile import in_place, inlined, part
+from groundstation.base.compile import in_place, inlined
 from groundstation.base.records import Int64Array
 from groundstation.estimators.cooperative.arrays import (
     HEIGHT,
@@ -147,7 +147,7 @@ def run_joint(
                 joint.x[i] = before[i]
 
 
-@part
+@in_place
 def _keep(fleet: Fleet, joint: Joint, who: int, log: Log) -> None:
     """Write down a vehicle's states."""
     at, first = log.counts[OUTPUTS], joint.first[who]
@@ -164,7 +164,7 @@ def _is_behind(joint: Joint, who: int, to_s: float) -> bool:
     return bool(to_s > joint.time_s[who] + SAME_TIME_S)
 
 
-@part
+@in_place
 def _advance(fleet: Fleet, joint: Joint, who: int, to_s: float, room: Room) -> None:
     """Move one vehicle's block on."""
     n, first = fleet.size[who], joint.first[who]
@@ -294,7 +294,7 @@ def _put(n: int, h: FloatArray, is_back: bool, phi: FloatArray, first: int, line
     return entry
 
 
-@part
+@in_place
 def _refer(fleet: Fleet, joint: Joint, who: int, source: int, arm_m: FloatArray, room: Room) -> None:
     """Line between two aircraft about which their range is linearised; its ends move when known to be wrong."""
     here, about, across = room.line[2], room.line[1], room.line[3]

@@ -1,6 +1,6 @@
 """What every compiled loop does with a judged measurement: it is written down, and rejections in a row are counted."""
 
-from groundstation.base.compile import part
+from groundstation.base.compile import in_place
 from groundstation.base.records import Int64Array
 from groundstation.estimators.cooperative.arrays import CLOCK_LEAPS, GATED, JUDGED, USED, Fleet, FloatArray, Log
 
@@ -8,7 +8,7 @@ PATIENCE = 30  # rejections of a vehicle in a row: then its clock has leapt, or 
 LEAP_M = 1e5
 
 
-@part
+@in_place
 def write_down(event: int, innovation: float, variance: float, passes: bool, log: Log) -> None:
     """Log a measurement as it was judged."""
     at = log.counts[JUDGED]
@@ -17,7 +17,7 @@ def write_down(event: int, innovation: float, variance: float, passes: bool, log
     log.counts[JUDGED] += 1
 
 
-@part
+@in_place
 def count_rejection(
     fleet: Fleet, who: int, passes: bool, may_open: bool, rejected: Int64Array, first: int, P: FloatArray, log: Log
 ) -> None:

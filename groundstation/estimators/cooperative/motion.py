@@ -6,7 +6,7 @@ Strapdown Inertial Navigation Technology, 2nd ed. 2004, section 12.3 (dynamics o
 
 import numpy as np
 
-from groundstation.base.compile import in_place, part
+from groundstation.base.compile import in_place
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.estimators.cooperative.arrays import (
     AXES,
@@ -29,7 +29,7 @@ SAME_TIME_S, SAME_STEP_S = 1e-9, 1e-12
 KEPT_STEP, KEPT_PHI, KEPT_NOISE = 8, 9, 10  # all aircraft of a session have one model there
 
 
-@part
+@in_place
 def fill_dynamics(fleet: Fleet, who: int, epoch: int, F: FloatArray) -> None:
     """Dynamics of an aircraft's errors from one epoch of its dead reckoning to the next.
 
@@ -57,7 +57,7 @@ def fill_dynamics(fleet: Fleet, who: int, epoch: int, F: FloatArray) -> None:
         F[fleet.bias[who], fleet.bias[who]] = -1.0 / bias_s
 
 
-@part
+@in_place
 def _fill_platform(flown: FloatArray, gyro_s: float, F: FloatArray) -> None:
     """Rows of position, velocity, platform angles and drifts in the global frame."""
     earth, meridian, normal = EARTH_RATE_RADPS, flown[MERIDIAN], flown[NORMAL]
@@ -90,7 +90,7 @@ def _fill_platform(flown: FloatArray, gyro_s: float, F: FloatArray) -> None:
     F[7, 7] = F[8, 8] = F[9, 9] = -1.0 / gyro_s
 
 
-@part
+@in_place
 def first_not_before(fleet: Fleet, who: int, at_s: float) -> int:
     """Place among a vehicle's epochs of the first that is not before a time (their number: none)."""
     low, high = fleet.first[who], fleet.first[who + 1]
@@ -103,7 +103,7 @@ def first_not_before(fleet: Fleet, who: int, at_s: float) -> int:
     return int(low - fleet.first[who])
 
 
-@part
+@in_place
 def compose(n: int, one: FloatArray, q: FloatArray, phi: FloatArray, noise: FloatArray, w: FloatArray) -> None:
     """phi <- one phi; noise <- one noise one' + q."""
     for i in range(n):
@@ -121,7 +121,7 @@ def compose(n: int, one: FloatArray, q: FloatArray, phi: FloatArray, noise: Floa
             noise[i, j] += q[i, j]
 
 
-@part
+@in_place
 def turn_covariance(n: int, phi: FloatArray, p: FloatArray, w: FloatArray) -> None:
     """p <- phi p phi'; entries of phi that are zero cost nothing but the look at them."""
     for i in range(n):
@@ -141,7 +141,7 @@ def turn_covariance(n: int, phi: FloatArray, p: FloatArray, w: FloatArray) -> No
                     p[i, j] += w[i, m] * phi[j, m]
 
 
-@part
+@in_place
 def turn_rows(n: int, phi: FloatArray, rows: FloatArray, w: FloatArray) -> None:
     """rows <- phi rows, the first n of them."""
     width = rows.shape[1]
@@ -199,7 +199,7 @@ def step(
         x[i] = room[0, 0, i]
 
 
-@part
+@in_place
 def _over_epochs(
     fleet: Fleet, who: int, from_s: float, to_s: float, phi: FloatArray, noise: FloatArray, room: FloatArray
 ) -> None:
@@ -263,7 +263,7 @@ def place(fleet: Fleet, who: int, at_s: float, reading: FloatArray, derivative: 
             derivative[axis, lever + 1] = cosine * east - sine * north
 
 
-@part
+@in_place
 def position(n: int, reading: FloatArray, derivative: FloatArray, x: FloatArray, out: FloatArray) -> None:
     """Fill the position, (3,): reading + derivative x."""
     for axis in range(3):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from groundstation.base.compile import in_place, part
+from groundstation.base.compile import in_place
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.estimators.cooperative.arrays import HEIGHT, POINT, SATELLITE, Events, Fleet, FloatArray, Rows
 
@@ -67,7 +67,7 @@ def observe(
     return 1
 
 
-@part
+@in_place
 def _range_row(
     fleet: Fleet,
     events: Events,
@@ -113,7 +113,7 @@ def _range_row(
     rows.innovation[0], rows.variance[0] = events.value_m[event] - predicted, events.variance_m2[event]
 
 
-@part
+@in_place
 def _while_the_earth_turns(
     line: FloatArray, source_m: FloatArray, distance: float, direction: FloatArray, seen: FloatArray
 ) -> float:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundstation.base.compile import in_place, part
+from groundstation.base.compile import in_place
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.estimators.cooperative.alone_update import solve
 from groundstation.estimators.cooperative.arrays import (
@@ -103,7 +103,7 @@ def run_pairs(
             _use(fleet, points, events, items.first[item], gate_sigma, members, room, rows, log)
 
 
-@part
+@in_place
 def _advance(fleet: Fleet, members: Members, who: int, to_s: float, room: Room) -> None:
     if to_s <= members.time_s[who] + SAME_TIME_S:
         return
@@ -118,7 +118,7 @@ def _advance(fleet: Fleet, members: Members, who: int, to_s: float, room: Room) 
     members.time_s[who] = to_s
 
 
-@part
+@in_place
 def _scale_factors(n: int, who: int, but: int, by: FloatArray, members: Members, room: Room) -> None:
     """Factors of a vehicle towards all others but one, times a matrix."""
     for other in range(len(members.time_s)):
@@ -126,7 +126,7 @@ def _scale_factors(n: int, who: int, but: int, by: FloatArray, members: Members,
             turn_rows(n, by, members.factor[who, other], room.wide)
 
 
-@part
+@in_place
 def _use(
     fleet: Fleet,
     points: Points,
@@ -154,7 +154,7 @@ def _use(
         _private(fleet, points, events, event, gate_sigma, members, room, rows, log)
 
 
-@part
+@in_place
 def _observe(fleet: Fleet, events: Events, event: int, members: Members, room: Room, rows: Rows) -> int:
     who, source, at_s, clock_m = events.receiver[event], events.source[event], events.time_s[event], 0.0
     place(fleet, who, at_s, room.reading[0], room.derivative[0])
@@ -168,7 +168,7 @@ def _observe(fleet: Fleet, events: Events, event: int, members: Members, room: R
     return observe(fleet, events, event, x, reading, derivative, room.source, clock_m, room.source, False, rows)
 
 
-@part
+@in_place
 def _passes(
     fleet: Fleet,
     events: Events,
@@ -188,7 +188,7 @@ def _passes(
     return passes
 
 
-@part
+@in_place
 def _private(
     fleet: Fleet,
     points: Points,
@@ -230,7 +230,7 @@ def _private(
     turn_rows(n, kept, members.map_rows[who], room.wide)
 
 
-@part
+@in_place
 def _relative(
     fleet: Fleet,
     events: Events,
@@ -271,7 +271,7 @@ def _relative(
     _share(fleet, one, two, rows.innovation[0], members, room)
 
 
-@part
+@in_place
 def _join(fleet: Fleet, one: int, two: int, members: Members, both: FloatArray) -> None:
     """Covariance of two vehicles together."""
     n, m = fleet.size[one], fleet.size[two]
@@ -289,7 +289,7 @@ def _join(fleet: Fleet, one: int, two: int, members: Members, both: FloatArray) 
             both[n + i, n + j] = members.P[two, i, j]
 
 
-@part
+@in_place
 def _share(fleet: Fleet, one: int, two: int, innovation: float, members: Members, room: Room) -> None:
     """Give both vehicles their part of the update; factors towards third ones are scaled by P(after) P(before)^-1."""
     n, width = fleet.size[one], members.map_rows.shape[2]
@@ -325,7 +325,7 @@ def _share(fleet: Fleet, one: int, two: int, innovation: float, members: Members
     members.has_factor[one, two] = members.has_factor[two, one] = True
 
 
-@part
+@in_place
 def _over(n: int, first: int, both: FloatArray, before: FloatArray, room: Room) -> None:
     """Fill ``room.phi`` with after before^-1, scaled by the sigmas: states differ by eight powers of ten."""
     normal, right = room.step[1], room.step[2]

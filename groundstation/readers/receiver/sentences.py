@@ -87,18 +87,28 @@ def _numbers(data: Any, starts: Any, counts: Any, field: int, value: Any, behind
             value[row], behind[row], state[row] = _number(data, begins[row], ends[row] - 1)
 
 
+@inlined
+def _power_of_ten(exponent: int) -> int:
+    """10 to a power that is not negative; the operator may fail, and what may fail is not kept as machine code."""
+    power = 1
+    for _ in range(exponent):
+        power *= 10
+    return power
+
+
 @in_place
 def _times_of_day(value: Any, behind: Any, day_ns: Any, sound: Any) -> None:
     """Nanoseconds of the day of times written as ``hhmmss`` and digits behind the point."""
     for row in range(len(value)):
-        unit = 10 ** behind[row]
+        unit = _power_of_ten(behind[row])
         whole, fraction = value[row] // unit, value[row] % unit
         hour, minute, second = whole // 10_000, whole // 100 % 100, whole % 100
         sound[row] = value[row] >= 0 and hour < 24 and minute < 60 and second < 61
         if sound[row]:
-            fraction_ns = (
-                fraction * 10 ** (9 - behind[row]) if behind[row] <= 9 else fraction // 10 ** (behind[row] - 9)
-            )
+            if behind[row] <= 9:
+                fraction_ns = fraction * _power_of_ten(9 - behind[row])
+            else:
+                fraction_ns = fraction // _power_of_ten(behind[row] - 9)
             day_ns[row] = ((hour * 60 + minute) * 60 + second) * NS_PER_S + fraction_ns
 
 
