@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from groundstation.plots import extents
 from groundstation.plots.marks import Cells, Floats
 from groundstation.plots.plot import WIDTH_MM, Panel, Plot, Row
+from groundstation.plots.scales import Span
 from groundstation.reports.frames import MM_PER_INCH, TIME
-from groundstation.reports.svg import extents
 from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, label, lines_of, width_pt
 from groundstation.reports.svg.legend import LINE_PT, Entry, above, beside_pt, entries_of
-from groundstation.reports.svg.scales import Span
 from groundstation.reports.svg.ticks import Tick, own_ticks, ticks_of
 
 PT_PER_MM = 72.0 / MM_PER_INCH

@@ -1,8 +1,6 @@
 """The look of a picture: a colour for each role, widths of lines, shades of phases, the scale of cells."""
 
-import numpy as np
-
-from groundstation.plots.marks import Dash, Emphasis, Floats, Role
+from groundstation.plots.marks import Dash, Emphasis, Role
 
 INK, FAINT, EDGE, GRID, PAPER = "#1c2530", "#6b7683", "#8d97a3", "#e4e8ec", "#ffffff"
 
@@ -54,7 +52,6 @@ _VIRIDIS = "".join(
     )
 )
 _VIRIDIS_AT = [[int(text[at : at + 2], 16) for at in (0, 2, 4)] for text in _VIRIDIS.split()]
-NO_PLACES: Floats = np.zeros(0)
 STEPS = 20  # colours of a scale
 
 
