@@ -129,7 +129,7 @@ def _deviation(recorder: Recorder, path: str, title: str, flown: LandingPath, ax
     named = [*lines, Line("positions" if axis == "lateral" else "height", colours.SAMPLES, THIN)]
     named += [Line("guidance", colours.INS, BOLD)]
     chart.curves("curves", [*curves, (along, placed, named[-2]), (along, guided, named[-1])])
-    chart.key(named)
+    chart.legend(named)
     recorder.static(
         f"{path}/aircraft", rr.Points2D.from_fields(colors=[colours.ANSWER], radii=rr.Radius.ui_points(MARK))
     )
