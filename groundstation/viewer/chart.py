@@ -16,6 +16,7 @@ from groundstation.plots.ranges import thin
 from groundstation.plots.scales import Span
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour, faint
+from groundstation.viewer.names import clean_text
 from groundstation.viewer.recorder import FLIGHT_TIME, UTC, Line, Recorder
 from groundstation.viewer.series import FloatArray
 
@@ -25,8 +26,8 @@ TICKS = 5  # about so many
 TIME_STEPS_S = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 28800, 86400)
 MOST_DECADES = 3  # of an axis on which twos and fives are written, too
 GRID, LABEL = 0.4, 0.1  # widths and radii in points of the screen
-KEY_ROOM, MOST_KEY_ROOM, LETTER = 56.0, 96.0, 3.4  # beside the box, for the names of many lines
-MOST_ABOVE, MOST_LETTERS = 4, 60  # names of lines above the box, and their letters
+KEY_ROOM, MOST_KEY_ROOM, LETTER = 56.0, 110.0, 4.4  # beside the box, for the names of many lines
+MOST_ABOVE, MOST_LETTERS, MOST_OF_A_NAME = 4, 60, 25  # names above the box, their letters; letters of one beside it
 BAND_COLUMNS = 320  # upright lines of a filled band across the whole box
 CURSOR, CURSOR_STEPS = 0.6, 600  # radius in points of the screen; places of a run
 FILLING, BEHIND, MIDDLE, FRONT, NOW = -1.0, 0.0, 1.0, 2.0, 90.0
@@ -142,14 +143,15 @@ class Chart:
         """Write the names of lines, each in its colour: of a few above the box, of many beside it."""
         letters = [len(line.name) for line in lines]
         if is_beside or len(lines) > MOST_ABOVE or sum(letters) > MOST_LETTERS:
-            longest = max(letters, default=0)
+            longest = min(max(letters, default=0), MOST_OF_A_NAME)
             self.right = min(max(KEY_ROOM, LETTER * longest), MOST_KEY_ROOM)
             step = self.height / max(len(lines), 1)
             places = [[WIDTH + 0.5 * self.right, step * (place + 0.1)] for place in range(len(lines))]
         else:
             step = WIDTH / max(len(lines), 1)
             places = [[step * (place + 0.5), -11.0] for place in range(len(lines))]
-        self.texts("legend", np.array(places), [line.name for line in lines], [line.colour for line in lines])
+        names = [clean_text(line.name, MOST_OF_A_NAME if self.right > RIGHT else MOST_LETTERS) for line in lines]
+        self.texts("legend", np.array(places), names, [line.colour for line in lines])
 
     def curves(
         self,

@@ -32,7 +32,7 @@ COLOURS = 24  # of a scale of cells
 def chart_view(
     recorder: Recorder, path: str, panel: Panel, name: str, height: float = HEIGHT, window: int | None = None
 ) -> rrb.Spatial2DView:
-    """Log a panel as a chart under ``path``; of one over flight time a window with a cursor."""
+    """Log a panel as a chart under ``path``; over flight time with a cursor, of a broken axis a window."""
     shown = panel if window is None else _of_window(panel, window)
     x, y = extents.x_span(shown, extents.x_extent(shown.marks)), extents.y_span(shown)
     if shown.is_map:
@@ -45,10 +45,10 @@ def chart_view(
         draw: Callable[[Chart, str, list[Any], float], None] = _DRAWN[kind]
         draw(chart, f"{places[id(several[0])]:02d}_{kind.__name__.lower()}", several, order)
     named = {mark.name: colours.ROLES[mark.role] for mark in shown.marks if mark.name}
-    if len(named) > 1 or shown.legend == "beside":
+    if shown.legend and len(named) > 1:
         lines = [Line(clean_text(text), shade) for text, shade in named.items()]
         chart.legend(lines, is_beside=shown.legend == "beside")
-    if window is not None:
+    if shown.x.scale == "time":
         chart.cursor()
     return chart.view(name)
 

@@ -1,7 +1,8 @@
 """Plots in a recording: a panel over flight time is a time view, any other one a chart.
 
-Rerun's vertical axes of time views are linear, without titles and without shaded ground: a view is named after its
-axis, which says the colours of a few lines, and a phase or an outage is a lane of its own.
+Rerun's time views have linear vertical axes, without titles and without shaded ground: a panel with a logarithmic
+axis is a chart with a cursor, a view is named after its axis and says the colours of a few lines, and a phase or an
+outage is a lane of its own.
 """
 
 from collections.abc import Iterator, Sequence
@@ -41,19 +42,19 @@ def panels_of(
     height : float
         Of the boxes of charts, which are 160 wide.
     apart : bool
-        Whether each curve of a logarithmic axis over time has a view of its own: on one linear axis the smaller of
-        two would lie on the ground.
+        Whether each curve of a logarithmic axis over time has a time view of its own, on a linear axis; else the panel
+        is a chart.
     """
     views: list[rrb.View] = []
     for path, title, panel in _named(told, of):
         if panel.nothing:
             recorder.document(path, markdown_text(panel.nothing))
             views.append(document(title, path))
-        elif panel.x.scale != "time":
-            views.append(chart_view(recorder, path, panel, f"{title} by {panel.x.title}", height))
+        elif panel.x.scale != "time" or (panel.y.scale == "log" and not apart):
+            views.append(chart_view(recorder, path, panel, title, height))
         elif any(isinstance(mark, Lanes) for mark in panel.marks):
             views.append(_lanes(recorder, path, panel, title))
-        elif apart and panel.y.scale == "log":
+        elif panel.y.scale == "log":
             curves = [mark for mark in panel.marks if isinstance(mark, Curve)]
             parts = path_parts(mark.name for mark in curves)
             for mark, part in zip(curves, parts, strict=True):
@@ -202,7 +203,7 @@ def _band(recorder: Recorder, path: str, band: Band, about: Curve | None, line: 
     rows = np.flatnonzero(np.isfinite(band.x))
     time_ns = recorder.time_ns(band.x[rows])
     with np.errstate(over="ignore", invalid="ignore"):
-        middle = 0.5 * (band.low + band.high)[rows] if about is None else about.y[rows]
+        middle = _middle(band)[rows] if about is None else about.y[rows]
         half = band.high[rows] - middle
     if about is not None:
         own = _line(about, "", title)
@@ -211,6 +212,11 @@ def _band(recorder: Recorder, path: str, band: Band, about: Curve | None, line: 
     else:
         line = Line(line.name, line.colour, colours.LINE["thin"])
     recorder.band(path, time_ns, middle, half, line, gap_after(time_ns))
+
+
+def _middle(band: Band) -> FloatArray:
+    """The line about which a band is drawn: of one that stands on zero that is zero, where its axis begins."""
+    return np.where(np.isfinite(band.high), 0.0, np.nan) if not band.low.any() else 0.5 * (band.low + band.high)
 
 
 def _join(groups: list[_Joined], mark: Curve | Dots, line: Line) -> None:

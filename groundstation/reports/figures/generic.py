@@ -1,5 +1,6 @@
 """Figure of the chapter that any answer has: arrays over flight time, one panel for each unit."""
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,7 @@ def series(results: FlightResults, name: str) -> Drawing | None:
         for place, (unit, columns) in enumerate(reversed(list(panels.items()))):
             bottom = BOTTOM_MM + place * (PANEL_MM + GAP_MM)
             axes = layout.place(figure, 18, bottom, 174, bottom + PANEL_MM)
-            for column, colour in zip(columns, d.SERIES, strict=False):
+            for column, colour in zip(columns, itertools.cycle(d.SERIES), strict=False):
                 x, y = broken_at_gaps(time, numbers(data, column)[order])
                 d.line(axes, x, y, colour, 1.0, label=d.label(quantity(column)[0]))
             axes.set_ylabel(

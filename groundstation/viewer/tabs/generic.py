@@ -17,10 +17,7 @@ def generic_tab(recorder: Recorder, results: FlightResults, answer: Answer) -> r
     section, path = chapter_of(results, answer), answer.analysis
     recorder.document(f"{path}/answer", markdown(section))
     text = document("What was found", f"{path}/answer")
-    plots = [
-        view
-        for name in figures_over_time(results, path)
-        for view in panels_of(recorder, plot_of(SERIES, results, name))
-    ]
+    told = (plot_of(SERIES, results, name) for name in figures_over_time(results, path))
+    plots = [view for one in told if one is not None for view in panels_of(recorder, one, of=one.title)]
     columns: list[rrb.View | rrb.Container] = [rrb.Vertical(contents=plots), text] if plots else [text]
     return rrb.Horizontal(contents=columns, column_shares=[3.0, 2.0][: len(columns)], name=section.title)
