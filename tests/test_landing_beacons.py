@@ -140,7 +140,7 @@ def test_the_answer_tells_distance_side_and_category(found: Found[BeaconLanding]
     assert LANDING_BEACONS.sentence({"landing_beacons": found.answer}).startswith("1 approach by bearings")
 
 
-def test_the_tab_has_the_time_of_the_approach_alone(found: Found[BeaconLanding], tmp_path: Path) -> None:
+def test_the_tab_has_every_position_on_its_axes(found: Found[BeaconLanding], tmp_path: Path) -> None:
     simulated, _ = flown(approach_scenario())
     flight, answer = simulated.flight, found.answer
     source = Source("a.csv", "00" * 32, 0, "flat-csv")
@@ -148,12 +148,12 @@ def test_the_tab_has_the_time_of_the_approach_alone(found: Found[BeaconLanding],
     results = FlightResults(**{**vars(bare), "answers": by_analysis(answer), "figures": answer.figures})
     write_recording(tmp_path / "flight.rrd", flight, results)
     contents = Contents(tmp_path / "flight.rrd")
-    cursor_s = np.sort(contents.times("/landing_beacons/1/lateral/cursor")) / 1e9
     data = answer.figures[0]
-    near_s = data["time_s"][data["straight_before_threshold_m"] < 6000.0]
-    assert cursor_s[0] == pytest.approx(near_s[0]) and near_s[0] > answer.approaches[0].start_s
-    assert cursor_s[-2] == pytest.approx(answer.approaches[0].end_s)
-    assert "/landing_beacons/1/glide_path/b_deviation" in contents.fixed
+    near = (data["straight_before_threshold_m"] < 5000.0) & (data["straight_before_threshold_m"] > -500.0)
+    for part, name, most_m in (("right_of_course", "lateral_m", 150.0), ("above_glide_path", "glide_path_m", 40.0)):
+        entities = [one for one in contents.fixed if part in one and one.endswith("_dots/0")]
+        drawn = [batch.column("Points2D:positions")[0].as_py() for one in entities for batch in contents.fixed[one]]
+        assert sum(map(len, drawn)) == (near & (np.abs(data[name]) <= most_m)).sum() > 100
 
 
 def test_bearings_that_run_the_wrong_way_give_no_numbers() -> None:

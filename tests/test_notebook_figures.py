@@ -20,11 +20,11 @@ from matplotlib.text import Text
 from groundstation.chapters.plots import PLOTS
 from groundstation.chapters.plots.fleet import FLEET_PLOTS
 from groundstation.plots import marks
+from groundstation.plots.extents import edges
 from groundstation.plots.marks import AnyMark, Floats, Points
 from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
 from groundstation.reports.notebook.figure import COLOUR_BAR, figure_of
 from groundstation.reports.svg.colours import COLOURS, PAPER
-from groundstation.reports.svg.extents import edges
 from groundstation.reports.svg.legend import entries_of
 from tests.every_mark import DRAWN, X, Y, empty, plot_of
 from tests.plot_cases import CASES, names_of

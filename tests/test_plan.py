@@ -103,7 +103,7 @@ def test_a_plan_comes_back_as_it_was_saved(made: Path) -> None:
 
 def test_the_recording_has_a_tab_of_the_plan(made: Path) -> None:
     recording = Contents(made / "mine.rrd")
-    assert {"/plan/user/now", "/plan/ranges", "/control/speed/user/covariance"} <= set(recording.batches)
+    assert {"/plan/user/now", "/plan/ranges", "/control/law/user__speed/b00_lines"} <= set(recording.batches)
 
 
 def test_a_plan_is_made_again_in_its_folder_and_nowhere_else(tmp_path: Path) -> None:
@@ -224,7 +224,8 @@ def test_a_landing_is_planned_into_a_folder_with_its_answer_in_a_line(tmp_path: 
         one.name for one in (folder / "tables").iterdir()
     }
     recording = Contents(folder / "mine.rrd")
-    assert {"/landing/aircraft/now", "/landing/ranges", "/landing_ranges/error_up/b_errors"} <= set(recording.batches)
+    assert {"/landing/aircraft/now", "/landing/ranges"} <= set(recording.batches)
+    assert "/landing_ranges/trials/error_up/01_curve" in recording.fixed
     assert sum(path.startswith("/landing/corridor/") for path in recording.fixed) == 3
 
 

@@ -375,7 +375,7 @@ def contents(out: Path) -> Contents:
 def test_the_recording_has_both_timelines_and_every_aircraft(contents: Contents) -> None:
     assert contents.timelines == {"utc", "flight_time"}
     for name in "ABC":
-        for entity in (f"/space/{name}/now", f"/space/{name}/ellipsoid", f"/cooperative/errors/{name}/a_band"):
+        for entity in (f"/space/{name}/now", f"/space/{name}/ellipsoid", f"/cooperative/errors/{name}/c00_band"):
             assert sum(batch.num_rows for batch in contents.batches[entity]) == EPOCHS, entity
         assert f"/space/{name}/track" in contents.fixed
     assert "/space/stations" in contents.fixed
@@ -419,14 +419,14 @@ def test_errors_and_geometry_in_the_recording_are_those_of_the_results(
     tracks = results.figure_with_rows("cooperative_tracks")
     assert tracks is not None
     rows = (tracks["algorithm"] == trusted(answer).algorithm) & (tracks["vehicle"] == "B")
-    time_ns, values = contents.scalars("/cooperative/errors/B/b_error")
+    time_ns, values = contents.scalars("/cooperative/errors/B/b00_lines")
     assert time_ns == pytest.approx(tracks["time_s"][rows] * 1e9)
-    assert values[:, 0] == pytest.approx(tracks["error_m"][rows])
-    _, middle, half = contents.band("/cooperative/errors/B/a_band")
+    assert values[:, 1] == pytest.approx(tracks["error_m"][rows]), "behind dead reckoning"
+    _, middle, half = contents.band("/cooperative/errors/B/c00_band")
     assert not middle.any() and half == pytest.approx(tracks["two_sigma_r_m"][rows])
     geometry = results.figure_with_rows("cooperative_geometry")
     assert geometry is not None
-    _, determinant = contents.scalars("/cooperative/geometry/determinant/A")
+    _, determinant = contents.scalars("/cooperative/geometry/det_H_H/b00_lines")
     assert determinant[:, 0] == pytest.approx(geometry["determinant"][geometry["vehicle"] == "A"])
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.reports.svg.scales import Span, span_of
+from groundstation.plots.scales import Span, span_of
 from groundstation.reports.svg.ticks import of_decade, own_ticks, ticks_of
 
 

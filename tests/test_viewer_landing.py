@@ -14,7 +14,6 @@ from groundstation.results.flight import FlightResults, Source
 from groundstation.results.landing import LandingResult
 from groundstation.simulation.approach import load_approach, simulate_approach
 from groundstation.viewer.recording import write_recording
-from groundstation.viewer.tabs.landing import SEEN_M
 from tests.recording_contents import Contents
 from tests.test_approaches import found, site
 
@@ -61,13 +60,12 @@ def test_the_tab_shows_the_samples_of_the_answer(with_site: FlightResults, tmp_p
     contents = Contents(tmp_path / "flight.rrd")
     answer = with_site.answer(LandingResult)
     assert answer is not None
-    path = answer.figures[0]
-    cursor_s = np.sort(contents.times("/landing/1/motion/cursor")) / 1e9
+    path, chart = answer.figures[0], "/landing/1/motion/1/sink_rate__m_s__and_bank"
+    cursor_s = np.sort(contents.times(f"{chart}/cursor")) / 1e9
     assert cursor_s[0] == pytest.approx(path["time_s"][0]), "the time axis is that of the approach alone"
-    assert cursor_s[-2] == pytest.approx(path["time_s"][-1]) and len(contents.fixed["/landing/1/motion/line/0"]) == 1
-    near = (path["distance_m"] < SEEN_M) & np.isfinite(path["lateral_guidance_m"])
-    moved = sum(batch.num_rows for batch in contents.batches["/landing/1/lateral/aircraft"])
-    assert moved == near.sum() > 20
+    assert cursor_s[-2] == pytest.approx(path["time_s"][-1]) and len(contents.fixed[f"{chart}/00_curve"]) == 1
+    moved = [row for entity, rows in contents.batches.items() if "right_of_the_course" in entity for row in rows]
+    assert 20 < sum(batch.num_rows for batch in moved) <= np.isfinite(path["lateral_guidance_m"]).sum()
     corridors = {f"/landing/1/space/corridor/{name}" for name in ("CAT_I", "CAT_II_and_IIIA", "CAT_IIIB")}
     assert corridors | {"/landing/1/space/positions", "/landing/1/space/guidance"} <= set(contents.fixed)
     assert "/landing/1/space/aircraft" in contents.batches

@@ -31,12 +31,12 @@ def test_errors_and_modulus_are_those_of_the_result(contents: Contents) -> None:
     figures = {figure.name: figure for figure in figure_eight().figures}
     samples, modulus = figures["magnetic_samples"], figures["magnetic_modulus"]
     mine = samples["part"] == "held out"
-    for name, column in (("before", "error_before_deg"), ("after", "error_poisson_attitude_deg")):
-        shown = contents.scalars(f"/magnetic/error/{name}")[1].ravel()
+    for part, column in (("d01_dots", "error_before_deg"), ("d02_dots", "error_poisson_attitude_deg")):
+        shown = contents.scalars(f"/magnetic/held_out/error_of_magnetic_heading/{part}")[1].ravel()
         assert np.array_equal(shown, samples[column][mine])
-    rows = contents.scalars("/magnetic/modulus")[1]
+    rows = contents.scalars("/magnetic/modulus/modulus_of_the_field/b00_lines")[1]
     known = np.isfinite(rows).all(axis=1)
-    assert np.array_equal(rows[known][:, 0], modulus["before_nt"])
+    assert np.array_equal(rows[known][:, 0], modulus["before_nt"] / 1e3)
 
 
 def test_field_lies_on_the_sphere_once_it_is_freed_of_the_iron() -> None:
@@ -57,7 +57,8 @@ def test_field_lies_on_the_sphere_once_it_is_freed_of_the_iron() -> None:
 
 def test_sphere_and_eight_are_in_the_tab(contents: Contents) -> None:
     assert {"/magnetic/field/model", "/magnetic/field/as_read", "/magnetic/field/freed_of_iron"} <= set(contents.fixed)
-    assert {"/magnetic/eight/track", "/magnetic/eight/grid"} <= set(contents.fixed)
+    assert {"/magnetic/track/north/00_curve", "/magnetic/track/north/axes/grid"} <= set(contents.fixed)
+    assert "/magnetic/track/north/01_told" in contents.batches, "the aircraft moves along its track"
 
 
 def test_text_holds_verdict_card_and_reasons(contents: Contents) -> None:

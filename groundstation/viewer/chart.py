@@ -10,54 +10,88 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from groundstation.chapters.wording import clock
+from groundstation.plots.plot import Scale
+from groundstation.plots.ranges import thin
+from groundstation.plots.scales import Span
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour, faint
+from groundstation.viewer.names import clean_text
 from groundstation.viewer.recorder import FLIGHT_TIME, UTC, Line, Recorder
 from groundstation.viewer.series import FloatArray
 
 WIDTH = 160.0  # of the box
 LEFT, RIGHT, TOP, BOTTOM = 24.0, 6.0, 14.0, 20.0  # room for ticks, a title and the names of the lines
 TICKS = 5  # about so many
+TIME_STEPS_S = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 28800, 86400)
+MOST_DECADES = 3  # of an axis on which twos and fives are written, too
 GRID, LABEL = 0.4, 0.1  # widths and radii in points of the screen
-KEY_ROOM = 56.0  # beside the box, for the names of many lines
+KEY_ROOM, MOST_KEY_ROOM, LETTER = 56.0, 110.0, 4.4  # beside the box, for the names of many lines
+MOST_ABOVE, MOST_LETTERS, MOST_OF_A_NAME = 4, 60, 25  # names above the box, their letters; letters of one beside it
 BAND_COLUMNS = 320  # upright lines of a filled band across the whole box
-FILLING, BEHIND, MIDDLE, FRONT = -1.0, 0.0, 1.0, 2.0
+CURSOR, CURSOR_STEPS = 0.6, 600  # radius in points of the screen; places of a run
+FILLING, BEHIND, MIDDLE, FRONT, NOW = -1.0, 0.0, 1.0, 2.0, 90.0
 
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis: title with unit, range, and whether it is logarithmic."""
+    """An axis: title with unit, ends, scale, and the texts of places that have one of their own.
+
+    One that runs backwards has the greater end first; a symlog scale is linear up to ``linear_to``.
+    """
 
     title: str
     low: float
     high: float
-    is_log: bool = False
+    scale: Scale = "linear"
+    linear_to: float = 1.0
+    texts: tuple[tuple[float, str], ...] = ()
 
     def share(self, values: FloatArray) -> FloatArray:
         """Place of values along the axis, 0 to 1; NaN outside of it."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            scaled = (
-                np.log(values / self.low) / np.log(self.high / self.low)
-                if self.is_log
-                else (values - self.low) / (self.high - self.low)
-            )
+        with np.errstate(invalid="ignore"):
+            scaled = Span(self.scale, self.low, self.high, self.linear_to).shares(values)
             return np.where((scaled >= -1e-9) & (scaled <= 1.0 + 1e-9), scaled, np.nan)
 
-    def ticks(self) -> FloatArray:
-        """Round values inside the range.
+    def within(self, values: FloatArray) -> FloatArray:
+        """Values moved to the nearer end where they lie beyond it."""
+        return np.clip(values, min(self.low, self.high), max(self.low, self.high))
+
+    def ticks(self) -> tuple[tuple[float, str], ...]:
+        """Round values inside the range, each with its text.
 
         Examples
         --------
-        >>> Axis("lead, min", 0.0, 120.0).ticks().tolist(), Axis("RMS, m", 5.0, 300.0, True).ticks().tolist()
-        ([0.0, 20.0, 40.0, 60.0, 80.0, 100.0, 120.0], [5.0, 10.0, 20.0, 50.0, 100.0, 200.0])
+        >>> [text for _, text in Axis("lead, min", 0.0, 120.0).ticks()]
+        ['0', '20', '40', '60', '80', '100', '120']
+        >>> [text for _, text in Axis("RMS, m", 5.0, 300.0, "log").ticks()]
+        ['5', '10', '20', '50', '100', '200']
+        >>> [text for _, text in Axis("flight time", 50.0, 200.0, "time").ticks()]
+        ['1:00', '1:30', '2:00', '2:30', '3:00']
         """
-        if self.is_log:
-            decades = 10.0 ** np.arange(np.floor(np.log10(self.low)), np.ceil(np.log10(self.high)) + 1)
-            marks = np.concatenate([decades * factor for factor in (1.0, 2.0, 5.0)])
-            return np.sort(marks[(marks >= self.low * (1 - 1e-9)) & (marks <= self.high * (1 + 1e-9))])
-        step = round_step((self.high - self.low) / TICKS)
-        first, last = np.ceil(self.low / step - 1e-9), np.floor(self.high / step + 1e-9)
-        return np.asarray(np.arange(first, last + 1) * step + 0.0)  # + 0.0: no minus zero
+        if self.texts:
+            return tuple(one for one in self.texts if np.isfinite(self.share(np.array([one[0]]))[0]))
+        low, high = min(self.low, self.high), max(self.low, self.high)
+        if self.scale == "log":
+            return tuple((place, f"{place:g}") for place in _of_decades(low, high))
+        if self.scale == "symlog":
+            sizes = [size for size in _of_decades(self.linear_to, max(abs(low), high)) if size >= self.linear_to]
+            places = [*(-size for size in reversed(sizes)), 0.0, *sizes]
+            return tuple((place, f"{place:g}") for place in places if low <= place <= high)
+        step = round_step((high - low) / TICKS)
+        if self.scale == "time":
+            step = min((one for one in TIME_STEPS_S if TICKS * one * 2 > high - low), default=TIME_STEPS_S[-1])
+        first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
+        places = (np.arange(first, last + 1) * step + 0.0).tolist()  # + 0.0: no minus zero
+        return tuple((place, clock(place) if self.scale == "time" else f"{place:g}") for place in places)
+
+
+def _of_decades(low: float, high: float) -> list[float]:
+    """Ones, twos and fives of every decade; of many decades the ones."""
+    first, last = np.floor(np.log10(low)), np.ceil(np.log10(high))
+    parts = (1.0, 2.0, 5.0) if np.log10(high / low) <= MOST_DECADES else (1.0,)
+    marks = np.concatenate([part * 10.0 ** np.arange(first, last + 1) for part in parts])
+    return sorted(marks[(marks >= low * (1 - 1e-9)) & (marks <= high * (1 + 1e-9))].tolist())
 
 
 def screen_radius(points: float) -> float:
@@ -95,24 +129,36 @@ class Chart:
         self.right = RIGHT
         self._frame()
 
-    def view(self) -> rrb.Spatial2DView:
-        """The view that shows the chart, named after its axes."""
+    def view(self, name: str = "") -> rrb.Spatial2DView:
+        """The view that shows the chart, named after its axes unless it has a name."""
         bounds = rrb.VisualBounds2D(x_range=[-LEFT, WIDTH + self.right], y_range=[-TOP, self.height + BOTTOM])
-        name = f"{self.y.title} by {self.x.title}"
+        name = name or f"{self.y.title} by {self.x.title}"
         return rrb.Spatial2DView(name=name, origin=f"/{self.path}", visual_bounds=bounds)
 
     def points(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Places in the picture, shape (n, 2); its axes run right and down."""
         return np.column_stack([WIDTH * self.x.share(x), self.height * (1.0 - self.y.share(y))])
 
-    def legend(self, lines: Sequence[Line]) -> None:
-        """Write the names of a few lines above the box, each in its colour."""
-        step = WIDTH / max(len(lines), 1)
-        places = np.array([[step * (place + 0.5), -11.0] for place in range(len(lines))])
-        self._texts("legend", places, [line.name for line in lines], [line.colour for line in lines])
+    def legend(self, lines: Sequence[Line], *, is_beside: bool = False) -> None:
+        """Write the names of lines, each in its colour: of a few above the box, of many beside it."""
+        letters = [len(line.name) for line in lines]
+        if is_beside or len(lines) > MOST_ABOVE or sum(letters) > MOST_LETTERS:
+            longest = min(max(letters, default=0), MOST_OF_A_NAME)
+            self.right = min(max(KEY_ROOM, LETTER * longest), MOST_KEY_ROOM)
+            step = self.height / max(len(lines), 1)
+            places = [[WIDTH + 0.5 * self.right, step * (place + 0.1)] for place in range(len(lines))]
+        else:
+            step = WIDTH / max(len(lines), 1)
+            places = [[step * (place + 0.5), -11.0] for place in range(len(lines))]
+        names = [clean_text(line.name, MOST_OF_A_NAME if self.right > RIGHT else MOST_LETTERS) for line in lines]
+        self.texts("legend", np.array(places), names, [line.colour for line in lines])
 
     def curves(
-        self, name: str, curves: Sequence[tuple[FloatArray, FloatArray, Line]], at_s: float | None = None
+        self,
+        name: str,
+        curves: Sequence[tuple[FloatArray, FloatArray, Line]],
+        at_s: float | None = None,
+        order: float = FRONT,
     ) -> None:
         """Log lines; with ``at_s`` they stand from that flight time on, until others take their place."""
         strips: list[FloatArray] = []
@@ -123,11 +169,24 @@ class Chart:
             strips += pieces
             shades += [line.colour] * len(pieces)
             radii += [screen_radius(line.width)] * len(pieces)
-        drawn = rr.LineStrips2D(strips, colors=shades, radii=radii, draw_order=FRONT)
-        self._log(name, drawn, at_s)
+        self._log(name, rr.LineStrips2D(strips, colors=shades, radii=radii, draw_order=order), at_s)
+
+    def dots(self, name: str, x: FloatArray, y: FloatArray, line: Line, order: float = MIDDLE) -> None:
+        """Log samples that no line should join."""
+        points = self.points(x, y)
+        inside = points[np.isfinite(points).all(axis=1)]
+        drawn = rr.Points2D(inside, colors=[line.colour], radii=screen_radius(line.width), draw_order=order)
+        self.recorder.static(f"{self.path}/{name}", drawn)
 
     def band(
-        self, name: str, x: FloatArray, low: FloatArray, high: FloatArray, colour: Colour, at_s: float | None = None
+        self,
+        name: str,
+        x: FloatArray,
+        low: FloatArray,
+        high: FloatArray,
+        colour: Colour,
+        at_s: float | None = None,
+        order: float = FILLING,
     ) -> None:
         """Log a filled band between two curves, of upright lines side by side, empty about NaN.
 
@@ -138,17 +197,39 @@ class Chart:
         if not known.any():
             return
         share = share[known]
-        order = np.argsort(share, kind="stable")
-        clipped = (np.clip(edge[known][order], self.y.low, self.y.high) for edge in (low, high))
+        along = np.argsort(share, kind="stable")
         ends = [
-            self.height * (1.0 - np.interp(places, share[order], self.y.share(edge), left=np.nan, right=np.nan))
-            for edge in clipped
+            self.height
+            * (1.0 - np.interp(places, share[along], self.y.share(self.y.within(edge[known][along])), np.nan, np.nan))
+            for edge in (low, high)
         ]
         strips = np.stack([np.column_stack([WIDTH * places, end]) for end in ends], axis=1)
         filled = strips[np.isfinite(strips).all(axis=(1, 2))]
         radius = 0.75 * WIDTH / (BAND_COLUMNS - 1)  # more than half of the distance: no seams
-        drawn = rr.LineStrips2D(list(filled), colors=[faint(colour)] * len(filled), radii=radius, draw_order=FILLING)
+        drawn = rr.LineStrips2D(list(filled), colors=[faint(colour)] * len(filled), radii=radius, draw_order=order)
         self._log(name, drawn, at_s)
+
+    def boxes(
+        self,
+        name: str,
+        across: tuple[FloatArray, FloatArray],
+        up: tuple[FloatArray, FloatArray],
+        shades: Sequence[Colour],
+        order: float = FILLING,
+    ) -> None:
+        """Log filled boxes between ends across and up, shapes (n,), each an upright line as broad as the box."""
+        left, right = (WIDTH * self.x.share(self.x.within(ends)) for ends in across)
+        low, high = (self.height * (1.0 - self.y.share(self.y.within(ends))) for ends in up)
+        middle = 0.5 * (left + right)
+        strips = np.stack([np.column_stack([middle, low]), np.column_stack([middle, high])], axis=1)
+        rows = np.flatnonzero(np.isfinite(strips).all(axis=(1, 2)) & (np.abs(right - left) > 0.0))
+        drawn = rr.LineStrips2D(
+            list(strips[rows]),
+            colors=[shades[row] for row in rows.tolist()],
+            radii=0.5 * np.abs(right - left)[rows],
+            draw_order=order,
+        )
+        self.recorder.static(f"{self.path}/{name}", drawn)
 
     def note(self, name: str, text: str, at_s: float | None = None) -> None:
         """Write a line of text at the top of the box."""
@@ -157,12 +238,43 @@ class Chart:
             name, rr.Points2D(place, colors=[colours.LIGHT], labels=[text], radii=rr.Radius.ui_points(LABEL)), at_s
         )
 
-    def key(self, lines: Sequence[Line]) -> None:
-        """Write the names of many lines beside the box, one below the other, each in its colour."""
-        self.right = KEY_ROOM
-        step = self.height / max(len(lines), 1)
-        places = np.array([[WIDTH + 0.5 * KEY_ROOM, step * (place + 0.1)] for place in range(len(lines))])
-        self._texts("legend", places, [line.name for line in lines], [line.colour for line in lines])
+    def texts(self, name: str, places: FloatArray, texts: Sequence[str], shades: Sequence[Colour]) -> None:
+        """Write texts at places of the picture, shape (n, 2)."""
+        points = rr.Points2D(
+            places,
+            labels=texts,
+            colors=shades,
+            radii=rr.Radius.ui_points(LABEL),
+            show_labels=True,
+            draw_order=MIDDLE,
+        )
+        self.recorder.static(f"{self.path}/{name}", points)
+
+    def moving(self, name: str, time_s: FloatArray, x: FloatArray, y: FloatArray, line: Line) -> None:
+        """Log a mark that is at a place from its flight time on; rows without a place in the box are left out.
+
+        Of very many places so many are logged as a cursor has.
+        """
+        points = self.points(x, y)
+        known = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(time_s))
+        rows = known[thin(len(known), CURSOR_STEPS)]
+        style = rr.Points2D.from_fields(colors=[line.colour], radii=screen_radius(line.width), draw_order=NOW)
+        self.recorder.static(f"{self.path}/{name}", style)
+        indexes = self.recorder.indexes(self.recorder.time_ns(time_s[rows]))
+        columns = rr.Points2D.columns(positions=points[rows].astype(np.float32))
+        self.recorder.stream.send_columns(f"{self.path}/{name}", indexes, columns)
+
+    def cursor(self) -> None:
+        """Log an upright line on an axis of time: it moves while the run lasts and is gone afterwards."""
+        time_s = np.linspace(self.x.low, self.x.high, CURSOR_STEPS)
+        x = np.linspace(0.0, WIDTH, CURSOR_STEPS)
+        strips = [np.array([[place, 0.0], [place, self.height]]) for place in x.tolist()]
+        style = rr.LineStrips2D.from_fields(colors=[colours.LIGHT], radii=screen_radius(CURSOR), draw_order=NOW)
+        self.recorder.static(f"{self.path}/cursor", style)
+        after = np.append(time_s, self.x.high + (time_s[1] - time_s[0]))
+        columns = rr.LineStrips2D.columns(strips=strips).partition([*[1] * len(strips), 0])
+        indexes = self.recorder.indexes(self.recorder.time_ns(after))
+        self.recorder.stream.send_columns(f"{self.path}/cursor", indexes, columns)
 
     def _log(self, name: str, archetype: rr.AsComponents, at_s: float | None) -> None:
         entity = f"{self.path}/{name}"
@@ -178,11 +290,11 @@ class Chart:
         stream.reset_time()
 
     def _frame(self) -> None:
-        grid = []
-        for place in (WIDTH * self.x.share(self.x.ticks())).tolist():
-            grid.append([[place, 0.0], [place, self.height]])
-        for place in (self.height * (1.0 - self.y.share(self.y.ticks()))).tolist():
-            grid.append([[0.0, place], [WIDTH, place]])
+        x_ticks, y_ticks = self.x.ticks(), self.y.ticks()
+        across = WIDTH * self.x.share(np.array([place for place, _ in x_ticks]))
+        down = self.height * (1.0 - self.y.share(np.array([place for place, _ in y_ticks])))
+        grid = [[[place, 0.0], [place, self.height]] for place in across.tolist()]
+        grid += [[[0.0, place], [WIDTH, place]] for place in down.tolist()]
         box = [[0.0, 0.0], [0.0, self.height], [WIDTH, self.height]]
         drawn = rr.LineStrips2D(
             [*grid, box],
@@ -191,23 +303,11 @@ class Chart:
             draw_order=BEHIND,
         )
         self.recorder.static(f"{self.path}/axes/grid", drawn)
-        x, y = self.x.ticks(), self.y.ticks()
-        below = np.column_stack([WIDTH * self.x.share(x), np.full(len(x), self.height + 2.0)])
-        beside = np.column_stack([np.full(len(y), -12.0), self.height * (1.0 - self.y.share(y)) - 5.0])
+        below = np.column_stack([across, np.full(len(across), self.height + 2.0)])
+        beside = np.column_stack([np.full(len(down), -12.0), down - 5.0])
         places = np.concatenate([below, beside, [[0.5 * WIDTH, self.height + 10.0]]])
-        texts = [*(f"{value:g}" for value in [*x.tolist(), *y.tolist()]), self.x.title]
-        self._texts("axes/labels", places, texts, [colours.LIGHT] * len(texts))
-
-    def _texts(self, name: str, places: FloatArray, texts: Sequence[str], shades: Sequence[Colour]) -> None:
-        points = rr.Points2D(
-            places,
-            labels=texts,
-            colors=shades,
-            radii=rr.Radius.ui_points(LABEL),
-            show_labels=True,
-            draw_order=MIDDLE,
-        )
-        self.recorder.static(f"{self.path}/{name}", points)
+        texts = [*(text for _, text in (*x_ticks, *y_ticks)), self.x.title]
+        self.texts("axes/labels", places, texts, [colours.LIGHT] * len(texts))
 
 
 def unbroken(points: FloatArray) -> list[FloatArray]:

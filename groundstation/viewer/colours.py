@@ -8,6 +8,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Final, TypeAlias
 
+from groundstation.plots.marks import Emphasis, Role
+
 Colour: TypeAlias = tuple[int, int, int, int]
 
 
@@ -24,6 +26,7 @@ VERMILION: Final = _rgb(0xE0661A)
 PINK: Final = _rgb(0xCC79A7)
 GREY: Final = _rgb(0x8C8C8C)
 DIM: Final = _rgb(0x5A5A5A)
+LIGHT: Final = _rgb(0xB0B0B0)
 YELLOW_GREEN: Final = _rgb(0xA3C14A)
 
 FAINT: Final = 0.35  # brightness of a filled band, of that of its line
@@ -42,6 +45,7 @@ WORDS: Final[dict[Colour, str]] = {
     PINK: "pink",
     GREY: "grey",
     DIM: "dark grey",
+    LIGHT: "light grey",
 }
 SERIES: Final = (SKY, ORANGE, GREEN, PINK, YELLOW, BLUE, VERMILION, GREY)
 
@@ -84,9 +88,36 @@ STATES: Final[dict[str, Colour]] = {
 }
 FILTER_STATES: Final[dict[str, Colour]] = {"GNSS used": GREEN, "forecast": ORANGE, "GNSS not used": GREY}
 DATA_STATES: Final[dict[str, Colour]] = {"data": GREEN, "gap": VERMILION}
-LIGHT: Final = _rgb(0xB0B0B0)
 FLAGS: Final[dict[str, Colour]] = {"yes": GREEN, "no": GREY}
 SEVERITIES: Final[dict[str, Colour]] = {"info": LIGHT, "warn": ORANGE, "fail": VERMILION}
+STATES_OF_LANES: Final[dict[str, Colour]] = {**STATES, **FILTER_STATES, **GNSS_STATES, **PHASES, **GATES}
+
+# What a mark of a plot means.
+ROLES: Final[dict[Role, Colour]] = {
+    "truth": LIGHT,
+    "gnss": GNSS,
+    "ins": INS,
+    "answer": ANSWER,
+    "limit": LIMIT,
+    "unused": SAMPLES,
+    "paper": DIM,
+    "ink": YELLOW,
+    "faint": GREY,
+    "good": GREEN,
+    "warn": OVER_LIMIT,
+    "bad": VERMILION,
+    "other": PINK,
+    "series 1": SKY,
+    "series 2": ORANGE,
+    "series 3": GREEN,
+    "series 4": PINK,
+    "series 5": YELLOW_GREEN,
+    "series 6": BLUE,
+    "series 7": LIGHT,
+}
+# Widths of lines and sizes of dots, in points.
+LINE: Final[dict[Emphasis, float]] = {"faint": 0.6, "thin": 1.0, "usual": 1.5, "bold": 2.5}
+DOT: Final[dict[Emphasis, float]] = {"faint": 1.0, "thin": 1.3, "usual": 1.6, "bold": 2.5}
 
 
 def faint(colour: Colour) -> Colour:

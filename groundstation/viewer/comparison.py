@@ -288,8 +288,8 @@ def _forecast(recorder: Recorder, halves: Sequence[Half]) -> rrb.Container | Non
     ends = [values[np.isfinite(values) & (values > 0.0)] for values in ends]
     if not all(values.size for values in ends):
         return None
-    x = Axis("horizon, min", float(ends[0].min()) / 1.1, float(ends[0].max()) * 1.1, True)
-    y = Axis("RMS radial error over all starts, m,", float(ends[1].min()) / 1.3, float(ends[1].max()) * 1.3, True)
+    x = Axis("horizon, min", float(ends[0].min()) / 1.1, float(ends[0].max()) * 1.1, "log")
+    y = Axis("RMS radial error over all starts, m,", float(ends[1].min()) / 1.3, float(ends[1].max()) * 1.3, "log")
     chart = Chart(recorder, "growth", x, y, GROWTH_HEIGHT)
     chart.curves("methods", curves)
     chart.legend([line for _, _, line in curves])

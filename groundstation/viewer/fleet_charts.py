@@ -180,11 +180,11 @@ def skill_by_horizon(recorder: FleetRecorder, fleet: FleetResults) -> list[rrb.V
     chart = Chart(
         recorder,
         "forecast/rms_by_horizon",
-        Axis("horizon, min", float(x.min()) / 1.1, float(x.max()) * 1.1, True),
-        Axis("RMS radial error over all starts of all flights, m,", float(y.min()) / 1.3, float(y.max()) * 1.3, True),
+        Axis("horizon, min", float(x.min()) / 1.1, float(x.max()) * 1.1, "log"),
+        Axis("RMS radial error over all starts of all flights, m,", float(y.min()) / 1.3, float(y.max()) * 1.3, "log"),
     )
     chart.curves("methods", curves)
-    chart.key([line for _, _, line in curves])
+    chart.legend([line for _, _, line in curves])
     return [chart.view()]
 
 

@@ -5,7 +5,8 @@ import numpy as np
 from groundstation.chapters.generic import columns_by_unit, quantity, titled
 from groundstation.chapters.plots.common import label
 from groundstation.plots.axes import time_axis
-from groundstation.plots.marks import SERIES, Curve
+from groundstation.plots.marks import Curve
+from groundstation.plots.marks import series as series_role
 from groundstation.plots.plot import Axis, Panel, Plot, Row
 from groundstation.plots.ranges import broken_at_gaps, padded
 from groundstation.results.figures import numbers
@@ -25,9 +26,9 @@ def series(results: FlightResults, name: str) -> Plot | None:
     panels = []
     for unit, columns in units.items():
         marks = []
-        for column, role in zip(columns, SERIES, strict=False):
+        for place, column in enumerate(columns):
             x, y = broken_at_gaps(time, numbers(data, column)[order])
-            marks.append(Curve(x=x, y=y, role=role, name=label(quantity(column)[0])))
+            marks.append(Curve(x=x, y=y, role=series_role(place), name=label(quantity(column)[0])))
         alone = quantity(columns[0])[0] if len(columns) == 1 else ""
         y_axis = Axis(label(", ".join(filter(None, (alone, unit)))))
         ends = padded(float(np.nanmin(time)), float(np.nanmax(time)))

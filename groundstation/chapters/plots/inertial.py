@@ -21,9 +21,17 @@ from groundstation.results.arrays.inertial import (
 )
 from groundstation.results.flight import FlightResults
 
+INFERRED = ("tilt", "drift", "drift_rate", "random_drift")  # what GNSS does not measure
 BAND_QUANTILES = (10.0, 90.0)  # the band of the first minutes and of long outages may leave the axis
 MOST_SIGMAS = 8.0  # of an innovation that is on the axis
-UNITS = {"position": "m", "velocity": "m/s", "tilt": "arcsec", "drift": "°/h"}
+UNITS = {
+    "position": "m",
+    "velocity": "m/s",
+    "tilt": "arcsec",
+    "drift": "°/h",
+    "drift_rate": "°/h per h",
+    "random_drift": "°/h",
+}
 STATES = {
     "position": "position",
     "velocity": "velocity",
@@ -35,20 +43,21 @@ STATES = {
 
 
 def state(results: FlightResults, name: str) -> Plot | None:
-    """Position or velocity error of both channels: measured, estimated, smoothed, with the 95 % band."""
+    """A state of both channels: measured, estimated, smoothed, with the 95 % band."""
     data = results.rows_of(InertialStates)
     if data is None or not _are_known(data, name):
         return None
+    told = STATES[name] if name in INFERRED else f"{name} error"
     rows = tuple(
-        Row((_state(data, states, name, f"{channel} {name} error", legend=above),), 40.0, shares_x=above)
+        Row((_state(data, states, name, f"{channel} {told}", legend=above),), 40.0, shares_x=above)
         for channel, states, above in (("north", data.north, True), ("east", data.east, False))
     )
     return Plot(
         f"inertial.state.{name}",
-        f"{name.capitalize()} error of the INS",
+        f"{told.capitalize()} of the INS",
         "Grey: INS − GNSS; green: estimate, shaded ± 1.96 σ; black: smoothed with data on both sides (RTS). Yellow "
         "background: nothing to compare, the filter forecasts.",
-        f"North and east {name} error over flight time with the estimate and its band.",
+        f"North and east {told} over flight time with the estimate and its band.",
         rows,
         ("inertial_states",),
     )

@@ -3,8 +3,8 @@
 import numpy as np
 
 from groundstation.base.units import DOTS_PER_FULL_SCALE
-from groundstation.chapters.plots.common import M_PER_KM
-from groundstation.plots.axes import ZERO, time_axis
+from groundstation.chapters.plots.common import M_PER_KM, has_values
+from groundstation.plots.axes import ZERO, broken_time_axis, time_axis
 from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit, Points, Role
 from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import padded
@@ -138,6 +138,30 @@ def _from_the_side(one: Approach, own: LandingPath) -> Panel:
         low, high = padded(0.0, float(np.nanmax(own.height_m)))
         y, nothing = Axis("height, m", low=low, high=high), ""
     return Panel(marks, _distance(own), y, nothing=nothing)
+
+
+def motion(results: FlightResults, of: str) -> Plot | None:
+    """Sink rate and bank over the time of the approach: of the recording, where there is room for it."""
+    found = _parts(results, of)
+    if found is None:
+        return None
+    one, own = found
+    listed: tuple[tuple[str, Role, Floats], ...] = (
+        ("sink rate, m/s", "ins", own.sink_rate_mps),
+        ("bank, °", "gnss", own.bank_deg),
+    )
+    marks = [Curve(x=own.time_s, y=y, role=role, name=name) for name, role, y in listed if has_values(y)]
+    if not marks:
+        return None
+    time = broken_time_axis([(float(own.time_s[0]), float(own.time_s[-1]))])  # a frame of its own
+    return Plot(
+        f"landing.motion.{of}",
+        f"Approach {one.number}: sink rate and bank",
+        "How fast the aircraft sank, and how it banked.",
+        "Sink rate and bank of the approach over flight time.",
+        one_panel(Panel(marks, time, Axis("sink rate, m/s, and bank, °")), 40.0),
+        ("landing_path",),
+    )
 
 
 def protection(results: FlightResults, of: str) -> Plot | None:

@@ -18,18 +18,18 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedFormatter, FixedLocator, Formatter, Locator, NullLocator
 from matplotlib.transforms import ScaledTranslation
 
+from groundstation.plots.extents import has_rows, names_of
 from groundstation.plots.marks import Cells
 from groundstation.plots.plot import Plot
+from groundstation.plots.scales import Span
 from groundstation.reports.notebook.shapes import draw, handle_of
 from groundstation.reports.svg import boxes as b
 from groundstation.reports.svg.boxes import Box, Placed
 from groundstation.reports.svg.cells import span_of_colours
 from groundstation.reports.svg.colours import EDGE, FAINT, GRID, INK, PAPER
-from groundstation.reports.svg.extents import has_rows, names_of
 from groundstation.reports.svg.font import SIZE_PT, TITLE_PT, label, lines_of, middle
 from groundstation.reports.svg.labels import HALO_PT, labels_of
 from groundstation.reports.svg.legend import BETWEEN_PT, GAP_PT, LINE_PT, SIGN_PT, Entry
-from groundstation.reports.svg.scales import Span
 from groundstation.reports.svg.ticks import ticks_of
 
 SHOWN_DPI = 144  # sharp on screens of two pixels a point

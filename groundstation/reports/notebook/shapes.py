@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.transforms import Bbox, TransformedBbox
 
+from groundstation.plots.extents import edges
 from groundstation.plots.marks import (
     AnyMark,
     Band,
@@ -32,7 +33,6 @@ from groundstation.plots.marks import (
 from groundstation.reports.svg import colours, symbols
 from groundstation.reports.svg.boxes import Box
 from groundstation.reports.svg.cells import colour_of_step, span_of_colours
-from groundstation.reports.svg.extents import edges
 from groundstation.reports.svg.font import label
 from groundstation.reports.svg.legend import MOST_OF_A_NAME, Entry
 from groundstation.reports.svg.shapes import LANE_PT, LEAST_LANE_PT, is_within, stepped

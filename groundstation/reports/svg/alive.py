@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from groundstation.plots.extents import has_rows, names_of
 from groundstation.plots.marks import (
     AnyMark,
     Band,
@@ -20,15 +21,13 @@ from groundstation.plots.marks import (
     Told,
 )
 from groundstation.plots.ranges import thin
+from groundstation.plots.scales import NO_PLACES, Span
 from groundstation.reports import live
 from groundstation.reports.live import TIME, Frame, Samples
 from groundstation.reports.svg import colours
 from groundstation.reports.svg.boxes import PT_PER_MM, Box, Placed
-from groundstation.reports.svg.colours import NO_PLACES
-from groundstation.reports.svg.extents import has_rows, names_of
 from groundstation.reports.svg.font import label
 from groundstation.reports.svg.legend import MOST_OF_A_NAME, ground
-from groundstation.reports.svg.scales import Span
 from groundstation.reports.svg.shapes import stepped
 from groundstation.reports.svg.thinning import shown_rows
 

@@ -6,13 +6,13 @@ from typing import TypeAlias
 
 import numpy as np
 
+from groundstation.plots import extents
 from groundstation.plots.marks import Cells, Floats
 from groundstation.plots.plot import WIDTH_MM, Panel, Plot, Row
+from groundstation.plots.scales import Span
 from groundstation.reports.live import TIME
-from groundstation.reports.svg import extents
 from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, label, lines_of, width_pt
 from groundstation.reports.svg.legend import LINE_PT, Entry, above, beside_pt, entries_of
-from groundstation.reports.svg.scales import Span
 from groundstation.reports.svg.ticks import Tick, own_ticks, ticks_of
 
 PT_PER_MM = 72.0 / 25.4

@@ -3,14 +3,15 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.plots.extents import edges
 from groundstation.plots.marks import Cells, Floats
 from groundstation.plots.ranges import thin
+from groundstation.plots.scales import NO_PLACES, Span, span_of
+from groundstation.plots.viridis import viridis
 from groundstation.reports.svg import path
 from groundstation.reports.svg.boxes import BAR_PT, MOST_OF_A_TITLE, TICK_PT, TO_BAR_PT, TO_TEXT_PT, Box
-from groundstation.reports.svg.colours import EDGE, NO_PLACES, STEPS, viridis
-from groundstation.reports.svg.extents import edges
+from groundstation.reports.svg.colours import EDGE, STEPS
 from groundstation.reports.svg.font import SIZE_PT, label, middle, width_pt, written
-from groundstation.reports.svg.scales import Span, span_of
 from groundstation.reports.svg.ticks import ticks_of
 
 MOST_CELLS = 90  # along either axis
@@ -36,7 +37,7 @@ def cells_shape(mark: Cells, box: Box) -> str:
 
 def colour_of_step(step: int) -> str:
     """One of the colours of a scale, from the lowest."""
-    return viridis((step + 0.5) / STEPS)
+    return "#" + "".join(f"{part:02x}" for part in viridis((step + 0.5) / STEPS))
 
 
 def _levels(mark: Cells, values: Floats) -> NDArray[np.int64]:

@@ -1,8 +1,6 @@
 """The look of a picture: a colour for each role, widths of lines, shades of phases, the scale of cells."""
 
-import numpy as np
-
-from groundstation.plots.marks import Dash, Emphasis, Floats, Role
+from groundstation.plots.marks import Dash, Emphasis, Role
 
 INK, FAINT, EDGE, GRID, PAPER = "#1c2530", "#6b7683", "#8d97a3", "#e4e8ec", "#ffffff"
 
@@ -46,16 +44,6 @@ DOT_PT: dict[Emphasis, float] = {"faint": 1.3, "thin": 1.6, "usual": 1.8, "bold"
 SHADE: dict[Emphasis, float] = {"faint": 0.10, "thin": 0.15, "usual": 0.19, "bold": 0.35}  # opacity of a band
 DASHES = {"dashed": "4 2", "dotted": "1 1.6"}
 SYMBOL_PT = 4.5  # across a symbol of the usual size
-
-# Viridis (van der Walt and Smith 2015, CC0) at sixteenths of its length.
-_VIRIDIS = "".join(
-    (
-        "440154 48186a 472d7b 424086 3b528b 33638d 2c728e 26828e 21918c ",
-        "1fa088 28ae80 3fbc73 5ec962 84d44b addc30 d8e219 fde725",
-    )
-)
-_VIRIDIS_AT = [[int(text[at : at + 2], 16) for at in (0, 2, 4)] for text in _VIRIDIS.split()]
-NO_PLACES: Floats = np.zeros(0)
 STEPS = 20  # colours of a scale
 
 
@@ -90,21 +78,6 @@ def dashes(dash: Dash) -> str:
     ''
     """
     return f' stroke-dasharray="{DASHES[dash]}"' if dash else ""
-
-
-def viridis(share: float) -> str:
-    """The colour at a share of the scale from 0 to 1.
-
-    Examples
-    --------
-    >>> viridis(0.0), viridis(0.5), viridis(1.0), viridis(7.0)
-    ('#440154', '#21918c', '#fde725', '#fde725')
-    """
-    place = min(max(share, 0.0), 1.0) * (len(_VIRIDIS_AT) - 1)
-    low = min(int(place), len(_VIRIDIS_AT) - 2)
-    ends = _VIRIDIS_AT[low : low + 2]
-    mixed = [round(one + (place - low) * (other - one)) for one, other in zip(*ends, strict=True)]
-    return "#" + "".join(f"{part:02x}" for part in mixed)
 
 
 def shade_of(kind: str, role: Role, emphasis: Emphasis = "usual") -> tuple[str, float]:

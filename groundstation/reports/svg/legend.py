@@ -20,6 +20,7 @@ from groundstation.plots.marks import (
     Told,
 )
 from groundstation.plots.plot import Panel
+from groundstation.plots.scales import NO_PLACES
 from groundstation.reports.svg import colours
 from groundstation.reports.svg.font import label, middle, width_pt, written
 from groundstation.reports.svg.symbols import symbol
@@ -67,7 +68,7 @@ def ground(mark: Spans, kind: str) -> Entry:
     return Entry(mark, label(kind or mark.name, MOST_OF_A_NAME), kind)
 
 
-_MORE = Told(x=colours.NO_PLACES, y=colours.NO_PLACES, value=colours.NO_PLACES, title="")
+_MORE = Told(x=NO_PLACES, y=NO_PLACES, value=NO_PLACES, title="")
 
 
 def above(entries: Sequence[Entry], room_pt: float) -> tuple[tuple[Entry, ...], ...]:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from groundstation.plots.extents import has_rows, names_of
 from groundstation.plots.marks import AnyMark, Cells, Floats, Spans
 from groundstation.plots.plot import Plot
 from groundstation.reports.live import Svg
@@ -19,7 +20,6 @@ from groundstation.reports.svg.alive import frames_of, panels_of
 from groundstation.reports.svg.boxes import Box, Placed, placed
 from groundstation.reports.svg.cells import scale_beside
 from groundstation.reports.svg.colours import EDGE, FAINT, GRID, INK, PAPER
-from groundstation.reports.svg.extents import has_rows, names_of
 from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, TITLE_PT, label, lines_of, middle, written
 from groundstation.reports.svg.labels import HALO_PT, labels_of
 from groundstation.reports.svg.shapes import is_within, shape

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from groundstation.plots.extents import edges
 from groundstation.plots.marks import (
     AnyMark,
     Band,
@@ -26,7 +27,6 @@ from groundstation.plots.ranges import thin
 from groundstation.reports.svg import colours, path
 from groundstation.reports.svg.boxes import Box
 from groundstation.reports.svg.cells import cells_shape
-from groundstation.reports.svg.extents import edges
 from groundstation.reports.svg.symbols import look, outline, symbol
 from groundstation.reports.svg.thinning import shown_rows
 

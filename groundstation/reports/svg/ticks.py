@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 
 from groundstation.chapters.wording import MINUS, NARROW_SPACE, clock
+from groundstation.plots.scales import Span
 from groundstation.reports.svg.dates import date_ticks
 from groundstation.reports.svg.font import width_pt
-from groundstation.reports.svg.scales import Span
 
 TIME_STEPS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 28800, 86400)
 WEEK_S = 604_800

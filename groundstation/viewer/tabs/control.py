@@ -1,39 +1,23 @@
 """Control of a session: the aircraft moving in space under the recommended law, the law, accuracy and geometry."""
 
-from collections.abc import Callable, Iterator, Mapping
-
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.base.angles import unwrap
-from groundstation.base.records import BoolArray, Int64Array
 from groundstation.chapters.control import control as chapter
 from groundstation.chapters.control import title_of
 from groundstation.chapters.markdown import markdown
-from groundstation.results.arrays.cooperative import ControlMeasures, ControlPaths, ControlPoints
-from groundstation.results.arrays.typed import Texts
+from groundstation.results.arrays.cooperative import ControlPaths, ControlPoints
 from groundstation.results.control import UNCONTROLLED, ControlPlan
 from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
 from groundstation.viewer.names import clean_text, path_parts
-from groundstation.viewer.recorder import Line, Recorder
+from groundstation.viewer.plot_views import panels_of, plot_of
+from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.views import document, plot
+from groundstation.viewer.views import document
 
 MARK, TRAIL, RANGE = 5.0, 1.2, 0.8  # radii in points of the screen
-THIN, BOLD = 1.0, 2.0
-# Entity, title, values.
-MEASURES: tuple[tuple[str, str, Callable[[ControlMeasures], FloatArray]], ...] = (
-    ("two_sigma_north_m", "2σ north, m", lambda data: data.two_sigma_north_m),
-    ("two_sigma_east_m", "2σ east, m", lambda data: data.two_sigma_east_m),
-    ("determinant", "det(H'H)", lambda data: data.determinant),
-    ("dop", "DOP", lambda data: data.dop),
-)
-FLOWN: Mapping[str, Callable[[ControlPaths], FloatArray]] = {
-    "speed": lambda paths: paths.speed_mps,
-    "heading": lambda paths: paths.track_deg,
-}
 
 
 def control(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
@@ -44,7 +28,8 @@ def control(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
         return None
     recorder.document("control/answer", markdown(section))
     left = [_space(recorder, answer, paths, results), document("Control laws", "control/answer")]
-    columns = [left, _laws(recorder, answer, paths), _measures(recorder, answer, results)]
+    laws, measures = (panels_of(recorder, plot_of(name, results)) for name in ("control.law", "control.measures"))
+    columns = [left, laws, measures]
     shown = [rrb.Vertical(contents=column) for column in columns if column]
     return rrb.Horizontal(contents=shown, column_shares=[1.6, 1.0, 1.0][: len(shown)], name="Control")
 
@@ -91,40 +76,3 @@ def _ranges(recorder: Recorder, judged: str, ways: dict[str, FloatArray], time_s
     flat = list(strips.reshape(-1, 2, 3).astype(np.float32))
     columns = rr.LineStrips3D.columns(strips=flat).partition([len(others)] * len(strips))
     recorder.stream.send_columns("plan/ranges", recorder.indexes(recorder.time_ns(time_s)), columns)
-
-
-def _laws(recorder: Recorder, answer: ControlPlan, paths: ControlPaths) -> list[rrb.View]:
-    """Every control with time, a view each, every law a line; headings do not jump at north."""
-    views = list[rrb.View]()
-    for row in answer.controls:
-        path = f"control/{row.control}/{path_parts([row.aircraft])[0]}"
-        for law, rows, line in _lines(answer, paths.law, paths.aircraft == row.aircraft):
-            values = FLOWN[row.control](paths)[rows]
-            if row.control == "heading":
-                values = row.start + unwrap(values) - values[0]
-            recorder.lines(f"{path}/{law}", recorder.time_ns(paths.time_s[rows]), values[:, None], [line])
-        unit = "m/s" if row.control == "speed" else "deg"
-        views.append(plot(f"{clean_text(row.aircraft)}: {row.control}, {unit}", path, legend=False))
-    return views
-
-
-def _measures(recorder: Recorder, answer: ControlPlan, results: FlightResults) -> list[rrb.View]:
-    """Accuracy and geometry with time, every law a line; from the first ranges on, or the scale would hide the rest."""
-    data = results.rows_of(ControlMeasures)
-    if data is None:
-        return []
-    views, time_s = list[rrb.View](), data.time_s
-    for part, title, values_of in MEASURES:
-        path = f"control/measures/{part}"
-        for law, rows, line in _lines(answer, data.law, time_s > 0.0):
-            values = values_of(data)[rows][:, None]
-            recorder.lines(f"{path}/{law}", recorder.time_ns(time_s[rows]), values, [line])
-        views.append(plot(f"{clean_text(answer.judged)}: {title}", path, legend=not views))
-    return views
-
-
-def _lines(answer: ControlPlan, laws: Texts, used: BoolArray) -> Iterator[tuple[str, Int64Array, Line]]:
-    """Rows of each law, and how its line looks."""
-    for row, shade in zip(answer.laws, colours.for_series(len(answer.laws)), strict=True):
-        width = BOLD if row.law == answer.recommended else THIN
-        yield row.law, np.flatnonzero(used & (laws == row.law)), Line(title_of(row.law), shade, width)

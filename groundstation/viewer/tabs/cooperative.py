@@ -1,35 +1,28 @@
 """Cooperative: the aircraft of a session in space with their ellipsoids and links, errors, geometry, links in time."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import rerun.blueprint as rrb
 
 from groundstation.chapters.cooperative import cooperative as chapter
-from groundstation.chapters.cooperative import trusted, worst_first
+from groundstation.chapters.cooperative import worst_first
 from groundstation.chapters.front import front
 from groundstation.chapters.markdown import front_markdown, markdown
-from groundstation.results.arrays.cooperative import CooperativeGeometry, CooperativeLinks, CooperativeTracks
+from groundstation.results.arrays.cooperative import CooperativeGeometry, CooperativeLinks
 from groundstation.results.arrays.typed import Counts, Texts
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.flight import FlightResults
 from groundstation.tables.session import GroundPoint
 from groundstation.viewer import colours
 from groundstation.viewer.names import clean_text, path_parts
+from groundstation.viewer.plot_views import panels_of, plot_of
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after
 from groundstation.viewer.tabs.session_space import space
 from groundstation.viewer.views import document, lanes, plot
 
-MOST_PLOTS, MOST_LANES = 6, 24
-THIN, BOLD, ROOM = 1.0, 2.0, 1.1
-# Entity, title, values.
-GEOMETRY: tuple[tuple[str, str, Callable[[CooperativeGeometry], FloatArray]], ...] = (
-    ("sources", "Sources heard", lambda data: data.sources),
-    ("hdop", "HDOP", lambda data: data.hdop),
-    ("determinant", "det(H'H)", lambda data: data.determinant),
-    ("eigenvalue", "least eigenvalue", lambda data: data.eigenvalue),
-)
+MOST_LANES = 24
 LINK_STATES = {"ranging": colours.ANSWER, "gated": colours.LIMIT, "silent": colours.DIM}
 SILENT_FRAMES = 3.0  # so many ordinary steps without a range are silence
 
@@ -43,64 +36,26 @@ def cooperative(recorder: Recorder, points: Sequence[GroundPoint], results: Flig
     recorder.document("cooperative/answer", markdown(section))
     text = document("Algorithms, geometry and links", "cooperative/answer")
     left = [*space(recorder, answer, points, results), text]
-    middle = _errors(recorder, answer, results)
-    right = [*_geometry(recorder, answer, results), *_links(recorder, answer, results)]
+    middle = panels_of(recorder, plot_of("cooperative.errors", results))
+    geometry = panels_of(recorder, plot_of("cooperative.geometry", results))
+    right = [*_sources(recorder, answer, results), *geometry, *_links(recorder, answer, results)]
     columns = [rrb.Vertical(contents=column) for column in (left, middle, right) if column]
     return rrb.Horizontal(contents=columns, column_shares=[1.6, 1.0, 1.0][: len(columns)], name="Cooperative")
 
 
-def _errors(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
-    """Error of each aircraft on the band of its computed 2 sigma_r, a view each."""
-    tracks = results.rows_of(CooperativeTracks)
-    if tracks is None:
-        return []
-    best, views = trusted(answer).algorithm, list[rrb.View]()
-    used = tracks.algorithm == best
-    for name, part in zip(answer.vehicle_names, path_parts(answer.vehicle_names), strict=True):
-        rows = used & (tracks.vehicle == name)
-        if not rows.any():
-            continue
-        path = f"cooperative/errors/{part}"
-        time_ns = recorder.time_ns(tracks.time_s[rows])
-        bound, error = tracks.two_sigma_r_m[rows], tracks.error_m[rows]
-        line = Line("2σ_r as computed, m", colours.HONEST, THIN)
-        recorder.band(f"{path}/a_band", time_ns, np.zeros(len(bound)), bound, line)
-        if np.isfinite(error).any():
-            line = Line("error against the truth, m", colours.ANSWER, BOLD)
-            recorder.lines(f"{path}/b_error", time_ns, error[:, None], [line], gap_after(time_ns))
-        title, high = f"{clean_text(name)}: horizontal error and 2σ_r, m", _ceiling(bound, error)
-        views.append(plot(title, path, axis_range=(0.0, high), legend=not views))
-    return views[:MOST_PLOTS]
-
-
-def _ceiling(*series: FloatArray) -> float:
-    """Upper end of an axis from 0 on which bands and lines are seen: Rerun scales by the lines alone."""
-    known = np.concatenate([values[np.isfinite(values)] for values in series])
-    return ROOM * float(known.max()) if known.size and known.max() > 0.0 else 1.0
-
-
-def _geometry(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
-    """Measures of geometry with time, one line an aircraft."""
+def _sources(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
+    """Sources that each aircraft hears with time: the page has them in its table."""
     data = results.rows_of(CooperativeGeometry)
-    if data is None:
+    if data is None or not np.isfinite(data.sources).any():
         return []
-    views = list[rrb.View]()
-    shades = colours.for_series(len(answer.vehicle_names))
-    for measure, title, values_of in GEOMETRY:
-        values = values_of(data)
-        if not np.isfinite(values).any():
-            continue
-        path = f"cooperative/geometry/{measure}"
-        names = zip(answer.vehicle_names, path_parts(answer.vehicle_names), shades, strict=True)
-        for name, part, shade in names:
-            rows = data.vehicle == name
-            if not rows.any():
-                continue
+    path, names = "cooperative/sources", answer.vehicle_names
+    for name, part, shade in zip(names, path_parts(names), colours.for_series(len(names)), strict=True):
+        rows = data.vehicle == name
+        if rows.any():
             time_ns = recorder.time_ns(data.time_s[rows])
-            line = Line(clean_text(name), shade, THIN)
-            recorder.lines(f"{path}/{part}", time_ns, values[rows][:, None], [line], gap_after(time_ns))
-        views.append(plot(title, path, legend=not views))
-    return views
+            values = np.asarray(data.sources[rows], dtype=np.float64)[:, None]
+            recorder.lines(f"{path}/{part}", time_ns, values, [Line(clean_text(name), shade, 1.0)], gap_after(time_ns))
+    return [plot("Sources heard", path)]
 
 
 def _links(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:

@@ -1,4 +1,4 @@
-"""Densities as bar views: the growing one of the heading error over its final state, and the mean speed at standstill.
+"""Density of the heading error as bars: the growing one over its final state.
 
 Rerun has no x-y plots: the fitted normal is drawn as hairline bars. An invisible bar as high as the highest step keeps
 the axes still while one scrubs. Rerun takes the abscissa of a bar for its left edge.
@@ -11,7 +11,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.results.arrays.heading import HeadingDistribution, HeadingGrowth, HeadingNormal, StandstillMeanSpeed
+from groundstation.results.arrays.heading import HeadingDistribution, HeadingGrowth, HeadingNormal
 from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour
@@ -50,22 +50,6 @@ def heading_error(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     name = "Density of d, 1/deg (grey all, green so far, red normal)"
     hidden = rrb.PlotLegend(visible=False)  # it would name the invisible bar
     return [rrb.BarChartView(name=name, origin=f"/{PATH}", plot_legend=hidden)]
-
-
-def mean_speed(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    """Log the densities of the mean speed at standstill over windows of 10 s and 30 s."""
-    figure = results.rows_of(StandstillMeanSpeed)
-    if figure is None:
-        return []
-    windows = figure.window_s
-    for window, colour in zip(np.unique(windows).tolist(), (colours.INS, colours.GNSS, colours.HONEST), strict=False):
-        chosen = windows == window
-        x, y = figure.speed_of_mean_mps[chosen], figure.density_per_mps[chosen]
-        width = np.full(len(x), float(np.median(np.diff(x))) if len(x) > 1 else 1e-3)
-        bar = rr.BarChart(y, abscissa=x - 0.5 * width, widths=width, color=(*colour[:3], 140))
-        recorder.static(f"mean_speed/{window:g}s", bar)
-    name = "Density of mean speed, s/m (blue 10 s, orange 30 s)"
-    return [rrb.BarChartView(name=name, origin="/mean_speed", plot_legend=rrb.PlotLegend(visible=False))]
 
 
 def _steps(growth: HeadingGrowth) -> Iterator[tuple[float, FloatArray, FloatArray]]:

@@ -8,13 +8,14 @@ from groundstation.base.normal import NORMAL_95
 from groundstation.base.timescales import duration_text
 from groundstation.chapters.forecast import forecast as chapter
 from groundstation.chapters.markdown import markdown
-from groundstation.results.arrays.forecast import ForecastFan, ForecastGrowth, ForecastMap
+from groundstation.results.arrays.forecast import ForecastFan, ForecastMap
 from groundstation.results.arrays.inertial import InertialStates
 from groundstation.results.flight import FlightResults
 from groundstation.results.forecast import METHODS, ForecastResult
 from groundstation.viewer import colours
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.names import words
+from groundstation.viewer.plot_views import panels_of, plot_of
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray
 from groundstation.viewer.views import document, plot
@@ -38,7 +39,8 @@ def forecast(recorder: Recorder, results: FlightResults) -> rrb.Container | None
     fan = _fan(recorder, results)
     if fan:
         rows.append(rrb.Horizontal(contents=fan))
-    pictures = [*_growth(recorder, results, answer), *_map(recorder, results, answer)]
+    growth = panels_of(recorder, plot_of("forecast.growth", results), height=GROWTH_HEIGHT)
+    pictures = [*growth, *_map(recorder, results, answer)]
     if pictures:
         rows.append(rrb.Horizontal(contents=pictures))
     if not rows:
@@ -46,7 +48,7 @@ def forecast(recorder: Recorder, results: FlightResults) -> rrb.Container | None
     left: list[rrb.View | rrb.Container] = [*rows]
     states = results.rows_of(InertialStates)
     if states is not None:  # somewhere to drag the playhead along
-        paths = [f"inertial/{channel}/position" for channel in ("north", "east")]
+        paths = ["inertial/state/position"]
         left.append(plot("INS position error, north and east, m: drag the playhead here", paths, legend=False))
     shares = [3.0] * len(rows) + [1.0] * (len(left) - len(rows))
     column = rrb.Vertical(contents=left, row_shares=shares)
@@ -122,53 +124,6 @@ def _starts(
 
 
 # ---------------------------------------------------------------------------------------------------- skill
-
-
-def _growth(recorder: Recorder, results: FlightResults, answer: ForecastResult) -> list[rrb.View]:
-    """RMS by horizon over methods, the shipped one bold; both axes logarithmic."""
-    growth = results.rows_of(ForecastGrowth)
-    if growth is None:
-        return []
-    horizon = growth.horizon_min
-    curves = {name: growth.rms_m[name] for name in METHODS if name in growth.rms_m}
-    values = np.concatenate([*curves.values(), horizon * np.nan])
-    values = values[np.isfinite(values) & (values > 0.0)]
-    times = horizon[np.isfinite(horizon) & (horizon > 0.0)]
-    if not values.size or not times.size:
-        return []
-    default = answer.default_method
-    x = Axis("horizon, min", float(times.min()) / MARGIN, float(times.max()) * MARGIN, True)
-    y = Axis("RMS radial error over all starts, m,", float(values.min()) / 1.3, float(values.max()) * 1.3, True)
-    chart = Chart(recorder, "forecast/growth", x, y, GROWTH_HEIGHT)
-    shades = method_colours(default)
-    widths = {name: BOLD if name == default else THIN for name in curves}
-    drawn = [(horizon, rms_m, Line(name, shades[name], widths[name])) for name, rms_m in curves.items()]
-    if growth.sigma_m is not None:
-        drawn.append((horizon, growth.sigma_m, CLAIMED))
-    chart.curves("methods", drawn)
-    names = [Line(words(name), shades[name], widths[name]) for name in curves]
-    if growth.sigma_m is not None:
-        names.append(Line("σ claimed", colours.HONEST, THIN))
-    chart.key(names)
-    return [chart.view()]
-
-
-def method_colours(default: str) -> dict[str, colours.Colour]:
-    """A colour for every method; the raw INS and the shipped one have those of their meaning.
-
-    Examples
-    --------
-    >>> shades = method_colours("windows")
-    >>> shades["windows"] == colours.ANSWER, shades["raw_ins"] == colours.INS, len(set(shades.values()))
-    (True, True, 9)
-    """
-    fixed = {"raw_ins": colours.INS, **({default: colours.ANSWER} if default in METHODS else {})}
-    spare = (
-        *(colours.GNSS, colours.PAPER, colours.LIMIT, colours.BLUE),
-        *(colours.GREY, colours.LIGHT, colours.YELLOW_GREEN, colours.ANSWER),
-    )
-    left = iter(colour for colour in spare if colour not in fixed.values())
-    return {name: fixed[name] if name in fixed else next(left) for name in METHODS}
 
 
 def _map(recorder: Recorder, results: FlightResults, answer: ForecastResult) -> list[rrb.View | rrb.Container]:

@@ -1,28 +1,30 @@
 """Landing: every final in space with the corridors of the categories, deviations, protection levels, the chapter."""
 
+from dataclasses import replace
+
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.chapters.landing import landing as chapter
 from groundstation.chapters.markdown import markdown
-from groundstation.results.arrays.landing import LandingPath, LandingProtection
+from groundstation.chapters.plots.landing import motion
+from groundstation.plots.marks import Told
+from groundstation.plots.plot import Plot
+from groundstation.results.arrays.landing import LandingPath
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing import Approach, LandingResult
 from groundstation.results.landing_categories import CATEGORIES
 from groundstation.viewer import colours
-from groundstation.viewer.chart import Axis, Chart
-from groundstation.viewer.recorder import Line, Recorder
-from groundstation.viewer.run_chart import RunChart, runs_of
+from groundstation.viewer.plot_views import panels_of, plot_of, runs_of
+from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.series import FloatArray
 from groundstation.viewer.views import document
 
 SEEN_M = 6_000.0  # of the final, before the threshold
 ENLARGED = 10.0  # across and up against along: corridors of metres along kilometres
 MARK, TRAIL, EDGE = 6.0, 2.0, 0.8  # radii in points of the screen
-THIN, BOLD = 1.0, 2.0
 M_PER_KM = 1000.0
-LEAST_REACH_M, ROOM, BEHIND_M, HEIGHT = 20.0, 1.15, 500.0, 110.0  # of the charts
 MOST_APPROACHES = 6
 SHADES = dict(zip((one.name for one in CATEGORIES), (colours.ORANGE, colours.PINK, colours.YELLOW_GREEN), strict=True))
 SPACE_NAME = (
@@ -46,10 +48,10 @@ def landing(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
 def _approach(recorder: Recorder, results: FlightResults, one: Approach, data: LandingPath) -> rrb.Container:
     flown, path = data.where(data.approach == one.number), f"landing/{one.number}"
     left = _space(recorder, f"{path}/space", flown)
-    left += _motion(recorder, f"{path}/motion", flown)
-    left += _protection(recorder, f"{path}/protection", results, one)
-    right = _deviation(recorder, f"{path}/lateral", "Right of the course, m", flown, "lateral")
-    right += _deviation(recorder, f"{path}/vertical", "Above the path, m", flown, "vertical")
+    left += [view for run in runs_of(recorder, motion(results, str(one.number)), f"{path}/motion") for view in run]
+    told = plot_of("landing.protection", results, str(one.number))
+    left += panels_of(recorder, told, of="Protection levels", height=70.0)
+    right = panels_of(recorder, _deviations(results, one, flown), height=110.0)
     shares = [2.0, *[1.0] * (len(left) - 1)]
     columns = [rrb.Vertical(contents=left, row_shares=shares), rrb.Vertical(contents=right)]
     contents = [view for view, has in zip(columns, (left, right), strict=True) if has]
@@ -105,73 +107,16 @@ def _space(recorder: Recorder, path: str, flown: LandingPath) -> list[rrb.View]:
     return [rrb.Spatial3DView(name=SPACE_NAME, origin=f"/{path}")]
 
 
-def _deviation(recorder: Recorder, path: str, title: str, flown: LandingPath, axis: str) -> list[rrb.View]:
-    """Deviation over the end of the final, in a dot of the guidance and the figures of the categories."""
-    distance = flown.distance_m
-    if axis == "lateral":
-        guided, dot, placed = flown.lateral_guidance_m, flown.lateral_dot_m, flown.across_m
-    else:
-        guided, dot, placed = flown.vertical_guidance_m, flown.vertical_dot_m, flown.height_m - flown.path_height_m
-    placed = np.where(distance > 0.0, placed, np.nan)
-    shown = guided if np.isfinite(guided).any() else placed
-    seen = (distance < SEEN_M) & np.isfinite(shown)
-    if seen.sum() < 2:
-        return []
-    reach = max(LEAST_REACH_M, ROOM * float(np.max(np.abs(shown[seen]))))
-    ends = np.array([-min(SEEN_M, float(distance[seen].max())), BEHIND_M]) / M_PER_KM
-    ahead, off = Axis("distance along the runway, km", *ends.tolist()), Axis(title, -reach, reach)
-    chart = Chart(recorder, path, ahead, off, HEIGHT)
-    along = -distance / M_PER_KM
-    lines = [Line("one dot", colours.DIM, THIN), *(Line(name, shade, THIN) for name, shade in SHADES.items())]
-    halves = [one.horizontal_m if axis == "lateral" else one.vertical_m for one in CATEGORIES]
-    levels = [dot, *(np.full(len(dot), half) for half in halves)]
-    curves = [(along, sign * half, line) for half, line in zip(levels, lines, strict=True) for sign in (1.0, -1.0)]
-    named = [*lines, Line("positions" if axis == "lateral" else "height", colours.SAMPLES, THIN)]
-    named += [Line("guidance", colours.INS, BOLD)]
-    chart.curves("curves", [*curves, (along, placed, named[-2]), (along, guided, named[-1])])
-    chart.key(named)
-    recorder.static(
-        f"{path}/aircraft", rr.Points2D.from_fields(colors=[colours.ANSWER], radii=rr.Radius.ui_points(MARK))
-    )
-    indexes = recorder.indexes(recorder.time_ns(flown.time_s[seen]))
-    points = np.nan_to_num(chart.points(along[seen], shown[seen])).astype(np.float32)
-    recorder.stream.send_columns(f"{path}/aircraft", indexes, rr.Points2D.columns(positions=points))
-    return [chart.view()]
-
-
-def _motion(recorder: Recorder, path: str, flown: LandingPath) -> list[rrb.View]:
-    """Sink rate and bank."""
-    series = {
-        Line("sink rate, m/s", colours.INS): flown.sink_rate_mps,
-        Line("bank, deg", colours.GNSS): flown.bank_deg,
-    }
-    return _over_time(recorder, path, "Sink rate, m/s, and bank, deg,", flown.time_s, series)
-
-
-def _over_time(
-    recorder: Recorder, path: str, title: str, time_s: FloatArray, series: dict[Line, FloatArray]
-) -> list[rrb.View]:
-    """Lines that have values over the time since the approach began; none without two samples."""
-    runs = runs_of(time_s, np.inf)
-    known = {line: values for line, values in series.items() if np.isfinite(values).any()}
-    if not runs or not known:
-        return []
-    chart = RunChart(recorder, path, title, runs[0], list(known.values()))
-    for number, (line, values) in enumerate(known.items()):
-        chart.line(f"line/{number}", time_s, values, line)
-    return [chart.view(list(known))]
-
-
-def _protection(recorder: Recorder, path: str, results: FlightResults, one: Approach) -> list[rrb.View]:
-    """Protection levels and alarm limits."""
-    data = results.rows_of(LandingProtection)
-    if one.protection is None or data is None:
-        return []
-    mine = data.where(data.approach == one.number)
-    series = {
-        Line("horizontal level", colours.GNSS, BOLD): mine.horizontal_protection_m,
-        Line("vertical level", colours.ANSWER, BOLD): mine.vertical_protection_m,
-        Line("horizontal limit", colours.LIMIT, THIN): mine.horizontal_alarm_limit_m,
-        Line("vertical limit", colours.HONEST, THIN): mine.vertical_alarm_limit_m,
-    }
-    return _over_time(recorder, path, "Protection levels, m,", mine.time_s, series)
+def _deviations(results: FlightResults, one: Approach, flown: LandingPath) -> Plot | None:
+    """The plot of the deviations, with a mark that is where the aircraft was: by the guidance, else by positions."""
+    told = plot_of("landing.deviations", results, str(one.number))
+    if told is None:
+        return None
+    height = np.where(flown.distance_m > 0.0, flown.height_m - flown.path_height_m, np.nan)
+    places = (flown.lateral_guidance_m, flown.across_m), (flown.vertical_guidance_m, height)
+    rows = []
+    for row, (guided, placed) in zip(told.rows, places, strict=True):
+        y = guided if np.isfinite(guided).any() else placed
+        mark = Told(x=flown.distance_m / M_PER_KM, y=y, value=flown.time_s, title="flight time", is_time=True)
+        rows.append(replace(row, panels=tuple(replace(panel, marks=(*panel.marks, mark)) for panel in row.panels)))
+    return replace(told, rows=tuple(rows))

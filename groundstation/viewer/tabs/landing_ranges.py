@@ -6,21 +6,21 @@ import rerun.blueprint as rrb
 
 from groundstation.chapters.landing_ranges import landing_ranges as chapter
 from groundstation.chapters.markdown import markdown
-from groundstation.results.arrays.landing import RangesErrors, RangesPath, RangesSpace
+from groundstation.results.arrays.landing import RangesPath, RangesSpace
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing_categories import CATEGORIES, LINEAR_95
-from groundstation.results.landing_ranges import HONEST, RangeLanding
+from groundstation.results.landing_ranges import RangeLanding
 from groundstation.viewer import colours
 from groundstation.viewer.names import clean_text, path_parts
+from groundstation.viewer.plot_views import panels_of, plot_of
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray
 from groundstation.viewer.views import document, plot
 
 MARK, TRAIL, RANGE = 5.0, 1.2, 0.8  # radii in points of the screen
-BOLD, THIN = 1.6, 1.0
+BOLD = 1.6
 CORRIDORS = (colours.ANSWER, colours.PAPER, colours.OVER_LIMIT)
 TIMES_LARGER = 5.0  # corridors and ellipsoids are drawn so many times their size
-MOST_TRIALS = 10
 VIEW_NAME = f"Along, left, up, m; frames: corridors of CAT I, II, III and ellipsoid of 95 %, {TIMES_LARGER:g} times"
 
 
@@ -33,8 +33,12 @@ def landing_ranges(recorder: Recorder, results: FlightResults) -> rrb.Container 
         return None
     recorder.document("landing_ranges/answer", markdown(section))
     left = [_space(recorder, answer, space, path), document("What was found", "landing_ranges/answer")]
-    right = [*_accuracy(recorder, path), *_errors(recorder, results), *_moving(recorder, space)]
-    columns = [rrb.Vertical(contents=left, row_shares=[2.0, 1.0]), rrb.Vertical(contents=right)]
+    plots = [plot_of(name, results) for name in ("landing_ranges.accuracy", "landing_ranges.trials")]
+    shown = [view for one in plots for view in panels_of(recorder, one, height=80.0)]
+    right: list[rrb.View | rrb.Container] = [rrb.Grid(contents=shown, grid_columns=2), *_moving(recorder, space)]
+    shares = [2.0, 1.0]
+    columns = [rrb.Vertical(contents=left, row_shares=shares)]
+    columns.append(rrb.Vertical(contents=right, row_shares=shares[: len(right)]))
     return rrb.Horizontal(contents=columns, column_shares=[1.4, 1.0], name="Landing")
 
 
@@ -109,53 +113,6 @@ def _ellipsoid(recorder: Recorder, path: RangesPath, flown: FloatArray) -> None:
     )
     columns = rr.Ellipsoids3D.columns(half_sizes=half.astype(np.float32), centers=flown.astype(np.float32))
     recorder.stream.send_columns("landing/aircraft/ellipsoid", recorder.indexes(recorder.time_ns(path.time_s)), columns)
-
-
-def _accuracy(recorder: Recorder, path: RangesPath) -> list[rrb.View]:
-    """95 % figures with the limits of the categories as level lines, and the measure of observability."""
-    time_ns, views = recorder.time_ns(path.time_s), list[rrb.View]()
-    panels = (
-        (
-            "horizontal",
-            {"horizontal": path.horizontal_95_m, "lateral": path.lateral_95_m},
-            [one.horizontal_m for one in CATEGORIES],
-        ),
-        ("vertical", {"vertical": path.vertical_95_m}, [one.vertical_m for one in CATEGORIES]),
-    )
-    for title, reached, limits in panels:
-        values = [*reached.values(), *(np.full(len(path), limit) for limit in limits)]
-        shades = colours.for_series(len(reached))
-        lines = [Line(f"{name} 95 %, m", shade, BOLD) for name, shade in zip(reached, shades, strict=True)]
-        lines += [Line(one.name, colours.LIMIT, THIN) for one in CATEGORIES]
-        entity, most = f"landing_ranges/{title}", 4.0 * max(limits)
-        recorder.lines(entity, time_ns, np.column_stack(values), lines)
-        views.append(plot(f"{title.capitalize()} 95 %, m (cut at {most:g})", entity, axis_range=(0.0, most)))
-    return views
-
-
-def _errors(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    """Errors of the first simulated approaches in the computed 95 % band."""
-    data = results.rows_of(RangesErrors)
-    if data is None:
-        return []
-    honest, trial, views = data.filter == HONEST, data.trial, list[rrb.View]()
-    count = min(int(trial.max()), MOST_TRIALS)
-    for axis, error, sigma, most in (
-        ("right", data.error_right_m, data.sigma_right_m, 6.0),
-        ("up", data.error_up_m, data.sigma_up_m, 20.0),
-    ):
-        first = honest & (trial == 1)
-        band = LINEAR_95 * sigma[first]
-        rows = [error[honest & (trial == one)] for one in range(1, count + 1)]
-        lines = [Line(f"approach {one}", colours.LIGHT, THIN) for one in range(1, count + 1)]
-        entity = f"landing_ranges/error_{axis}"
-        time_ns = recorder.time_ns(data.time_s[first])
-        half, name = np.clip(band, 0.0, most), Line("95 % as computed, m", colours.HONEST, THIN)
-        recorder.band(f"{entity}/a_band", time_ns, np.zeros(len(band)), half, name)
-        recorder.lines(f"{entity}/b_errors", time_ns, np.clip(np.column_stack(rows), -most, most), lines)
-        title = f"Error {axis} of simulated approaches, m (cut at {most:g})"
-        views.append(plot(title, entity, axis_range=(-most, most), legend=False))
-    return views
 
 
 def _moving(recorder: Recorder, space: RangesSpace) -> list[rrb.View]:

@@ -1,24 +1,20 @@
-"""Magnetic: the field as a sphere before and after, and the figures as flown, coloured by branch."""
+"""Magnetic: the field as a sphere before and after."""
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.base.geodesy import on_earth, plan_north_east_m
-from groundstation.results.arrays.flight import Overview
 from groundstation.results.arrays.magnetic import BodyField, MagneticField
 from groundstation.results.flight import FlightResults
-from groundstation.results.magnetic import MagneticResult, Turn
+from groundstation.results.magnetic import MagneticResult
 from groundstation.viewer import colours
 from groundstation.viewer.chart import round_step, screen_radius
 from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.tabs.track import bounds_of, grid, grid_unit
 
 NT_PER_UT = 1000.0
 EXAGGERATED_TO = 0.15  # of the radius: what the modulus differs by from the model's, as read
-MARGIN_S = 30.0
-THIN, BOLD, DOT = 0.8, 2.4, 2.0
+THIN, DOT = 0.8, 2.0
 CIRCLE_POINTS = 73
 PARALLELS_DEG = (-60.0, -30.0, 0.0, 30.0, 60.0)
 
@@ -83,49 +79,3 @@ def _circles(radius: float) -> list[FloatArray]:
     for azimuth in np.deg2rad((0.0, 45.0, 90.0, 135.0)):
         circles.append(np.column_stack([np.cos(turn) * np.cos(azimuth), np.cos(turn) * np.sin(azimuth), np.sin(turn)]))
     return [radius * circle for circle in circles]
-
-
-def eight(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    """The used turns on the ground track, right and left in two colours."""
-    figure = results.rows_of(Overview)
-    answer = results.answer(MagneticResult)
-    turns = [turn for turn in (answer.turns if answer else ()) if turn.state == "used"]
-    if figure is None or not turns:
-        return []
-    time_s = figure.time_s
-    latitude, longitude = on_earth(figure.latitude_deg, figure.longitude_deg)
-    start_s, end_s = min(turn.start_s for turn in turns) - MARGIN_S, max(turn.end_s for turn in turns) + MARGIN_S
-    shown = np.flatnonzero((time_s >= start_s) & (time_s <= end_s) & np.isfinite(latitude) & np.isfinite(longitude))
-    if len(shown) < 2:
-        return []
-    origin = float(latitude[shown[0]]), float(longitude[shown[0]])
-    north, east = plan_north_east_m(latitude[shown], longitude[shown], *origin)
-    points = np.column_stack([east, -north])  # the axes of a Rerun picture run right and down
-    low, high = bounds_of(points)
-    recorder.static("magnetic/eight/grid", grid(low, high))
-    strips, shades = _branches(points, time_s[shown], turns)
-    recorder.static(
-        "magnetic/eight/track",
-        rr.LineStrips2D(
-            [points, *strips],
-            colors=[colours.SAMPLES, *shades],
-            radii=[screen_radius(THIN), *[screen_radius(BOLD)] * len(strips)],
-            draw_order=1.0,
-        ),
-    )
-    bounds = rrb.VisualBounds2D(x_range=[low[0], high[0]], y_range=[low[1], high[1]])
-    unit = grid_unit(float((high - low).max()))[0]
-    name = f"Figures as flown: orange right, blue left; {unit} east and north"
-    return [rrb.Spatial2DView(name=name, origin="/magnetic/eight", visual_bounds=bounds)]
-
-
-def _branches(
-    points: FloatArray, time_s: FloatArray, turns: list[Turn]
-) -> tuple[list[FloatArray], list[colours.Colour]]:
-    strips, shades = [], []
-    for turn in turns:
-        mine = points[(time_s >= turn.start_s) & (time_s <= turn.end_s)]
-        if len(mine) > 1:
-            strips.append(mine)
-            shades.append(colours.GNSS if turn.bank_deg > 0.0 else colours.INS)
-    return strips, shades

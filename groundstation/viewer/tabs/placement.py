@@ -1,33 +1,24 @@
 """Placement of ground points: the way in space over a map of accuracy, points, and accuracy along the way."""
 
-from collections.abc import Callable
-
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.chapters.markdown import markdown
-from groundstation.chapters.placement import design_title
 from groundstation.chapters.placement import placement as chapter
 from groundstation.results.arrays.cooperative import PlacementAccuracy, PlacementKeepOut, PlacementMap, PlacementPoints
 from groundstation.results.flight import FlightResults
 from groundstation.results.placement import PlacementPlan
 from groundstation.viewer import colours
 from groundstation.viewer.names import clean_text
-from groundstation.viewer.recorder import Line, Recorder
+from groundstation.viewer.plot_views import panels_of, plot_of
+from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.views import document, plot
+from groundstation.viewer.views import document
 
 MARK, TRAIL, EDGE = 5.0, 1.2, 0.8  # radii in points of the screen
-THIN, BOLD = 1.0, 2.0
 WORST_SHARE = 90.0  # per cent of the map's values that keep their own colour
 GOOD, BAD = np.array([70.0, 190.0, 140.0]), np.array([80.0, 40.0, 90.0])
-# Entity, title, values.
-MEASURES: tuple[tuple[str, str, Callable[[PlacementAccuracy], FloatArray]], ...] = (
-    ("two_sigma_north_m", "2σ north, m", lambda way: way.two_sigma_north_m),
-    ("two_sigma_east_m", "2σ east, m", lambda way: way.two_sigma_east_m),
-    ("two_sigma_up_m", "2σ up, m", lambda way: way.two_sigma_up_m),
-)
 
 
 def placement(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
@@ -38,7 +29,7 @@ def placement(recorder: Recorder, results: FlightResults) -> rrb.Container | Non
         return None
     recorder.document("placement/answer", markdown(section))
     left = [_space(recorder, answer, way, results), document("Designs and places", "placement/answer")]
-    right = [_along(recorder, answer, way, *measure) for measure in MEASURES]
+    right = panels_of(recorder, plot_of("placement.accuracy", results))
     columns = [rrb.Vertical(contents=left), rrb.Vertical(contents=right)]
     return rrb.Horizontal(contents=columns, column_shares=[1.6, 1.0], name="Placement")
 
@@ -109,21 +100,3 @@ def _ground(recorder: Recorder, results: FlightResults) -> None:
         vertex_colors=shades,
     )
     recorder.static("site/ground", mesh)
-
-
-def _along(
-    recorder: Recorder,
-    answer: PlacementPlan,
-    way: PlacementAccuracy,
-    measure: str,
-    title: str,
-    values_of: Callable[[PlacementAccuracy], FloatArray],
-) -> rrb.View:
-    path, values = f"placement/{measure}", values_of(way)
-    shades = colours.for_series(len(answer.designs))
-    for row, shade in zip(answer.designs, shades, strict=True):
-        mine = np.flatnonzero(way.design == row.design)[1:]  # before the first range the scale would hide the rest
-        line = Line(design_title(row.design), shade, BOLD if row.design == answer.recommended else THIN)
-        time_ns = recorder.time_ns(way.time_s[mine])
-        recorder.lines(f"{path}/{row.design}", time_ns, values[mine][:, None], [line])
-    return plot(f"{clean_text(answer.judged)}: {title}", path, legend=measure == MEASURES[0][0])

@@ -15,6 +15,7 @@ LEAST_SPAN = 1e-9  # of the greater end: ends nearer to each other are moved apa
 SMALLEST = 1e-200  # ends nearer to each other are one, and nothing smaller stands on a logarithmic scale
 LEAST_LINEAR = 1e-100
 LARGEST = 1e200  # what is beyond is as good as infinite, and its squares are not
+NO_PLACES: Floats = np.zeros(0)
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,7 @@ from groundstation.plots.marks import (
 )
 from groundstation.plots.plot import Panel
 from groundstation.plots.ranges import finite
-from groundstation.reports.svg.colours import NO_PLACES
-from groundstation.reports.svg.scales import Span, span_of
+from groundstation.plots.scales import NO_PLACES, Span, span_of
 
 ABOVE_ROWS, BELOW_ROWS = 0.6, 0.6  # of a row, before the first and behind the last
 
