@@ -106,6 +106,12 @@ def test_numba_is_imported_by_its_wrapper_alone() -> None:
         assert "numba" not in names or path == PACKAGE / "base" / "compile.py", path
 
 
+def test_matplotlib_is_imported_where_notebooks_are_painted_alone() -> None:
+    for path in modules():
+        names = {name.partition(".")[0] for name, _ in imports_of(path)}
+        assert "matplotlib" not in names or path.parent == PACKAGE / "reports" / "notebook", path
+
+
 def test_what_of_rerun_is_not_public_stands_in_one_file() -> None:
     """Modules beside ``rerun`` and their files, and underscored names of objects that are not of this package."""
     found: dict[Path, set[str]] = {}

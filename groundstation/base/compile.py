@@ -11,6 +11,7 @@ Keep compiled functions scalar: small matrix products inside njit take 7-10 s to
 """
 
 import os
+import pickle
 import tempfile
 from collections.abc import Callable
 from dis import get_instructions
@@ -44,6 +45,7 @@ SMALL_BYTES = 65_536  # of a log: plain Python takes up to a second for so many,
 _BESIDE = Path(__file__).parent / "__pycache__"
 PLAIN_S = 1.0  # of a process for one loop: after that it is compiled, however few bytes come
 _ANEW = "each process compiles its loops anew"
+_UNREADABLE = ImportError, AttributeError, pickle.UnpicklingError  # of a pickle
 _LOCK = RLock()  # numba and its linker are told one thing at a time
 
 
@@ -116,6 +118,19 @@ def _compiled_by_numba(function: Callable[..., Any], **options: bool) -> Any:
         return cast(Callable[..., Any], numba.njit)(nogil=True, error_model="numpy", **options)(function)
 
 
+def _forget_unreadable() -> None:
+    """Remove numba's lists of what it keeps of this package that name a class where it is no longer."""
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    for place in (Path(__file__).parents[1], *([Path(chosen)] if chosen else [])):
+        for listed in place.rglob("*.nbi"):
+            try:
+                with listed.open("rb") as file:
+                    pickle.load(file)  # of which numba
+                    pickle.load(file)
+            except _UNREADABLE:
+                listed.unlink(missing_ok=True)
+
+
 class Loop:
     """A function that is compiled when it is first called, by Python or by another one that is compiled.
 
@@ -177,7 +192,7 @@ class Loop:
         """Run it: kept machine code where there is any, else what numba compiles."""
         forms = forms_of(arguments) if self._is_kept else None
         if forms is None:
-            return self._ordinary(*arguments)
+            return self._run_ordinary(arguments)
         if forms not in self._linked:
             if self._small_bytes and self._is_soon_done(forms, arguments):
                 return self._run_plain(arguments)
@@ -186,8 +201,22 @@ class Loop:
                     self._linked[forms] = self._found(forms)
         linked = self._linked[forms]
         if linked is None or linked.would_write(arguments):  # to an array that is read-only: numba refuses it by name
-            return self._ordinary(*arguments)
+            return self._run_ordinary(arguments)
         return linked(*arguments)
+
+    def _run_ordinary(self, arguments: tuple[Any, ...]) -> Any:
+        """The same by what numba compiled; what it kept and cannot read any more it compiles anew.
+
+        numba pickles what it keeps, with the place of every class in it: an update that moves one makes it fail before
+        the loop has begun.
+        """
+        try:
+            return self._ordinary(*arguments)
+        except _UNREADABLE:
+            with _LOCK:
+                _forget_unreadable()
+                self.__dict__.pop("_ordinary", None)
+            return self._ordinary(*arguments)
 
     def _is_soon_done(self, forms: tuple[Form, ...], arguments: tuple[Any, ...]) -> bool:
         """Whether there is nothing kept, and so little to do that it need not be compiled."""
