@@ -28,8 +28,9 @@ MOST_DECADES = 3  # of an axis on which twos and fives are written, too
 GRID, LABEL = 0.4, 0.1  # widths and radii in points of the screen
 KEY_ROOM, MOST_KEY_ROOM, LETTER = 56.0, 110.0, 4.4  # beside the box, for the names of many lines
 MOST_ABOVE, MOST_LETTERS, MOST_OF_A_NAME = 4, 60, 25  # names above the box, their letters; letters of one beside it
-BAND_COLUMNS = 320  # upright lines of a filled band across the whole box
-CURSOR, CURSOR_STEPS = 0.6, 600  # radius in points of the screen; places of a run
+BAND_COLUMNS, FINE = 320, 0.8  # upright lines of a filled band across the whole box; breadth of a line of a box
+CURSOR, CURSOR_STEPS = 0.6, 300  # radius in points of the screen; places of a run
+MOST_PLACES = 600  # of a mark that moves
 FILLING, BEHIND, MIDDLE, FRONT, NOW = -1.0, 0.0, 1.0, 2.0, 90.0
 
 
@@ -217,18 +218,21 @@ class Chart:
         shades: Sequence[Colour],
         order: float = FILLING,
     ) -> None:
-        """Log filled boxes between ends across and up, shapes (n,), each an upright line as broad as the box."""
+        """Log filled boxes between ends across and up, shapes (n,), each of upright lines side by side.
+
+        Ends of lines are round, so that one line as broad as its box would not look like one.
+        """
         left, right = (WIDTH * self.x.share(self.x.within(ends)) for ends in across)
         low, high = (self.height * (1.0 - self.y.share(self.y.within(ends))) for ends in up)
-        middle = 0.5 * (left + right)
-        strips = np.stack([np.column_stack([middle, low]), np.column_stack([middle, high])], axis=1)
-        rows = np.flatnonzero(np.isfinite(strips).all(axis=(1, 2)) & (np.abs(right - left) > 0.0))
-        drawn = rr.LineStrips2D(
-            list(strips[rows]),
-            colors=[shades[row] for row in rows.tolist()],
-            radii=0.5 * np.abs(right - left)[rows],
-            draw_order=order,
-        )
+        broad = np.abs(right - left)
+        rows = np.flatnonzero(np.isfinite(broad + low + high) & (broad > 0.0) & (low != high))
+        counts = np.ceil(broad[rows] / FINE).astype(np.int64)
+        each, radii = np.repeat(rows, counts), np.repeat(0.5 * broad[rows] / counts, counts)
+        place = np.arange(len(each)) - np.repeat(np.cumsum(counts) - counts, counts)
+        middle = np.minimum(left, right)[each] + radii * (2.0 * place + 1.0)
+        strips = np.stack([np.column_stack([middle, ends[each]]) for ends in (low, high)], axis=1)
+        colours_of = [shades[row] for row in each.tolist()]
+        drawn = rr.LineStrips2D(list(strips), colors=colours_of, radii=1.02 * radii, draw_order=order)
         self.recorder.static(f"{self.path}/{name}", drawn)
 
     def note(self, name: str, text: str, at_s: float | None = None) -> None:
@@ -253,11 +257,11 @@ class Chart:
     def moving(self, name: str, time_s: FloatArray, x: FloatArray, y: FloatArray, line: Line) -> None:
         """Log a mark that is at a place from its flight time on; rows without a place in the box are left out.
 
-        Of very many places so many are logged as a cursor has.
+        Of very many places 600 are logged, evenly spread.
         """
         points = self.points(x, y)
         known = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(time_s))
-        rows = known[thin(len(known), CURSOR_STEPS)]
+        rows = known[thin(len(known), MOST_PLACES)]
         style = rr.Points2D.from_fields(colors=[line.colour], radii=screen_radius(line.width), draw_order=NOW)
         self.recorder.static(f"{self.path}/{name}", style)
         indexes = self.recorder.indexes(self.recorder.time_ns(time_s[rows]))

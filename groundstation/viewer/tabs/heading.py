@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 
 from groundstation.chapters.heading import heading as heading_chapter
 from groundstation.chapters.markdown import markdown
-from groundstation.plots.plot import Plot
+from groundstation.plots.plot import Plot, one_panel
 from groundstation.results.arrays.heading import HeadingLanes, HeadingRunning, HeadingSamples
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import HeadingResult
@@ -34,7 +34,7 @@ def heading(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     runs = _runs(recorder, results, plots)
     pictures = [
         *distribution.heading_error(recorder, results),
-        *panels_of(recorder, plot_of("standstill.components", results))[:1],
+        *panels_of(recorder, _first_panel(plot_of("standstill.components", results))),
         *panels_of(recorder, plot_of("standstill.mean_speed", results), height=80.0),
     ]
     columns: list[rrb.View | rrb.Container] = []
@@ -47,6 +47,11 @@ def heading(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
         columns.append(rrb.Vertical(contents=pictures))
     widths = {1: [1.0], 2: [3.0, 2.0], 3: [5.0, 4.0, 3.5]}[len(columns)]
     return rrb.Horizontal(contents=columns, column_shares=widths, name="Heading")
+
+
+def _first_panel(told: Plot | None) -> Plot | None:
+    """The velocities over time alone: there is no room for their plane."""
+    return None if told is None else replace(told, rows=one_panel(told.panels[0], told.rows[0].height_mm))
 
 
 def _on_ground(results: FlightResults) -> FlightResults:
