@@ -195,7 +195,7 @@ def test_the_recording_has_its_tab(scratch: Scratch) -> None:
     text = contents.text("/gnss_noise/answer")
     assert text.startswith("# GNSS noise\n")
     assert "Standstills" in text
-    values = contents.scalars("/gnss_noise/gnss_noise_speed/m_s")[1]
+    values = contents.scalars("/generic/series/gnss_noise_speed/speed/b00_lines")[1]
     rms = float(np.sqrt(np.nanmean(values**2)))
     assert rms == pytest.approx(float(str(answer_of(scratch)["speed_rms_mps"])), abs=0.05)
 

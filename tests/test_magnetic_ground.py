@@ -484,7 +484,10 @@ def test_the_report_shows_the_runs_without_system_3(tmp_path: Path) -> None:
 def test_the_tab_shows_the_runs_without_system_3(tmp_path: Path) -> None:
     results = whole()
     write_recording(tmp_path / "flight.rrd", make(), results)
-    assert "/magnetic/ground/curves" in Contents(tmp_path / "flight.rrd").fixed
+    fixed = Contents(tmp_path / "flight.rrd").fixed
+    assert {
+        f"/magnetic/ground_runs/error_of_the_heading/{mark}" for mark in ("01_dots/0", "03_curve", "04_bars")
+    } <= set(fixed)
     on_ground = results.answer(GroundDeviation)
     assert on_ground is not None
     text = Contents(tmp_path / "flight.rrd").text("/magnetic/answer")

@@ -31,7 +31,6 @@ RENAMED = (
     ("radial_error_rate_50_nmiph", ("results/inertial.py", "estimators/inertial/estimate.py"), "chapters/inertial.py"),
     ("honest_half_width_deg", ARRAYS, "chapters/plots/heading.py"),
     ("honest_half_width_deg", ARRAYS, "chapters/plots/comparison.py"),
-    ("mean_deg", ARRAYS, "viewer/tabs/heading.py"),
     ("longest_s", ("base/ledger.py", "integrity/ledger.py"), "cli/check_table.py"),
 )
 
