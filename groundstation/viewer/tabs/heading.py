@@ -8,6 +8,7 @@ import rerun.blueprint as rrb
 
 from groundstation.chapters.heading import heading as heading_chapter
 from groundstation.chapters.markdown import markdown
+from groundstation.chapters.wording import clock
 from groundstation.plots.plot import Plot, one_panel
 from groundstation.results.arrays.heading import HeadingLanes, HeadingRunning, HeadingSamples
 from groundstation.results.flight import FlightResults
@@ -19,7 +20,6 @@ from groundstation.viewer.views import document
 
 AFTER_TAXI = ("too fast", "take-off run", "landing roll", "airborne")
 WHOLE = 0.5  # a run that is this share of the flight needs no view of its own
-MOST_RUNS = 4
 
 
 def heading(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
@@ -64,9 +64,14 @@ def _on_ground(results: FlightResults) -> FlightResults:
 
 def _runs(recorder: Recorder, results: FlightResults, plots: Sequence[Plot | None]) -> rrb.Container | None:
     """Log each ground run on a time axis of its own; None where one fills the flight."""
-    windows = [window for one in plots if one is not None for window in one.panels[0].x.windows]
+    windows = next((one.panels[0].x.windows for one in plots if one is not None), ())
     if not windows or max(high - low for low, high in windows) > WHOLE * results.duration_s:
         return None
-    drawn = [runs_of(recorder, one, "heading/run") for one in plots]
-    panels = [rrb.Vertical(contents=[view for views in run for view in views]) for run in zip(*drawn, strict=True)]
-    return rrb.Vertical(contents=panels[:MOST_RUNS], name="Each ground run")
+    drawn = [runs_of(recorder, one, "heading/run") for one in plots if one is not None]
+    several = len(windows) > 1
+    name = "Each ground run"
+    panels = [
+        rrb.Vertical(contents=[view for views in run for view in views], name=f"From {clock(low)}" if several else name)
+        for (low, _), *run in zip(windows, *drawn, strict=True)
+    ]
+    return rrb.Tabs(contents=panels, name=name, active_tab=0) if several else panels[0]
