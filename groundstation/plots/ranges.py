@@ -80,19 +80,18 @@ def windows(time: Any, least_gap_s: float = LEAST_PAUSE_S) -> tuple[tuple[float,
     return tuple(padded(low, high, 0.05, 2.0) for low, high in spans)
 
 
-def broken_at_wrap(angle_deg: Any) -> Floats:
-    """Headings with NaN where they jump through north: the line breaks there instead of crossing the figure.
+def broken_at_wrap(time: Any, angle_deg: Any) -> tuple[Floats, Floats]:
+    """Time and headings with a NaN between two that jump through north: the line breaks instead of crossing the figure.
 
     Examples
     --------
-    >>> broken_at_wrap([358.0, 359.0, 1.0, 2.0]).tolist()
-    [358.0, 359.0, nan, 2.0]
+    >>> [column.tolist() for column in broken_at_wrap([0.0, 1.0, 2.0], [359.0, 1.0, 2.0])]
+    [[0.0, 0.5, 1.0, 2.0], [359.0, nan, 1.0, 2.0]]
     """
-    angle = np.array(angle_deg, dtype=np.float64)
+    time, angle = np.asarray(time, dtype=np.float64), np.asarray(angle_deg, dtype=np.float64)
     with np.errstate(invalid="ignore"):
-        jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180.0)
-    angle[jumps + 1] = np.nan
-    return angle
+        after = np.flatnonzero(np.abs(np.diff(angle)) > 180.0) + 1
+    return np.insert(time, after, 0.5 * (time[after - 1] + time[after])), np.insert(angle, after, np.nan)
 
 
 def broken_at_gaps(time: Any, *values: Any) -> tuple[Floats, ...]:

@@ -83,7 +83,7 @@ def _speed(data: Overview) -> TimeLine:
 
 
 def _heading(data: Overview) -> TimeLine:
-    return TimeLine(data.time_s, broken_at_wrap(data.heading_deg))
+    return TimeLine(*broken_at_wrap(data.time_s, data.heading_deg))
 
 
 def _mean(data: HeadingRunning) -> TimeLine:

@@ -195,11 +195,12 @@ def attitude(results: FlightResults) -> Plot | None:
     )
     panels = []
     for curves, unit in listed:
-        marks = [
-            Curve(x=data.time_s, y=values if unit == "attitude, °" else broken_at_wrap(values), role=role, name=name)
-            for (values, name), role in zip(curves, _TWO, strict=True)
-            if values is not None and np.isfinite(values).any()
-        ]
+        marks = []
+        for (values, name), role in zip(curves, _TWO, strict=True):
+            if values is not None and np.isfinite(values).any():
+                is_heading = unit != "attitude, °"
+                x, y = broken_at_wrap(data.time_s, values) if is_heading else (data.time_s, values)
+                marks.append(Curve(x=x, y=y, role=role, name=name))
         if marks:
             panels.append(Panel(marks, time_axis(*span(data.time_s)), Axis(unit)))
     if not panels or not finite(data.time_s).size:

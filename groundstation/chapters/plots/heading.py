@@ -196,9 +196,10 @@ def taxi(results: FlightResults) -> Plot | None:
 def _angles(samples: HeadingSamples, spans: Windows, time: Axis) -> Panel:
     nose, speed = samples.heading_deg, samples.ground_speed_mps
     track = np.where(speed > SLOWEST_TRACK_MPS, samples.track_deg, np.nan)
+    (track_s, track_line), (nose_s, nose_line) = (broken_at_wrap(samples.time_s, angle) for angle in (track, nose))
     marks = (
-        Curve(x=samples.time_s, y=broken_at_wrap(track), role="gnss", name="GNSS track", emphasis="thin"),
-        Curve(x=samples.time_s, y=broken_at_wrap(nose), role="ins", name="INS heading"),
+        Curve(x=track_s, y=track_line, role="gnss", name="GNSS track", emphasis="thin"),
+        Curve(x=nose_s, y=nose_line, role="ins", name="INS heading"),
     )
     ranges = []
     for low, high in spans:
