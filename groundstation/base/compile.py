@@ -200,7 +200,7 @@ class Loop:
                 if forms not in self._linked:
                     self._linked[forms] = self._found(forms)
         linked = self._linked[forms]
-        if linked is None or linked.would_write(arguments):  # to an array that is read-only: numba refuses it by name
+        if linked is None or linked.would_write(arguments):  # to arrays that are read-only: numba refuses them by name
             return self._run_ordinary(arguments)
         return linked(*arguments)
 

@@ -26,6 +26,7 @@ ARRAY_DTYPES = {np.dtype(name): name for name in _DTYPES}  # in the byte order o
 ENTRY, SUFFIX = "groundstation_entry", ".machine_code"
 LAYOUT = 4  # of what is kept
 _RESULTS: dict[Any, type] = {int: ctypes.c_int64, bool: ctypes.c_int64, float: ctypes.c_double, None: ctypes.c_int64}
+MOST_COPIED_BYTES = 1 << 25  # of arrays that are read-only and may be written to
 _NO_BYTES = ctypes.c_char * 0
 _NUMBERS = count()  # every library has a name of its own
 _NOT_WRITTEN = {b"readonly", b"readnone"}  # what LLVM says of an array that is only read, or not touched at all
@@ -288,19 +289,32 @@ class Linked:
         self._annotation = _annotation(function)
 
     def would_write(self, arguments: Sequence[Any]) -> bool:
-        """Whether one of the arrays that the loop may write to is read-only."""
+        """Whether so much that is read-only may be written to that it is not copied for a call."""
         plain = _plain(arguments)
-        return not all(plain[at].flags.writeable for at in self._written)
+        return bool(sum(plain[at].nbytes for at in self._written if not plain[at].flags.writeable) > MOST_COPIED_BYTES)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Run the loop; the arrays that it writes to must be writable."""
+        """Run the loop.
+
+        LLVM cannot prove of every array that it is left as it is: of those that are read-only the loop gets copies.
+
+        Raises
+        ------
+        ValueError
+            When it has written to one of them.
+        """
+        plain = _plain(arguments)
+        copied = [at for at in self._written if not plain[at].flags.writeable]
+        handed = {at: plain[at].copy() for at in copied}
         values: list[Any] = []
-        for one in _plain(arguments):
+        for at, one in enumerate(plain):
             if isinstance(one, np.ndarray):
-                values += (_address(one), *one.shape)
+                values += (_address(handed.get(at, one)), *one.shape)
             else:
                 values.append(one)
         answer = self._entry(*values)
+        if not all(np.array_equal(handed[at].view(np.uint8), plain[at].view(np.uint8)) for at in copied):
+            raise ValueError("a compiled loop would write to an array that is readonly")
         return None if self._annotation is None else self._annotation(answer)
 
 
