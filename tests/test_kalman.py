@@ -8,6 +8,7 @@ from scipy.linalg import block_diag, expm
 from scipy.stats import chi2
 
 from groundstation.base.angles import FloatArray
+from groundstation.base.compile import Loop
 from groundstation.methods.kalman.arrays import ABSENT, REJECTED, USED
 from groundstation.methods.kalman.filter import (
     FilterRun,
@@ -163,6 +164,16 @@ def test_filter_is_the_textbooks() -> None:
     run = run_filter(model.transition, model.step, model.measurements(z), start_of(model))
     assert apart(run, textbook(model, z, np.zeros(SIZE))) < ROUNDING
     assert np.array_equal(run.mark == ABSENT, np.isnan(z))
+
+
+def test_what_is_handed_over_read_only_runs_by_kept_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(loop: Loop, _arguments: object) -> None:
+        raise AssertionError(f"{loop.py_func.__qualname__} would load numba in every process")
+
+    model = case()
+    z = draw(model, np.random.default_rng(3))[1]
+    monkeypatch.setattr(Loop, "_run_ordinary", refused)
+    smooth(run_filter(model.transition, model.step, model.measurements(z), start_of(model)))
 
 
 def test_sparse_equals_dense() -> None:
