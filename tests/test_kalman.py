@@ -173,7 +173,9 @@ def test_what_is_handed_over_read_only_runs_by_kept_code(monkeypatch: pytest.Mon
     model = case()
     z = draw(model, np.random.default_rng(3))[1]
     monkeypatch.setattr(Loop, "_run_ordinary", refused)
-    smooth(run_filter(model.transition, model.step, model.measurements(z), start_of(model)))
+    transition = Transition.dense(model.F, model.Q)
+    assert not transition.dynamics.F.flags.writeable
+    smooth(run_filter(transition, model.step, model.measurements(z), start_of(model)))
 
 
 def test_sparse_equals_dense() -> None:
