@@ -34,6 +34,7 @@ ROUNDING = {"rtol": 1e-9, "atol": 1e-9}
 POINTS_PER_INCH = 72.0
 MEET_PT = 2.5  # letters do not touch while the boxes about two lines, empty above and below, share less
 FEWEST = {"report": 24, "magnetic": 18, "bare": 0}  # plots of a case, else two
+QUICK = ("report", "landing", "placement", "session", "bare", "fleet")  # figures of every kind of mark
 
 
 def of_case(case: str) -> Iterator[Plot]:
@@ -55,7 +56,9 @@ def of_fleet() -> Iterator[Plot]:
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("case", [*CASES, "fleet"])
+@pytest.mark.parametrize(
+    "case", [*QUICK, *(pytest.param(case, marks=pytest.mark.slow) for case in CASES if case not in QUICK)]
+)
 def test_a_figure_shows_what_is_described(case: str) -> None:
     plots = list(of_fleet() if case == "fleet" else of_case(case))
     assert len(plots) >= FEWEST.get(case, 2)

@@ -178,6 +178,7 @@ def test_one_engine_is_held_where_it_is_stated_alone() -> None:
     assert stated.verdict != "accept"
 
 
+@pytest.mark.slow
 def test_the_study_of_verdicts_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
     """Runs of its eleven kinds by turns; the time is over before the second turn, and none is made again."""
     from groundstation.pipeline.verbs.kept_runs import KeptRuns

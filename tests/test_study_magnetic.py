@@ -117,6 +117,7 @@ def test_a_whole_flight_is_answered_and_judged() -> None:
         assert (np.diff(judged.curve_inside) >= 0.0).all()
 
 
+@pytest.mark.slow
 def test_seed_decides_everything_in_one_process_and_in_several(monkeypatch: pytest.MonkeyPatch) -> None:
     jobs = [job(run, (REFERENCE,)) for run in (0, 1)]
     alone = run_jobs(jobs)
