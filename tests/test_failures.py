@@ -247,6 +247,8 @@ def test_a_generic_chapter_a_front_and_a_page_that_fail_leave_the_rest(
     with gathered_failures():
         document = flight_report.flight_document(load(folder))
         assert document.front.title == ANSWERED.flight_id and len(document.sections) > 5
+        whole = flight_report.flight_report_html(document)
+        assert f"<h1>{ANSWERED.flight_id}</h1>" in whole and 'class="verdict' not in whole
         page = tmp_path / "report.html"
         page.write_text("of an earlier run", encoding="utf-8")
         flight_report.write_pages(page, fails, document, document, with_pdf=False)
