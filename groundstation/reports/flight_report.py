@@ -86,9 +86,10 @@ def add_pdf(folder: Path, answer_types: Mapping[str, type[Answer]]) -> Written:
         document = flight_document(load(folder, answer_types))
         if failures():
             return write_flight_report(folder, answer_types, with_pdf=True)
-        path = folder / PDF
-        problem = _put_pdf(document, path)
-        return Written((path,) if path.is_file() else (), problem, failures())
+        problem = _put_pdf(document, folder / PDF)
+        summary = (SUMMARY,) if put_failures(folder, failures()) else ()
+        paths = (folder / name for name in (PDF, *summary))
+        return Written(tuple(path for path in paths if path.is_file()), problem, failures())
 
 
 def write_pages(

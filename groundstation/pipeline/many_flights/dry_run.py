@@ -1,6 +1,6 @@
 """What a run would do of each log, found without running any."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -17,14 +17,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
-
-PLANS: Mapping[str, str] = {
-    "everything": "to run",
-    "analysis": "to analyse again: a setting changed, a file is missing or a part failed; the MCAP stays",
-    "reports": "to report again",
-    "pdf": "finished, its PDF to add",
-    "nothing": "finished, nothing to do",
-}
+from groundstation.pipeline.one_flight.resume import TO_DO
 
 
 def plan_many(
@@ -71,14 +64,14 @@ def _planned(job: Job) -> Outcome:
     """What would become of a log."""
     if job.finished is not None:
         is_there = job.step == "nothing"
-        return Outcome(job.log, "done", PLANS[job.step], flight_id=job.finished.flight_id, was_finished=is_there)
+        return Outcome(job.log, "done", TO_DO[job.step], flight_id=job.finished.flight_id, was_finished=is_there)
     try:
         open_log(job.path, job.configuration.profile_path)
     except UnclaimedLogError as error:
         return Outcome(job.log, "failed" if job.is_named else "skipped", str(error))
     except Exception as error:
         return Outcome(job.log, "failed", reason_of(job.name, error)[0])
-    return Outcome(job.log, "done", PLANS[job.step])
+    return Outcome(job.log, "done", TO_DO[job.step])
 
 
 def _planned_sessions(asked: Asked, among: Scan, planned: Sequence[Outcome]) -> list[Outcome]:
@@ -87,7 +80,7 @@ def _planned_sessions(asked: Asked, among: Scan, planned: Sequence[Outcome]) -> 
     found = find_sessions(asked, among, flight_ids) if flight_ids else FoundSessions()
     sessions = [*map(planned_session, found.jobs), *(one for one in found.told if one.state == "failed")]
     logs = [one for one in planned if one.state == "done"]
-    unread = [one.source for one in logs if one.text == PLANS["everything"]]
+    unread = [one.source for one in logs if one.text == TO_DO["everything"]]
     has_stations = asked.stations is not None or any(Path(log).with_name(STATIONS_TOML).is_file() for log in unread)
     if unread and len(logs) > 1 and has_stations:
         text = "looked for among the flights once the logs are read"

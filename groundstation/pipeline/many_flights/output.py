@@ -160,9 +160,11 @@ class RemoteOutput:
             self._out.send(folder, staged)
             self._out.replace(staged, session_id, partial(is_made, identity=session_id))
             return
-        for name in (REPORT, PDF, MANIFEST):
+        for name in (REPORT, PDF, SUMMARY, MANIFEST):
             if (folder / name).is_file() and (content := (folder / name).read_bytes()):
                 self._out.write(f"{session_id}/{name}", content)
+        if not (folder / PDF).exists():  # it could not be made again
+            self._out.remove(f"{session_id}/{PDF}")
 
     def discard(self, folder: str) -> None:
         """Throw a flight folder away; what somebody else put into one that is in place stays."""

@@ -1,7 +1,6 @@
 """One session from beginning to end: MCAPs of its logs, answers, recording and report in a folder of its own."""
 
 import hashlib
-import json
 import platform
 import shutil
 from collections.abc import Collection, Iterator, Sequence
@@ -39,7 +38,7 @@ from groundstation.pipeline.one_flight.log import Log
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Listener, silent
-from groundstation.pipeline.one_flight.resume import versions
+from groundstation.pipeline.one_flight.resume import TO_DO, Step, digest_of_parts, versions
 from groundstation.pipeline.one_flight.sealing import seal, spoiled_files
 from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
 from groundstation.results.file_names import MANIFEST
@@ -116,13 +115,11 @@ class SessionJob:
         tables = dict(self.configuration.tables)
         thresholds = tables.get("thresholds", {})
         used = {name: tables.get(name, {}) for name in session_tables()}
-        conversion = _digest(logs, thresholds, self.configuration.profile, dict(versions()), platform.python_version())
-        analysis = _digest(conversion, asdict(self.stations), used, [asdict(note) for note in self.notes])
+        conversion = digest_of_parts(
+            logs, thresholds, self.configuration.profile, dict(versions()), platform.python_version()
+        )
+        analysis = digest_of_parts(conversion, asdict(self.stations), used, [asdict(note) for note in self.notes])
         return Keys(conversion, analysis)
-
-
-def _digest(*parts: object) -> str:
-    return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def load_stations(path: Path | None) -> Stations:
@@ -185,13 +182,8 @@ class _Kept(NamedTuple):
 
     folder: Path
     resume: Resume
-    with_page: bool
-    with_pdf: bool
-
-    @property
-    def is_finished(self) -> bool:
-        """Whether nothing of it is missing."""
-        return not self.with_page and not self.with_pdf
+    step: Step
+    with_pdf: bool = False
 
 
 def _kept(job: SessionJob) -> _Kept | None:
@@ -209,11 +201,12 @@ def _kept(job: SessionJob) -> _Kept | None:
         if not is_of_the_verb and (job.redo or not is_whole):
             continue
         if job.only_results:
-            return _Kept(folder, resume, with_page=False, with_pdf=False)
-        with_page = not _is_whole(folder / REPORT, spoiled)
+            return _Kept(folder, resume, "nothing")
         has_pdf = PDF in manifest.files and _is_whole(folder / PDF, spoiled)
-        with_pdf = job.with_pdf or has_pdf if with_page else job.with_pdf and not has_pdf  # one that is there stays
-        return _Kept(folder, resume, with_page, with_pdf)
+        step: Step = "pdf" if job.with_pdf and not has_pdf else "nothing"
+        if not _is_whole(folder / REPORT, spoiled):
+            step = "reports"
+        return _Kept(folder, resume, step, job.with_pdf or has_pdf)  # one that is there stays
     return None
 
 
@@ -235,12 +228,12 @@ def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
     if kept is None:
         return None
     folder, resume, problem = kept.folder, kept.resume, ""
-    if not kept.is_finished:
+    if kept.step != "nothing":
         with watch.stage("reporting"):
-            problem = report_finished(folder, with_page=kept.with_page, with_pdf=kept.with_pdf)
+            problem = report_finished(folder, with_page=kept.step == "reports", with_pdf=kept.with_pdf)
     state = state_of(load_document(folder).findings, resume.has_lost_data, job.fail_on)
     found = _outcome(job, state, "; ".join(filter(None, (resume.text, problem))), folder, watch)
-    return replace(found, was_finished=kept.is_finished)
+    return replace(found, was_finished=kept.step == "nothing")
 
 
 def planned_session(job: SessionJob) -> Outcome:
@@ -248,9 +241,9 @@ def planned_session(job: SessionJob) -> Outcome:
     kept = _kept(job)
     if kept is None:
         return Outcome(job.name, "done", "session to run", is_session=True)
-    to_do = "to report again" if kept.with_page else "finished, its PDF to add" if kept.with_pdf else ""
-    text = f"session {to_do or 'finished, nothing to do'}"
-    return Outcome(job.name, "done", text, kept.folder.name, is_session=True, was_finished=kept.is_finished)
+    is_finished = kept.step == "nothing"
+    text = f"session {TO_DO[kept.step]}"
+    return Outcome(job.name, "done", text, kept.folder.name, is_session=True, was_finished=is_finished)
 
 
 def _run_into(partial: Path, job: SessionJob, watch: Stopwatch) -> Outcome:

@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial as bound
 from pathlib import Path, PurePosixPath
-from typing import TypeVar
 
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
 from groundstation.base.failures import attempt, failures, gathered_failures, is_incomplete, with_failures
@@ -41,7 +40,6 @@ PARTIAL_PREFIX = ".partial-"
 OF_THE_WORLD = OSError, GroundstationError  # a full disk, a setting: no defect of the part that meets it
 REPORT_FILES = (REPORT, PDF, DEVIATION_CSV, STEER_CARD)
 MOST_APART = 50  # records that a part read alone may have more than as part of a flight, at each joint
-Inside = TypeVar("Inside")
 Version = tuple[tuple[int, int], ...]  # of each file of a log: time and size
 
 
@@ -287,13 +285,10 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
 
 def report_finished(folder: Path, *, with_page: bool, with_pdf: bool) -> str:
     """Make the report of a finished folder again, or its PDF alone, and take it down; returns what went wrong."""
-    from groundstation.results.files import put_failures
-
     if with_page:
         written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf)
     else:
         written = add_pdf(folder, ANSWER_TYPES)
-    put_failures(folder, failures())
     note(folder, written.paths, removed=REPORT_FILES)
     return written.problem
 

@@ -36,6 +36,13 @@ from groundstation.results.manifest import Keys as Keys
 from groundstation.results.manifest import Manifest, PartOfRun, PowerUpOfRun
 
 Step = Literal["everything", "analysis", "reports", "pdf", "nothing"]  # what has to be done for a log
+TO_DO: Mapping[Step, str] = {
+    "everything": "to run",
+    "analysis": "to analyse again: a setting changed, a file is missing or a part failed; the MCAP stays",
+    "reports": "to report again",
+    "pdf": "finished, its PDF to add",
+    "nothing": "finished, nothing to do",
+}
 _OF_RESULTS = (SUMMARY, f"{ARRAYS}/", f"{TABLES}/")
 PACKAGES = (
     *("mcap", "numpy", "pandas", "numba", "scipy", "pyarrow", "rerun-sdk"),
@@ -159,18 +166,19 @@ def keys_of(source: Source, configuration: Configuration, *, digests: Sequence[s
     tables = dict(configuration.tables)
     thresholds = tables.pop("thresholds", {})
     tables.pop(ISOLATION, None)
-    conversion = _digest(
+    conversion = digest_of_parts(
         *(asdict(source), _layouts_of(configuration), thresholds, dict(versions()), platform.python_version()),
         *([list(digests)] if len(digests) > 1 else []),
     )
     intervals = [[asdict(part) for part in listed] for listed in (configuration.exclude, configuration.force)]
     apply = None if configuration.apply is None else asdict(configuration.apply)
     lessons = [] if configuration.lessons is None else [[asdict(one) for one in configuration.lessons]]
-    analysis = _digest(conversion, tables, intervals, apply, configuration.weather, *lessons)
+    analysis = digest_of_parts(conversion, tables, intervals, apply, configuration.weather, *lessons)
     return Keys(conversion, analysis)
 
 
-def _digest(*parts: Any) -> str:
+def digest_of_parts(*parts: Any) -> str:
+    """The SHA-256 of what keys are made of."""
     return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 

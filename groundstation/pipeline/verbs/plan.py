@@ -1,7 +1,6 @@
 """Plans from beginning to end: a scenario becomes answers, recording and report in a folder of its own."""
 
 import hashlib
-import json
 import platform
 import shutil
 from dataclasses import asdict, dataclass, replace
@@ -27,12 +26,12 @@ from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
-from groundstation.pipeline.one_flight.resume import versions
+from groundstation.pipeline.one_flight.resume import digest_of_parts, versions
 from groundstation.pipeline.one_flight.sealing import seal, spoiled_files
 from groundstation.reports.flight_report import PDF, write_flight_report
 from groundstation.results.files import load_document, load_manifest, put_failures, save, write_text
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.manifest import Keys, Manifest, Resume
+from groundstation.results.manifest import Keys, Resume
 from groundstation.studies.shipped_plans import LoadedPlan, load_plan, plan_names
 
 
@@ -92,71 +91,67 @@ def run_plan(
     listen(Event("begin", total=1))
     with alone_in(out):
         prepare(out)
-        watch = Stopwatch(listen, loaded.name)
-        kept = None if force else _kept(target, _keys(plan, loaded))
-        if kept is None:
-            outcome = _run(plan, loaded, target, fail_on, with_pdf, watch)
-        else:
-            outcome = _finished(loaded, target, kept, fail_on, with_pdf, watch)
+        outcome = _run(plan, loaded, target, force, fail_on, with_pdf, Stopwatch(listen, loaded.name))
     listen(Event("end", loaded.name, outcome.text))
     return outcome
 
 
 def _keys(plan: Plan[Any], loaded: LoadedPlan[Any]) -> Keys:
     """Equal keys, equal results: the scenario and the versions go in."""
-    told = plan.name, loaded.name, loaded.text, dict(versions()), platform.python_version()
-    key = hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+    key = digest_of_parts(plan.name, loaded.name, loaded.text, dict(versions()), platform.python_version())
     return Keys(key, key)
 
 
-def _kept(target: Path, keys: Keys) -> Manifest | None:
-    """The manifest of a finished plan of such keys; None where anything but its PDF is missing or was changed."""
+def _kept(target: Path, keys: Keys) -> tuple[Resume, bool] | None:
+    """What a finished plan of such keys said, and whether it has its PDF; None where anything else is amiss."""
     try:
         manifest, findings = load_manifest(target), load_document(target).findings
     except GroundstationError:
         return None
-    is_equal = manifest.resume is not None and manifest.resume.keys == keys
-    is_whole = not is_incomplete(findings) and spoiled_files(target, manifest) <= {PDF}
-    return manifest if is_equal and is_whole else None
+    spoiled = spoiled_files(target, manifest)
+    if manifest.resume is None or manifest.resume.keys != keys or is_incomplete(findings) or not spoiled <= {PDF}:
+        return None
+    return manifest.resume, PDF in manifest.files and not spoiled
 
 
 def _finished(
-    loaded: LoadedPlan[Any], target: Path, manifest: Manifest, fail_on: str, with_pdf: bool, watch: Stopwatch
+    loaded: LoadedPlan[Any], target: Path, kept: tuple[Resume, bool], fail_on: str, with_pdf: bool, watch: Stopwatch
 ) -> Outcome:
     """The outcome of a finished plan, to which a PDF is added where it is asked for and missing."""
-    has_pdf = PDF in manifest.files and not spoiled_files(target, manifest)
+    resume, has_pdf = kept
     problem = ""
-    with gathered_failures():
-        if with_pdf and not has_pdf:
-            with watch.stage("reporting"):
-                problem = report_finished(target, with_page=False, with_pdf=True)
-        found = with_failures(load_document(target).findings, failures())
-        told = "; ".join(filter(None, (manifest.resume.text if manifest.resume else "", problem)))
-        return Outcome(
-            loaded.name,
-            state_of(found, False, fail_on),
-            told,
-            target.name,
-            str(target),
-            _digest(loaded),
-            watch.times_s,
-            was_finished=has_pdf or not with_pdf,
-            failures=failures(),
-        )
+    if with_pdf and not has_pdf:
+        with watch.stage("reporting"):
+            problem = report_finished(target, with_page=False, with_pdf=True)
+    told = "; ".join(filter(None, (resume.text, problem)))
+    state = state_of(load_document(target).findings, False, fail_on)
+    done = Outcome(loaded.name, state, told, target.name, str(target), _digest(loaded), watch.times_s)
+    return replace(done, was_finished=has_pdf or not with_pdf, failures=failures())
 
 
 def _run(
-    plan: Plan[Any], loaded: LoadedPlan[Any], target: Path, fail_on: str, with_pdf: bool, watch: Stopwatch
+    plan: Plan[Any],
+    loaded: LoadedPlan[Any],
+    target: Path,
+    force: bool,
+    fail_on: str,
+    with_pdf: bool,
+    watch: Stopwatch,
 ) -> Outcome:
-    partial = partial_folder(target.parent)
+    partial: Path | None = None
     try:
         with gathered_failures():
+            kept = None if force else _kept(target, _keys(plan, loaded))
+            if kept is not None:
+                return _finished(loaded, target, kept, fail_on, with_pdf, watch)
+            partial = partial_folder(target.parent)
             return _run_into(partial, plan, loaded, target, fail_on, with_pdf, watch)
     except Exception as error:
         reason, trace = reason_of(loaded.name, error)
         return Outcome(loaded.name, "failed", reason, sha256=_digest(loaded), times_s=watch.times_s, trace=trace)
     finally:
-        shutil.rmtree(partial, ignore_errors=True)
+        if partial is not None:
+            shutil.rmtree(partial, ignore_errors=True)
 
 
 def _run_into(
