@@ -14,6 +14,7 @@ import os
 import pickle
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from dis import get_instructions
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
@@ -93,9 +94,9 @@ def keeps_nothing() -> bool:
 
 
 def why_nothing_is_kept() -> str:
-    """Say why compiled code is kept nowhere; empty where it is."""
+    """Say why compiled code is kept nowhere, or by numba alone; empty where it is kept here."""
     if _cache_folder() is not None:
-        return f"compiled code is not kept ({_refused[0]}): {_ANEW}" if _refused else ""
+        return f"compiled code is not kept ({_refused[0]}): numba is loaded for what it keeps" if _refused else ""
     folder = _own_choice()
     if folder is None:
         reason = "no home folder"
@@ -108,6 +109,7 @@ def why_nothing_is_kept() -> str:
 _BARE = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _INSIDE_EACH = {"forceinline": True}
 _refused: list[str] = []  # why loops of this process are compiled without them
+_places: set[Path] = set()  # where numba keeps what it compiled of this process; each serves
 
 
 def _compiled_by_numba(function: Callable[..., Any], **options: bool) -> Any:
@@ -119,15 +121,14 @@ def _compiled_by_numba(function: Callable[..., Any], **options: bool) -> Any:
 
 
 def _forget_unreadable() -> None:
-    """Remove numba's lists of what it keeps of this package that name a class where it is no longer."""
-    chosen = os.environ.get("NUMBA_CACHE_DIR")
-    for place in (Path(__file__).parents[1], *([Path(chosen)] if chosen else [])):
-        for listed in place.rglob("*.nbi"):
+    """Remove numba's lists of what it keeps of loops of this process that name a class where it is no longer."""
+    for listed in (path for place in _places for path in place.glob("*.nbi")):
+        with suppress(OSError):
             try:
                 with listed.open("rb") as file:
                     pickle.load(file)  # of which numba
                     pickle.load(file)
-            except _UNREADABLE:
+            except (*_UNREADABLE, EOFError):
                 listed.unlink(missing_ok=True)
 
 
@@ -162,6 +163,7 @@ class Loop:
             kept = _compiled_by_numba(function, cache=True)
             place = getattr(getattr(kept, "stats", None), "cache_path", None)
             if place is not None and not hand_of_others(Path(place)):
+                _places.add(Path(place))
                 return kept
         return _compiled_by_numba(function)
 

@@ -78,13 +78,8 @@ def discretise(F: FloatArray, q: FloatArray, step_s: float) -> tuple[FloatArray,
     """
     n = len(F)
     transition, noise = np.empty((n, n)), np.empty((n, n))
-    _series(np.ascontiguousarray(F), q, step_s, transition, noise, np.zeros((ROOMS, n, n)))
+    fill_step(n, np.ascontiguousarray(F), q, step_s, transition, noise, np.zeros((ROOMS, n, n)))
     return transition, noise
-
-
-@in_place
-def _series(F: FloatArray, q: FloatArray, step_s: float, phi: FloatArray, noise: FloatArray, room: FloatArray) -> None:
-    fill_step(len(F), F, q, step_s, phi, noise, room)
 
 
 def local_dynamics(velocity_s: float, baro_s: float, clock_s: float) -> FloatArray:

@@ -28,10 +28,10 @@ from groundstation.estimators.inertial.velocity_changes import (
     turned,
 )
 from groundstation.methods.ins_noise import RADPS_PER_DPH
+from groundstation.methods.intervals import BOUND95
 from groundstation.results.inertial import AzimuthEstimate, EarlyAzimuth
 
 ITERATIONS = 3  # what the filter had taken for tilt in earlier turns shrinks by ten or more each time
-BOUND95 = 1.959963984540054
 AZIMUTH_PRIOR_RAD = 1.0  # no knowledge
 EARLY_S = 3600.0  # of turns that tell the azimuth on taxi: it oscillates over 24 h
 S_PER_H, LEAST_PRODUCT = 3600.0, 1e-300

@@ -6,10 +6,9 @@ import numpy as np
 
 from groundstation.estimators.inertial.differences import Differences
 from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.tables.ins_kind import AIDED, HALF, UNAIDED, UNKNOWN
+from groundstation.tables.ins_kind import AIDED, HALF, STATED, UNAIDED, UNKNOWN
 
 WHY_NOT = {AIDED: "GNSS corrects this INS already", UNKNOWN: "it is not known whether GNSS corrects this INS"}
-STATED = (UNAIDED, AIDED)
 MINUTE_S, LEAST_MINUTES = 60.0, 5.0
 AT_REST_MPS = 5.0
 DRIFT_MPS = 0.005  # an INS that stays below has not drifted: 0.01 nmi/h

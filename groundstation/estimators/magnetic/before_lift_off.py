@@ -191,9 +191,8 @@ def _speed_min_mps(part: Flight, basis: HeadingBasis, settings: MagneticSettings
     """Least speed by the velocity error allowed for, or by that which the receiver states where it is larger."""
     stated = np.zeros(0)
     with suppress(NotAssessableError):  # said when system 1 is run
-        stated = part[choose_pair(part, basis.request.ins_topic, basis.request.gnss_topic)[1]].values(
-            "velocity_sigma_mps"
-        )
+        _ins, gnss = choose_pair(part, basis.request.ins_topic, basis.request.gnss_topic)
+        stated = part[gnss].values("velocity_sigma_mps")
     stated = stated[np.isfinite(stated)]
     error_mps = max(settings.gnss_velocity_error_mps, float(np.median(stated)) if stated.size else 0.0)
     return min(least_speed_mps(error_mps, settings.track_error_max_deg), NO_LIMIT_MPS)

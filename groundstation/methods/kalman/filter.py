@@ -1,7 +1,7 @@
 """Kalman filter and smoother of any linear system with scalar measurements, at the cost of its entries.
 
 The frozen types hold arrays; the loops over them are compiled (``runs``, ``smoother_runs``). A compiled loop of another
-room may call their parts (``kernels``) itself.
+folder may call their parts (``kernels``) itself.
 """
 
 from dataclasses import dataclass, field

@@ -1,6 +1,6 @@
 """Compiled parts of the Kalman filter: predict, innovate, update. Functions on arrays that other compiled loops call.
 
-Letters, the same in all of this room:
+Letters, the same in all of this folder:
 
 =======  ==========================================================================================
 x        states, shape (c, n): c right-hand sides share one covariance; c = 0 is covariance alone

@@ -43,7 +43,7 @@ class TaxiLimits(Protocol):
 
 @dataclass(frozen=True)
 class GroundLimits:
-    """Limits of the paper, for headings that are not those of system 1.
+    """Limits of taxi, for other headings than that of an INS; those of the paper are speeds, rate and dilution.
 
     Source: Markelov, Kostishin, Shukalov, Heading correction of an INS before take-off by satellite navigation, 2015.
     """

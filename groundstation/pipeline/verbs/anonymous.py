@@ -29,6 +29,7 @@ from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.methods.ins_noise import class_names
 from groundstation.tables.headings import positions_for
+from groundstation.tables.ins_kind import STATED
 from groundstation.tables.phases import ALWAYS_ON_GROUND, YES
 from groundstation.tables.table import Flight
 
@@ -41,7 +42,6 @@ NAMED = frozenset(("link", "adf"))  # topics whose second part is the name of an
 MAGNETIC_HEADING = "magnetic_heading_deg"
 COLUMNS_LEFT_OUT = frozenset(("frequency_mhz", "course_magnetic_deg"))  # of a localizer: it is found by them
 WORDS = frozenset(("mode", "constellation", "fix"))  # text of a few fixed words
-INS_KINDS = ("gnss_aided", "unaided")
 ORIGINS = ("magnetic", "land")  # what analyses look for in the text that tells what a field was derived from
 ANONYMOUS, ZERO_EVENT = "anonymous", "flight time zero"
 LEAST_SHIFT_DEG, WEEKS, FORWARD_BEFORE_YEAR = 10.0, (26, 300), 2018  # models of the field serve 2010 to 2029
@@ -66,7 +66,7 @@ def _word_of(*words: str) -> Callable[[str], str]:
 
 _FACTS: Mapping[str, Callable[[str], str]] = MappingProxyType(
     {
-        "ins_kind": _word_of(*INS_KINDS),
+        "ins_kind": _word_of(*STATED),
         "ins_class": lambda text: _word_of(*class_names())(text),
         ALWAYS_ON_GROUND: _word_of(*YES),
         **dict.fromkeys(("clip.zero_s", "clip.from_s", "clip.to_s"), _number),
