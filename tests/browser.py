@@ -58,7 +58,7 @@ class Browser:
         self.told.clear()
         self.ask("Page.navigate", url=page.absolute().as_uri())
         while not any(event["method"] == "Page.loadEventFired" for event in self.told):
-            self._event()
+            self._note(self._message())
 
     def run(self, script: str) -> Any:
         """Run a script in the page, a promise to its end; returns what JSON holds of its value."""
@@ -96,9 +96,6 @@ class Browser:
                     raise BrowserError(f"{method}: {answer['error']['message']}")
                 return dict(answer["result"])
             self._note(answer)
-
-    def _event(self) -> None:
-        self._note(self._message())
 
     def _note(self, message: Mapping[str, Any]) -> None:
         if "method" in message:

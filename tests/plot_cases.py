@@ -1,4 +1,4 @@
-"""Results whose plots are compared with what the drawers paint, each made once."""
+"""Results with plots of every kind, each made once."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -107,12 +107,16 @@ def write_text(path: Path, text: str, *, is_synced: bool = True) -> None:
 
     A lone surrogate (a file name that is not UTF-8) is written as its escape, which JSON reads back as it was.
     """
-    write_bytes(path, text.encode("utf-8", "backslashreplace"), is_synced=is_synced)
+    write_bytes(path, _encoded(text), is_synced=is_synced)
 
 
 def has_text(path: Path, text: str) -> bool:
     """Tell whether a file holds what :func:`write_text` would write."""
-    return path.is_file() and path.read_bytes() == text.encode("utf-8", "backslashreplace")
+    return path.is_file() and path.read_bytes() == _encoded(text)
+
+
+def _encoded(text: str) -> bytes:
+    return text.encode("utf-8", "backslashreplace")
 
 
 def write_bytes(path: Path, content: bytes, *, is_synced: bool = True) -> None:
