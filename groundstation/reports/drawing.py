@@ -36,6 +36,11 @@ class Drawing(Part):
     name: str = ""
 
 
+def plot_of(plots: Mapping[str, Callable[..., Plot | None]], figure: Figure, results: object) -> Plot | None:
+    """The plot of a figure of a chapter; None where there is nothing to show."""
+    return plots[figure.name](results, *((figure.of,) if figure.of else ()))
+
+
 def drawing_of(plot: Plot | None, name: str = "") -> Drawing | None:
     """The part of a report that shows a plot, by its name or another; None of no plot."""
     if plot is None:
@@ -53,5 +58,4 @@ def _drawn(plots: Mapping[str, Callable[..., Plot | None]], part: Part, results:
     if not isinstance(part, Figure):
         return part
     name = ".".join(filter(None, (part.name, part.of)))
-    told = (part.of,) if part.of else ()
-    return attempt("figure", name, lambda: drawing_of(plots[part.name](results, *told), name))
+    return attempt("figure", name, lambda: drawing_of(plot_of(plots, part, results), name))

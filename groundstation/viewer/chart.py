@@ -67,14 +67,16 @@ class Axis:
         ['0', '20', '40', '60', '80', '100', '120']
         >>> [text for _, text in Axis("RMS, m", 5.0, 300.0, "log").ticks()]
         ['5', '10', '20', '50', '100', '200']
+        >>> [text for _, text in Axis("a, m", 3.2, 4.5, "log").ticks()]
+        ['3.2', '3.4', '3.6', '3.8', '4', '4.2', '4.4']
         >>> [text for _, text in Axis("flight time", 50.0, 200.0, "time").ticks()]
         ['1:00', '1:30', '2:00', '2:30', '3:00']
         """
         if self.texts:
             return tuple(one for one in self.texts if np.isfinite(self.share(np.array([one[0]]))[0]))
         low, high = min(self.low, self.high), max(self.low, self.high)
-        if self.scale == "log":
-            return tuple((place, f"{place:g}") for place in _of_decades(low, high))
+        if self.scale == "log" and len(places := _of_decades(low, high)) > 1:
+            return tuple((place, f"{place:g}") for place in places)
         if self.scale == "symlog":
             sizes = [size for size in _of_decades(self.linear_to, max(abs(low), high)) if size >= self.linear_to]
             places = [*(-size for size in reversed(sizes)), 0.0, *sizes]

@@ -22,8 +22,8 @@ from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray
 
 HEIGHT = 100.0  # of a box, which is 160 wide
-SYMBOL, NOW = 4.0, 5.0  # radii in points of the screen
-BEHIND, STEP = 1.0, 0.1  # where the first mark stands before the grid, the next one before it
+SYMBOL, HERE = 4.0, 5.0  # radii in points of the screen
+FIRST, STEP = 1.0, 0.1  # where the first mark stands before the grid, the next one before it
 BESIDE = 6.0  # room of a label above its place
 ROW = 0.25  # half the height of a lane
 COLOURS = 24  # of a scale of cells
@@ -41,7 +41,7 @@ def chart_view(
     places = {id(mark): place for place, mark in enumerate(shown.marks)}
     for kind, group in groupby(shown.marks, key=type):
         several = list(group)
-        order = BEHIND + STEP * places[id(several[0])]
+        order = FIRST + STEP * places[id(several[0])]
         draw: Callable[[Chart, str, list[Any], float], None] = _DRAWN[kind]
         draw(chart, f"{places[id(several[0])]:02d}_{kind.__name__.lower()}", several, order)
     named = {mark.name: colours.ROLES[mark.role] for mark in shown.marks if mark.name}
@@ -158,11 +158,11 @@ def _limits(chart: Chart, name: str, several: list[marks.Limit], order: float) -
 
 def _bars(chart: Chart, name: str, several: list[marks.Bars], order: float) -> None:
     drawn = []
-    for mark in several:
+    for place, mark in enumerate(several):
         for x, y, half in zip(mark.x, mark.y, np.nan_to_num(mark.half), strict=True):
             line = _line(mark, 0.5 * colours.LINE["thin"])
             drawn.append((np.full(2, x), chart.y.within(np.array([y - half, y + half])), line))
-        chart.dots(f"{name}/values", mark.x, mark.y, _line(mark, SYMBOL), order + STEP)
+        chart.dots(f"{name}/values/{place}", mark.x, mark.y, _line(mark, SYMBOL), order + STEP)
     chart.curves(name, drawn, order=order)
 
 
@@ -220,7 +220,7 @@ def _told(chart: Chart, name: str, several: list[marks.Told], _: float) -> None:
     """Log a mark that is where the aircraft is at the cursor, where the description tells flight time."""
     for mark in several:
         if mark.is_time:
-            chart.moving(name, mark.value, mark.x, mark.y, Line("", colours.PAPER, NOW))
+            chart.moving(name, mark.value, mark.x, mark.y, Line("", colours.PAPER, HERE))
 
 
 def _label(chart: Chart, name: str, labels: list[tuple[FloatArray, str, Colour]]) -> None:

@@ -5,7 +5,7 @@ import numpy as np
 from groundstation.base.units import DOTS_PER_FULL_SCALE
 from groundstation.chapters.plots.common import M_PER_KM, has_values
 from groundstation.plots.axes import ZERO, broken_time_axis, time_axis
-from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit, Points, Role
+from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit, Points, Role, Told
 from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import padded
 from groundstation.results.arrays.landing import LandingPath, LandingProtection
@@ -64,6 +64,8 @@ def _deviation(own: LandingPath, guided: Floats, placed: Floats, dot_m: Floats, 
     marks += [ZERO, THRESHOLD]
     marks.append(Dots(x=distance_km, y=placed, role="unused", name="height" if is_vertical else "positions"))
     marks.append(Curve(x=distance_km, y=guided, role="ins", name="guidance"))
+    flown = guided if np.isfinite(guided).any() else placed
+    marks.append(Told(x=distance_km, y=flown, value=own.time_s, title="", is_time=True))
     reach = _reach(guided, placed, own.distance_m > 0.0)
     ticks = [tick for tick in TICKS_M if tick <= reach]
     y = Axis(

@@ -1,12 +1,11 @@
 """Plots of a flight's report by the names that notebooks know them by."""
 
-from typing import Any
-
 from groundstation.base.failures import attempt
 from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.parts import Figure
 from groundstation.chapters.plots import PLOTS
 from groundstation.plots.plot import Plot
+from groundstation.reports.drawing import plot_of
 from groundstation.reports.sections import told_sections
 from groundstation.results.files import SavedFlight
 
@@ -49,6 +48,5 @@ def name_of(figure: Figure) -> str:
 
 
 def _told(figure: Figure, saved: SavedFlight) -> Plot | None:
-    describe: Any = PLOTS[figure.name]
-    of = (figure.of,) if figure.of else ()
-    return attempt("figure", ".".join((figure.name, *of)), describe, saved.results, *of)
+    name = ".".join(filter(None, (figure.name, figure.of)))
+    return attempt("figure", name, plot_of, PLOTS, figure, saved.results)

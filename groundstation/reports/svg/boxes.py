@@ -10,8 +10,7 @@ from groundstation.plots import extents
 from groundstation.plots.marks import Cells, Floats
 from groundstation.plots.plot import WIDTH_MM, Panel, Plot, Row
 from groundstation.plots.scales import Span
-from groundstation.reports.live import TIME
-from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, label, lines_of, width_pt
+from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, TITLE_PT, label, lines_of, width_pt
 from groundstation.reports.svg.legend import LINE_PT, Entry, above, beside_pt, entries_of
 from groundstation.reports.svg.ticks import Tick, own_ticks, ticks_of
 
@@ -289,7 +288,7 @@ def _placed(told: _Told, left: float, width: float, height: float, gap: float) -
                 y_ticks=ticks,
                 has_x_texts=told.has_x_texts,
                 has_y_texts=has_own or not place,
-                x_title=x_title(panel, window) if told.has_x_texts and is_widest else "",
+                x_title=label(panel.x.title, MOST_OF_A_TITLE) if told.has_x_texts and is_widest else "",
                 y_title="" if place else label(panel.y.title, MOST_OF_A_TITLE),
             )
         )
@@ -297,7 +296,7 @@ def _placed(told: _Told, left: float, width: float, height: float, gap: float) -
     title = label(panel.title, MOST_OF_A_TITLE)
     lines = above(told.entries, width) if panel.legend == "above" else ()
     taken = sum(entry.width_pt for entry in lines[0]) if lines else 0.0
-    has_own_line = bool(title and lines) and (len(lines) > 1 or width_pt(title, 8.5, True) + taken + 10.0 > width)
+    has_own_line = bool(title and lines) and (len(lines) > 1 or width_pt(title, TITLE_PT, True) + taken + 10.0 > width)
     return Placed(panel, tuple(boxes), title, told.entries, lines, has_own_line, told.has_scale)
 
 
@@ -305,13 +304,6 @@ def _x_ticks(panel: Panel, span: Span, width: float) -> tuple[Tick, ...]:
     if panel.x.names:
         return tuple((place, label(name, 24)) for place, name in panel.x.names if np.isfinite(place))
     return own_ticks(panel.x.ticks) if panel.x.ticks else ticks_of(span, width, is_upright=False)
-
-
-def x_title(panel: Panel, span: Span) -> str:
-    """The title of the horizontal axis; of flight time with the units that its numbers have."""
-    if panel.x.scale == "time" and panel.x.title in ("", TIME):
-        return f"{TIME}, h:min:s" if max(span.low, span.high) >= 3600.0 else f"{TIME}, min:s"
-    return label(panel.x.title, MOST_OF_A_TITLE)
 
 
 def _above_pt(one: Placed) -> float:

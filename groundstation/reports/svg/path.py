@@ -45,7 +45,7 @@ def hundredths(values: Floats) -> Steps:
     return np.rint(100.0 * np.clip(values, -FAR_PT, FAR_PT)).astype(np.int64)
 
 
-def polyline(x: Floats, y: Floats, starts: NDArray[np.bool_], *, is_closed: bool = False) -> str:
+def polyline(x: Floats, y: Floats, starts: NDArray[np.bool_]) -> str:
     """Path through finite places, a new piece where ``starts`` says; one place alone is a stroke of no length.
 
     Parameters
@@ -70,10 +70,6 @@ def polyline(x: Floats, y: Floats, starts: NDArray[np.bool_], *, is_closed: bool
     for first, last in zip(begins.tolist(), ends.tolist(), strict=True):
         rest = "l" + words(steps[first + 1 : last]).lstrip() if last - first > 1 else NO_LENGTH
         parts.append("m" + words(steps[first : first + 1]).lstrip() + rest)
-        if is_closed:
-            parts.append("z")
-            if last < len(places):  # behind the end of a closed piece the pen is at its beginning
-                steps[last] += places[last - 1] - places[first]
     return "M" + "".join(parts)[1:]
 
 

@@ -35,7 +35,7 @@ def ticks_of(span: Span, length_pt: float, *, is_upright: bool) -> tuple[Tick, .
     if span.scale == "date":
         return date_ticks(low, high, length_pt)
     if span.scale == "log":
-        return _log(span, low, high, length_pt, is_upright)
+        return _log(low, high, length_pt, is_upright)
     if span.scale == "symlog":
         return _symlog(span, length_pt, is_upright)
     if span.scale == "angle":
@@ -129,7 +129,7 @@ def _clock(seconds: float, places: int) -> str:
     return sign + clock(whole) + (part[1:] if places else "")
 
 
-def _log(span: Span, low: float, high: float, length_pt: float, is_upright: bool) -> tuple[Tick, ...]:
+def _log(low: float, high: float, length_pt: float, is_upright: bool) -> tuple[Tick, ...]:
     decades = math.log10(high) - math.log10(low)
     room = UPRIGHT_PT if is_upright else ROOM_PT
     per_decade = length_pt / decades / room

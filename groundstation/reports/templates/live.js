@@ -13,10 +13,10 @@
   const HINT = matchMedia("(pointer: fine)").matches ? "drag to zoom, double-click to go back" : "";
   const timed = []; // plots over flight time: their axes move together
   const colourOf = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const INKS = { "#1c2530": "--ink", "#6b7683": "--faint", "#cfe5dd": "--fill" };
+  const INKS = { "#1c2530": "--ink", "#6b7683": "--faint" };
   const shown = (colour) => {
-    const name = INKS[colour.length === 9 && colour.endsWith("ff") ? colour.slice(0, 7) : colour];
-    return name ? colourOf(name) : colour;
+    const name = INKS[colour.slice(0, 7)];
+    return name ? colourOf(name) + colour.slice(7) : colour; // as opaque as it was
   };
 
   const clock = (seconds) => {

@@ -1,7 +1,5 @@
 """Landing: every final in space with the corridors of the categories, deviations, protection levels, the chapter."""
 
-from dataclasses import replace
-
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
@@ -9,8 +7,6 @@ import rerun.blueprint as rrb
 from groundstation.chapters.landing import landing as chapter
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.plots.landing import motion
-from groundstation.plots.marks import Told
-from groundstation.plots.plot import Plot
 from groundstation.results.arrays.landing import LandingPath
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing import Approach, LandingResult
@@ -24,7 +20,6 @@ from groundstation.viewer.views import document
 SEEN_M = 6_000.0  # of the final, before the threshold
 ENLARGED = 10.0  # across and up against along: corridors of metres along kilometres
 MARK, TRAIL, EDGE = 6.0, 2.0, 0.8  # radii in points of the screen
-M_PER_KM = 1000.0
 MOST_APPROACHES = 6
 SHADES = dict(zip((one.name for one in CATEGORIES), (colours.ORANGE, colours.PINK, colours.YELLOW_GREEN), strict=True))
 SPACE_NAME = (
@@ -51,7 +46,7 @@ def _approach(recorder: Recorder, results: FlightResults, one: Approach, data: L
     left += [view for run in runs_of(recorder, motion(results, str(one.number)), f"{path}/motion") for view in run]
     told = plot_of("landing.protection", results, str(one.number))
     left += panels_of(recorder, told, of="Protection levels", height=70.0)
-    right = panels_of(recorder, _deviations(results, one, flown), height=110.0)
+    right = panels_of(recorder, plot_of("landing.deviations", results, str(one.number)), height=110.0)
     shares = [2.0, *[1.0] * (len(left) - 1)]
     columns = [rrb.Vertical(contents=left, row_shares=shares), rrb.Vertical(contents=right)]
     contents = [view for view, has in zip(columns, (left, right), strict=True) if has]
@@ -105,18 +100,3 @@ def _space(recorder: Recorder, path: str, flown: LandingPath) -> list[rrb.View]:
     recorder.stream.send_columns(f"{path}/aircraft", indexes, rr.Points3D.columns(positions=place))
     recorder.static(path, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     return [rrb.Spatial3DView(name=SPACE_NAME, origin=f"/{path}")]
-
-
-def _deviations(results: FlightResults, one: Approach, flown: LandingPath) -> Plot | None:
-    """The plot of the deviations, with a mark that is where the aircraft was: by the guidance, else by positions."""
-    told = plot_of("landing.deviations", results, str(one.number))
-    if told is None:
-        return None
-    height = np.where(flown.distance_m > 0.0, flown.height_m - flown.path_height_m, np.nan)
-    places = (flown.lateral_guidance_m, flown.across_m), (flown.vertical_guidance_m, height)
-    rows = []
-    for row, (guided, placed) in zip(told.rows, places, strict=True):
-        y = guided if np.isfinite(guided).any() else placed
-        mark = Told(x=flown.distance_m / M_PER_KM, y=y, value=flown.time_s, title="flight time", is_time=True)
-        rows.append(replace(row, panels=tuple(replace(panel, marks=(*panel.marks, mark)) for panel in row.panels)))
-    return replace(told, rows=tuple(rows))
