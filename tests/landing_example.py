@@ -4,10 +4,10 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from groundstation.estimators.known import Beacon, Known, Runway, SiteData
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.landing_aids import RunwayPlaces, runway_places
 from groundstation.simulation.scenario import Scenario, load_scenario
+from groundstation.systems.known import Beacon, Known, Runway, SiteData
 from groundstation.tables.phases import flight_phases
 
 BEACONS = (Beacon("outer", 4000.0), Beacon("inner", 1000.0), Beacon("side", 0.0, 500.0))

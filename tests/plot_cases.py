@@ -16,7 +16,6 @@ from groundstation.estimators.control.plan import plan_session
 from groundstation.estimators.control.scenario import KeepOut
 from groundstation.estimators.cooperative.analysis import COOPERATIVE, SessionKnown
 from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
-from groundstation.estimators.plan import Planned
 from groundstation.pipeline.one_flight.analyse import Given, analyse, run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
@@ -32,6 +31,7 @@ from groundstation.results.landing import LandingResult
 from groundstation.results.reference import ReferenceResult
 from groundstation.results.together import Together
 from groundstation.simulation.session import simulate_session
+from groundstation.systems.plan import Planned
 from groundstation.tables.table import Flight
 from tests import report_example, viewer_example
 from tests.inertial_example import aided_figures, forecast_result, inertial_result

@@ -13,15 +13,15 @@ from groundstation.base.findings import Finding
 from groundstation.chapters.acceptance import sections
 from groundstation.chapters.acceptance_front import front
 from groundstation.cli.main import app
-from groundstation.estimators.fleet.acceptance import CORRELATION_CONFIDENCE, judge
-from groundstation.estimators.fleet.confidence import (
+from groundstation.methods.fleet.acceptance import CORRELATION_CONFIDENCE, judge
+from groundstation.methods.fleet.confidence import (
     correlation_within,
     effective_flights,
     flights_needed,
     order_bound,
     share_low,
 )
-from groundstation.estimators.fleet.ins_errors import growth_of, ins_errors
+from groundstation.methods.fleet.ins_errors import growth_of, ins_errors
 from groundstation.pipeline.many_flights.acceptance import STANDARDS, accept, accept_to, read_standard
 from groundstation.results.acceptance import ENSEMBLE, UNKNOWN_INS, Bound, FlightError, Limit, Standard
 from tests.acceptance_example import save_fleet, save_flight

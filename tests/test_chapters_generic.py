@@ -7,19 +7,10 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from groundstation.chapters.by_answer import (
-    FLIGHT_CHAPTERS,
-    PLAN_CHAPTERS,
-    SESSION_CHAPTERS,
-    chapters_of,
-    without_chapter,
-)
 from groundstation.chapters.generic import MOST_ROWS, figures_over_time, generic
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Facts, Section
-from groundstation.chapters.plots import PLOTS
 from groundstation.chapters.plots.generic import series
-from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES, PLANS, SESSION_ANALYSES
 from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.results.answer import Answer, by_analysis
 from groundstation.results.columns import AnswerColumn
@@ -28,9 +19,10 @@ from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults
 from groundstation.results.heading import Gate
 from groundstation.results.manifest import Manifest
-from groundstation.viewer.recording import ANSWER_TABS, SHOWN_ELSEWHERE
+from groundstation.systems import systems
 from tests.report_example import example, heading_result
 from tests.section_contents import facts, grid, notes, row, rows, titles, tones
+from tests.told import PLOTS, chapters_of, without_chapter
 
 NAN = float("nan")
 
@@ -196,26 +188,24 @@ def test_an_answer_with_a_chapter_has_no_second_one(tmp_path: Path) -> None:
     assert [answer.analysis for answer in without_chapter(results)] == ["wind"]
     assert [section.key for section in chapters_of(results)][-1] == "wind"
     save(tmp_path, results, Manifest())
-    assert without_chapter(load(tmp_path, ANSWER_TYPES).results) == ()  # a type that nobody named is left out
-    (back,) = without_chapter(load(tmp_path, {**ANSWER_TYPES, "wind": Wind}).results)
+    assert without_chapter(load(tmp_path, systems().answer_types).results) == ()  # a type that nobody named is left out
+    (back,) = without_chapter(load(tmp_path, {**systems().answer_types, "wind": Wind}).results)
     live, saved = generic(results, wind()), generic(load(tmp_path, {"wind": Wind}).results, back)
     assert markdown(saved) == markdown(live)
     assert titles(saved) == titles(live)
 
 
 def test_every_shipped_answer_has_a_chapter_of_its_own() -> None:
-    own = {kind for chapter in (*FLIGHT_CHAPTERS, *SESSION_CHAPTERS, *PLAN_CHAPTERS) for kind in chapter.answers}
-    planned = {kind for plan in PLANS for kind in plan.answers}
-    assert own == {analysis.answer for analysis in (*FLIGHT_ANALYSES, *SESSION_ANALYSES)} | planned
+    assert set(systems().chapters.told) == set(systems().answer_types.values())
     assert by_analysis(wind())["wind"] == wind()
 
 
 def test_tabs_name_analyses_that_there_are() -> None:
-    named = [*SHOWN_ELSEWHERE, *(name for _, names in ANSWER_TABS for name in names)]
-    assert sorted(named) == sorted({analysis.name for analysis in FLIGHT_ANALYSES})
+    named = [name for tab in systems().tabs for name in tab.shows]
+    assert sorted(named) == sorted(systems().answer_types)
 
 
 def test_a_column_without_a_field_is_refused_where_the_analysis_is_defined() -> None:
-    heading = next(analysis for analysis in FLIGHT_ANALYSES if analysis.name == "heading")
+    heading = next(analysis for analysis in systems().analyses if analysis.name == "heading")
     with pytest.raises(TypeError, match="HeadingResult has no field for the columns eror_deg"):
         replace(heading, columns=(AnswerColumn("eror_deg", "number", "misspelt"),))

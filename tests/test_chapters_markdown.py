@@ -2,13 +2,13 @@
 
 import pytest
 
-from groundstation.chapters.front import front
 from groundstation.chapters.heading import heading
 from groundstation.chapters.markdown import escaped, front_markdown, markdown, part_markdown
 from groundstation.chapters.parts import Cell, Facts, Figure, Front, Grid, Head, Mark, Note, Section
 from groundstation.results.flight import NotAssessable
 from tests.markup import MARKDOWN, foreign_markup
 from tests.report_example import example, heading_result
+from tests.told import front
 
 HEADS = (Head("State"), Head("Gate"), Head("Figure", True), Head("Reason"))
 LONG = "a remark that is far longer than a cell of a panel that does not wrap"

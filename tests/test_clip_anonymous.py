@@ -14,7 +14,6 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.errors import UsageError
 from groundstation.base.records import Column, RecordBatch
 from groundstation.cli.main import app
-from groundstation.estimators.analyses import FLIGHT_ANALYSES
 from groundstation.pipeline.one_flight.analyse import known_of, run_analyses, seen_by_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
@@ -26,6 +25,7 @@ from groundstation.results.answer import Answer
 from groundstation.store.info import StoreInfo
 from groundstation.store.reader import read_info
 from groundstation.store.writer import StoreWriter
+from groundstation.systems import systems
 from groundstation.tables.headings import true_heading
 from groundstation.tables.table import Flight
 from tests.inertial_flights import batch_of, flight_of, without_rows
@@ -64,7 +64,7 @@ def answer(flight: Flight, name: str) -> Answer:
     """What an analysis says of a flight; it fails where it says nothing."""
     configuration = Configuration({"heading": {"runs": "all_ground"}})  # a recorded log taxies straight after landing
     seen = seen_by_analyses(flight, configuration)
-    (analysis,) = (one for one in FLIGHT_ANALYSES if one.name == name)
+    (analysis,) = (one for one in systems().analyses if one.name == name)
     found = run_analyses((analysis,), seen, known_of(seen, configuration))
     assert name in found.answers, found.reasons
     answered: Answer = found.answers[name]

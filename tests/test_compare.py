@@ -16,7 +16,6 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.cli.main import app
-from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.many_flights.inputs import collect
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job, run_flight
@@ -32,6 +31,7 @@ from groundstation.results.inertial import InertialResult, RealOutage
 from groundstation.results.manifest import Manifest
 from groundstation.results.summary import summary_of
 from groundstation.simulation.samples import write_scenario
+from groundstation.systems import systems
 from groundstation.viewer.comparison import write_comparison
 from tests.inertial_example import inertial_result
 from tests.recording_contents import Contents
@@ -222,7 +222,7 @@ def lanes(**columns: Any) -> FigureData:
 
 def saved_with(figures: dict[str, FigureData], inertial: InertialResult | None = None) -> SavedFlight:
     document = summary_of(replace(make_results(make_flight()), answers=by_analysis(inertial), figures=()))
-    return SavedFlight(Path("x"), document, Manifest(), figures, ANSWER_TYPES)
+    return SavedFlight(Path("x"), document, Manifest(), figures, systems().answer_types)
 
 
 @pytest.mark.parametrize(

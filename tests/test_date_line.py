@@ -18,22 +18,22 @@ from rerun.experimental import ViewerClient
 from groundstation.base.ecef import ecef_from_n, ecef_m
 from groundstation.base.geodesy import continuous_longitude_deg, north_east_m, plan_north_east_m
 from groundstation.base.local_frame import plane_through
-from groundstation.estimators.fleet.ins_errors import ins_errors
 from groundstation.exports.gpx import write_gpx
 from groundstation.exports.kml import write_kml
 from groundstation.exports.tracks import Track
+from groundstation.methods.fleet.ins_errors import ins_errors
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.flight import FlightResults
 from groundstation.simulation.approach import TrueRunway, simulate_approach
 from groundstation.viewer import colours
 from groundstation.viewer.recorder import Recorder
-from groundstation.viewer.recording import write_recording
 from groundstation.viewer.tabs import track as track_tab
 from groundstation.viewer.tabs.track import MAP_LATITUDE_DEG, zoom_of
 from tests.figure_arrays import filled
 from tests.recording_contents import Contents
 from tests.test_approaches import EXACT, PLAIN, only
+from tests.told import write_recording
 from tests.viewer_example import make_flight, make_results
 from tests.viewer_shots import SATURATED, colourful, picture, settled
 

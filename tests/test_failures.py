@@ -13,15 +13,13 @@ import rerun.blueprint as rrb
 from groundstation.base.failures import Failure, attempt, failures, gathered_failures, reason_of
 from groundstation.base.ledger import Ledger
 from groundstation.chapters import by_answer
+from groundstation.chapters.chapter import Chapters
 from groundstation.chapters.fleet import CHAPTERS as FLEET_CHAPTERS
 from groundstation.chapters.parts import Figure, Note, Section
-from groundstation.chapters.plots import PLOTS
 from groundstation.chapters.plots.acceptance import JUDGED
 from groundstation.chapters.plots.comparison import COMPARED
 from groundstation.chapters.plots.fleet import FLEET_PLOTS
 from groundstation.cli.main import main
-from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
-from groundstation.estimators.analysis import Analysis
 from groundstation.pipeline.many_flights import publishing
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.one_flight import analyse as analysing
@@ -30,16 +28,22 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports import comparison, drawing, fleet_report, sections
 from groundstation.reports.drawing import drawn_by
-from groundstation.results.answer import Answer
+from groundstation.results.answer import Answer, PlanAnswer
 from groundstation.results.files import load_document, put_failures, save
+from groundstation.results.flight import FlightResults
+from groundstation.systems import systems
+from groundstation.systems.analysis import Analysis
+from groundstation.systems.system import Tab
 from groundstation.tables.table import Flight
 from groundstation.viewer import comparison as viewer_comparison
 from groundstation.viewer import fleet as viewer_fleet
 from groundstation.viewer import plan as viewer_plan
 from groundstation.viewer import recording
+from groundstation.viewer.recorder import Recorder
 from tests.recording_contents import Contents
 from tests.report_example import MANIFEST, example, heading_result
 from tests.saved import load, write_flight_report
+from tests.told import PLOTS, answer_chapters, flight_document, flight_sections, shipped_but, write_recording
 from tests.viewer_example import make_flight, make_results
 
 SAMPLE = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv"
@@ -117,14 +121,14 @@ def changed(listed: tuple[Analysis, ...], name: str, **parts: Callable[..., Any]
 
 
 @pytest.mark.parametrize("part", ["run", "applies"])
-@pytest.mark.parametrize("name", [one.name for one in FLIGHT_ANALYSES])
+@pytest.mark.parametrize("name", [one.name for one in systems().analyses])
 def test_an_analysis_that_fails_leaves_the_others(name: str, part: str, monkeypatch: pytest.MonkeyPatch) -> None:
     flight = bare()
     before = analysing.answers_of(flight, Configuration())[0]
-    requires = {one.name: {*one.requires} for one in FLIGHT_ANALYSES}
+    requires = {one.name: {*one.requires} for one in systems().analyses}
     always: dict[str, Any] = {"requires": (), "applies": lambda *_: True}
-    with_it = changed(FLIGHT_ANALYSES, name, **(always if part == "run" else {}), **{part: fails})
-    monkeypatch.setattr(analysing, "FLIGHT_ANALYSES", with_it)
+    with_it = changed(systems().analyses, name, **(always if part == "run" else {}), **{part: fails})
+    monkeypatch.setattr(analysing, "systems", lambda: shipped_but(analyses=with_it))
     with pytest.raises(ZeroDivisionError):
         analysing.answers_of(flight, Configuration())
     with gathered_failures():
@@ -138,30 +142,30 @@ def test_an_analysis_that_fails_leaves_the_others(name: str, part: str, monkeypa
     assert {one: found.reasons[one] for one in kept} == {one: before.reasons[one] for one in kept}
 
 
-@pytest.mark.parametrize("name", [one.name for one in SESSION_ANALYSES])
+@pytest.mark.parametrize("name", [one.name for one in systems().session_analyses])
 def test_an_analysis_of_a_session_that_fails_leaves_the_others(name: str) -> None:
     from groundstation.estimators.cooperative.analysis import SessionKnown
 
     known = SessionKnown(settings=Configuration().settings.analyses)
     with gathered_failures():
-        found = analysing.run_analyses(changed(SESSION_ANALYSES, name, run=fails), None, known)
+        found = analysing.run_analyses(changed(systems().session_analyses, name, run=fails), None, known)
     assert [one.analysis for one in found.not_assessable] == [name] and found.reasons[name] == REASON
 
 
-@pytest.mark.parametrize("name", [one.name for one in FLIGHT_ANALYSES])
+@pytest.mark.parametrize("name", [one.name for one in systems().analyses])
 def test_damage_checks_lines_and_columns_that_fail_leave_the_rest(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     results = replace(ANSWERED, answers={})
-    monkeypatch.setattr(running, "FLIGHT_ANALYSES", changed(FLIGHT_ANALYSES, name, sentence=fails))
+    with_it = changed(systems().analyses, name, sentence=fails)
+    monkeypatch.setattr(running, "systems", lambda: shipped_but(analyses=with_it))
     with gathered_failures():
         assert running.sentence(results).startswith("not assessable")
         assert codes() == [f"internal.line.{name}"]
-    monkeypatch.setattr(analysing, "FLIGHT_ANALYSES", FLIGHT_ANALYSES)
     monkeypatch.setattr(analysing, "_on_damage", fails)
     flight = bare()
     given = analysing.Given("NOTIME_01234567", results.source, Ledger(), results.clock, (), False)
     with gathered_failures():
         done = analysing.analyse(flight, given, Configuration())
-        assert f"internal.damage_check.{name}" in codes() and len(codes()) == len(FLIGHT_ANALYSES)
+        assert f"internal.damage_check.{name}" in codes() and len(codes()) == len(systems().analyses)
     assert done.figure("phases") is not None
 
 
@@ -173,10 +177,8 @@ def test_damage_checks_lines_and_columns_that_fail_leave_the_rest(name: str, mon
     [(one, name) for one in (PLOTS, FLEET_PLOTS, JUDGED) for name in one],
     ids=lambda one: one if isinstance(one, str) else "",
 )
-def test_a_figure_that_cannot_be_drawn_leaves_the_rest_of_its_chapter(
-    plots: dict[str, Any], name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(plots, name, fails)
+def test_a_figure_that_cannot_be_drawn_leaves_the_rest_of_its_chapter(plots: dict[str, Any], name: str) -> None:
+    plots = {**plots, name: fails}
     section = Section("a", "A", "", (Note("before"), Figure(name), Figure(name, "one"), Note("behind")))
     with gathered_failures():
         assert drawn_by(plots, section, None).parts == (Note("before"), Note("behind"))
@@ -206,27 +208,24 @@ def test_a_chapter_on_a_flight_that_fails_leaves_the_others(
 ) -> None:
     monkeypatch.setitem(getattr(sections, where), name, fails)
     with gathered_failures():
-        found = sections.flight_sections(load(folder))
+        found = flight_sections(load(folder))
         assert codes() == [f"internal.chapter.{name}"]
     assert len(found) > 5 and "heading" in {one.key for one in found}
 
 
-@pytest.mark.parametrize("listed", ["FLIGHT_CHAPTERS", "SESSION_CHAPTERS", "PLAN_CHAPTERS"])
-def test_a_chapter_on_an_answer_that_fails_leaves_the_others(listed: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    every = getattr(by_answer, listed)
-    kind = {"SESSION_CHAPTERS": "is_session", "PLAN_CHAPTERS": "is_plan"}.get(listed)
+@pytest.mark.parametrize("kind", Chapters._fields)
+def test_a_chapter_on_an_answer_that_fails_leaves_the_others(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    every = getattr(systems().chapters, kind)
+    if kind != "flight":
+        monkeypatch.setattr(FlightResults, f"is_{kind}", True)
     for failing in every:
-        with monkeypatch.context() as patch:
-            patch.setattr(by_answer, listed, tuple(one._replace(build=_named(one)) for one in every))
-            if kind is not None:
-                patch.setattr(by_answer, kind, lambda _: True)
-            shown = [one.key for one in by_answer.chapters_of(ANSWERED)]
-            broken = tuple(one._replace(build=fails if one is failing else _named(one)) for one in every)
-            patch.setattr(by_answer, listed, broken)
-            with gathered_failures():
-                found = by_answer.chapters_of(ANSWERED)
-                assert codes() == [f"internal.chapter.{failing.name}"]
-            assert [one.key for one in found] == [key for key in shown if key != failing.name]
+        whole = tuple(one._replace(build=_named(one)) for one in every)
+        shown = [one.key for one in by_answer.chapters_of(ANSWERED, Chapters(**{kind: whole}))]
+        broken = tuple(one._replace(build=fails if one is failing else _named(one)) for one in every)
+        with gathered_failures():
+            found = by_answer.chapters_of(ANSWERED, Chapters(**{kind: broken}))
+            assert codes() == [f"internal.chapter.{failing.name}"]
+        assert [one.key for one in found] == [key for key in shown if key != failing.name]
 
 
 def _named(chapter: Any) -> Callable[[Any], Section]:
@@ -242,10 +241,10 @@ def test_a_generic_chapter_a_front_and_a_page_that_fail_leave_the_rest(
     other = type("Other", (Answer,), {"analysis": "other", "figures": ()})
     results = replace(ANSWERED, answers={"other": other()})
     with gathered_failures():
-        assert by_answer.answer_chapters(results) == () and codes() == ["internal.chapter.other"]
+        assert answer_chapters(results) == () and codes() == ["internal.chapter.other"]
     monkeypatch.setattr(flight_report, "front", fails)
     with gathered_failures():
-        document = flight_report.flight_document(load(folder))
+        document = flight_document(load(folder))
         assert document.front.title == ANSWERED.flight_id and len(document.sections) > 5
         whole = flight_report.flight_report_html(document)
         assert f"<h1>{ANSWERED.flight_id}</h1>" in whole and 'class="verdict' not in whole
@@ -285,7 +284,8 @@ def empty(name: str) -> Callable[..., rrb.Container]:
     return lambda *_: rrb.Vertical(name=name)
 
 
-NAMES = [name for name, _ in recording.tabs_of(*[None] * 2, make_results(SHORT))]  # type: ignore[arg-type]
+OF_PLANS: dict[str, Any] = dict.fromkeys(tab.shows[0] for tab in systems().tabs_of(PlanAnswer))
+NAMES = [name for name, _ in recording.tabs_of(Recorder(None, 0, False, systems()), None, make_results(SHORT))]  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("failing", [*NAMES, "log"])
@@ -305,27 +305,30 @@ def test_a_tab_of_a_flight_that_fails_leaves_the_others(
     monkeypatch.setattr(recording, "log", fails if failing == "log" else empty("log"))
     flight = SHORT
     with gathered_failures():
-        recording.write_recording(tmp_path / "a.rrd", flight, make_results(flight))
+        write_recording(tmp_path / "a.rrd", flight, make_results(flight))
         assert codes() == [f"internal.tab.{failing}"]
     assert shown == [name for name in (*NAMES, "log") if name != failing] and layout is not None
 
 
 @pytest.mark.parametrize(
     ("tabs", "name"),
-    [(one, name) for one in (viewer_fleet.TABS, viewer_comparison.TABS, viewer_plan.PLAN_TABS) for name in one],
+    [(one, name) for one in (viewer_fleet.TABS, viewer_comparison.TABS, OF_PLANS) for name in one],
     ids=lambda one: one if isinstance(one, str) else "",
 )
 def test_a_tab_of_another_recording_that_fails_leaves_the_others(
     tabs: dict[str, Any], name: str, fleet: Any, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for one in tabs:
-        monkeypatch.setitem(tabs, one, fails if one == name else empty(one))
+    made = {one: fails if one == name else empty(one) for one in tabs}
+    if tabs is not OF_PLANS:
+        for one, tab in made.items():
+            monkeypatch.setitem(tabs, one, tab)
     path = tmp_path / "a.rrd"
     with gathered_failures():
         if tabs is viewer_fleet.TABS:
             viewer_fleet.write_fleet_recording(path, fleet)
-        elif tabs is viewer_plan.PLAN_TABS:
-            viewer_plan.write_plan_recording(path, replace(ANSWERED, answers={}, figures=()))
+        elif tabs is OF_PLANS:
+            planned = shipped_but(tabs=lambda: tuple(Tab((one,), tab) for one, tab in made.items()))
+            viewer_plan.write_plan_recording(path, replace(ANSWERED, answers={}, figures=()), planned)
         else:
             saved = load(folder)
             compared = _compared(folder)
@@ -354,7 +357,8 @@ def test_a_figure_of_a_comparison_that_fails_leaves_the_others(folder: Path, mon
 
 def break_five(monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     """Make an analysis, a plot, the picture of one, a chapter and a tab fail; the codes in their order."""
-    monkeypatch.setattr(analysing, "FLIGHT_ANALYSES", changed(FLIGHT_ANALYSES, "latency", run=fails, requires=()))
+    with_it = changed(systems().analyses, "latency", run=fails, requires=())
+    monkeypatch.setattr(analysing, "systems", lambda: shipped_but(analyses=with_it))
     monkeypatch.setitem(PLOTS, "overview.profile", fails)
     write = drawing.picture_of
     monkeypatch.setattr(drawing, "picture_of", lambda plot: fails() if plot.name == "overview.track" else write(plot))
@@ -437,7 +441,8 @@ def test_a_plan_with_failures_has_all_else(tmp_path: Path, monkeypatch: pytest.M
     from groundstation.pipeline.verbs.plan import run_plan
     from tests.test_plan import scenario
 
-    monkeypatch.setitem(viewer_plan.PLAN_TABS, "placement", fails)
+    tabs = tuple(tab._replace(log=fails) if "placement" in tab.shows else tab for tab in systems().tabs)
+    monkeypatch.setitem(systems().__dict__, "tabs", tabs)
     monkeypatch.setitem(PLOTS, "control.paths", fails)
     monkeypatch.setitem(sections.ON_THE_SESSION, "provenance", fails)
     done = run_plan("session", scenario(tmp_path), tmp_path / "out", with_pdf=False)

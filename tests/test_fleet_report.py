@@ -20,12 +20,12 @@ from pypdf import PdfReader
 from groundstation.base.timescales import utc_ns_to_stamp
 from groundstation.chapters.fleet import flights
 from groundstation.chapters.plots.fleet import densities
-from groundstation.estimators.fleet import answer
-from groundstation.estimators.fleet.changes import ChangeSettings
-from groundstation.estimators.fleet.density import densities_of, histogram_of
-from groundstation.estimators.fleet.deviation import deviations
-from groundstation.estimators.fleet.moments import moments_of
-from groundstation.estimators.fleet.skill import SkillMerger, SkillOfFlight
+from groundstation.methods.fleet import answer
+from groundstation.methods.fleet.changes import ChangeSettings
+from groundstation.methods.fleet.density import densities_of, histogram_of
+from groundstation.methods.fleet.deviation import deviations
+from groundstation.methods.fleet.moments import moments_of
+from groundstation.methods.fleet.skill import SkillMerger, SkillOfFlight
 from groundstation.pipeline.many_flights.fleet import gather
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
 from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_fleet_report

@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.estimators.fleet import answer
-from groundstation.estimators.fleet.aircraft import mean_over_flights
-from groundstation.estimators.fleet.calibration import calibrate
-from groundstation.estimators.fleet.changes import ChangeSettings, control_chart, find_changes
-from groundstation.estimators.fleet.density import MOST_BINS, densities_of, histogram_of
-from groundstation.estimators.fleet.deviation import deviations
-from groundstation.estimators.fleet.moments import Moments, merged, moments_of
-from groundstation.estimators.fleet.outliers import find_outliers
-from groundstation.estimators.fleet.skill import SkillMerger, SkillOfFlight
+from groundstation.methods.fleet import answer
+from groundstation.methods.fleet.aircraft import mean_over_flights
+from groundstation.methods.fleet.calibration import calibrate
+from groundstation.methods.fleet.changes import ChangeSettings, control_chart, find_changes
+from groundstation.methods.fleet.density import MOST_BINS, densities_of, histogram_of
+from groundstation.methods.fleet.deviation import deviations
+from groundstation.methods.fleet.moments import Moments, merged, moments_of
+from groundstation.methods.fleet.outliers import find_outliers
+from groundstation.methods.fleet.skill import SkillMerger, SkillOfFlight
 from groundstation.methods.intervals import share_interval
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
 from groundstation.results.figures import FigureData

@@ -19,7 +19,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from groundstation.base.errors import GroundstationError, UsageError
-from groundstation.estimators.fleet.moments import merged, moments_of
+from groundstation.methods.fleet.moments import merged, moments_of
 from groundstation.pipeline.many_flights import fleet_share
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, gather, write_fleet
@@ -447,7 +447,7 @@ def test_the_answers_of_the_docs_are_right(name: str, text: str, fleet: Path, mo
 
 
 def _moments(row: dict[str, Any]) -> Any:
-    from groundstation.estimators.fleet.moments import Moments
+    from groundstation.methods.fleet.moments import Moments
 
     return Moments(row["samples"], row["sample_mean_deg"], row["sample_m2_deg2"])
 

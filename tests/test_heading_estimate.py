@@ -13,11 +13,11 @@ from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.figures import IN_PAUSE
 from groundstation.estimators.heading.references import reference_findings
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.estimators.known import AircraftData, SiteData, Stand
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import Gate, HeadingResult
 from groundstation.simulation.taxi import TaxiCase, TaxiRun, noiseless, simulate_taxi, table_of, taxi_flight
 from groundstation.simulation.taxi_disturbance import Disturbance
+from groundstation.systems.known import AircraftData, SiteData, Stand
 from groundstation.tables.phases import flight_phases, ground_mask
 from groundstation.tables.table import Flight, Table
 
@@ -712,7 +712,7 @@ def test_sideslip_on_the_way_back_takes_the_other_sign() -> None:
 
 def test_weather_that_is_not_of_the_taxi_is_told(flight: Flight) -> None:
     from groundstation.estimators.heading.analysis import HEADING
-    from groundstation.estimators.known import Known
+    from groundstation.systems.known import Known
 
     known = Known(flight_phases(flight), aircraft=AIRCRAFT, weather=("METAR UUEE 040930Z 09010MPS CAVOK=",))
     found = HEADING.run(flight, known, HeadingSettings())

@@ -29,7 +29,6 @@ from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.standstill import find_standstill, speed_bound_mps
 from groundstation.estimators.heading.steps import heading_steps
 from groundstation.estimators.heading.verdict import decide, explain
-from groundstation.estimators.known import AircraftData, Runway, SiteData, Stand
 from groundstation.methods.intervals import effective_samples
 from groundstation.methods.taxi.gating import gate_samples, intervals_without_epoch
 from groundstation.methods.taxi.intervals import Interval
@@ -38,6 +37,7 @@ from groundstation.methods.taxi.settings import GroundLimits
 from groundstation.results.heading import Gate
 from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.taxi import TaxiCase, noiseless, simulate_taxi, table_of, taxi_flight
+from groundstation.systems.known import AircraftData, Runway, SiteData, Stand
 from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.table import Flight, Table
 

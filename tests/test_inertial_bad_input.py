@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import NotAssessableError
-from groundstation.estimators.fleet.ins_errors import ins_errors
 from groundstation.estimators.inertial.analysis import FORECAST, INERTIAL
 from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
 from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.estimators.known import AircraftData, Known
+from groundstation.methods.fleet.ins_errors import ins_errors
 from groundstation.pipeline.one_flight.analyse import Answered, run_analyses
 from groundstation.results.inertial import InertialResult
+from groundstation.systems.known import AircraftData, Known
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight
 from tests.inertial_flights import batch_of, changed, flight_of, table_of, with_table, without_rows

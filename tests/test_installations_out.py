@@ -12,7 +12,6 @@ import pytest
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.serial import to_json
-from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.installation.lesson import Stored, lesson_of
 from groundstation.estimators.installation.series import answer_from
 from groundstation.estimators.installation.settings import InstallationSettings
@@ -33,6 +32,7 @@ from groundstation.results.heading import judged_gate
 from groundstation.results.inertial import InertialResult
 from groundstation.results.installation import InstallationResult, Installations, read_installations
 from groundstation.results.schema import installations_schema
+from groundstation.systems import systems
 from tests.installation_example import heading_of, inertial_of, save_installed
 
 SCHEMA_FILE = Path(__file__).parents[1] / "schemas" / "installations.schema.json"
@@ -231,7 +231,7 @@ def test_reports_show_what_was_learned_and_stay_as_they_are(tmp_path: Path) -> N
     fleet_in(tmp_path, (1, 2, 3))
     folders = sorted(path for path in tmp_path.iterdir() if path.name.startswith("2026"))
     for folder in folders:
-        write_flight_report(folder, ANSWER_TYPES, with_pdf=False)
+        write_flight_report(folder, systems(), with_pdf=False)
     names = tuple(folder.name for folder in folders)
     learned(tmp_path, names)
     pages = [(folder / REPORT).read_text(encoding="utf-8") for folder in folders]
@@ -240,7 +240,7 @@ def test_reports_show_what_was_learned_and_stay_as_they_are(tmp_path: Path) -> N
     found = refresh(tmp_path)[0]
     assert refresh_installations(tmp_path, found, names) == []
     assert refresh_installations(tmp_path, found, ()) == []
-    write_flight_report(folders[2], ANSWER_TYPES, with_pdf=False)
+    write_flight_report(folders[2], systems(), with_pdf=False)
     assert "S1 from 2 flights" not in (folders[2] / REPORT).read_text(encoding="utf-8")
     show_installation(folders[2])
     assert (folders[2] / REPORT).read_text(encoding="utf-8") == pages[2]
@@ -249,7 +249,7 @@ def test_reports_show_what_was_learned_and_stay_as_they_are(tmp_path: Path) -> N
 def test_a_page_left_behind_by_a_kill_is_filled_at_the_next_run(tmp_path: Path) -> None:
     fleet_in(tmp_path, (1, 2))
     for folder in sorted(tmp_path.iterdir()):
-        write_flight_report(folder, ANSWER_TYPES, with_pdf=False)
+        write_flight_report(folder, systems(), with_pdf=False)
     found = refresh(tmp_path)[0]
     changed = refresh_installations(tmp_path, found, ())
     assert len(changed) == 2
@@ -261,7 +261,7 @@ def test_a_page_left_behind_by_a_kill_is_filled_at_the_next_run(tmp_path: Path) 
 def test_filled_reports_do_not_make_the_dataset_old(tmp_path: Path) -> None:
     fleet_in(tmp_path, (1, 2))
     for folder in sorted(tmp_path.iterdir()):
-        write_flight_report(folder, ANSWER_TYPES, with_pdf=False)
+        write_flight_report(folder, systems(), with_pdf=False)
     assert write_beside(tmp_path, (), only_results=True) == ()
     assert scan(tmp_path).stale == ()
 
@@ -351,5 +351,5 @@ def test_logs_of_one_ins_learn_in_any_order_and_one_log_learns_from_the_file(tmp
     by_file = installed_as(Configuration(), once / INSTALLATIONS)
     (alone,) = run_many(logs[2:], tmp_path / "now", by_file, jobs=1, only_results=True)
     assert alone.text.count("installation of S1 from 2 flights") == 1 and "nothing learned" not in alone.text
-    stored = load(Path(alone.folder), ANSWER_TYPES).results.answer(InstallationResult)
+    stored = load(Path(alone.folder), systems().answer_types).results.answer(InstallationResult)
     assert to_json(stored) == to_json(read(once).installations[0].flights[2].answer)

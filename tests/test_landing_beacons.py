@@ -8,8 +8,6 @@ import pytest
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.errors import NotAssessableError, SettingsError
-from groundstation.estimators.analysis import Found
-from groundstation.estimators.known import Beacon, Ground, Runway, SiteData
 from groundstation.estimators.landing_beacons.analysis import LANDING_BEACONS
 from groundstation.estimators.landing_beacons.approach import Deviations, over_known_ground
 from groundstation.estimators.landing_beacons.geometry import (
@@ -29,10 +27,12 @@ from groundstation.results.answer import by_analysis
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.landing_beacons import BeaconLanding
 from groundstation.simulation.scenario import Scenario
-from groundstation.viewer.recording import write_recording
+from groundstation.systems.analysis import Found
+from groundstation.systems.known import Beacon, Ground, Runway, SiteData
 from tests.landing_example import BEACONS, approach_scenario, flown, known_of
 from tests.recording_contents import Contents
 from tests.saved import load
+from tests.told import write_recording
 
 PLACES = np.array([(-one.before_threshold_m, one.right_m) for one in BEACONS])
 EXACT_M = 1e-3  # of a solution of exact bearings

@@ -15,7 +15,6 @@ from groundstation.base.units import NS_PER_S
 from groundstation.chapters.latency import latency
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.known import AircraftData
 from groundstation.estimators.latency.analysis import LATENCY
 from groundstation.estimators.latency.estimate import estimate_latencies
 from groundstation.methods.lag.settings import LatencySettings
@@ -30,6 +29,7 @@ from groundstation.results.files import save
 from groundstation.results.manifest import Manifest
 from groundstation.simulation.flight import simulate
 from groundstation.simulation.scenario import load_scenario
+from groundstation.systems.known import AircraftData
 from groundstation.tables.table import Flight, Table
 from tests.real_logs import real_log
 from tests.report_example import example

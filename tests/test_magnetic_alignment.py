@@ -17,7 +17,6 @@ from groundstation.base.toml_settings import settings_from
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.alignment import NOT_IN_INTERVAL, against_heading, align, refused
 from groundstation.estimators.magnetic.attitude import field_in_body
 from groundstation.estimators.magnetic.before_lift_off import (
@@ -43,6 +42,7 @@ from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.flight_errors import heading_error_deg
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, simulate_magnetic_family
 from groundstation.simulation.scenario import load_scenario
+from groundstation.systems.known import AircraftData
 from groundstation.tables.phases import Interval, Phases, flight_phases
 from groundstation.tables.table import Flight
 from tests.inertial_example import inertial_result

@@ -58,12 +58,12 @@ from groundstation.simulation.magnetic_family import MagneticFamilySettings, dra
 from groundstation.store.reader import read, read_info
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.table import Flight, Table
-from groundstation.viewer.recording import write_recording
 from tests import magnetic_example
 from tests.recording_contents import Contents
 from tests.saved import load
 from tests.test_magnetic_run import analysed, figure_eight, simulated, system_3_alone
 from tests.test_reports import HOSTILE
+from tests.told import write_recording
 
 FAMILY = MagneticFamilySettings(
     figures=1, straights=3, hard_iron_sigma_nt=1500.0, soft_iron_sigma=0.02, longitude_deg=(35.0, 35.0),

@@ -22,7 +22,6 @@ from groundstation.base.units import NS_PER_S
 from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.markdown import escaped
 from groundstation.chapters.parts import Grid, Note
-from groundstation.chapters.plots import PLOTS
 from groundstation.chapters.wording import number
 from groundstation.estimators.magnetic.analysis import MAGNETIC_GROUND
 from groundstation.estimators.magnetic.ground_fit import fit_curve
@@ -42,11 +41,11 @@ from groundstation.results.magnetic import LETTERS
 from groundstation.results.magnetic_ground import GroundDeviation
 from groundstation.results.manifest import Manifest
 from groundstation.tables.table import Flight, Table
-from groundstation.viewer.recording import write_recording
 from tests.real_logs import real_log
 from tests.recording_contents import Contents
 from tests.saved import load
 from tests.schema_fields import SCHEMA, expect_fields
+from tests.told import PLOTS, write_recording
 
 START_NS = iso_to_utc_ns("2026-05-09T08:00:00Z")[0]
 LATITUDE_DEG, LONGITUDE_DEG = 55.97, 37.41

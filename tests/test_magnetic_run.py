@@ -14,8 +14,6 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.clock import Clock
 from groundstation.base.errors import SettingsError
 from groundstation.base.ledger import Ledger
-from groundstation.chapters.front import front
-from groundstation.estimators.analyses import FLIGHT_ANALYSES
 from groundstation.estimators.inertial.analysis import INERTIAL
 from groundstation.estimators.magnetic.analysis import MAGNETIC
 from groundstation.estimators.magnetic.settings import MagneticSettings
@@ -35,10 +33,12 @@ from groundstation.results.manifest import Manifest
 from groundstation.simulation.deviation import BIN_MIDDLES_DEG, scenario_deviation
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
+from groundstation.systems import systems
 from groundstation.tables.table import Flight
 from tests.real_logs import real_log
 from tests.saved import load
 from tests.schema_fields import SCHEMA, expect_fields
+from tests.told import front, shipped_but
 
 
 @cache
@@ -50,8 +50,8 @@ def simulated(name: str) -> Simulated:
 def system_3_alone() -> Iterator[pytest.MonkeyPatch]:
     """Within, runs have system 3 and what it builds on: the other analyses take longer, and no test of it asks them."""
     with pytest.MonkeyPatch.context() as patch:
-        asked = tuple(one for one in FLIGHT_ANALYSES if one.name in ("latency", "heading", "magnetic"))
-        patch.setattr(pipeline, "FLIGHT_ANALYSES", asked)
+        asked = tuple(one for one in systems().analyses if one.name in ("latency", "heading", "magnetic"))
+        patch.setattr(pipeline, "systems", lambda: shipped_but(analyses=asked))
         yield patch
 
 

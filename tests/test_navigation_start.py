@@ -14,9 +14,9 @@ from groundstation.base.units import NS_PER_S
 from groundstation.chapters import inertial as chapter
 from groundstation.cli.main import app
 from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
-from groundstation.estimators.known import AircraftData
 from groundstation.pipeline.many_flights.acceptance import accept
 from groundstation.results.inertial import InertialResult
+from groundstation.systems.known import AircraftData
 from groundstation.tables.table import Flight
 from tests.acceptance_example import save_fleet, save_flight
 from tests.inertial_flights import batch_of, changed, flight_of, with_table, without_rows

@@ -18,8 +18,6 @@ import pytest
 import groundstation
 from groundstation.base.errors import GroundstationError, NotAssessableError, UnreadableLogError, UsageError
 from groundstation.chapters.parts import Figure
-from groundstation.chapters.plots import PLOTS
-from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.api import OpenLog, SavedRun
 from groundstation.pipeline.verbs.clip import Wanted, clip
 from groundstation.reports.notebook.plots import name_of
@@ -27,9 +25,11 @@ from groundstation.results.files import SavedFlight, save
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import Manifest
 from groundstation.results.summary import summary_of
+from groundstation.systems import systems
 from groundstation.viewer import inline
 from tests import inertial_example, report_example
 from tests.saved import load
+from tests.told import PLOTS
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = ROOT / "sample_logs"
@@ -302,7 +302,7 @@ def test_a_summary_that_lacks_something_is_one_line(folder: Path) -> None:
         {"findings": [{"severity": "info"}]},
     ):
         with pytest.raises(UnreadableLogError, match="run the log again"):
-            assert SavedFlight(folder, {**saved.summary, **spoil}, Manifest(), {}, ANSWER_TYPES).results
+            assert SavedFlight(folder, {**saved.summary, **spoil}, Manifest(), {}, systems().answer_types).results
 
 
 def test_the_card_shows_no_markup_of_a_log(tmp_path: Path) -> None:

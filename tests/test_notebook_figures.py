@@ -17,7 +17,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import StepPatch
 from matplotlib.text import Text
 
-from groundstation.chapters.plots import PLOTS
 from groundstation.chapters.plots.fleet import FLEET_PLOTS
 from groundstation.plots import marks
 from groundstation.plots.extents import edges
@@ -29,6 +28,7 @@ from groundstation.reports.svg.legend import entries_of
 from tests.every_mark import DRAWN, X, Y, empty, plot_of
 from tests.plot_cases import CASES, names_of
 from tests.test_fleet_report import fleet_of
+from tests.told import PLOTS
 
 ROUNDING = {"rtol": 1e-9, "atol": 1e-9}
 POINTS_PER_INCH = 72.0

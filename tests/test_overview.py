@@ -5,7 +5,7 @@ import pytest
 
 from groundstation.base.findings import Finding
 from groundstation.base.records import Column
-from groundstation.estimators.overview import overview, state_lanes
+from groundstation.methods.overview import overview, state_lanes
 from groundstation.results.figures import FigureData
 from groundstation.results.grouped_findings import grouped
 from groundstation.results.reasons import WHAT_HEADING_NEEDS, explained

@@ -10,15 +10,15 @@ import pytest
 from typer.testing import CliRunner
 
 from groundstation.cli.main import app
-from groundstation.estimators.analyses import ANSWER_TYPES, PLANS
 from groundstation.estimators.control.scenario import SessionPlan
 from groundstation.estimators.landing_ranges.scenario import RangeApproach
-from groundstation.estimators.plan import Plan
 from groundstation.pipeline.many_flights.inputs import flight_folders, plan_folders
 from groundstation.pipeline.many_flights.publishing import report_again
 from groundstation.pipeline.verbs.plan import run_plan, shipped_scenarios
 from groundstation.results.files import load, load_manifest
-from groundstation.studies.shipped_plans import load_plan, plan_names
+from groundstation.systems import systems
+from groundstation.systems.plan import Plan
+from groundstation.systems.shipped_plans import load_plan, plan_names
 from tests.recording_contents import Contents
 
 SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
@@ -95,7 +95,7 @@ def test_a_plan_is_no_flight_and_its_report_is_made_again(made: Path) -> None:
 
 
 def test_a_plan_comes_back_as_it_was_saved(made: Path) -> None:
-    results = load(made, ANSWER_TYPES).results
+    results = load(made, systems().answer_types).results
     assert [type(answer).analysis for answer in results.answers.values()] == ["control"]
     page = (made / "report.html").read_text(encoding="utf-8")
     assert "Control of the session" in page and 'id="provenance"' in page and "Heading" not in page
@@ -151,7 +151,7 @@ def test_a_wrong_scenario_is_told_in_a_line(tmp_path: Path, change: tuple[str, s
 def test_the_scenario_of_the_documentation_is_read(tmp_path: Path) -> None:
     page = (Path(__file__).parents[1] / "docs" / "control.md").read_text(encoding="utf-8")
     (text,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
-    loaded = load_plan(PLANS[0], scenario(tmp_path, text)).scenario
+    loaded = load_plan(systems().plans[0], scenario(tmp_path, text)).scenario
     assert loaded.user.control == ("speed",) and loaded.placement.keep_out[0].name == "lake"
 
 
@@ -178,7 +178,7 @@ def quick(scenario: object) -> object:
     return replace(scenario, control=control, placement=replace(scenario.placement, starts=0, iterations=5, map_side=5))
 
 
-@pytest.mark.parametrize(("plan", "name"), [(plan, name) for plan in PLANS for name in plan_names(plan)])
+@pytest.mark.parametrize(("plan", "name"), [(plan, name) for plan in systems().plans for name in plan_names(plan)])
 def test_every_shipped_scenario_gives_a_plan(plan: Plan[object], name: str) -> None:
     planned = plan.run(quick(load_plan(plan, name).scenario))
     assert planned.answers and plan.sentence(planned.answers)

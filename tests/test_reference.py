@@ -9,9 +9,7 @@ import pytest
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
-from groundstation.chapters.by_answer import chapter_of
 from groundstation.chapters.markdown import markdown
-from groundstation.estimators.known import Known
 from groundstation.estimators.reference.analysis import REFERENCE
 from groundstation.estimators.reference.columns import REFERENCE_COLUMNS
 from groundstation.estimators.reference.errors import Errors, errors_of, turned_arm
@@ -28,10 +26,12 @@ from groundstation.results.manifest import Manifest
 from groundstation.results.reference import ReferenceResult
 from groundstation.simulation.flight import simulate
 from groundstation.simulation.processes import gauss_markov
+from groundstation.systems.known import Known
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
 from tests.saved import load
 from tests.simulated_flights import FLIGHT_LEGS, quiet
+from tests.told import chapter_of
 
 START_NS = 1_777_874_400_000_000_000
 ORIGIN = 55.97, 37.41

@@ -17,7 +17,7 @@ from groundstation.base.clock import Clock
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import DamageEntry, Ledger, ThresholdsUsed, Truncation
-from groundstation.reports.flight_report import PDF, REPORT, flight_document, flight_report_html
+from groundstation.reports.flight_report import PDF, REPORT, flight_report_html
 from groundstation.reports.page import digest_of
 from groundstation.results.answer import by_analysis
 from groundstation.results.figures import FigureData
@@ -27,6 +27,7 @@ from groundstation.results.heading import Gate, HeadingResult
 from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import MANIFEST, example, figure, heading_result
 from tests.saved import load, write_flight_report
+from tests.told import flight_document
 
 LARGEST_REPORT_BYTES = 2_000_000  # mailed and opened on old machines
 LARGEST_LONG_REPORT_BYTES = 3_000_000  # with the figures of INS errors and forecast

@@ -13,10 +13,8 @@ from groundstation.base.failures import failures, gathered_failures
 from groundstation.chapters.forecast import forecast
 from groundstation.chapters.inertial import inertial
 from groundstation.chapters.parts import Front
-from groundstation.chapters.plots import PLOTS
 from groundstation.chapters.plots.flight import track_map
 from groundstation.reports.drawing import Drawing, drawn_by
-from groundstation.reports.flight_report import flight_document
 from groundstation.results.corrected_position import corrected_position
 from groundstation.results.figures import FigureData
 from groundstation.results.files import save
@@ -26,6 +24,7 @@ from groundstation.results.inertial import InertialResult
 from tests.inertial_example import AIDED, aided_figures, forecast_result, inertial_result
 from tests.report_example import MANIFEST, example
 from tests.saved import load
+from tests.told import PLOTS, flight_document
 
 INERTIAL = (
     *("Position error of the INS", "Velocity error of the INS", "Track error before and after correction"),

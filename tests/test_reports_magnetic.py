@@ -9,9 +9,7 @@ import pytest
 from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Figure, Grid, Note, Section
-from groundstation.chapters.plots import PLOTS
 from groundstation.reports.drawing import Drawing, drawn_by
-from groundstation.reports.sections import flight_sections
 from groundstation.results.answer import by_analysis
 from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.figures import FigureData
@@ -24,6 +22,7 @@ from tests.report_example import example
 from tests.saved import load
 from tests.test_magnetic_run import figure_eight
 from tests.test_reports import Page, report
+from tests.told import PLOTS, flight_sections
 
 FIGURES = ("Deviation by heading", "Error on data that no fit used", "Figures as flown", "Both branches")
 TABLES = ("Coefficients", "Steer card", "Gates", "Methods side by side", "Turns of steady bank", "Each figure alone")

@@ -18,7 +18,7 @@ from groundstation.pipeline.many_flights.publishing import report_again
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.reports import pdf
 from groundstation.reports.drawing import Drawing
-from groundstation.reports.flight_report import PDF, REPORT, flight_document
+from groundstation.reports.flight_report import PDF, REPORT
 from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
@@ -26,6 +26,7 @@ from tests import test_reports as html
 from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import MANIFEST, example, heading_result
 from tests.saved import load, write_flight_report
+from tests.told import flight_document
 
 A4_POINTS = (595.3, 841.9)
 MARGIN_POINTS = 45.0  # 16 mm

@@ -11,12 +11,12 @@ from typer.testing import CliRunner
 from groundstation.base.errors import SettingsError, UsageError
 from groundstation.cli.main import app
 from groundstation.cli.rules import rules_text
-from groundstation.estimators.analyses import FLIGHT_ANALYSES
 from groundstation.pipeline.api import open_flight, simulate
 from groundstation.pipeline.verbs.rules import RulesTest, rules_test
 from groundstation.results.files import save
 from groundstation.results.heading import HeadingResult
 from groundstation.results.manifest import Manifest
+from groundstation.systems import systems
 from tests.saved import load
 
 SAMPLES = sorted((Path(__file__).parents[1] / "sample_logs").glob("*.csv"))
@@ -102,7 +102,7 @@ def test_criteria_of_an_approach_are_judged_again(out: Path, tmp_path: Path) -> 
 
 
 def test_every_analysis_with_gates_has_rules_and_its_limits_are_settings() -> None:
-    ruled = {analysis.name: analysis for analysis in FLIGHT_ANALYSES if analysis.rules is not None}
+    ruled = {analysis.name: analysis for analysis in systems().analyses if analysis.rules is not None}
     assert set(ruled) == {"heading", "magnetic", "landing"}
     for analysis in ruled.values():
         assert analysis.rules.limits <= set(analysis.settings.__dataclass_fields__)

@@ -11,8 +11,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from groundstation.chapters.cooperative import TITLES, cooperative, is_session, session_front, trusted, worst_first
-from groundstation.chapters.front import front
+from groundstation.chapters.cooperative import TITLES, cooperative, session_front, trusted, worst_first
 from groundstation.chapters.parts import Facts, Figure, Grid, Mark, Note, Section
 from groundstation.cli.main import main
 from groundstation.estimators.cooperative.analysis import COOPERATIVE, NIS_MAX, SessionKnown, innovations_of
@@ -32,6 +31,7 @@ from tests.cooperative_example import believed, truth_of
 from tests.recording_contents import Contents
 from tests.saved import load
 from tests.session_example import SEED, SHORT, simulated
+from tests.told import front
 
 IDENTITY = "20180305T120000Z_session_A-B-C"
 SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
@@ -349,7 +349,7 @@ def test_a_session_without_an_answer_says_why(results: FlightResults) -> None:
     from groundstation.results.flight import NotAssessable
 
     bare = replace(results, answers={}, not_assessable=(NotAssessable("cooperative", "no range at all"),))
-    assert is_session(bare)
+    assert bare.is_session
     top = front(bare)
     assert top.headline == "Navigation between aircraft: not assessable"
     assert top.sentences == ("No range at all.",)

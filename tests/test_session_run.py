@@ -11,7 +11,6 @@ import fsspec
 import pytest
 
 from groundstation.cli.main import main
-from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.many_flights import session_search
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
@@ -23,6 +22,7 @@ from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.files import load, load_document, load_manifest
 from groundstation.results.flight import FlightResults
 from groundstation.simulation.session_log import write_session
+from groundstation.systems import systems
 from tests.session_example import SEED, SHORT
 
 IDENTITY = "20180305T120000Z_session_A-B-C"
@@ -163,7 +163,7 @@ def out(logs: Path, configuration: Configuration, tmp_path_factory: pytest.TempP
 
 
 def results_in(folder: Path) -> FlightResults:
-    return load(folder, ANSWER_TYPES).results
+    return load(folder, systems().answer_types).results
 
 
 def rows_of(out: Path) -> list[dict[str, object]]:

@@ -10,7 +10,7 @@ from groundstation.studies import control
 from groundstation.studies.control import laws_table, page, placement_table, published_table
 from groundstation.studies.control_cases import CASES, SPEED, placements, scenario, with_fixed_point
 from groundstation.studies.control_flown import fly
-from groundstation.studies.page import StudyResult
+from groundstation.systems.study import StudyResult
 
 RUNS = 60
 SIGMA_OF_RMS = 4.0 / np.sqrt(2.0 * RUNS)  # four of its relative standard error

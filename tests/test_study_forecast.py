@@ -11,7 +11,7 @@ from groundstation.base.errors import UsageError
 from groundstation.estimators.inertial.hindcast import Hindcast
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.pipeline.verbs.catalogue import catalogue
-from groundstation.pipeline.verbs.synthesis import STUDIES, study_to
+from groundstation.pipeline.verbs.synthesis import study_to
 from groundstation.results.figures import FigureData
 from groundstation.results.forecast import METHODS
 from groundstation.simulation.inertial_family import simulate_family
@@ -29,7 +29,8 @@ from groundstation.studies.forecast_runs import (
     run_cases,
 )
 from groundstation.studies.forecast_tables import BETTER, UNDECIDED, WORSE, Resampled, finding
-from groundstation.studies.page import StudyResult
+from groundstation.systems import systems
+from groundstation.systems.study import StudyResult
 
 SEED, FLIGHTS = 5, 12
 SETTINGS = InertialSettings()
@@ -248,7 +249,7 @@ def test_every_study_is_listed_and_no_other_is_run(tmp_path: Path) -> None:
     listed = [entry["name"] for entry in catalogue() if entry["kind"] == "study"]
     names = ["heading", "crew", "installation", "forecast", "magnetic", "cooperative", "control", "landing"]
     names += ["approach"]
-    assert listed == list(STUDIES) == names
+    assert listed == [one.name for one in systems().studies] == names
     with pytest.raises(UsageError, match="one of heading, crew, installation, forecast"):
         study_to("weather", tmp_path / "out", runs=10, seed=1, force=False, listen=lambda event: None)
     assert not (tmp_path / "out").exists()

@@ -19,7 +19,7 @@ from groundstation.studies.landing_tables import (
     trial_table,
     variation_table,
 )
-from groundstation.studies.shipped_plans import plan_names
+from groundstation.systems.shipped_plans import plan_names
 
 
 @pytest.fixture(scope="module")

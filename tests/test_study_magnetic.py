@@ -43,7 +43,7 @@ from groundstation.studies.magnetic_tables import (
     rows_where,
     samples_of,
 )
-from groundstation.studies.page import StudyResult
+from groundstation.systems.study import StudyResult
 from groundstation.tables.phases import Interval, Phases
 
 SEED, FEW = 5, 4

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from groundstation.chapters.parts import Document, Figure, Front, Section
-from groundstation.chapters.plots import PLOTS
 from groundstation.plots.marks import Band, Cells, Curve, Dots, Histogram, Limit, Points, Spans, Told
 from groundstation.plots.plot import Axis, Panel, Plot, Row, Scale, one_panel
 from groundstation.reports.drawing import drawing_of, drawn_by
@@ -24,6 +23,7 @@ from groundstation.reports.svg.picture import picture_of
 from groundstation.reports.svg.thinning import shown_rows
 from tests.every_mark import DRAWN, X, Y, empty, plot_of
 from tests.plot_cases import CASES, names_of
+from tests.told import PLOTS
 
 NUMBER = re.compile(r"-?\d*\.?\d+")
 HOSTILE = '</text><script>alert("x")</script>]]> & \' \x00\x1b[2J\u202e\ud800 一' + "é" * 500

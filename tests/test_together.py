@@ -11,10 +11,9 @@ from groundstation.base.errors import UsageError
 from groundstation.base.records import Column, RecordBatch
 from groundstation.base.units import NS_PER_S
 from groundstation.chapters.together import together as chapter
-from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.latency.signals import pairs_of
-from groundstation.estimators.overview import overview
 from groundstation.estimators.two_clocks.relation import NotOneFlightError
+from groundstation.methods.overview import overview
 from groundstation.methods.taxi.pair import choose_pair
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
@@ -26,6 +25,7 @@ from groundstation.results.files import load
 from groundstation.results.together import Together
 from groundstation.store.reader import read
 from groundstation.store.writer import StoreWriter
+from groundstation.systems import systems
 from groundstation.tables.motion import motion_of
 from groundstation.tables.sources import TOGETHER, ranked, said_of, sources_of_kind, why_first
 from groundstation.tables.table import Flight, Table
@@ -139,7 +139,7 @@ def test_where_one_log_is_left_it_is_a_plain_run_that_says_what_is_left_out(logs
     code, _out, _err = groundstation("run", str(odd), str(logs / "b.ubx"), "--together", "-o", str(out), "--no-pdf")
     assert code == 3
     (folder,) = (path for path in out.iterdir() if (path / "summary.json").exists())
-    results = load(folder, ANSWER_TYPES).results
+    results = load(folder, systems().answer_types).results
     alone = convert_log(open_log(logs / "b.ubx"), tmp_path / "alone.mcap").info
     assert results.answer(Together) is None
     assert (results.source.name, results.source.sha256) == ("b.ubx", alone.source_sha256)
@@ -175,7 +175,7 @@ def test_run_together_gives_one_flight_that_says_how(logs: Path, tmp_path: Path)
     assert code == 0
     assert "2 logs on one clock" in out
     (folder,) = (path for path in (tmp_path / "out").iterdir() if (path / "summary.json").exists())
-    results = load(folder, ANSWER_TYPES).results
+    results = load(folder, systems().answer_types).results
     answer = results.answer(Together)
     assert answer is not None
     assert [log.source_name for log in answer.logs] == ["a.ulg", "b.ubx"]

@@ -18,9 +18,9 @@ from groundstation.results.inertial import InertialResult
 from groundstation.tables.table import Flight
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder
-from groundstation.viewer.recording import write_recording
 from tests.inertial_example import AIDED, aided_figures, inertial_result
 from tests.recording_contents import Contents
+from tests.told import write_recording
 from tests.viewer_example import START_NS, make_flight, make_results
 
 

@@ -7,15 +7,14 @@ import pytest
 
 from groundstation.chapters.landing import landing
 from groundstation.chapters.markdown import markdown
-from groundstation.chapters.plots import PLOTS
 from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.results.answer import by_analysis
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.landing import LandingResult
 from groundstation.simulation.approach import load_approach, simulate_approach
-from groundstation.viewer.recording import write_recording
 from tests.recording_contents import Contents
 from tests.test_approaches import found, site
+from tests.told import PLOTS, write_recording
 
 SCENARIO = load_approach("ils-approach")
 FLIGHT = simulate_approach(SCENARIO).flight

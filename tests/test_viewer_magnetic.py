@@ -13,9 +13,9 @@ from groundstation.results.answer import by_analysis
 from groundstation.results.deviation import STEER_CARD
 from groundstation.results.flight import NotAssessable
 from groundstation.results.magnetic import ADVISORY, MagneticResult
-from groundstation.viewer.recording import write_recording
 from tests.recording_contents import Contents
 from tests.test_magnetic_run import figure_eight, simulated
+from tests.told import write_recording
 
 
 @pytest.fixture(scope="module")

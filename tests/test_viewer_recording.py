@@ -17,7 +17,6 @@ import rerun as rr
 from groundstation.base.attitude import quaternion_enu_from_flu_xyzw
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Column
-from groundstation.chapters.front import front
 from groundstation.plots.ranges import windows
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, Source
@@ -25,11 +24,11 @@ from groundstation.results.heading import HeadingResult
 from groundstation.tables.table import Flight
 from groundstation.viewer import recording
 from groundstation.viewer.recorder import Recorder
-from groundstation.viewer.recording import stream_recording, write_recording
 from groundstation.viewer.tabs import raw
 from groundstation.viewer.tabs.log import place_s
 from tests.markup import foreign_markup
 from tests.recording_contents import Contents
+from tests.told import front, stream_recording, write_recording
 from tests.viewer_example import GNSS_GAP_S, START_NS, make_flight, make_results, table
 from tests.viewer_shots import free_port
 

@@ -13,7 +13,7 @@ from rerun.experimental import ViewerClient
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight
 from groundstation.viewer.recorder import Recorder
-from groundstation.viewer.recording import send_flight, stream_recording
+from tests.told import send_flight, stream_recording
 from tests.viewer_example import make_flight, make_results
 from tests.viewer_shots import ALL_OR_SOME, PATIENCE_S, chosen, colourful, open_recording, pages, picture
 

@@ -122,11 +122,6 @@ def state_of(row: AlgorithmRow | SessionRow) -> Mark:
     return Mark("good", "Consistent") if row.is_consistent else Mark("warn", "Not consistent")
 
 
-def is_session(results: FlightResults) -> bool:
-    """Whether the results are those of a session of several aircraft."""
-    return results.answer(CooperativeResult) is not None or results.figure("session_clocks") is not None
-
-
 def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -> Front:
     """The top of a session's report: what was found, or why nothing."""
     answer = results.answer(CooperativeResult)

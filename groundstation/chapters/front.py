@@ -4,9 +4,9 @@ from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.assessed import not_assessed
 from groundstation.chapters.by_answer import answer_chapters
-from groundstation.chapters.cooperative import is_session, session_front
+from groundstation.chapters.chapter import Chapters
 from groundstation.chapters.parts import Cell, Front, Mark, Tile
-from groundstation.chapters.plan import is_plan, plan_front
+from groundstation.chapters.plan import plan_front
 from groundstation.chapters.wording import ABSENT, clock, is_number
 from groundstation.results.flight import FlightResults, Status
 
@@ -20,17 +20,18 @@ NO_ANSWER = Mark("unknown", "No answer")
 NOTHING = "Recorded, but nothing could be assessed"
 
 
-def front(results: FlightResults) -> Front:
+def front(results: FlightResults, chapters: Chapters) -> Front:
     """The top of the report."""
-    if is_plan(results):
-        return plan_front(results, _pairs_of_plan(results))
+    if results.is_plan:
+        return plan_front(results, _pairs_of_plan(results), chapters.plan)
     names = [results.metadata.get(key, "") for key in ("aircraft", "flight")]
     title = " · ".join(filter(None, (names[0], names[1] and f"flight {names[1]}"))) or results.flight_id
-    if is_session(results):
-        return session_front(results, _pairs(results))
-    chapters = answer_chapters(results)
-    tiles = [Tile(one.title, one.key, one.claim) for one in chapters if one.claim is not None]
-    left_open = tuple((one.title, one.headline) for one in chapters if one.is_open)
+    if results.is_session:
+        tops = (one.front(results, _pairs(results)) for one in chapters.session if one.front is not None)
+        return next(tops, Front(title, _pairs(results), NO_ANSWER, NOTHING))
+    sections = answer_chapters(results, chapters)
+    tiles = [Tile(one.title, one.key, one.claim) for one in sections if one.claim is not None]
+    left_open = tuple((one.title, one.headline) for one in sections if one.is_open)
     pairs, missing = _pairs(results), (*left_open, *not_assessed(results))
     if not tiles:
         return Front(title, pairs, NO_ANSWER, NOTHING, _recorded(results), missing=missing)

@@ -1,24 +1,13 @@
-"""Chapters of a plan and the top of its report: what is planned, and what its chapters say above all."""
+"""Top of a plan's report: what is planned, and what its chapters say above all."""
+
+from collections.abc import Sequence
 
 from groundstation.base.failures import attempt
 from groundstation.base.findings import worst
-from groundstation.chapters.chapter import Chapter
-from groundstation.chapters.control import control
-from groundstation.chapters.landing_ranges import landing_ranges
-from groundstation.chapters.parts import Cell, Facts, Front, Mark, Note
-from groundstation.chapters.placement import placement
-from groundstation.results.control import ControlPlan
+from groundstation.chapters.chapter import Chapter, Pairs
+from groundstation.chapters.parts import Facts, Front, Mark, Note
 from groundstation.results.flight import FlightResults
-from groundstation.results.landing_ranges import RangeLanding
-from groundstation.results.placement import PlacementPlan
-from groundstation.results.plan import PlanAnswer
 
-# In the order of the report. An answer that none of them tells has the generic chapter.
-PLAN_CHAPTERS: tuple[Chapter, ...] = (
-    Chapter((ControlPlan,), control),
-    Chapter((PlacementPlan,), placement),
-    Chapter((RangeLanding,), landing_ranges),
-)
 MARKS = {
     None: Mark("good", "Planned"),
     "info": Mark("good", "Planned"),
@@ -27,14 +16,9 @@ MARKS = {
 }
 
 
-def is_plan(results: FlightResults) -> bool:
-    """Whether the results tell of a plan and not of something flown."""
-    return any(isinstance(answer, PlanAnswer) for answer in results.answers.values())
-
-
-def plan_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -> Front:
+def plan_front(results: FlightResults, pairs: Pairs, chapters: Sequence[Chapter]) -> Front:
     """The top of a plan's report: headline of its first chapter, and what every chapter has above its parts."""
-    built = (attempt("chapter", chapter.name, chapter.build, results) for chapter in PLAN_CHAPTERS)
+    built = (attempt("chapter", chapter.name, chapter.build, results) for chapter in chapters)
     sections = [section for section in built if section is not None]
     above = [part for section in sections for part in section.above]
     return Front(

@@ -1,8 +1,6 @@
 """Chapter: where the numbers come from. Time of run, host and versions stand in manifest.json alone."""
 
-from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.parts import Facts, Note, Part, Section
-from groundstation.chapters.plan import is_plan
 from groundstation.chapters.wording import ABSENT, clean, number
 from groundstation.results.flight import FlightResults, Source
 
@@ -20,14 +18,14 @@ CHECKS = (
 def provenance(results: FlightResults) -> Section:
     """The chapter."""
     flight_id = clean(results.flight_id)
-    if is_plan(results):
+    if results.is_plan:
         store = ("Scenario as given", "plan.toml", "the file that this plan was made from")
-    elif is_session(results):
+    elif results.is_session:
         store = ("Lossless stores", "manifest.json", "names the MCAP of every log")
     else:
         store = ("Lossless store", f"{flight_id}.mcap", "every topic of the log")
     pairs = (
-        *source_pairs(results.source, "scenario" if is_plan(results) else "log"),
+        *source_pairs(results.source, "scenario" if results.is_plan else "log"),
         ("Recording", f"{flight_id}.rrd", "open with: groundstation view"),
         store,
     )
@@ -37,7 +35,7 @@ def provenance(results: FlightResults) -> Section:
         own = [pair for pair in listed if not pair[0].startswith((*LONG_LISTS, DERIVED)) and pair[0] not in ON_TOP]
         rows = [(key, value, "") for key, value in own[:MOST_METADATA]]
         if rows:
-            parts.append(Facts("Title and kind" if is_plan(results) else "Metadata of the log", rows))
+            parts.append(Facts("Title and kind" if results.is_plan else "Metadata of the log", rows))
         if len(rows) < len(own) or any(key.startswith(LONG_LISTS) for key, _ in listed):
             parts.append(Note(REST))
     parts.append(Note(CHECKS))

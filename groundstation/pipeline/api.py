@@ -205,25 +205,25 @@ class OpenLog(OpenFlight):
             return SavedRun(Path(outcome.folder))
 
     def _saved(self) -> "SavedFlight":
-        from groundstation.estimators.analyses import ANSWER_TYPES
         from groundstation.results.files import SavedFlight
         from groundstation.results.manifest import Manifest
         from groundstation.results.summary import summary_of
+        from groundstation.systems import systems
 
         manifest = Manifest(configuration=self.configuration.to_dict())
         figures = {figure.name: figure for figure in self.results.figures}
-        return SavedFlight(Path(), summary_of(self.results), manifest, figures, ANSWER_TYPES)
+        return SavedFlight(Path(), summary_of(self.results), manifest, figures, systems().answer_types)
 
 
 class SavedRun(OpenFlight):
     """A flight folder that a run made: its answers as they were saved, its tables from the MCAP in it."""
 
     def __init__(self, folder: Path) -> None:
-        from groundstation.estimators.analyses import ANSWER_TYPES
         from groundstation.results.files import load
+        from groundstation.systems import systems
 
         self.folder = folder
-        self.saved = load(folder, ANSWER_TYPES)
+        self.saved = load(folder, systems().answer_types)
 
     @cached_property
     def results(self) -> "FlightResults":

@@ -169,16 +169,18 @@ class OpenFlight(ABC):
     @cached_property
     def _plots(self) -> "dict[str, Plot]":
         from groundstation.reports.notebook.plots import plots_of
+        from groundstation.systems import systems
 
-        return plots_of(self._saved())
+        return plots_of(self._saved(), systems())
 
     def recording(self, path: AnyPath) -> Path:
         """Write the Rerun recording to a file and return its path; `groundstation view` and Rerun open it."""
+        from groundstation.systems import systems
         from groundstation.viewer.recording import write_recording
 
         target = Path(path)
         with told_in_a_line(str(target)):
-            write_recording(target, self.flight, self.results)
+            write_recording(target, self.flight, self.results, systems())
         return target
 
     def show(self, *, inline: bool | None = None, width: int | str = "auto", height: int | str = 700) -> Any:
@@ -201,11 +203,12 @@ class OpenFlight(ABC):
         GroundstationError
             When rerun-notebook is not installed (``pip install 'groundstation[notebook]'``), or no viewer starts.
         """
+        from groundstation.systems import systems
         from groundstation.viewer.inline import inline_viewer, is_notebook
         from groundstation.viewer.launch import open_viewer
 
         if is_notebook() if inline is None else inline:
-            return inline_viewer(self.flight, self.results, width=width, height=height)
+            return inline_viewer(self.flight, self.results, systems(), width=width, height=height)
         with told_in_a_line(self.source.name), TemporaryDirectory(prefix="groundstation-") as folder:
             code = open_viewer(self.recording(Path(folder) / "flight.rrd"))
         if code:
@@ -222,8 +225,9 @@ class OpenFlight(ABC):
     def _repr_html_(self) -> str:
         """The top of the report as a short table: verdict, correction, span, topics."""
         from groundstation.chapters.front import front
+        from groundstation.systems import systems
 
-        told = front(self._saved().results)
+        told = front(self._saved().results, systems().chapters)
         rows = [(name, value if isinstance(value, str) else value.text) for name, value in told.pairs]
         rows.insert(0, ("Flight", told.title))
         if told.verdict is not None:

@@ -1,6 +1,6 @@
 """A plot: panels in rows, each with two axes and what stands on them; sizes on paper in millimetres."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -122,3 +122,7 @@ class Plot:
 def one_panel(panel: Panel, height_mm: float) -> tuple[Row, ...]:
     """The rows of a plot of one panel."""
     return (Row((panel,), height_mm),)
+
+
+# Describes a figure, None where there is nothing to show: ``describe(results)``; of several alike with which one it is.
+Describe = Callable[..., Plot | None]

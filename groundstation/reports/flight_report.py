@@ -1,23 +1,21 @@
 """The report of one flight: one self-contained HTML file, and its PDF on demand, made from the saved results alone."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.base.failures import Failure, attempt, failures, gathered_failures
-from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.front import front
 from groundstation.chapters.parts import Document, Front
-from groundstation.chapters.plan import is_plan
 from groundstation.reports.drawing import Drawing
 from groundstation.reports.page import TEMPLATES, live_figures, render
 from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.reports.sections import flight_sections
 from groundstation.reports.steer_card import write_exports
-from groundstation.results.answer import Answer
 from groundstation.results.file_names import SUMMARY
 from groundstation.results.files import SavedFlight, has_text, load, put_failures, write_text
+from groundstation.systems.system import Systems
 
 PARTS = "chapter", "figure", "report"  # of a report, by their kinds as failures tell them
 REPORT = "report.html"
@@ -40,7 +38,7 @@ class Written:
     failures: tuple[Failure, ...] = ()
 
 
-def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], *, with_pdf: bool = False) -> Written:
+def write_flight_report(folder: Path, systems: Systems, *, with_pdf: bool = False) -> Written:
     """Write report.html into a flight folder; with a magnetic deviation its table and steer card too.
 
     A part that fails by a defect is left out, and summary.json and the report tell it: those that failed elsewhere
@@ -51,8 +49,8 @@ def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], 
     folder : Path
         Holds summary.json, manifest.json and arrays/: nothing else is read, and equal files give equal bytes
         whatever the time, the host or the number of workers.
-    answer_types : mapping of analysis name to dataclass
-        What its answers become.
+    systems : Systems
+        Those whose answers it has.
     with_pdf : bool
         Write report.pdf too. Without it there is none afterwards: that of an earlier run would tell of other results.
 
@@ -62,14 +60,14 @@ def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], 
         When the folder has no saved results.
     """
     with gathered_failures():
-        saved = load(folder, answer_types)
+        saved = load(folder, systems.answer_types)
         # first: the report links to those that are there
         exports = attempt("report", "exports", write_exports, saved, unless=(OSError,))
         written, problem = exports or ((), "")
-        document = flight_document(saved)
+        document = flight_document(saved, systems)
         is_changed = put_failures(folder, failures(), PARTS)
         if is_changed:
-            document = flight_document(load(folder, answer_types))
+            document = flight_document(load(folder, systems.answer_types), systems)
         pages = write_pages(folder / REPORT, flight_report_html, document, document, with_pdf=with_pdf)
         is_changed |= put_failures(folder, failures())
         problems = "; ".join(filter(None, (pages.problem, problem)))
@@ -77,15 +75,15 @@ def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], 
         return Written((*pages.paths, *written, *summary), problems, failures())
 
 
-def add_pdf(folder: Path, answer_types: Mapping[str, type[Answer]]) -> Written:
+def add_pdf(folder: Path, systems: Systems) -> Written:
     """Write report.pdf beside the page of a flight folder, parameters as of :func:`write_flight_report`.
 
     The page and all else stay as they are, unless a part fails by a defect now: then both are written and tell it.
     """
     with gathered_failures():
-        document = flight_document(load(folder, answer_types))
+        document = flight_document(load(folder, systems.answer_types), systems)
         if failures():
-            return write_flight_report(folder, answer_types, with_pdf=True)
+            return write_flight_report(folder, systems, with_pdf=True)
         problem = _put_pdf(document, folder / PDF)
         summary = (SUMMARY,) if put_failures(folder, failures()) else ()
         paths = (folder / name for name in (PDF, *summary))
@@ -127,11 +125,11 @@ def _put_pdf(document: Document, pdf: Path) -> str:
     return ""
 
 
-def flight_document(saved: SavedFlight) -> Document:
+def flight_document(saved: SavedFlight, systems: Systems) -> Document:
     """Put the report of one saved flight, a session of several or a plan, together, its figures drawn."""
-    kind = PLAN if is_plan(saved.results) else SESSION if is_session(saved.results) else "Flight report"
-    top = attempt("chapter", "front", front, saved.results) or Front(saved.results.flight_id)
-    return Document(kind, saved.results.flight_id, top, flight_sections(saved))
+    kind = PLAN if saved.results.is_plan else SESSION if saved.results.is_session else "Flight report"
+    top = attempt("chapter", "front", front, saved.results, systems.chapters) or Front(saved.results.flight_id)
+    return Document(kind, saved.results.flight_id, top, flight_sections(saved, systems))
 
 
 def flight_report_html(document: Document, beside: str = "manifest.json") -> str:

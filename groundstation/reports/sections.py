@@ -9,19 +9,17 @@ from typing import Any
 
 from groundstation.base.failures import attempt
 from groundstation.chapters.by_answer import answer_chapters, chapters_of
-from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.findings import findings
 from groundstation.chapters.next_steps import next_steps
 from groundstation.chapters.overview import overview
 from groundstation.chapters.parts import Facts, Note, Part, Section, kept
-from groundstation.chapters.plan import is_plan
-from groundstation.chapters.plots import PLOTS
 from groundstation.chapters.provenance import provenance
 from groundstation.chapters.quality import quality
 from groundstation.chapters.sources import sources
 from groundstation.reports.drawing import drawn_by
 from groundstation.results.files import SavedFlight
 from groundstation.results.flight import FlightResults
+from groundstation.systems.system import Systems
 
 Build = Callable[[FlightResults], Section | None]
 BEFORE_THE_ANSWERS: dict[str, Build] = {"overview": overview, "next_steps": next_steps}
@@ -30,25 +28,30 @@ ON_THE_SESSION: dict[str, Build] = {"findings": findings, "provenance": provenan
 APPENDICES: dict[str, Build] = {"provenance": provenance, "sources": sources}
 
 
-def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
+def flight_sections(saved: SavedFlight, systems: Systems) -> tuple[Section, ...]:
     """The chapters of a flight: the flight itself, what to do next, its answers, the best first, its data; appendices.
 
     Of a session of several aircraft, and of a plan: those on its answers, its findings, its source.
 
     A chapter that has nothing to say is left out, one of nothing but figures without arrays, and one that fails.
     """
-    chapters, appendices = told_sections(saved)
-    return (*_numbered(chapters, saved, count(1)), *_numbered(appendices, saved, ascii_uppercase))
+    chapters, appendices = told_sections(saved, systems)
+    numbered = _numbered(chapters, saved, systems, count(1))
+    return (*numbered, *_numbered(appendices, saved, systems, ascii_uppercase))
 
 
-def told_sections(saved: SavedFlight) -> tuple[list[Section], list[Section]]:
+def told_sections(saved: SavedFlight, systems: Systems) -> tuple[list[Section], list[Section]]:
     """The chapters of :func:`flight_sections` and their appendices as they are told, no figure drawn."""
     results = saved.results
-    is_flight = not (is_session(results) or is_plan(results))
+    is_flight = not (results.is_session or results.is_plan)
     told = (
-        (*_built(BEFORE_THE_ANSWERS, results), *answer_chapters(results), *_built(ON_THE_DATA, results))
+        (
+            *_built(BEFORE_THE_ANSWERS, results),
+            *answer_chapters(results, systems.chapters),
+            *_built(ON_THE_DATA, results),
+        )
         if is_flight
-        else (*chapters_of(results), *_built(ON_THE_SESSION, results))
+        else (*chapters_of(results, systems.chapters), *_built(ON_THE_SESSION, results))
     )
     chapters = [section for section in told if section is not None]
     workings = (_workings(section, saved.manifest.configuration) for section in chapters)
@@ -61,9 +64,11 @@ def _built(builds: Mapping[str, Build], results: FlightResults) -> tuple[Section
     return tuple(attempt("chapter", name, build, results) for name, build in builds.items())
 
 
-def _numbered(sections: Sequence[Section], saved: SavedFlight, numbers: Iterable[object]) -> tuple[Section, ...]:
+def _numbered(
+    sections: Sequence[Section], saved: SavedFlight, systems: Systems, numbers: Iterable[object]
+) -> tuple[Section, ...]:
     """The sections as a page shows them, those without parts left out."""
-    drawn = (attempt("chapter", section.key, on_a_page, section, saved) for section in sections)
+    drawn = (attempt("chapter", section.key, on_a_page, section, saved, systems) for section in sections)
     shown = (section for section in drawn if section is not None and section.parts)
     return tuple(replace(section, number=str(number)) for section, number in zip(shown, numbers, strict=False))
 
@@ -84,9 +89,9 @@ def _as_set(part: Part, configuration: Mapping[str, Any]) -> Part | None:
     return replace(part, pairs=pairs) if pairs else None
 
 
-def on_a_page(section: Section, saved: SavedFlight) -> Section:
+def on_a_page(section: Section, saved: SavedFlight, systems: Systems) -> Section:
     """The section as a report shows it: its figures drawn, of the files beside the report those that are there."""
-    drawn = drawn_by(PLOTS, section, saved.results)
+    drawn = drawn_by(systems.plots, section, saved.results)
     parts = (
         _of_files_there(part, saved.folder) if isinstance(part, Note) and part.files else part for part in drawn.parts
     )

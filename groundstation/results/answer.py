@@ -18,6 +18,14 @@ class Answer(Tabular):
     figures: tuple[FigureData, ...]
 
 
+class PlanAnswer(Answer):
+    """Base of the answers of ``groundstation plan``: they tell of something that has not been flown."""
+
+
+class SessionAnswer(Answer):
+    """Base of the answers of a session of several aircraft."""
+
+
 A = TypeVar("A", bound=Answer)
 Answers = Mapping[str, Answer]  # by the name of the analysis
 

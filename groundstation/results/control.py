@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
+from groundstation.results.answer import PlanAnswer
 from groundstation.results.figures import FigureData
-from groundstation.results.plan import PlanAnswer
 
 Horizon = Literal["none", "each step", "end"]
 UNCONTROLLED = "uncontrolled"

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from groundstation.results.answer import Answer
+from groundstation.results.answer import SessionAnswer
 from groundstation.results.figures import FigureData
 
 
@@ -108,7 +108,7 @@ class LinkRow:
 
 
 @dataclass(frozen=True)
-class CooperativeResult(Answer):
+class CooperativeResult(SessionAnswer):
     """Navigation between the vehicles of one session.
 
     Parameters

@@ -13,7 +13,7 @@ from groundstation.base.failures import attempt
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.units import NS_PER_S
-from groundstation.results.answer import A, Answers, answer_of
+from groundstation.results.answer import A, Answers, PlanAnswer, SessionAnswer, answer_of
 from groundstation.results.arrays.typed import T
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.figures import FigureData, FigureSet, numbers
@@ -88,6 +88,17 @@ class FlightResults(Tabular):
     answers: Answers = field(default_factory=dict)
     figures: Sequence[FigureData] = ()
     chosen: tuple[ChosenInterval, ...] = ()
+
+    @property
+    def is_plan(self) -> bool:
+        """Tell whether the results are those of a plan and not of something flown."""
+        return any(isinstance(answer, PlanAnswer) for answer in self.answers.values())
+
+    @property
+    def is_session(self) -> bool:
+        """Tell whether the results are those of a session of several aircraft."""
+        is_answered = any(isinstance(answer, SessionAnswer) for answer in self.answers.values())
+        return is_answered or self.figure("session_clocks") is not None
 
     def answer(self, kind: type[A]) -> A | None:
         """The answer of that type, None where its analysis has none."""

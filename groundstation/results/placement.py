@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+from groundstation.results.answer import PlanAnswer
 from groundstation.results.figures import FigureData
-from groundstation.results.plan import PlanAnswer
 
 GIVEN = "given"
 

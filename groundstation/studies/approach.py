@@ -14,7 +14,6 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.chapters.parts import Section
 from groundstation.estimators.approaches.analysis import LANDING
 from groundstation.estimators.approaches.settings import LandingSettings
-from groundstation.estimators.known import Known, Runway, SiteData
 from groundstation.results.figures import FigureData
 from groundstation.results.landing import PositionError
 from groundstation.results.landing_categories import LINEAR_95
@@ -26,7 +25,8 @@ from groundstation.simulation.approach import (
     TrueRunway,
     simulate_approach,
 )
-from groundstation.studies.page import StudyResult, section, table
+from groundstation.systems.known import Known, Runway, SiteData
+from groundstation.systems.study import StudyResult, section, table
 from groundstation.tables.phases import flight_phases
 
 Progress = Callable[[str], None]

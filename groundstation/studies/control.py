@@ -15,7 +15,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.placement import PlacementPlan
 from groundstation.studies.control_cases import CASES, FACTOR, FIRST_SEED, PUBLISHED_M, SPEED, placements, scenario
 from groundstation.studies.control_flown import fly
-from groundstation.studies.page import StudyResult, section, table
+from groundstation.systems.study import StudyResult, section, table
 
 Progress = Callable[[str], object]
 

@@ -11,7 +11,7 @@ from groundstation.estimators.control.scenario import Placement, SessionPlan
 from groundstation.results.arrays.cooperative import ControlMeasures
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.control import UNCONTROLLED, ControlPlan
-from groundstation.studies.shipped_plans import load_plan
+from groundstation.systems.shipped_plans import load_plan
 
 FIRST_SEED = 95_000  # no smaller seed belongs to this study
 FACTOR = 2.0  # a figure of ours within so many times of the published one counts as the same

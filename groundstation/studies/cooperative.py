@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from groundstation.studies.cooperative_cases import CASES, FIRST_SEED, Case
 from groundstation.studies.cooperative_page import page, study_table
 from groundstation.studies.cooperative_runs import WORKERS, Progress, run_cases
-from groundstation.studies.page import StudyResult
+from groundstation.systems.study import StudyResult
 
 
 def study_cooperative(

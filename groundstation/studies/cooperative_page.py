@@ -10,7 +10,7 @@ from groundstation.methods.intervals import nees_limits
 from groundstation.results.figures import FigureData
 from groundstation.studies.cooperative_cases import FACTOR, Case
 from groundstation.studies.cooperative_runs import Outcome, diverges
-from groundstation.studies.page import grid, section
+from groundstation.systems.study import grid, section
 
 HONEST_SHARE = 0.99  # of honest filters inside the limits: some twenty are judged at once
 

@@ -8,7 +8,7 @@ from groundstation.studies.forecast_coupled_bank import bank_table, fly_banks
 from groundstation.studies.forecast_outages import fly_outages, outage_table
 from groundstation.studies.forecast_page import page
 from groundstation.studies.forecast_runs import COUPLED, Progress, run_cases
-from groundstation.studies.page import StudyResult
+from groundstation.systems.study import StudyResult
 
 OUTAGE_RUNS = 30  # flights of a case with outages in the log
 BANK_RUNS = 10  # that decide on the bank on the coupled model: two seconds of processor time each

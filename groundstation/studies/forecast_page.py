@@ -12,7 +12,7 @@ from groundstation.results.forecast import METHODS
 from groundstation.studies.forecast_cases import Case
 from groundstation.studies.forecast_runs import COUPLED, METHOD_NAMES, SETS_OF_STARTS, STUDY_HORIZONS_MIN
 from groundstation.studies.forecast_tables import BETTER, COMPARED, REFERENCE, UNDECIDED, WORSE
-from groundstation.studies.page import grid, section, table
+from groundstation.systems.study import grid, section, table
 
 HORIZON_HEAD = [f"{horizon:g} min" for horizon in STUDY_HORIZONS_MIN]
 FREEDOM_A_RUN = 12  # six states, two channels

@@ -20,7 +20,7 @@ from groundstation.studies.heading_family import (
     time_to_precision_table,
 )
 from groundstation.studies.heading_paper import arm_table, precision_table, quality_table, standstill_tables
-from groundstation.studies.page import StudyResult, section, table
+from groundstation.systems.study import StudyResult, section, table
 
 PUBLISHED: tuple[Family, ...] = ("grid", "continuous")  # families that the published figures are compared with
 PAPER_RUNS = 2000  # realisations of the plain processes: the paper had more than 500 at standstill

@@ -13,12 +13,12 @@ from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.steady import FACTORS
-from groundstation.estimators.known import AircraftClass, AircraftData
 from groundstation.results.figures import FigureData
 from groundstation.simulation.processes import damped_oscillation
 from groundstation.simulation.taxi import TaxiCase, TaxiRun, draw_case, simulate_taxi, taxi_flight
 from groundstation.simulation.taxi_disturbance import Disturbance, metar_line
-from groundstation.studies.page import StudyResult, section, table
+from groundstation.systems.known import AircraftClass, AircraftData
+from groundstation.systems.study import StudyResult, section, table
 from groundstation.tables.phases import flight_phases
 
 FloatArray = NDArray[np.float64]

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.known import AircraftClass, AircraftData
 from groundstation.results.arrays.heading import HeadingRunning
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult
 from groundstation.simulation.taxi import Family, TaxiCase, draw_run, taxi_flight
 from groundstation.simulation.taxi_disturbance import KINDS
+from groundstation.systems.known import AircraftClass, AircraftData
 from groundstation.tables.phases import flight_phases
 
 BoolArray = NDArray[np.bool_]

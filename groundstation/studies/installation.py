@@ -15,7 +15,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.installation import InstallationResult
 from groundstation.studies.installation_family import AIRCRAFT, FAMILIES, FLIGHTS, LIMIT_DEG, FlownFlight, draw_fleet
 from groundstation.studies.installation_pool import Kept, Progress, TaxiOfPool, draw_pool, pool_figure
-from groundstation.studies.page import StudyResult, section, table
+from groundstation.systems.study import StudyResult, section, table
 
 LEAST_POOL = FLIGHTS
 ORDER = [family.name for family in FAMILIES]

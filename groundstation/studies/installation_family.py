@@ -15,9 +15,9 @@ from groundstation.estimators.installation.settings import (
     STEADY_DEG,
     alignment_sigma_deg,
 )
-from groundstation.estimators.known import AircraftClass
 from groundstation.results.installation import Lesson
 from groundstation.studies.installation_pool import TaxiOfPool
+from groundstation.systems.known import AircraftClass
 
 AIRCRAFT, FLIGHTS = 100, 6
 CLASSES: tuple[AircraftClass, ...] = ("light", "jet trainer", "business jet", "airliner")

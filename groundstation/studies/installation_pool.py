@@ -9,10 +9,10 @@ import numpy as np
 from groundstation.base.angles import wrap_180
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.verdict import STANDSTILL_GATE, WHOLE
-from groundstation.estimators.known import AircraftData
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult
 from groundstation.simulation.taxi import draw_case, simulate_taxi, taxi_flight
+from groundstation.systems.known import AircraftData
 from groundstation.tables.phases import flight_phases
 
 Progress = Callable[[str], None]

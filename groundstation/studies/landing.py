@@ -10,7 +10,7 @@ from groundstation.studies.landing_tables import (
     trial_table,
     variation_table,
 )
-from groundstation.studies.page import StudyResult, section, table
+from groundstation.systems.study import StudyResult, section, table
 
 DRAWS_A_RUN = 100  # of bearings, which cost next to nothing
 

@@ -9,7 +9,7 @@ from typing import Literal
 from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
 from groundstation.estimators.landing_ranges.scenario import OwnErrors, RangeApproach, RangeNoise
 from groundstation.results.landing_categories import CATEGORIES
-from groundstation.studies.shipped_plans import load_plan
+from groundstation.systems.shipped_plans import load_plan
 
 FACTOR = 2.0  # a figure of ours within so many times of the published one counts as the same
 FIRST_SEED = 90_000  # no smaller seed belongs to this study

@@ -8,7 +8,7 @@ from groundstation.studies.magnetic_coverage import SECOND, coverage_table, firs
 from groundstation.studies.magnetic_page import page
 from groundstation.studies.magnetic_runs import Progress, jobs_of, run_jobs
 from groundstation.studies.magnetic_taxis import taxi_table
-from groundstation.studies.page import StudyResult
+from groundstation.systems.study import StudyResult
 
 
 def study_magnetic(

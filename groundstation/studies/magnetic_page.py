@@ -20,7 +20,7 @@ from groundstation.studies.magnetic_tables import (
     WORSE,
     rows_where,
 )
-from groundstation.studies.page import grid, section, table
+from groundstation.systems.study import grid, section, table
 
 TITLES: dict[str, str] = {"none": "no correction", "one_branch": "one branch alone"}
 TITLES.update((str(name), title) for name, title in METHOD_TITLES.items())

@@ -25,7 +25,7 @@ from groundstation.estimators.cooperative.settings import (
 )
 from groundstation.estimators.cooperative.tracks import AlgorithmRun
 from groundstation.results.figures import FigureData
-from groundstation.studies.page import StudyResult, grid, section, table
+from groundstation.systems.study import StudyResult, grid, section, table
 from groundstation.tables.session import Session
 from groundstation.tables.session_robots import blinded
 

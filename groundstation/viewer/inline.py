@@ -9,6 +9,7 @@ from typing import Any
 
 from groundstation.base.errors import GroundstationError
 from groundstation.results.flight import FlightResults
+from groundstation.systems.system import Systems
 from groundstation.tables.table import Flight
 from groundstation.viewer.inner import NOTEBOOK, NOTEBOOK_ASSET, NOTEBOOK_ASSET_HERE
 
@@ -19,7 +20,9 @@ def is_notebook() -> bool:
     return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
 
 
-def inline_viewer(flight: Flight, results: FlightResults, *, width: int | str, height: int | str) -> Any:
+def inline_viewer(
+    flight: Flight, results: FlightResults, systems: Systems, *, width: int | str, height: int | str
+) -> Any:
     """A viewer for a notebook cell with the recording of one flight in it: the same logging as into a file.
 
     The viewer's own files come from this machine, not from the Internet, unless the environment
@@ -27,7 +30,7 @@ def inline_viewer(flight: Flight, results: FlightResults, *, width: int | str, h
 
     Parameters
     ----------
-    flight, results
+    flight, results, systems
         As for :func:`write_recording`.
     width, height : int or "auto"
         Pixels.
@@ -57,7 +60,7 @@ def inline_viewer(flight: Flight, results: FlightResults, *, width: int | str, h
     with open_stream(results.flight_id) as stream:
         try:
             viewer = Viewer(width=width, height=height, recording=stream)  # type: ignore[arg-type]
-            send_flight(stream, flight, results)
+            send_flight(stream, flight, results, systems)
         except (ValueError, RuntimeError) as error:
             raise GroundstationError("the recording in a notebook", str(error)) from error
     return viewer

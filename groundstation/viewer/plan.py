@@ -1,33 +1,22 @@
 """The Rerun recording of a plan."""
 
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.base.failures import attempt
-from groundstation.chapters.by_answer import without_chapter
+from groundstation.results.answer import PlanAnswer
 from groundstation.results.flight import FlightResults
+from groundstation.systems.system import Systems
 from groundstation.tables.table import Flight
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.properties import send_properties
 from groundstation.viewer.recorder import Recorder
-from groundstation.viewer.recording import logged, save_stream, send_layout
-from groundstation.viewer.tabs.control import control
-from groundstation.viewer.tabs.generic import generic_tab
-from groundstation.viewer.tabs.landing_ranges import landing_ranges
-from groundstation.viewer.tabs.placement import placement
-
-PLAN_TABS: dict[str, Callable[[Recorder, FlightResults], rrb.Container | None]] = {  # in the order of the report
-    "control": control,
-    "placement": placement,
-    "landing_ranges": landing_ranges,
-}
+from groundstation.viewer.recording import answer_tabs, logged, save_stream, send_layout
 
 
-def write_plan_recording(path: Path, results: FlightResults) -> None:
+def write_plan_recording(path: Path, results: FlightResults, systems: Systems) -> None:
     """Write the recording of a plan, blueprint embedded; see :func:`recording.write_recording`.
 
     Raises
@@ -35,15 +24,14 @@ def write_plan_recording(path: Path, results: FlightResults) -> None:
     GroundstationError
         When Rerun refused the data or the file could not be written.
     """
-    save_stream(path, results.flight_id, lambda stream: send_plan(stream, results))
+    save_stream(path, results.flight_id, lambda stream: send_plan(stream, results, systems))
 
 
-def send_plan(stream: rr.RecordingStream, results: FlightResults) -> rrb.Blueprint:
+def send_plan(stream: rr.RecordingStream, results: FlightResults, systems: Systems) -> rrb.Blueprint:
     """Log everything to a stream that has its sink and send the layout; returns the layout."""
-    recorder = Recorder(stream, 0, has_utc=False)
+    recorder = Recorder(stream, 0, has_utc=False, systems=systems)
     stream.send_recording_name(clean_text(results.flight_id))
     attempt("properties", "results", send_properties, stream, results)
     clock = Flight({}, results.metadata)  # findings have places in time alone
-    generic = {answer.analysis: partial(generic_tab, recorder, results, answer) for answer in without_chapter(results)}
-    tabs = {name: partial(tab, recorder, results) for name, tab in PLAN_TABS.items()} | generic
-    return send_layout(stream, logged(tabs.items(), recorder, clock, results))
+    tabs = answer_tabs(PlanAnswer, recorder, results)
+    return send_layout(stream, logged(tabs, recorder, clock, results))

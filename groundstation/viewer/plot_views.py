@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 import rerun.blueprint as rrb
 
-from groundstation.chapters.plots import PLOTS
 from groundstation.plots import extents
 from groundstation.plots.marks import Band, Curve, Dots, Lanes, Limit, Mark, Spans
 from groundstation.plots.plot import Panel, Plot
@@ -82,9 +81,9 @@ def runs_of(recorder: Recorder, told: Plot | None, path: str, *, height: float =
     ]
 
 
-def plot_of(name: str, results: FlightResults, *of: str) -> Plot | None:
+def plot_of(recorder: Recorder, name: str, results: FlightResults, *of: str) -> Plot | None:
     """The description of a figure of a chapter; ``of`` says which of several alike."""
-    return PLOTS[name](results, *of)
+    return recorder.systems.plots[name](results, *of)
 
 
 def _named(told: Plot | None, of: str) -> Iterator[tuple[str, str, Panel]]:

@@ -11,12 +11,14 @@ from rerun.components import AggregationPolicy, InterpolationMode
 
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
+from groundstation.systems.system import Systems
 from groundstation.viewer.colours import SEVERITIES, Colour, for_states
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.series import FloatArray, break_line, thin
 
 UTC, FLIGHT_TIME = "utc", "flight_time"
 ROWS_PER_CALL = 65_536  # larger chunks only cost the viewer memory
+NO_SYSTEMS = Systems(())
 MAX_LOG_TEXT = 600
 MAX_HALF_WIDTH = 1e150  # of a band: its square is a number
 LEVELS = {"info": "INFO", "warn": "WARN", "fail": "ERROR"}
@@ -41,10 +43,12 @@ class Recorder:
         Corrected time of flight time zero.
     has_utc : bool
         Whether corrected time is UTC; without it there is no timeline ``utc``.
+    systems : Systems
+        Those whose chapters and plots the tabs show.
     """
 
-    def __init__(self, stream: rr.RecordingStream, start_ns: int, has_utc: bool) -> None:
-        self.stream, self.start_ns, self.has_utc = stream, start_ns, has_utc
+    def __init__(self, stream: rr.RecordingStream, start_ns: int, has_utc: bool, systems: Systems = NO_SYSTEMS) -> None:
+        self.stream, self.start_ns, self.has_utc, self.systems = stream, start_ns, has_utc, systems
 
     def time_ns(self, flight_seconds: ArrayLike) -> Int64Array:
         """Corrected time of flight seconds, to the nanosecond."""

@@ -18,47 +18,26 @@ from groundstation.base.failures import attempt, failures, with_failures
 from groundstation.base.to_disk import sync_file
 from groundstation.results.answer import Answer
 from groundstation.results.flight import FlightResults
+from groundstation.systems.system import Systems
 from groundstation.tables.table import Flight
 from groundstation.viewer.inner import forget_closed, send_blueprint
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.properties import send_properties
 from groundstation.viewer.recorder import FLIGHT_TIME, Recorder
-from groundstation.viewer.tabs.forecast import forecast
 from groundstation.viewer.tabs.generic import generic_tab
-from groundstation.viewer.tabs.heading import heading
-from groundstation.viewer.tabs.inertial import inertial
-from groundstation.viewer.tabs.installation import installation
-from groundstation.viewer.tabs.landing import landing
-from groundstation.viewer.tabs.landing_beacons import landing_beacons
 from groundstation.viewer.tabs.log import log
-from groundstation.viewer.tabs.magnetic import magnetic
 from groundstation.viewer.tabs.overview import overview
 from groundstation.viewer.tabs.quality import quality
 from groundstation.viewer.tabs.raw import raw
-from groundstation.viewer.tabs.reference import reference
-from groundstation.viewer.tabs.together import together
 
 APPLICATION = "groundstation"
 DEFAULT_VIEWER_URL = "rerun+http://127.0.0.1:9876/proxy"
 DEFAULT_PORT = 9876
-# In order: a tab and the analyses whose answers it shows. An answer that none of them shows has the generic tab.
-ANSWER_TABS: tuple[tuple[Callable[[Recorder, FlightResults], rrb.Container | None], tuple[str, ...]], ...] = (
-    (heading, ("heading",)),
-    (installation, ("installation",)),
-    (inertial, ("inertial",)),
-    (forecast, ("forecast",)),
-    (magnetic, ("magnetic", "magnetic_ground")),
-    (landing, ("landing",)),
-    (landing_beacons, ("landing_beacons",)),
-    (together, ("together",)),
-    (reference, ("reference",)),
-)
-Tab = tuple[str, Callable[[], rrb.Container | None]]
-SHOWN_ELSEWHERE = ("latency",)  # in the tab on data quality
+NamedTab = tuple[str, Callable[[], rrb.Container | None]]
 CONNECT_SECONDS, FLUSH_SECONDS = 3.0, 60.0
 
 
-def write_recording(path: Path, flight: Flight, results: FlightResults) -> None:
+def write_recording(path: Path, flight: Flight, results: FlightResults, systems: Systems) -> None:
     """Write the recording of one flight, blueprint embedded.
 
     Parameters
@@ -67,13 +46,15 @@ def write_recording(path: Path, flight: Flight, results: FlightResults) -> None:
         The .rrd file. It is written under a temporary name and moved into place: a kill never leaves half a file.
     flight : Flight
     results : FlightResults
+    systems : Systems
+        Those whose tabs it has.
 
     Raises
     ------
     GroundstationError
         When Rerun refused the data or the file could not be written.
     """
-    save_stream(path, results.flight_id, lambda stream: send_flight(stream, flight, results))
+    save_stream(path, results.flight_id, lambda stream: send_flight(stream, flight, results, systems))
 
 
 def save_stream(path: Path, identity: str, send: Callable[[rr.RecordingStream], object]) -> None:
@@ -96,12 +77,14 @@ def _save(path: Path, identity: str, send: Callable[[rr.RecordingStream], object
         send(stream)
 
 
-def stream_recording(flight: Flight, results: FlightResults, *, connect_url: str = DEFAULT_VIEWER_URL) -> None:
+def stream_recording(
+    flight: Flight, results: FlightResults, systems: Systems, *, connect_url: str = DEFAULT_VIEWER_URL
+) -> None:
     """Send the recording of one flight to a running viewer.
 
     Parameters
     ----------
-    flight, results
+    flight, results, systems
         As for :func:`write_recording`.
     connect_url : str
         Where the viewer listens: ``rerun+http://host:port/proxy``.
@@ -115,7 +98,7 @@ def stream_recording(flight: Flight, results: FlightResults, *, connect_url: str
     with open_stream(results.flight_id) as stream:
         try:
             stream.connect_grpc(connect_url)
-            send_flight(stream, flight, results)
+            send_flight(stream, flight, results, systems)
         except (ValueError, RuntimeError) as error:
             raise GroundstationError(
                 connect_url, str(error), next_step="start the viewer first, or check its port"
@@ -133,9 +116,9 @@ def _expect_viewer(url: str) -> None:
         ) from error
 
 
-def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResults) -> rrb.Blueprint:
+def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResults, systems: Systems) -> rrb.Blueprint:
     """Log everything to a stream that has its sink, send the layout, wait until it is out; returns the layout."""
-    recorder = Recorder(stream, flight.start_ns, flight.has_utc)
+    recorder = Recorder(stream, flight.start_ns, flight.has_utc, systems)
     stream.send_recording_name(clean_text(results.flight_id))
     attempt("properties", "results", send_properties, stream, results)
     if flight.has_utc:
@@ -143,18 +126,15 @@ def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResul
     return send_layout(stream, logged(tabs_of(recorder, flight, results), recorder, flight, results))
 
 
-def tabs_of(recorder: Recorder, flight: Flight, results: FlightResults) -> Iterator[Tab]:
+def tabs_of(recorder: Recorder, flight: Flight, results: FlightResults) -> Iterator[NamedTab]:
     """Tabs of a flight but for the log, in their order: the name of each and what logs it."""
     yield "overview", partial(overview, recorder, results)
     yield "quality", partial(quality, recorder, flight, results)
-    for tab, analyses in ANSWER_TABS:
-        yield analyses[0], partial(tab, recorder, results)
-    for answer in _without_tab(results):
-        yield answer.analysis, partial(generic_tab, recorder, results, answer)
+    yield from answer_tabs(None, recorder, results)
     yield "raw", partial(raw, recorder, flight, results)
 
 
-def logged(tabs: Iterable[Tab], recorder: Recorder, flight: Flight, results: FlightResults) -> list[rrb.Container]:
+def logged(tabs: Iterable[NamedTab], recorder: Recorder, flight: Flight, results: FlightResults) -> list[rrb.Container]:
     """Log tabs and, behind them, the log, which tells of those that failed and are left out."""
     shown = [attempt("tab", name, tab) for name, tab in tabs]
     told = replace(results, findings=with_failures(results.findings, failures()))
@@ -162,9 +142,16 @@ def logged(tabs: Iterable[Tab], recorder: Recorder, flight: Flight, results: Fli
     return [tab for tab in shown if tab is not None]
 
 
-def _without_tab(results: FlightResults) -> list[Answer]:
-    shown = {*SHOWN_ELSEWHERE, *(name for _, names in ANSWER_TABS for name in names)}
-    return [answer for name, answer in results.answers.items() if name not in shown]
+def answer_tabs(kind: type[Answer] | None, recorder: Recorder, results: FlightResults) -> Iterator[NamedTab]:
+    """Return the tabs of the systems that show answers of a kind, then a generic one for each answer without any."""
+    tabs = tuple(recorder.systems.tabs_of(kind))
+    for tab in tabs:
+        if tab.log is not None:
+            yield tab.shows[0], partial(tab.log, recorder, results)
+    shown = {name for tab in tabs for name in tab.shows}
+    for name, answer in results.answers.items():
+        if name not in shown:
+            yield name, partial(generic_tab, recorder, results, answer)
 
 
 def send_layout(

@@ -1,23 +1,23 @@
 """The Rerun recording of a session of several aircraft."""
 
-from functools import partial
 from pathlib import Path
 
 import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.base.failures import attempt
+from groundstation.results.answer import SessionAnswer
 from groundstation.results.flight import FlightResults
+from groundstation.systems.system import Systems
 from groundstation.tables.session_assemble import AssembledSession
 from groundstation.tables.table import Flight
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.properties import send_properties
 from groundstation.viewer.recorder import Recorder
-from groundstation.viewer.recording import logged, save_stream, send_layout
-from groundstation.viewer.tabs.cooperative import cooperative
+from groundstation.viewer.recording import answer_tabs, logged, save_stream, send_layout
 
 
-def write_session_recording(path: Path, assembled: AssembledSession, results: FlightResults) -> None:
+def write_session_recording(path: Path, assembled: AssembledSession, results: FlightResults, systems: Systems) -> None:
     """Write the recording of a session, blueprint embedded; see :func:`recording.write_recording`.
 
     Parameters
@@ -27,22 +27,26 @@ def write_session_recording(path: Path, assembled: AssembledSession, results: Fl
     assembled : AssembledSession
         Its clock and its ground points.
     results : FlightResults
+    systems : Systems
+        Those whose tabs it has.
 
     Raises
     ------
     GroundstationError
         When Rerun refused the data or the file could not be written.
     """
-    save_stream(path, results.flight_id, lambda stream: send_session(stream, assembled, results))
+    save_stream(path, results.flight_id, lambda stream: send_session(stream, assembled, results, systems))
 
 
-def send_session(stream: rr.RecordingStream, assembled: AssembledSession, results: FlightResults) -> rrb.Blueprint:
+def send_session(
+    stream: rr.RecordingStream, assembled: AssembledSession, results: FlightResults, systems: Systems
+) -> rrb.Blueprint:
     """Log everything to a stream that has its sink and send the layout; returns the layout."""
-    recorder = Recorder(stream, assembled.start_ns, assembled.has_utc)
+    recorder = Recorder(stream, assembled.start_ns, assembled.has_utc, systems)
     stream.send_recording_name(clean_text(results.flight_id))
     attempt("properties", "results", send_properties, stream, results)
     if assembled.has_utc:
         stream.send_recording_start_time_nanos(assembled.start_ns)
     clock = Flight({}, results.metadata, assembled.start_ns, assembled.has_utc)  # findings have places in time alone
-    tabs = [("cooperative", partial(cooperative, recorder, assembled.session.points, results))]
+    tabs = answer_tabs(SessionAnswer, recorder, results)
     return send_layout(stream, logged(tabs, recorder, clock, results))

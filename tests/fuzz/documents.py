@@ -54,10 +54,10 @@ def _documented(heading: str) -> str:
 
 def _defaults() -> str:
     """Every plain setting of every analysis with its default."""
-    from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
+    from groundstation.systems import systems
 
     lines: list[str] = []
-    for analysis in {one.settings_table: one for one in (*FLIGHT_ANALYSES, *SESSION_ANALYSES)}.values():
+    for analysis in {one.settings_table: one for one in (*systems().analyses, *systems().session_analyses)}.values():
         lines.append(f"[{analysis.settings_table}]")
         for name, value in vars(analysis.settings()).items():
             if isinstance(value, bool | int | float | str):
@@ -86,7 +86,7 @@ def bases(kind: str) -> tuple[str, ...]:
         "approach": lambda: _shipped("simulation/approaches"),
         "landing-plan": lambda: _shipped("plans/landing"),
         "session-plan": lambda: _shipped("plans/session"),
-        "standard": lambda: _shipped("estimators/fleet/standards"),
+        "standard": lambda: _shipped("methods/fleet/standards"),
         "noise-class": lambda: _shipped("methods/ins_classes"),
         "ins-class": lambda: _shipped("simulation/ins_classes"),
     }[kind]()
@@ -163,7 +163,7 @@ def _plan(name: str) -> Callable[[Path], Any]:
     def load(path: Path) -> Any:
         from groundstation.estimators.control.analysis import SESSION_PLAN
         from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
-        from groundstation.studies.shipped_plans import load_plan
+        from groundstation.systems.shipped_plans import load_plan
 
         return load_plan(SESSION_PLAN if name == "session" else LANDING_PLAN, path)
 

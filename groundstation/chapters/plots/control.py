@@ -1,5 +1,7 @@
 """Plots of a planned session: ways from above, accuracy and geometry with time, laws of control."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from groundstation.base.angles import unwrap
@@ -7,7 +9,7 @@ from groundstation.chapters.control import title_of
 from groundstation.chapters.plots.common import M_PER_KM, label
 from groundstation.plots.axes import time_axis
 from groundstation.plots.marks import AnyMark, Curve, Dots, Emphasis, Floats, Limit, Points, Role, Told, series
-from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
+from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import finite, padded
 from groundstation.results.arrays.cooperative import ControlMeasures, ControlPaths, ControlPoints
 from groundstation.results.arrays.typed import Flags, T
@@ -138,3 +140,10 @@ def _unwrapped(data: ControlPaths, rows: Flags, start_deg: float) -> Floats:
     """Headings without jumps through north, beginning at the start."""
     track = unwrap(data.track_deg[rows])
     return np.asarray(start_deg + track - track[0])
+
+
+PLOTS: Mapping[str, Describe] = {
+    "control.paths": paths,
+    "control.measures": measures,
+    "control.law": law,
+}

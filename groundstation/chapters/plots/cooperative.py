@@ -1,5 +1,7 @@
 """Plots of the chapter on navigation between aircraft: map, errors against sigma, geometry, residuals."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from groundstation.base.ellipse import magnified, outlines
@@ -22,7 +24,7 @@ from groundstation.plots.marks import (
     Told,
     series,
 )
-from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
+from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import broken_at_gaps, finite, thin
 from groundstation.results.arrays.cooperative import (
     CooperativeGeometry,
@@ -238,3 +240,11 @@ def links(results: FlightResults) -> Plot | None:
         one_panel(Panel(marks, time_axis(float(time.min()), float(time.max())), y), 44.0),
         ("cooperative_links",),
     )
+
+
+PLOTS: Mapping[str, Describe] = {
+    "cooperative.map": session_map,
+    "cooperative.errors": errors,
+    "cooperative.geometry": geometry,
+    "cooperative.links": links,
+}

@@ -1,11 +1,13 @@
 """Plots of the forecast: growth by horizon, calibration, the hindcast map."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from groundstation.chapters.plots.common import has_values, label, line_with_dots, positive
 from groundstation.chapters.wording import number
 from groundstation.plots.marks import AnyMark, Band, Cells, Curve, Dots, Emphasis, Floats, Limit, Points, Role
-from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
+from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import finite, thin
 from groundstation.results.arrays.forecast import ForecastGrowth, ForecastMap
 from groundstation.results.flight import FlightResults
@@ -133,3 +135,10 @@ def hindcast_map(results: FlightResults) -> Plot | None:
         (Row(tuple(panels), 54.0),),
         ("forecast_map",),
     )
+
+
+PLOTS: Mapping[str, Describe] = {
+    "forecast.growth": growth,
+    "forecast.calibration": calibration,
+    "forecast.hindcast_map": hindcast_map,
+}

@@ -1,5 +1,6 @@
 """Plots of the taxi stage: difference over time, density, convergence, heading and track, estimates by segment."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from groundstation.plots.marks import (
     Role,
     Spans,
 )
-from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
+from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import around, broken_at_wrap, finite, padded, windows
 from groundstation.results.arrays.heading import (
     HeadingDistribution,
@@ -301,3 +302,13 @@ def _segment_name(index: int, item: TaxiSegment) -> str:
 
 def _direction_name(item: TaxiSegment) -> str:
     return f"direction {number(item.mean_track_deg, 0, '°')}  ·  n {number(item.samples, 0)}"
+
+
+PLOTS: Mapping[str, Describe] = {
+    "heading.difference": difference,
+    "heading.density": density,
+    "heading.convergence": convergence,
+    "heading.taxi": taxi,
+    "heading.forest": forest,
+    "heading.spectrum": spectrum,
+}

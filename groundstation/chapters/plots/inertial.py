@@ -1,12 +1,14 @@
 """Plots of the INS errors: each state with its band, innovations, observability, and the track before and after."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from groundstation.base.normal import NORMAL_95
 from groundstation.chapters.plots.common import has_values, positive, span
 from groundstation.plots.axes import ZERO, time_axis
 from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit, Spans, series
-from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
+from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import finite, padded, symmetric
 from groundstation.results.arrays.inertial import (
     InertialDifferences,
@@ -271,3 +273,14 @@ def _most_of(values: Floats) -> tuple[float, float]:
     known = np.abs(finite(values))
     largest = 1.3 * float(np.quantile(known, 0.99)) if known.size else 1.0
     return -max(largest, 1e-3), max(largest, 1e-3)
+
+
+PLOTS: Mapping[str, Describe] = {
+    "inertial.state": state,
+    "inertial.tilt_and_drift": tilt_and_drift,
+    "inertial.radial": radial,
+    "inertial.innovations": innovations,
+    "inertial.observability": observability,
+    "inertial.differences": differences,
+    "inertial.own_innovations": own_innovations,
+}

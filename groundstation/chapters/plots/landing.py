@@ -1,12 +1,14 @@
 """Plots of the approaches: deviations with corridors, the final from above and from the side, protection levels."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from groundstation.base.units import DOTS_PER_FULL_SCALE
 from groundstation.chapters.plots.common import M_PER_KM, has_values
 from groundstation.plots.axes import ZERO, broken_time_axis, time_axis
 from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit, Points, Role, Told
-from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
+from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import padded
 from groundstation.results.arrays.landing import LandingPath, LandingProtection
 from groundstation.results.flight import FlightResults
@@ -195,3 +197,10 @@ def protection(results: FlightResults, of: str) -> Plot | None:
         one_panel(panel, 44.0),
         ("landing_protection",),
     )
+
+
+PLOTS: Mapping[str, Describe] = {
+    "landing.deviations": deviations,
+    "landing.final": final,
+    "landing.protection": protection,
+}

@@ -1,10 +1,12 @@
 """Plot of landing by locators: deviations along the approach with their bands, and the limits of the categories."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from groundstation.chapters.plots.common import M_PER_KM
 from groundstation.plots.marks import AnyMark, Band, Dots, Floats, Limit, series
-from groundstation.plots.plot import Axis, Panel, Plot, Row
+from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row
 from groundstation.results.arrays.landing import BeaconsPath
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing_beacons import BeaconLanding
@@ -68,3 +70,8 @@ def _running_median(values: Floats) -> Floats:
     out = np.full(len(values), np.nan)
     out[known] = np.nanmedian(neighbours[known], axis=1)
     return out
+
+
+PLOTS: Mapping[str, Describe] = {
+    "landing_beacons.deviations": deviations,
+}

@@ -1,10 +1,12 @@
 """Plots of landing by ranges: points and path, accuracy along it with the categories' limits, simulated errors."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from groundstation.chapters.plots.common import M_PER_KM, label
 from groundstation.plots.marks import AnyMark, Band, Curve, Floats, Limit, Points, Role
-from groundstation.plots.plot import Axis, Panel, Plot, Row
+from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row
 from groundstation.results.arrays.landing import RangesErrors, RangesPath, RangesSpace
 from groundstation.results.arrays.typed import T
 from groundstation.results.flight import FlightResults
@@ -136,3 +138,10 @@ def _errors(data: RangesErrors, which: str, axis: str, count: int) -> Panel:
     x = Axis("before the threshold, km", low=float(before.max()), high=float(before.min()))
     y, is_named = Axis(f"error {axis}, m", low=-most, high=most), axis == "right"
     return Panel(marks, x, y, title=FILTERS[which] if is_named else "", legend="" if is_named else "above")
+
+
+PLOTS: Mapping[str, Describe] = {
+    "landing_ranges.space": space,
+    "landing_ranges.accuracy": accuracy,
+    "landing_ranges.trials": trials,
+}

@@ -1,10 +1,12 @@
 """Plot of the chapter on latency: what is left between sensor and INS against the latency tried."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from groundstation.chapters.plots.common import label
 from groundstation.plots.marks import SERIES, AnyMark, Curve, Spans
-from groundstation.plots.plot import Axis, Panel, Plot, one_panel
+from groundstation.plots.plot import Axis, Describe, Panel, Plot, one_panel
 from groundstation.results.arrays.flight import LatencySearch
 from groundstation.results.flight import FlightResults
 from groundstation.results.latency import Latencies
@@ -40,3 +42,8 @@ def search(results: FlightResults) -> Plot | None:
         one_panel(panel, 44.0),
         ("latency_search",),
     )
+
+
+PLOTS: Mapping[str, Describe] = {
+    "latency.search": search,
+}

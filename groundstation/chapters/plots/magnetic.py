@@ -1,5 +1,7 @@
 """Plots of the magnetic deviation: by heading, on the part held out, the figure flown, its branches, the modulus."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from groundstation.base.geodesy import on_earth, plan_north_east_m
@@ -8,7 +10,7 @@ from groundstation.chapters.plots.common import M_PER_KM
 from groundstation.chapters.wording import number
 from groundstation.plots.axes import ZERO, broken_time_axis, time_axis
 from groundstation.plots.marks import AnyMark, Band, Bars, Curve, Dots, Limit, Role, Told
-from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
+from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import broken_at_gaps, padded, windows
 from groundstation.results.arrays.flight import Overview
 from groundstation.results.arrays.magnetic import (
@@ -226,3 +228,13 @@ def ground_runs(results: FlightResults) -> Plot | None:
         one_panel(Panel(marks, heading_axis(), errors), 54.0),
         ("magnetic_ground_epochs", "magnetic_ground_curve"),
     )
+
+
+PLOTS: Mapping[str, Describe] = {
+    "magnetic.deviation": deviation,
+    "magnetic.held_out": held_out,
+    "magnetic.track": track,
+    "magnetic.branches": branches,
+    "magnetic.modulus": modulus,
+    "magnetic.ground_runs": ground_runs,
+}

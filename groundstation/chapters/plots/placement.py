@@ -1,12 +1,14 @@
 """Plots of a placement: map of accuracy with the points, and accuracy along the way."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from groundstation.chapters.placement import design_title
 from groundstation.chapters.plots.common import M_PER_KM, label
 from groundstation.plots.axes import time_axis
 from groundstation.plots.marks import AnyMark, Cells, Curve, Emphasis, Limit, Outlines, Points, Role, Symbol, series
-from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
+from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import finite, padded
 from groundstation.results.arrays.cooperative import PlacementAccuracy, PlacementKeepOut, PlacementMap, PlacementPoints
 from groundstation.results.flight import FlightResults
@@ -114,3 +116,9 @@ def accuracy(results: FlightResults) -> Plot | None:
         tuple(rows),
         ("placement_accuracy",),
     )
+
+
+PLOTS: Mapping[str, Describe] = {
+    "placement.map": accuracy_map,
+    "placement.accuracy": accuracy,
+}

@@ -1,5 +1,6 @@
 """Plots of the comparison with a reference: errors in the band claimed, plan view, claimed against seen."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from groundstation.chapters.plots.common import label
 from groundstation.chapters.wording import MINUS
 from groundstation.plots.axes import ZERO, time_axis
 from groundstation.plots.marks import AnyMark, Band, Curve, Emphasis, Floats, Intervals, Limit, Role
-from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
+from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import broken_at_gaps, finite, padded
 from groundstation.results.arrays.reference import ReferenceErrors, ReferenceTrack
 from groundstation.results.flight import FlightResults
@@ -153,3 +154,10 @@ def claims(results: FlightResults) -> Plot | None:
 
 def _name(subject: str, quantity: str, axis: str) -> str:
     return label(f"{title_of(subject)}, {axis if quantity == 'attitude' else f'{quantity} {axis}'}", 44)
+
+
+PLOTS: Mapping[str, Describe] = {
+    "reference.errors": errors,
+    "reference.track": track,
+    "reference.claims": claims,
+}

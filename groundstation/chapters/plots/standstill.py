@@ -1,11 +1,13 @@
 """Plots of the standstill stage: errors of the velocity components, density of the mean speed."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from groundstation.chapters.wording import is_number, number
 from groundstation.plots.axes import time_axis
 from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit, Outlines, Points, Spans, series
-from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
+from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import broken_at_gaps, finite, padded
 from groundstation.results.arrays.heading import StandstillMeanSpeed, StandstillVelocity
 from groundstation.results.flight import FlightResults
@@ -98,3 +100,9 @@ def mean_speed(results: FlightResults) -> Plot | None:
         one_panel(Panel(marks, x_axis, Axis("probability density, s/m", low=0.0)), 48.0),
         ("standstill_mean_speed",),
     )
+
+
+PLOTS: Mapping[str, Describe] = {
+    "standstill.components": components,
+    "standstill.mean_speed": mean_speed,
+}

@@ -1,12 +1,14 @@
 """Plot of the chapter on several logs: the motion that two of them show, and the difference."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from groundstation.chapters.generic import quantity
 from groundstation.chapters.plots.common import label
 from groundstation.plots.axes import ZERO, time_axis
 from groundstation.plots.marks import Curve
-from groundstation.plots.plot import Axis, Panel, Plot, Row
+from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row
 from groundstation.plots.ranges import broken_at_gaps, padded
 from groundstation.results.arrays.together import JoinedDifference, JoinedMotion
 from groundstation.results.flight import FlightResults
@@ -47,3 +49,8 @@ def motion(results: FlightResults, of: str) -> Plot | None:
         ),
         (both.name, left.name),
     )
+
+
+PLOTS: Mapping[str, Describe] = {
+    "together.motion": motion,
+}

@@ -9,7 +9,6 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.analysis import Analysis, Found, RestsOn, Rules, Shortfall
 from groundstation.estimators.approaches.columns import COLUMNS
 from groundstation.estimators.approaches.figures import path_columns
 from groundstation.estimators.approaches.finals import Final, ends_of, final_of
@@ -35,7 +34,6 @@ from groundstation.estimators.approaches.reference import (
 from groundstation.estimators.approaches.settings import LIMITS, LandingSettings
 from groundstation.estimators.approaches.stabilised import rejudge, stabilised
 from groundstation.estimators.approaches.touchdown import touchdown_of
-from groundstation.estimators.known import Known
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.arrays.landing import LandingPath, LandingProtection
 from groundstation.results.arrays.typed import joined
@@ -51,6 +49,8 @@ from groundstation.results.landing import (
     Sensitivity,
 )
 from groundstation.results.landing_categories import ACCURACY_ONLY, axis_category_met
+from groundstation.systems.analysis import Analysis, Found, RestsOn, Rules, Shortfall
+from groundstation.systems.known import Known
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight

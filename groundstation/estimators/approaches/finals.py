@@ -9,8 +9,8 @@ from groundstation.base.angles import FloatArray, direction_of, wrap_180
 from groundstation.base.geodesy import north_east_m
 from groundstation.estimators.approaches.path import METRES_PER_DEG, FlightPath, on_guidance, step_of
 from groundstation.estimators.approaches.settings import LandingSettings
-from groundstation.estimators.known import Runway, SiteData
 from groundstation.results.landing import LeftOutApproach, Outcome
+from groundstation.systems.known import Runway, SiteData
 
 if TYPE_CHECKING:
     from groundstation.tables.phases import Phases

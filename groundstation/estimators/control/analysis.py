@@ -1,10 +1,10 @@
 """The plan of a session as one object."""
 
 from groundstation.estimators.control.scenario import SessionPlan
-from groundstation.estimators.plan import Plan, Planned
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.control import UNCONTROLLED, ControlPlan
 from groundstation.results.placement import PlacementPlan
+from groundstation.systems.plan import Plan, Planned
 
 
 def _run(scenario: SessionPlan) -> Planned:

@@ -13,11 +13,11 @@ from groundstation.estimators.control.measures import Geometry
 from groundstation.estimators.control.motion import Paths
 from groundstation.estimators.control.placement import plan_placement
 from groundstation.estimators.control.scenario import LOCAL_CRITERIA, NEAREST_M, SessionPlan
-from groundstation.estimators.plan import Planned
 from groundstation.results.answer import by_analysis
 from groundstation.results.arrays.cooperative import ControlMeasures, ControlPaths, ControlPoints
 from groundstation.results.control import UNCONTROLLED, ControlPlan, ControlRow, Horizon, LawRow
 from groundstation.results.figures import FigureData
+from groundstation.systems.plan import Planned
 
 INTEGRAL = "covariance"
 AT_BOUND = 1e-6  # of the room a control has

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
-from groundstation.estimators.analysis import Analysis, Found, Shortfall
 from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.cooperative import CooperativeResult
+from groundstation.systems.analysis import Analysis, Found, Shortfall
 
 if TYPE_CHECKING:
     from groundstation.tables.session import Session

@@ -3,14 +3,14 @@
 from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding
-from groundstation.estimators.analysis import Analysis, Found, RestsOn, Rules, Shortfall
 from groundstation.estimators.heading.columns import COLUMNS
 from groundstation.estimators.heading.settings import LIMITS, HeadingRequest, HeadingSettings
-from groundstation.estimators.known import Known
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.heading import HeadingResult
 from groundstation.results.latency import Latencies
 from groundstation.results.rules import Rejudged
+from groundstation.systems.analysis import Analysis, Found, RestsOn, Rules, Shortfall
+from groundstation.systems.known import Known
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight

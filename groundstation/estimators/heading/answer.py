@@ -21,10 +21,10 @@ from groundstation.estimators.heading.solution import Solution
 from groundstation.estimators.heading.standstill import StandstillData
 from groundstation.estimators.heading.steady import SteadyPrior
 from groundstation.estimators.heading.verdict import Figures, build_gates, decide, explain, round_to_step
-from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.methods.taxi_error.posterior import ErrorPosterior
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult, IntervalPart, Standstill
+from groundstation.systems.known import AircraftData, SiteData
 from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight
 

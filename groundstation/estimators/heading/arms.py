@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.known import AircraftData
 from groundstation.methods.taxi.gating import NOT_TAXI
 from groundstation.methods.taxi.samples import Samples
 from groundstation.methods.taxi_error.interval import Differences, Regressor, fixed_noise_estimate, misfit
 from groundstation.methods.taxi_error.priors import PRIOR_MEAN
+from groundstation.systems.known import AircraftData
 
 FloatArray = NDArray[np.float64]
 ERROR_PRIOR_SIGMA_DEG = 0.3  # of the median of the straight samples, as the error that the turns share

@@ -12,11 +12,11 @@ from groundstation.estimators.heading.standstill import find_standstill
 from groundstation.estimators.heading.steady import steady_prior
 from groundstation.estimators.heading.steps import heading_steps
 from groundstation.estimators.heading.taxi import delay_of, straight_taxi
-from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.methods.taxi.pair import choose_pair
 from groundstation.methods.taxi.samples import HeadingOf, OnGround, logged_heading
 from groundstation.results.heading import HeadingResult, HeadingStep
 from groundstation.results.latency import Latencies
+from groundstation.systems.known import AircraftData, SiteData
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight
 

@@ -4,16 +4,16 @@ from itertools import groupby
 
 import numpy as np
 
-from groundstation.estimators.analysis import Shortfall
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.heading.standstill import find_standstill
 from groundstation.estimators.heading.taxi import delay_of, straight_taxi
 from groundstation.estimators.heading.verdict import STANDSTILL_GATE, Figures, build_gates
 from groundstation.estimators.heading.wording import told
-from groundstation.estimators.known import Known
 from groundstation.methods.taxi.pair import choose_pair
 from groundstation.methods.taxi.samples import Samples
 from groundstation.results.latency import Latencies
+from groundstation.systems.analysis import Shortfall
+from groundstation.systems.known import Known
 from groundstation.tables.headings import true_heading
 from groundstation.tables.phases import ground_mask
 from groundstation.tables.table import Flight

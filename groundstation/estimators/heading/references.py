@@ -11,11 +11,11 @@ from groundstation.base.angles import mean_heading, unwrap, wrap_180, wrap_360
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.known import SiteData
 from groundstation.methods.ins_noise import class_names, load_class
 from groundstation.methods.intervals import effective_samples
 from groundstation.methods.taxi.samples import Samples
 from groundstation.results.heading import HeadingResult, OnboardComparison, RunwayCheck
+from groundstation.systems.known import SiteData
 from groundstation.tables.table import Flight
 
 FloatArray = NDArray[np.float64]
@@ -139,7 +139,7 @@ def reference_conflict(flight_metadata: Mapping[str, str], site: SiteData) -> st
 
     Examples
     --------
-    >>> from groundstation.estimators.known import Stand
+    >>> from groundstation.systems.known import Stand
     >>> reference_conflict({"reference.parking_heading_deg": "311"}, SiteData((Stand("7", 310.0),)))
     'references of the parking heading disagree: 310.00 deg (site file, stand 7), 311.00 deg (log); the former is used'
     """

@@ -12,7 +12,6 @@ from groundstation.estimators.heading.recursion import Running, run_recursion
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.standstill import StandstillData
 from groundstation.estimators.heading.steady import SteadyPrior
-from groundstation.estimators.known import AircraftData
 from groundstation.methods.taxi.samples import Samples, take_samples, without_arm
 from groundstation.methods.taxi_error.interval import (
     Differences,
@@ -25,6 +24,7 @@ from groundstation.methods.taxi_error.interval import (
 )
 from groundstation.methods.taxi_error.posterior import ErrorPosterior
 from groundstation.results.heading import HeadingStep, TaxiSegment
+from groundstation.systems.known import AircraftData
 
 FloatArray = NDArray[np.float64]
 DRAWS_FOR_PARTS = 24

@@ -19,9 +19,9 @@ from groundstation.base.metar import metar_winds, nearest_wind
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.known import AircraftClass, AircraftData, SiteData
 from groundstation.methods.taxi_error.interval import Regressor
 from groundstation.results.heading import TaxiWind
+from groundstation.systems.known import AircraftClass, AircraftData, SiteData
 from groundstation.tables.table import Flight
 
 FloatArray = NDArray[np.float64]

@@ -4,11 +4,11 @@ import numpy as np
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.estimators.known import AircraftData
 from groundstation.methods.taxi.delay import KnownDelay, known_delay
 from groundstation.methods.taxi.gating import gate_samples
 from groundstation.methods.taxi.samples import HeadingOf, OnGround, Samples, pair_samples
 from groundstation.results.latency import Latencies
+from groundstation.systems.known import AircraftData
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight
 

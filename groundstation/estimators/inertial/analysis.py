@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
-from groundstation.estimators.analysis import Analysis, Found, RestsOn, Shortfall
 from groundstation.estimators.inertial.columns import FORECAST_COLUMNS, INERTIAL_COLUMNS
 from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.estimators.known import AircraftData, Known
 from groundstation.methods.ins_noise import choose_class
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.inertial import InertialResult
+from groundstation.systems.analysis import Analysis, Found, RestsOn, Shortfall
+from groundstation.systems.known import AircraftData, Known
 from groundstation.tables.phases import Phases
 
 if TYPE_CHECKING:

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from groundstation.estimators.analysis import Shortfall
 from groundstation.estimators.inertial.differences import Differences, differences, seconds_covered
 from groundstation.estimators.inertial.kind import WHY_NOT, kind_of, stated_kind
 from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.estimators.known import Known
+from groundstation.systems.analysis import Shortfall
+from groundstation.systems.known import Known
 from groundstation.tables.ins_kind import UNAIDED
 from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight

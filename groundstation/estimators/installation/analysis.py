@@ -4,12 +4,12 @@ from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding
 from groundstation.base.serial import from_json, to_json
-from groundstation.estimators.analysis import Analysis, Found
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.known import Known
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.heading import HeadingResult
 from groundstation.results.installation import InstallationResult
+from groundstation.systems.analysis import Analysis, Found
+from groundstation.systems.known import Known
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight

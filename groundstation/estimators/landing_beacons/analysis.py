@@ -10,8 +10,6 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.analysis import Analysis, Found
-from groundstation.estimators.known import Beacon, Known, Runway, SiteData
 from groundstation.estimators.landing_beacons.answer import beacon_landing
 from groundstation.estimators.landing_beacons.approach import (
     Belief,
@@ -27,6 +25,8 @@ from groundstation.estimators.landing_beacons.settings import LandingBeaconsSett
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.columns import AnswerColumn
 from groundstation.results.landing_beacons import BeaconLanding, DeviationRow
+from groundstation.systems.analysis import Analysis, Found
+from groundstation.systems.known import Beacon, Known, Runway, SiteData
 from groundstation.tables.resample import values_at
 from groundstation.tables.sources import sources_of_kind
 

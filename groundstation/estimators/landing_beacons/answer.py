@@ -5,13 +5,13 @@ from dataclasses import asdict
 
 import numpy as np
 
-from groundstation.estimators.known import Beacon, Runway
 from groundstation.estimators.landing_beacons.approach import WELL_KNOWN_M, Belief, Deviations, Sampled
 from groundstation.estimators.landing_beacons.settings import LandingBeaconsSettings
 from groundstation.results.arrays.landing import BeaconsPath
 from groundstation.results.arrays.typed import joined
 from groundstation.results.landing_beacons import BeaconApproachRow, BeaconLanding, BeaconRow, DeviationRow
 from groundstation.results.landing_categories import ACCURACY_ONLY, LINEAR_95, axis_category_met
+from groundstation.systems.known import Beacon, Runway
 
 DISTANCES_M = (5000.0, 3000.0, 2000.0, 1500.0, 750.0, 500.0, 320.0, 100.0, 0.0)
 MEAN_S = 1.0  # a row is the mean over so long

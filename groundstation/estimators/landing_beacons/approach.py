@@ -6,9 +6,9 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180, wrap_360
 from groundstation.base.records import BoolArray, frozen
-from groundstation.estimators.known import Runway
 from groundstation.estimators.landing_beacons.geometry import BearingFix, solve_bearings
 from groundstation.estimators.landing_beacons.settings import LandingBeaconsSettings
+from groundstation.systems.known import Runway
 
 WELL_KNOWN_M = 300.0  # sigma of a distance that may say something about the speed
 LEAST_FIXES = 10
@@ -114,7 +114,7 @@ def ground_m(before_m: FloatArray, runway: Runway) -> FloatArray:
 
     Examples
     --------
-    >>> from groundstation.estimators.known import Ground
+    >>> from groundstation.systems.known import Ground
     >>> hill = Runway("09", 90.0, ground=(Ground(0.0, 0.0), Ground(2000.0, 40.0)))
     >>> ground_m(np.array([500.0, 3000.0]), hill).tolist()
     [10.0, nan]

@@ -4,10 +4,10 @@ import numpy as np
 
 from groundstation.base.findings import Finding
 from groundstation.estimators.landing_ranges.scenario import RangeApproach
-from groundstation.estimators.plan import Plan, Planned
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.landing_categories import CATEGORIES
 from groundstation.results.landing_ranges import ALL_AXES, HONEST, TOUCHDOWN, RangeLanding
+from groundstation.systems.plan import Plan, Planned
 
 LEAST_WIDTH_M = 50.0  # of points that do not stand on one line; beside the course
 OVERFLOWN_M = 100.0

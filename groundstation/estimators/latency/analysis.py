@@ -3,11 +3,11 @@
 from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding
-from groundstation.estimators.analysis import Analysis, Found
-from groundstation.estimators.known import Known
 from groundstation.methods.lag.settings import LatencySettings
 from groundstation.results.inertial import InertialResult
 from groundstation.results.latency import Latencies
+from groundstation.systems.analysis import Analysis, Found
+from groundstation.systems.known import Known
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight

@@ -10,13 +10,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.before_lift_off import GroundRuns
 from groundstation.estimators.magnetic.gyros import GyroDrift
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
 from groundstation.results.magnetic import Alignment, AlignmentSource, SourceName
+from groundstation.systems.known import AircraftData
 
 S_PER_H = 3600.0
 # What these gates of system 1 find is not in its interval; all that the others find widens it.

@@ -4,9 +4,7 @@ from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.analysis import Analysis, Found, Rules, Shortfall
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.estimators.known import Known
 from groundstation.estimators.magnetic.columns import COLUMNS
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
 from groundstation.estimators.magnetic.settings import LIMITS, MagneticSettings
@@ -17,6 +15,8 @@ from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import MagneticResult
 from groundstation.results.magnetic_ground import GroundDeviation
 from groundstation.results.rules import Rejudged
+from groundstation.systems.analysis import Analysis, Found, Rules, Shortfall
+from groundstation.systems.known import Known
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight

@@ -11,7 +11,6 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.estimators.magnetic.entered import corrections_entered
 from groundstation.estimators.magnetic.gyros import GyroDrift, gyro_drift
 from groundstation.estimators.magnetic.settings import MagneticSettings
@@ -20,6 +19,7 @@ from groundstation.results.arrays.heading import HeadingSamples
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.heading import HeadingResult
 from groundstation.results.latency import Latencies
+from groundstation.systems.known import AircraftData, SiteData
 from groundstation.tables.phases import Phases, ground_mask
 from groundstation.tables.table import Flight
 

@@ -12,7 +12,6 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.apply import corrected_by_coefficients, corrected_by_iron, corrected_by_table
 from groundstation.estimators.magnetic.attitude import levelled_heading_deg
 from groundstation.estimators.magnetic.flown import IN_THE_AIR
@@ -29,6 +28,7 @@ from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.deviation import Deviation
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import Residual
+from groundstation.systems.known import AircraftData
 from groundstation.tables.headings import true_from_magnetic
 from groundstation.tables.phases import Phases
 from groundstation.tables.resample import values_at

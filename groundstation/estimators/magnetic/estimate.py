@@ -9,7 +9,6 @@ import numpy as np
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.records import BoolArray
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.estimators.known import AircraftData, SiteData
 from groundstation.estimators.magnetic.alignment import S_PER_H, align, refused
 from groundstation.estimators.magnetic.apply import corrected_by_table
 from groundstation.estimators.magnetic.before_lift_off import HeadingBasis, find_ground_runs, gyros_at_standstill
@@ -48,6 +47,7 @@ from groundstation.results.magnetic import (
     Residual,
     SigmaPart,
 )
+from groundstation.systems.known import AircraftData, SiteData
 from groundstation.tables.phases import Phases, flight_phases
 from groundstation.tables.table import Flight
 

@@ -3,16 +3,16 @@
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
-from groundstation.estimators.analysis import Shortfall
 from groundstation.estimators.inertial.examine import compared_with_kind
 from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.estimators.known import Known
 from groundstation.estimators.magnetic.earth import earth_field
 from groundstation.estimators.magnetic.flown import Flown, find_flown
 from groundstation.estimators.magnetic.held_out import find_unseen, is_level
 from groundstation.estimators.magnetic.readings import choose_topics
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.results.latency import Latencies
+from groundstation.systems.analysis import Shortfall
+from groundstation.systems.known import Known
 from groundstation.tables.table import Flight
 
 

@@ -11,7 +11,6 @@ from groundstation.base.angles import FloatArray, mean_heading, wrap_180, wrap_3
 from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
 from groundstation.estimators.magnetic.readings import NO_DATE, PLACE_WANTED
 from groundstation.methods.taxi.delay import known_delay
@@ -22,6 +21,7 @@ from groundstation.methods.taxi.settings import GroundLimits
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import DeclinationUsed
 from groundstation.results.magnetic_ground import LeftOut
+from groundstation.systems.known import AircraftData
 from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.headings import FARTHEST_POSITION_S
 from groundstation.tables.phases import ground_mask

@@ -12,7 +12,6 @@ import numpy as np
 from groundstation.base.angles import FloatArray, mean_heading, unwrap, wrap_180, wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.units import DEG_PER_RAD
-from groundstation.estimators.known import AircraftData
 from groundstation.estimators.magnetic.compass_table import CENTRES_DEG
 from groundstation.estimators.magnetic.ground_epochs import (
     ANALYSIS,
@@ -41,6 +40,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import DeclinationUsed
 from groundstation.results.magnetic_ground import GroundDeviation, GroundRun, LeftOut
+from groundstation.systems.known import AircraftData
 from groundstation.tables.phases import Phases, flight_phases
 from groundstation.tables.resample import join
 from groundstation.tables.table import Flight, Table

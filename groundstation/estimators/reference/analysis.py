@@ -3,12 +3,12 @@
 from typing import TYPE_CHECKING
 
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.analysis import Analysis, Found
-from groundstation.estimators.known import Known
 from groundstation.estimators.reference.columns import REFERENCE_COLUMNS
 from groundstation.estimators.reference.settings import ReferenceSettings
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.reference import ReferenceResult, title_of
+from groundstation.systems.analysis import Analysis, Found
+from groundstation.systems.known import Known
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight

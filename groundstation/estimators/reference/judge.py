@@ -9,8 +9,6 @@ import numpy as np
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.analysis import Found
-from groundstation.estimators.known import Known
 from groundstation.estimators.reference.answers import forecast_checks, heading_check
 from groundstation.estimators.reference.errors import FIELDS, Errors, errors_of
 from groundstation.estimators.reference.figures import checks_figure, errors_figure, track_figure
@@ -24,6 +22,8 @@ from groundstation.results.forecast import ForecastResult
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
 from groundstation.results.reference import ErrorRow, Placed, ReferenceResult
+from groundstation.systems.analysis import Found
+from groundstation.systems.known import Known
 
 if TYPE_CHECKING:
     from groundstation.tables.table import Flight, Table

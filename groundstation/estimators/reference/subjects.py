@@ -9,8 +9,8 @@ from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.known import Known
 from groundstation.results.heading import HeadingResult
+from groundstation.systems.known import Known
 from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.headings import true_heading
 from groundstation.tables.table import Flight, Table

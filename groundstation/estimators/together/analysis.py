@@ -10,8 +10,6 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.base.serial import MismatchError, from_json
-from groundstation.estimators.analysis import Analysis, Found
-from groundstation.estimators.known import Known
 from groundstation.estimators.two_clocks.channels import UNITS, side_of
 from groundstation.estimators.two_clocks.settings import TwoClocksSettings
 from groundstation.results.answer import Answers, answer_of
@@ -19,6 +17,8 @@ from groundstation.results.arrays.together import JoinedDifference, JoinedMotion
 from groundstation.results.columns import AnswerColumn
 from groundstation.results.figures import FigureData
 from groundstation.results.together import ChosenSource, JoinedLog, Joining, MotionAgreement, Together
+from groundstation.systems.analysis import Analysis, Found
+from groundstation.systems.known import Known
 from groundstation.tables.sources import TOGETHER, is_joined, ranked, why_first
 
 if TYPE_CHECKING:

@@ -16,8 +16,7 @@ from groundstation.base.shipped_toml import ShippedToml, TomlFile
 from groundstation.base.toml_settings import settings_from
 from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.base.version import __version__
-from groundstation.estimators.analyses import ANSWER_TYPES
-from groundstation.estimators.fleet.acceptance import (
+from groundstation.methods.fleet.acceptance import (
     accuracy_ratio,
     curves_figure,
     decision_of,
@@ -25,7 +24,7 @@ from groundstation.estimators.fleet.acceptance import (
     ins_rows,
     judgements,
 )
-from groundstation.estimators.fleet.ins_errors import InsErrors, growth_of, ins_errors
+from groundstation.methods.fleet.ins_errors import InsErrors, growth_of, ins_errors
 from groundstation.pipeline.many_flights.inputs import saved_flights
 from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.reports.acceptance import write_acceptance_report
@@ -36,8 +35,9 @@ from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, csv_text, json_text, load, mapping, write_text
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
+from groundstation.systems import systems
 
-STANDARDS = ShippedToml("groundstation.estimators.fleet", "standards", "standard")
+STANDARDS = ShippedToml("groundstation.methods.fleet", "standards", "standard")
 STATES, TRACK = "inertial_states", "inertial_track"
 NOT_STATED = "not stated"
 RESET, REALIGNED = "inertial.ins_reset", "inertial.realigned"
@@ -131,7 +131,7 @@ def flights_figure(found: Acceptance) -> FigureData:
 def _flight_of(folder: Path, standard: Standard) -> tuple[FlightError, InsErrors | None, Mapping[str, Any]]:
     """The errors of one flight, or why it is left out; and the settings that its errors were found with."""
     try:
-        saved = load(folder, ANSWER_TYPES)
+        saved = load(folder, systems().answer_types)
         return _errors_of(saved, standard)
     except GroundstationError as error:
         reason = f"cannot be read: {error}"

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError
-from groundstation.estimators.analyses import ANSWER_TYPES
-from groundstation.estimators.fleet import answer
-from groundstation.estimators.fleet.changes import ChangeSettings
-from groundstation.estimators.fleet.density import densities_of
-from groundstation.estimators.fleet.deviation import deviations
-from groundstation.estimators.fleet.installations import installation_flights, installation_rows
-from groundstation.estimators.fleet.moments import Moments
-from groundstation.estimators.fleet.skill import SkillMerger
+from groundstation.estimators.installation.settings import InstallationSettings
+from groundstation.methods.fleet import answer
+from groundstation.methods.fleet.changes import ChangeSettings
+from groundstation.methods.fleet.density import densities_of
+from groundstation.methods.fleet.deviation import deviations
+from groundstation.methods.fleet.installations import installation_flights, installation_rows
+from groundstation.methods.fleet.moments import Moments
+from groundstation.methods.fleet.skill import SkillMerger
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
 from groundstation.pipeline.many_flights.fleet_rows import session_row
 from groundstation.pipeline.many_flights.fleet_share import (
@@ -37,6 +37,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.file_names import INDEX_JSON, SUMMARY
 from groundstation.results.files import load, write_bytes
 from groundstation.results.fleet import FleetResults, NotInFleet, SessionRow
+from groundstation.systems import systems
 
 FLEET_PARQUET = "fleet.parquet"
 SKILL_COLUMNS = {
@@ -167,7 +168,7 @@ def _results(found: Scan, flights: FigureData, shares: Any, unread: list[NotInFl
     sessions: list[SessionRow] = []
     for folder in found.sessions:
         try:
-            sessions.append(session_row(load(folder, ANSWER_TYPES)))
+            sessions.append(session_row(load(folder, systems().answer_types)))
         except GroundstationError as error:
             unread.append(NotInFleet("failed", str(folder), str(error)))
     return FleetResults(
@@ -186,7 +187,7 @@ def _results(found: Scan, flights: FigureData, shares: Any, unread: list[NotInFl
         deviations=deviations(flights),
         sessions=tuple(sessions),
         stated=answer.stated_rates(settings),
-        installations=installation_rows(installations),
+        installations=installation_rows(installations, InstallationSettings().named_probability),
         installation_flights=installation_flights(installations),
     )
 

@@ -3,9 +3,9 @@
 from contextlib import suppress
 from typing import Any
 
-from groundstation.estimators.analyses import FLIGHT_ANALYSES
 from groundstation.results.columns import FlightColumn
 from groundstation.results.flight import FlightResults
+from groundstation.systems import systems
 
 BEFORE = (
     FlightColumn("flight_id", "text", "name of the flight and of its folder"),
@@ -31,10 +31,10 @@ BEHIND = (
 )
 FLIGHT_COLUMNS: tuple[FlightColumn, ...] = (
     *BEFORE,
-    *(column for analysis in FLIGHT_ANALYSES for column in analysis.columns),
+    *(column for analysis in systems().analyses for column in analysis.columns),
     *BEHIND,
 )
-INDEXED = tuple(column.name for analysis in FLIGHT_ANALYSES for column in analysis.columns if column.is_indexed)
+INDEXED = tuple(column.name for analysis in systems().analyses for column in analysis.columns if column.is_indexed)
 
 
 def answer_values(results: FlightResults) -> dict[str, Any]:
@@ -43,7 +43,7 @@ def answer_values(results: FlightResults) -> dict[str, Any]:
     Columns that fail are empty: the run of the flight has told it.
     """
     found: dict[str, Any] = {}
-    for analysis in FLIGHT_ANALYSES:
+    for analysis in systems().analyses:
         with suppress(Exception):
             found |= analysis.values(results.answers)
     return found

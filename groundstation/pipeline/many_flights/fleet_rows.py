@@ -12,11 +12,11 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.records import MAX_TEXT_CHARACTERS
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.chapters.cooperative import REFERENCE, trusted
-from groundstation.estimators.fleet.density import SampleHistogram, histogram_of
-from groundstation.estimators.fleet.moments import Moments, moments_of
-from groundstation.estimators.fleet.skill import SkillOfFlight
 from groundstation.estimators.heading.figures import IN_PAUSE
 from groundstation.estimators.heading.references import REFERENCE_SIGMA_DEG, logged_reference
+from groundstation.methods.fleet.density import SampleHistogram, histogram_of
+from groundstation.methods.fleet.moments import Moments, moments_of
+from groundstation.methods.fleet.skill import SkillOfFlight
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, answer_values
 from groundstation.reports.index import index_row, reasons_of
 from groundstation.results.arrays.heading import HeadingSamples

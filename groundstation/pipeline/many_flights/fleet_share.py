@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from groundstation.base.serial import from_json, to_json_exactly
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.analyses import ANSWER_TYPES
-from groundstation.estimators.fleet.density import SampleHistogram
-from groundstation.estimators.fleet.skill import SkillOfFlight
 from groundstation.estimators.installation.lesson import lesson_of_flight
+from groundstation.methods.fleet.density import SampleHistogram
+from groundstation.methods.fleet.skill import SkillOfFlight
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, answer_values
 from groundstation.pipeline.many_flights.fleet_rows import Check, checks_of, flight_row, heading_samples, skill_of
 from groundstation.pipeline.many_flights.fleet_samples import SampleStore
@@ -26,6 +25,7 @@ from groundstation.results.columns import FlightColumn
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, load, mapping, utf8_text
 from groundstation.results.installation import Lesson
+from groundstation.systems import systems
 from groundstation.tables.session_tracks import aircraft_named
 
 TEXTS = ("text", "category")
@@ -107,7 +107,7 @@ def share_of(folder: Path, store: SampleStore | None = None) -> FlightShare:
     OSError
         When the samples cannot be written.
     """
-    saved = load(folder, ANSWER_TYPES)
+    saved = load(folder, systems().answer_types)
     results, samples = saved.results, heading_samples(saved)
     row = flight_row(saved, samples)
     empty = SampleHistogram(np.zeros(0, np.int32), np.zeros(0, np.int32))

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.serial import from_json
-from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.installation.analysis import sentence_of
 from groundstation.estimators.installation.series import Series, installation_of, series_of
 from groundstation.estimators.installation.settings import InstallationSettings
@@ -28,6 +27,7 @@ from groundstation.results.installation import (
     installations_text,
     read_installations,
 )
+from groundstation.systems import systems
 
 INSTALLATIONS = "installations.json"
 
@@ -100,7 +100,7 @@ def _lessons(out: Path, found: Scan) -> Iterator[Lesson]:
         yield from lessons_of(part)
     for name in found.stale:
         try:
-            lesson = lesson_of(load(out / name, ANSWER_TYPES))
+            lesson = lesson_of(load(out / name, systems().answer_types))
         except Exception:  # it is told of where the index is written
             continue
         if lesson is not None:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
 from groundstation.base.failures import attempt, failures, gathered_failures
-from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, write_fleet
 from groundstation.pipeline.many_flights.fleet_columns import INDEXED, answer_values
 from groundstation.pipeline.many_flights.fleet_samples import SAMPLES
@@ -39,6 +38,7 @@ from groundstation.reports.fleet_report import PDF as FLEET_PDF
 from groundstation.reports.fleet_report import write_fleet_report
 from groundstation.reports.index import IndexRow, Kind
 from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
+from groundstation.systems import systems
 
 MOST_SKIPPED = 1000  # files that the index lists
 FLEET_RECORDING = "fleet.rrd"
@@ -144,7 +144,7 @@ def write_index_of(
         if is_large and kind == "flight" and len(unread) > MOST_LISTED:
             continue
         try:
-            saved = load(folder, ANSWER_TYPES)
+            saved = load(folder, systems().answer_types)
             rows.append(index_row(saved, kind, answer_values(saved.results)))
         except Exception as error:
             problems.append(_beside(folder, "failed", *reason_of(folder.name, error)))
@@ -206,7 +206,7 @@ def report_again(out: Path, *, with_pdf: bool = False) -> ReportedAgain:
     for folder in folders:
         try:
             with told_in_a_line(str(folder)):
-                written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf)
+                written = write_flight_report(folder, systems(), with_pdf=with_pdf)
                 note(folder, written.paths, removed=REPORT_FILES)
         except GroundstationError as error:
             if is_flight:

@@ -17,7 +17,6 @@ from groundstation.base.records import RecordBatch
 from groundstation.base.signals import kind_of
 from groundstation.base.toml_settings import settings_from
 from groundstation.chapters.cooperative import names_or_count
-from groundstation.estimators.analyses import ANSWER_TYPES, SESSION_ANALYSES
 from groundstation.estimators.cooperative.analysis import SessionKnown
 from groundstation.pipeline.many_flights.inputs import session_folders
 from groundstation.pipeline.many_flights.session_figures import session_figures
@@ -45,6 +44,7 @@ from groundstation.results.file_names import MANIFEST
 from groundstation.results.files import load_document, load_manifest, put_failures, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.manifest import Keys, LogOfSession, Manifest, Resume
+from groundstation.systems import systems
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.session_assemble import AssembledSession, session_from_flights
 from groundstation.tables.session_settings import Stations
@@ -278,9 +278,11 @@ def _show(partial: Path, assembled: AssembledSession, results: FlightResults, jo
         from groundstation.viewer.session import write_session_recording
 
         path = partial / f"{results.flight_id}.rrd"
-        attempt("recording", "session", write_session_recording, path, assembled, results, unless=OF_THE_WORLD)
+        attempt(
+            "recording", "session", write_session_recording, path, assembled, results, systems(), unless=OF_THE_WORLD
+        )
     with watch.stage("reporting"):
-        return write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf).problem
+        return write_flight_report(partial, systems(), with_pdf=job.with_pdf).problem
 
 
 def _flights(partial: Path, job: SessionJob) -> tuple[list[Flight], tuple[LogOfSession, ...], list[Finding]]:
@@ -328,9 +330,9 @@ def _results(
     job: SessionJob, assembled: AssembledSession, flights: Sequence[Flight], damaged: Sequence[Finding]
 ) -> FlightResults:
     known = SessionKnown(assembled.truth, job.configuration.settings.analyses)
-    found = run_analyses(SESSION_ANALYSES, assembled.session, known)
+    found = run_analyses(systems().session_analyses, assembled.session, known)
     findings = [*damaged, *job.notes, *_assumed(job), *assembled.findings]
-    for analysis in SESSION_ANALYSES:
+    for analysis in systems().session_analyses:
         findings += found.findings.get(analysis.name, ())
     names = assembled.session.names
     start_utc_ns = assembled.start_ns if assembled.has_utc else None
@@ -393,7 +395,7 @@ def joined_names(names: Sequence[str]) -> str:
 
 
 def _sentence(results: FlightResults) -> str:
-    told = (attempt("line", one.name, one.sentence, results.answers) for one in SESSION_ANALYSES)
+    told = (attempt("line", one.name, one.sentence, results.answers) for one in systems().session_analyses)
     found = [text for text in told if text]
     reasons = "; ".join(f"{entry.analysis}: {entry.reason}" for entry in results.not_assessable)
     return "; ".join(found) or f"not assessable: {reasons}"

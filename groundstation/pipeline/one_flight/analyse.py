@@ -15,22 +15,22 @@ from groundstation.base.findings import Finding, Severity
 from groundstation.base.gaps import Gaps
 from groundstation.base.ledger import Ledger
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators import overview
-from groundstation.estimators.analyses import FLIGHT_ANALYSES
-from groundstation.estimators.analysis import Analysis, Found, in_order_of_need
-from groundstation.estimators.damage import damage_finding
 from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.known import Known
 from groundstation.integrity.ledger import gaps_of
+from groundstation.methods import overview
 from groundstation.methods.taxi.intervals import Interval
 from groundstation.pipeline.one_flight import configuration as configured
 from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.pipeline.one_flight.damage import damage_finding
 from groundstation.pipeline.one_flight.intervals import seconds_of
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.chosen import chosen_intervals
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
 from groundstation.results.heading import HeadingResult
+from groundstation.systems import systems
+from groundstation.systems.analysis import Analysis, Found, in_order_of_need
+from groundstation.systems.known import Known
 from groundstation.tables.phases import ALWAYS_ON_GROUND, flight_phases
 from groundstation.tables.table import Flight
 
@@ -90,7 +90,7 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
     thresholds = configuration.thresholds
     gaps = {name: gaps_of(name, flight[name].time_ns, thresholds=thresholds) for name in flight.topics()}
     findings = list(given.findings)
-    for analysis in FLIGHT_ANALYSES:
+    for analysis in systems().analyses:
         findings += found.findings.get(analysis.name, ())
         findings += (
             attempt("damage check", analysis.name, _on_damage, analysis, flight, given, found.answers, gaps) or ()
@@ -132,9 +132,9 @@ def answers_of(flight: Flight, configuration: Configuration) -> tuple[Answered, 
     """Run all analyses on a flight; the truth is seen by those alone that judge by it, and by them after all others."""
     seen = flight.without(TRUTH)
     known = known_of(seen, configuration)
-    found = run_analyses(tuple(one for one in FLIGHT_ANALYSES if not one.judges), seen, known)
+    found = run_analyses(tuple(one for one in systems().analyses if not one.judges), seen, known)
     so_far = replace(known, answers=found.answers, workings=found.workings)
-    judged = run_analyses(tuple(one for one in FLIGHT_ANALYSES if one.judges), flight, so_far)
+    judged = run_analyses(tuple(one for one in systems().analyses if one.judges), flight, so_far)
     if not topics_of_kind(TRUTH, flight.topics()):
         judged = replace(judged, not_assessable=())  # nobody asked for it
     return found.joined(judged), known

@@ -17,9 +17,9 @@ from groundstation.integrity.limits import Thresholds, thresholds_from
 from groundstation.pipeline.one_flight.isolation import Isolation
 
 if TYPE_CHECKING:
-    from groundstation.estimators.known import AircraftData, SiteData
     from groundstation.pipeline.one_flight.deviation_to_apply import Apply
     from groundstation.results.installation import Lesson
+    from groundstation.systems.known import AircraftData, SiteData
     from groundstation.tables.session_settings import SessionSettings
 
 ISOLATION = "isolation"  # the table that changes no result: it is not kept
@@ -31,17 +31,17 @@ Settings = Path | Mapping[str, Any]  # a TOML file, or its content
 @cache
 def session_tables() -> tuple[str, ...]:
     """Names of the settings tables of a session."""
-    from groundstation.estimators.analyses import SESSION_ANALYSES
+    from groundstation.systems import systems
 
-    return (*(analysis.settings_table for analysis in SESSION_ANALYSES), "session")
+    return (*(analysis.settings_table for analysis in systems().session_analyses), "session")
 
 
 @cache
 def tables() -> tuple[str, ...]:
     """Names of all settings tables."""
-    from groundstation.estimators.analyses import FLIGHT_ANALYSES
+    from groundstation.systems import systems
 
-    of_flights = dict.fromkeys(analysis.settings_table for analysis in FLIGHT_ANALYSES)
+    of_flights = dict.fromkeys(analysis.settings_table for analysis in systems().analyses)
     return (*of_flights, *session_tables(), "aircraft", "site", "thresholds", "rules")
 
 
@@ -168,18 +168,21 @@ class Configuration:
     @cached_property
     def settings(self) -> UserSettings:
         """Settings of the analyses, the aircraft, the site and the session."""
-        from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
-        from groundstation.estimators.known import AircraftData, SiteData
+        from groundstation.systems import systems
+        from groundstation.systems.known import AircraftData, SiteData
         from groundstation.tables.session_settings import SessionSettings
 
-        types = {analysis.settings_table: analysis.settings for analysis in (*FLIGHT_ANALYSES, *SESSION_ANALYSES)}
+        types = {
+            analysis.settings_table: analysis.settings
+            for analysis in (*systems().analyses, *systems().session_analyses)
+        }
         settings = UserSettings(
             {name: self._table(name, kind) for name, kind in types.items()},
             self._table("aircraft", AircraftData),
             self._table("site", SiteData),
             self._table("session", SessionSettings),
         )
-        for analysis in FLIGHT_ANALYSES:
+        for analysis in systems().analyses:
             analysis.check(settings.analyses[analysis.settings_table], settings.aircraft)
         return settings
 

@@ -15,7 +15,6 @@ from groundstation.base.failures import attempt, failures, gathered_failures, is
 from groundstation.base.findings import SEVERITIES, Finding, worst
 from groundstation.base.records import RecordBatch
 from groundstation.base.to_disk import sync_folder
-from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES
 from groundstation.pipeline.one_flight.analyse import Given, analyse
 from groundstation.pipeline.one_flight.apply_deviation import apply_deviation, corrected_name, write_corrected
 from groundstation.pipeline.one_flight.convert import Converted, convert_flight, parts_told
@@ -34,6 +33,7 @@ from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import PartOfRun, PowerUpOfRun, Resume
+from groundstation.systems import systems
 from groundstation.tables.table import Flight
 
 PARTIAL_PREFIX = ".partial-"
@@ -164,7 +164,7 @@ def _run(log: Log, version: Version, job: Job, partial: Path, watch: Stopwatch) 
         asked = job.configuration.apply, job.configuration.settings
         applied = attempt("applied deviation", "all", apply_deviation, flight, results, *asked, unless=OF_THE_WORLD)
         results = results if applied is None else applied.results
-        for one in FLIGHT_ANALYSES:
+        for one in systems().analyses:
             attempt("columns", one.name, one.values, results.answers)  # of the tables of flights
     with watch.stage("saving"):
         if applied is not None:
@@ -238,16 +238,16 @@ def _show(partial: Path, flight: Flight, results: FlightResults, job: Job, watch
         from groundstation.viewer.recording import write_recording
 
         path = partial / f"{results.flight_id}.rrd"
-        attempt("recording", "flight", write_recording, path, flight, results, unless=OF_THE_WORLD)
+        attempt("recording", "flight", write_recording, path, flight, results, systems(), unless=OF_THE_WORLD)
     with watch.stage("reporting"):
-        return write_flight_report(partial, ANSWER_TYPES, with_pdf=job.with_pdf).problem
+        return write_flight_report(partial, systems(), with_pdf=job.with_pdf).problem
 
 
 def _export(folder: Path) -> str:
     """Write the tables that reports write beside them; returns what went wrong."""
     from groundstation.results.files import load
 
-    saved = load(folder, ANSWER_TYPES)
+    saved = load(folder, systems().answer_types)
     written = attempt("report", "exports", bound(write_exports, saved, with_card=False), unless=OF_THE_WORLD)
     return "" if written is None else written[1]
 
@@ -285,10 +285,8 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
 
 def report_finished(folder: Path, *, with_page: bool, with_pdf: bool) -> str:
     """Make the report of a finished folder again, or its PDF alone, and take it down; returns what went wrong."""
-    if with_page:
-        written = write_flight_report(folder, ANSWER_TYPES, with_pdf=with_pdf)
-    else:
-        written = add_pdf(folder, ANSWER_TYPES)
+    every = systems()
+    written = write_flight_report(folder, every, with_pdf=with_pdf) if with_page else add_pdf(folder, every)
     note(folder, written.paths, removed=REPORT_FILES)
     return written.problem
 
@@ -333,7 +331,7 @@ def state_of(findings: tuple[Finding, ...], has_lost_data: bool, fail_on: str) -
 
 def sentence(results: FlightResults) -> str:
     """What was found, in one line."""
-    told = (attempt("line", one.name, one.sentence, results.answers) for one in FLIGHT_ANALYSES)
+    told = (attempt("line", one.name, one.sentence, results.answers) for one in systems().analyses)
     found = [text for text in told if text]
     if found:
         return "; ".join(found)

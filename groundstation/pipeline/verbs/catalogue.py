@@ -4,10 +4,10 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
 from groundstation.pipeline.many_flights.inputs import file_in, is_session
 from groundstation.results.file_names import SUMMARY
 from groundstation.results.files import load_document
+from groundstation.systems import systems
 
 
 def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict[str, Any]]:
@@ -36,14 +36,14 @@ def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict
 def _analyses() -> list[dict[str, Any]]:
     return [
         {"kind": "analysis", "name": analysis.name, "title": analysis.title, "needs": analysis.needs}
-        for analysis in FLIGHT_ANALYSES
+        for analysis in systems().analyses
     ]
 
 
 def _session_analyses() -> list[dict[str, Any]]:
     return [
         {"kind": "analysis", "name": analysis.name, "title": analysis.title, "needs": analysis.needs}
-        for analysis in SESSION_ANALYSES
+        for analysis in systems().session_analyses
     ]
 
 
@@ -117,8 +117,8 @@ def _sessions() -> list[dict[str, Any]]:
 
 
 def _plans() -> list[dict[str, Any]]:
-    from groundstation.estimators.analyses import PLANS
-    from groundstation.studies.shipped_plans import load_plan, plan_names
+    from groundstation.systems import systems
+    from groundstation.systems.shipped_plans import load_plan, plan_names
 
     return [
         {
@@ -127,15 +127,13 @@ def _plans() -> list[dict[str, Any]]:
             "title": load_plan(plan, name).scenario.title,
             "needs": "nothing",
         }
-        for plan in PLANS
+        for plan in systems().plans
         for name in plan_names(plan)
     ]
 
 
 def _studies() -> list[dict[str, Any]]:
-    from groundstation.pipeline.verbs.synthesis import STUDIES
-
     return [
-        {"kind": "study", "name": name, "title": f"study: {title}", "needs": "nothing"}
-        for name, title in STUDIES.items()
+        {"kind": "study", "name": study.name, "title": f"study: {study.title}", "needs": "nothing"}
+        for study in systems().studies
     ]

@@ -341,13 +341,23 @@ def zero_s(metadata: Mapping[str, Any]) -> float:
 
 def _record(target: Path, done: Converted, configuration: Configuration) -> None:
     """Write the recording of a part, with everything that its data allows."""
+    from groundstation.systems import systems
     from groundstation.viewer.recording import write_recording
 
     log = open_log(target)
     flight = read_flight(target, done)
     identity = flight_id(flight.start_ns if flight.has_utc else None, flight.metadata, log.source.sha256)
     results = analyse(flight, given_of(log, done, identity), configuration)
-    attempt("recording", "part", write_recording, target.with_suffix(".rrd"), flight, results, unless=OF_THE_WORLD)
+    attempt(
+        "recording",
+        "part",
+        write_recording,
+        target.with_suffix(".rrd"),
+        flight,
+        results,
+        systems(),
+        unless=OF_THE_WORLD,
+    )
 
 
 def _told(info: "StoreInfo") -> str:

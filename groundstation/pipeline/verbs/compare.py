@@ -16,7 +16,6 @@ from groundstation.base.findings import SEVERITIES, Finding
 from groundstation.base.signals import is_canonical
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.wording import is_number
-from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.many_flights.inputs import COMPARISON_MARKS, COMPARISON_RECORDING, is_ours, is_session
 from groundstation.pipeline.verbs.alignment import align
 from groundstation.pipeline.verbs.clip import CUT_SHA256
@@ -27,6 +26,7 @@ from groundstation.results.file_names import MANIFEST
 from groundstation.results.files import SavedFlight, csv_text, load, mapping, write_text
 from groundstation.results.flight import NotAssessable
 from groundstation.results.grouped_findings import grouped
+from groundstation.systems import systems
 
 (PAGE, TABLE), RECORDING = COMPARISON_MARKS, COMPARISON_RECORDING
 IDENTITY = (  # what tells the rows of a table in the results apart
@@ -125,7 +125,7 @@ def _load(folder: Path) -> SavedFlight:
     if not folder.is_dir() or not (folder / MANIFEST).is_file():
         found = "no such folder" if not folder.exists() else "no results"
         raise UsageError(str(folder), found, "a flight folder that `run` made")
-    saved = load(folder, ANSWER_TYPES)
+    saved = load(folder, systems().answer_types)
     errors = session_errors(saved)
     return saved if errors is None else replace(saved, figures={**saved.figures, errors.name: errors})
 

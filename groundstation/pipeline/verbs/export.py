@@ -115,12 +115,12 @@ def saved_flight(folder: Path) -> "SavedFlight":
     UsageError
         When it is no folder of a flight.
     """
-    from groundstation.estimators.analyses import ANSWER_TYPES
     from groundstation.results.files import load
+    from groundstation.systems import systems
 
     if not (folder / FLIGHT_FOLDER_MARK).is_file():
         raise no_log(folder)
-    return load(folder, ANSWER_TYPES)
+    return load(folder, systems().answer_types)
 
 
 def _compared_ins(saved: "SavedFlight") -> str:

@@ -10,8 +10,6 @@ from typing import Any
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.failures import attempt, failures, gathered_failures, is_incomplete, with_failures
 from groundstation.base.findings import worst
-from groundstation.estimators.analyses import ANSWER_TYPES, PLANS
-from groundstation.estimators.plan import Plan, Planned
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, PLAN_MARK
 from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
 from groundstation.pipeline.one_flight.flight import (
@@ -32,7 +30,9 @@ from groundstation.reports.flight_report import PDF, write_flight_report
 from groundstation.results.files import load_document, load_manifest, put_failures, save, write_text
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.manifest import Keys, Resume
-from groundstation.studies.shipped_plans import LoadedPlan, load_plan, plan_names
+from groundstation.systems import systems
+from groundstation.systems.plan import Plan, Planned
+from groundstation.systems.shipped_plans import LoadedPlan, load_plan, plan_names
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class ShippedScenario:
 
 def plan_of(name: str) -> Plan[Any]:
     """The kind of plan of that name."""
-    return next(plan for plan in PLANS if plan.name == name)
+    return next(plan for plan in systems().plans if plan.name == name)
 
 
 def shipped_scenarios(name: str) -> tuple[ShippedScenario, ...]:
@@ -178,9 +178,9 @@ def _run_into(
         write_text(partial / PLAN_MARK, loaded.text)
     with watch.stage("recording"):
         path = partial / f"{results.flight_id}.rrd"
-        attempt("recording", "plan", write_plan_recording, path, results, unless=OF_THE_WORLD)
+        attempt("recording", "plan", write_plan_recording, path, results, systems(), unless=OF_THE_WORLD)
     with watch.stage("reporting"):
-        problem = write_flight_report(partial, ANSWER_TYPES, with_pdf=with_pdf).problem
+        problem = write_flight_report(partial, systems(), with_pdf=with_pdf).problem
     put_failures(partial, failures())
     seal(partial, manifest)
     place(partial, target)

@@ -12,7 +12,6 @@ import numpy as np
 from groundstation.base.digits import digits_of
 from groundstation.base.errors import GroundstationError
 from groundstation.base.serial import to_json
-from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.installation.answer import verdict_of
 from groundstation.pipeline.many_flights.inputs import saved_flights
@@ -23,6 +22,7 @@ from groundstation.results.files import SavedFlight, csv_text, load, mapping, wr
 from groundstation.results.heading import Gate, judged_gate
 from groundstation.results.installation import InstalledFlight
 from groundstation.results.rules import Rejudged
+from groundstation.systems import systems
 
 LEARNED_GATE = "whole_half_width_learned"
 LEARNED_TITLE = "half width of the 95 % interval, the installation learned"
@@ -96,7 +96,7 @@ def rules_test(new: Path, out: Path) -> RulesTest:
     learned = learned_in(out)
     for folder in folders:
         try:
-            saved = load(folder, ANSWER_TYPES)
+            saved = load(folder, systems().answer_types)
             found = list(_of_flight(saved, configuration, learned.get(folder.name)))
         except GroundstationError as error:
             unread.append(str(error))
@@ -180,7 +180,7 @@ def _of_flight(
 ) -> Iterator[tuple[Rejudged, str]]:
     """Every verdict of a flight, judged again, and what of it only the log could tell."""
     results, unsure = saved.results, set[str]()
-    for analysis in FLIGHT_ANALYSES:
+    for analysis in systems().analyses:
         answer = results.answers.get(analysis.name)
         if answer is None or analysis.rules is None:
             continue

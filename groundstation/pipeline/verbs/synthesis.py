@@ -8,23 +8,10 @@ from groundstation.base.errors import UsageError
 from groundstation.pipeline.many_flights.inputs import STUDY_MARK
 from groundstation.pipeline.one_flight.configuration import read_toml
 from groundstation.pipeline.one_flight.progress import Event, Listener
+from groundstation.systems import systems
 
 if TYPE_CHECKING:
-    from groundstation.studies.page import StudyResult
-
-STUDIES = {
-    "heading": "heading correction before take-off: errors, coverage of the interval, figures of the paper repeated",
-    "crew": "heading verdicts on taxi in the wind: accepted, advisory, refused; both numbers; what is no straight taxi",
-    "installation": "what earlier flights teach of mounting and crab: coverage and verdicts on fleets of aircraft",
-    "forecast": "forecast of INS errors: every method under true and false models, and how honest its sigma is",
-    "magnetic": "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
-    "cooperative": "navigation between aircraft: published figures with ours beside them, divergence, consistency",
-    "control": "control of a session and placement of ground points: published figures with ours, laws flown",
-    "landing": "landing by reference points and by locators: every published figure with ours beside it",
-    "approach": "recorded approaches: the localizer as a reference for positions, how honest its interval is",
-}
-
-RESUMED = ("heading", "crew", "installation")  # studies whose runs are kept
+    from groundstation.systems.study import StudyResult
 
 
 def simulate_to(
@@ -137,16 +124,19 @@ def study_to(
     """
     from groundstation.results.files import csv_text, write_text
 
-    study = _study(name) if recorded is None else _study_of(name, recorded)
-
+    found = next((one for one in systems().studies if one.name == name), None)
+    if found is None:
+        raise UsageError("study", repr(name), f"one of {', '.join(one.name for one in systems().studies)}")
+    study = found.load() if recorded is None else _study_of(name, recorded)
     page = folder / f"{name}.md"
     kept = folder / "runs"
     if page.exists() and not force and not kept.is_dir():
         raise UsageError(str(page), "a file that exists", "a new folder", "-f overwrites it")
-    if name in RESUMED:
-        study = _resumed(name, study, kept, minutes, afresh=force)
+    if found.outcome is not None:
+        study = _resumed(found.outcome(), study, kept, minutes, afresh=force)
     elif minutes is not None:
-        raise UsageError("study", f"--minutes with {name}", " or ".join(RESUMED))
+        kept_ones = [one.name for one in systems().studies if one.outcome is not None]
+        raise UsageError("study", f"--minutes with {name}", " or ".join(kept_ones))
     (folder / "tables").mkdir(parents=True, exist_ok=True)
     listen(Event("begin", total=1))
     result = study(runs=runs, seed=seed, progress=lambda text: listen(Event("stage", name, text)))
@@ -159,21 +149,17 @@ def study_to(
 
 
 def _resumed(
-    name: str, study: "Callable[..., StudyResult]", folder: Path, minutes: float | None, *, afresh: bool
+    outcome: type, study: "Callable[..., StudyResult]", folder: Path, minutes: float | None, *, afresh: bool
 ) -> "Callable[..., StudyResult]":
-    """A study with the runs kept in a folder."""
+    """Return the study with its runs, of type ``outcome``, kept in a folder."""
     from functools import partial
     from shutil import rmtree
 
     from groundstation.pipeline.verbs.kept_runs import KeptRuns
-    from groundstation.studies.heading_crew import CrewOutcome
-    from groundstation.studies.heading_family import RunOutcome
-    from groundstation.studies.installation_pool import TaxiOfPool
 
     if afresh and folder.is_dir():
         rmtree(folder)
-    outcomes: dict[str, type] = {"heading": RunOutcome, "crew": CrewOutcome, "installation": TaxiOfPool}
-    kept: KeptRuns[Any] = KeptRuns(folder, outcomes[name])
+    kept: KeptRuns[Any] = KeptRuns(folder, outcome)
     return partial(study, kept=kept, minutes=minutes)
 
 
@@ -188,44 +174,3 @@ def _study_of(name: str, recorded: Path) -> "Callable[..., StudyResult]":
         return study_recorded(recorded_sets(recorded), progress)
 
     return run
-
-
-def _study(name: str) -> "Callable[..., StudyResult]":
-    """The study's function; each imports its own estimators."""
-    if name == "heading":
-        from groundstation.studies.heading import study_heading
-
-        return study_heading
-    if name == "crew":
-        from groundstation.studies.heading_crew import study_crew
-
-        return study_crew
-    if name == "installation":
-        from groundstation.studies.installation import study_installation
-
-        return study_installation
-    if name == "forecast":
-        from groundstation.studies.forecast import study_forecast
-
-        return study_forecast
-    if name == "magnetic":
-        from groundstation.studies.magnetic import study_magnetic
-
-        return study_magnetic
-    if name == "cooperative":
-        from groundstation.studies.cooperative import study_cooperative
-
-        return study_cooperative
-    if name == "control":
-        from groundstation.studies.control import study_control
-
-        return study_control
-    if name == "landing":
-        from groundstation.studies.landing import study_landing
-
-        return study_landing
-    if name == "approach":
-        from groundstation.studies.approach import study_approach
-
-        return study_approach
-    raise UsageError("study", repr(name), f"one of {', '.join(STUDIES)}")

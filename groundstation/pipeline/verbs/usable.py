@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal
 from groundstation.base.errors import NotAssessableError, SettingsError, UsageError
 from groundstation.base.findings import Finding
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
-from groundstation.estimators.analysis import Analysis, Shortfall
 from groundstation.estimators.cooperative.analysis import SessionKnown
 from groundstation.pipeline.one_flight.analyse import known_of, seen_by_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
+from groundstation.systems import systems
+from groundstation.systems.analysis import Analysis, Shortfall
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:
@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 
 LISTED = 3  # spans told of a shortfall
 
-FLIGHT_PURPOSES: Mapping[str, Analysis] = MappingProxyType({one.name: one for one in FLIGHT_ANALYSES if one.examine})
-SESSION_PURPOSES: Mapping[str, Analysis] = MappingProxyType({one.name: one for one in SESSION_ANALYSES if one.examine})
+FLIGHT_PURPOSES: Mapping[str, Analysis] = MappingProxyType({one.name: one for one in systems().analyses if one.examine})
+SESSION_PURPOSES: Mapping[str, Analysis] = MappingProxyType(
+    {one.name: one for one in systems().session_analyses if one.examine}
+)
 
 
 @dataclass(frozen=True)

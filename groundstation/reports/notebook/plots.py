@@ -3,11 +3,11 @@
 from groundstation.base.failures import attempt
 from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.parts import Figure
-from groundstation.chapters.plots import PLOTS
 from groundstation.plots.plot import Plot
 from groundstation.reports.drawing import plot_of
 from groundstation.reports.sections import told_sections
 from groundstation.results.files import SavedFlight
+from groundstation.systems.system import Systems
 
 # Scripts rely on these: names that are not the chapter's with hyphens, and chapters that their names leave out.
 NAMES = {
@@ -27,11 +27,11 @@ NAMES = {
 LEFT_OUT = {"forecast", "heading", "overview", "quality", "standstill"}
 
 
-def plots_of(saved: SavedFlight) -> dict[str, Plot]:
+def plots_of(saved: SavedFlight, systems: Systems) -> dict[str, Plot]:
     """Every plot of a flight's report by its name, in the order of the report."""
-    sections = (section for part in told_sections(saved) for section in part)
+    sections = (section for part in told_sections(saved, systems) for section in part)
     figures = [part for section in sections for part in section.parts if isinstance(part, Figure)]
-    return {name_of(one): plot for one in figures if (plot := _told(one, saved)) is not None}
+    return {name_of(one): plot for one in figures if (plot := _told(one, saved, systems)) is not None}
 
 
 def name_of(figure: Figure) -> str:
@@ -47,6 +47,6 @@ def name_of(figure: Figure) -> str:
     return "-".join(filter(None, (NAMES.get(figure.name, usual), figure.of.replace(" ", "-"))))
 
 
-def _told(figure: Figure, saved: SavedFlight) -> Plot | None:
+def _told(figure: Figure, saved: SavedFlight, systems: Systems) -> Plot | None:
     name = ".".join(filter(None, (figure.name, figure.of)))
-    return attempt("figure", name, plot_of, PLOTS, figure, saved.results)
+    return attempt("figure", name, plot_of, systems.plots, figure, saved.results)

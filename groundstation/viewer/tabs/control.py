@@ -28,7 +28,9 @@ def control(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
         return None
     recorder.document("control/answer", markdown(section))
     left = [_space(recorder, answer, paths, results), document("Control laws", "control/answer")]
-    laws, measures = (panels_of(recorder, plot_of(name, results)) for name in ("control.law", "control.measures"))
+    laws, measures = (
+        panels_of(recorder, plot_of(recorder, name, results)) for name in ("control.law", "control.measures")
+    )
     columns = [left, laws, measures]
     shown = [rrb.Vertical(contents=column) for column in columns if column]
     return rrb.Horizontal(contents=shown, column_shares=[1.6, 1.0, 1.0][: len(shown)], name="Control")

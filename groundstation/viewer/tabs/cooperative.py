@@ -1,7 +1,5 @@
 """Cooperative: the aircraft of a session in space with their ellipsoids and links, errors, geometry, links in time."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import rerun.blueprint as rrb
 
@@ -13,7 +11,6 @@ from groundstation.results.arrays.cooperative import CooperativeGeometry, Cooper
 from groundstation.results.arrays.typed import Counts, Texts
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.flight import FlightResults
-from groundstation.tables.session import GroundPoint
 from groundstation.viewer import colours
 from groundstation.viewer.names import clean_text, path_parts
 from groundstation.viewer.plot_views import panels_of, plot_of
@@ -27,17 +24,17 @@ LINK_STATES = {"ranging": colours.ANSWER, "gated": colours.LIMIT, "silent": colo
 SILENT_FRAMES = 3.0  # so many ordinary steps without a range are silence
 
 
-def cooperative(recorder: Recorder, points: Sequence[GroundPoint], results: FlightResults) -> rrb.Container:
+def cooperative(recorder: Recorder, results: FlightResults) -> rrb.Container:
     """Log the tab of a session; without an answer it is the text that says why."""
     answer, section = results.answer(CooperativeResult), chapter(results)
     if answer is None or section is None:
-        recorder.document("cooperative/answer", front_markdown(front(results)))
+        recorder.document("cooperative/answer", front_markdown(front(results, recorder.systems.chapters)))
         return rrb.Vertical(contents=[document("Session", "cooperative/answer")], name="Cooperative")
     recorder.document("cooperative/answer", markdown(section))
     text = document("Algorithms, geometry and links", "cooperative/answer")
-    left = [*space(recorder, answer, points, results), text]
-    middle = panels_of(recorder, plot_of("cooperative.errors", results))
-    geometry = panels_of(recorder, plot_of("cooperative.geometry", results))
+    left = [*space(recorder, answer, results), text]
+    middle = panels_of(recorder, plot_of(recorder, "cooperative.errors", results))
+    geometry = panels_of(recorder, plot_of(recorder, "cooperative.geometry", results))
     right = [*_sources(recorder, answer, results), *geometry, *_links(recorder, answer, results)]
     columns = [rrb.Vertical(contents=column) for column in (left, middle, right) if column]
     return rrb.Horizontal(contents=columns, column_shares=[1.6, 1.0, 1.0][: len(columns)], name="Cooperative")

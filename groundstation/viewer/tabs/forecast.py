@@ -39,7 +39,7 @@ def forecast(recorder: Recorder, results: FlightResults) -> rrb.Container | None
     fan = _fan(recorder, results)
     if fan:
         rows.append(rrb.Horizontal(contents=fan))
-    growth = panels_of(recorder, plot_of("forecast.growth", results), height=GROWTH_HEIGHT)
+    growth = panels_of(recorder, plot_of(recorder, "forecast.growth", results), height=GROWTH_HEIGHT)
     pictures = [*growth, *_map(recorder, results, answer)]
     if pictures:
         rows.append(rrb.Horizontal(contents=pictures))

@@ -14,10 +14,10 @@ from groundstation.viewer.views import document
 
 def generic_tab(recorder: Recorder, results: FlightResults, answer: Answer) -> rrb.Container:
     """Log the tab of any answer."""
-    section, path = chapter_of(results, answer), answer.analysis
+    section, path = chapter_of(results, answer, recorder.systems.chapters), answer.analysis
     recorder.document(f"{path}/answer", markdown(section))
     text = document("What was found", f"{path}/answer")
-    told = (plot_of(SERIES, results, name) for name in figures_over_time(results, path))
+    told = (plot_of(recorder, SERIES, results, name) for name in figures_over_time(results, path))
     plots = [view for one in told if one is not None for view in panels_of(recorder, one, of=one.title)]
     columns: list[rrb.View | rrb.Container] = [rrb.Vertical(contents=plots), text] if plots else [text]
     return rrb.Horizontal(contents=columns, column_shares=[3.0, 2.0][: len(columns)], name=section.title)

@@ -29,13 +29,13 @@ def heading(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     recorder.document("heading/verdict", markdown(heading_chapter(results)))
     verdict = document("Verdict and the number to type", "heading/verdict")
     on_ground = _on_ground(results)
-    plots = [plot_of(name, on_ground) for name in ("heading.difference", "heading.taxi")]
+    plots = [plot_of(recorder, name, on_ground) for name in ("heading.difference", "heading.taxi")]
     views = [view for one in plots for view in panels_of(recorder, one)]
     runs = _runs(recorder, results, plots)
     pictures = [
         *distribution.heading_error(recorder, results),
-        *panels_of(recorder, _first_panel(plot_of("standstill.components", results))),
-        *panels_of(recorder, plot_of("standstill.mean_speed", results), height=80.0),
+        *panels_of(recorder, _first_panel(plot_of(recorder, "standstill.components", results))),
+        *panels_of(recorder, plot_of(recorder, "standstill.mean_speed", results), height=80.0),
     ]
     columns: list[rrb.View | rrb.Container] = []
     if views:

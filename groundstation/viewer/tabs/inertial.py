@@ -46,7 +46,7 @@ def inertial(recorder: Recorder, results: FlightResults) -> rrb.Container | None
         return None
     recorder.document("inertial/answer", markdown(section))
     right: list[rrb.View] = [document("Errors of this INS against GNSS", "inertial/answer")]
-    right += panels_of(recorder, plot_of("inertial.radial", results), apart=True)
+    right += panels_of(recorder, plot_of(recorder, "inertial.radial", results), apart=True)
     column = rrb.Vertical(contents=right, row_shares=[2.0, 1.0, 1.0][: len(right)])
     pages = [page for told in PAGES if (page := _page(recorder, results, *told)) is not None]
     if not pages:
@@ -60,7 +60,7 @@ def _page(
     recorder: Recorder, results: FlightResults, name: str, of: str, figures: Sequence[tuple[str, ...]]
 ) -> rrb.Container | None:
     """A page of plots, north on the left and east on the right."""
-    plots = (plot_of(figure, results, *which) for figure, *which in figures)
+    plots = (plot_of(recorder, figure, results, *which) for figure, *which in figures)
     views = [view for one in plots for view in panels_of(recorder, one, of=of)]
     columns = [rrb.Vertical(contents=side) for side in (views[::2], views[1::2])]
     return rrb.Horizontal(contents=columns, name=name) if views else None

@@ -44,9 +44,9 @@ def _approach(recorder: Recorder, results: FlightResults, one: Approach, data: L
     flown, path = data.where(data.approach == one.number), f"landing/{one.number}"
     left = _space(recorder, f"{path}/space", flown)
     left += [view for run in runs_of(recorder, motion(results, str(one.number)), f"{path}/motion") for view in run]
-    told = plot_of("landing.protection", results, str(one.number))
+    told = plot_of(recorder, "landing.protection", results, str(one.number))
     left += panels_of(recorder, told, of="Protection levels", height=70.0)
-    right = panels_of(recorder, plot_of("landing.deviations", results, str(one.number)), height=110.0)
+    right = panels_of(recorder, plot_of(recorder, "landing.deviations", results, str(one.number)), height=110.0)
     shares = [2.0, *[1.0] * (len(left) - 1)]
     columns = [rrb.Vertical(contents=left, row_shares=shares), rrb.Vertical(contents=right)]
     contents = [view for view, has in zip(columns, (left, right), strict=True) if has]

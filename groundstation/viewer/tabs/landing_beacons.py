@@ -14,7 +14,7 @@ from groundstation.viewer.views import document
 def landing_beacons(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     """Log the tab; None without an answer or its positions."""
     section = chapter(results)
-    views = panels_of(recorder, plot_of("landing_beacons.deviations", results), height=70.0)
+    views = panels_of(recorder, plot_of(recorder, "landing_beacons.deviations", results), height=70.0)
     if results.answer(BeaconLanding) is None or section is None or not views:
         return None
     recorder.document("landing_beacons/answer", markdown(section))

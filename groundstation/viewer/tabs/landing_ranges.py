@@ -33,7 +33,7 @@ def landing_ranges(recorder: Recorder, results: FlightResults) -> rrb.Container 
         return None
     recorder.document("landing_ranges/answer", markdown(section))
     left = [_space(recorder, answer, space, path), document("What was found", "landing_ranges/answer")]
-    plots = [plot_of(name, results) for name in ("landing_ranges.accuracy", "landing_ranges.trials")]
+    plots = [plot_of(recorder, name, results) for name in ("landing_ranges.accuracy", "landing_ranges.trials")]
     shown = [view for one in plots for view in panels_of(recorder, one, height=80.0)]
     right: list[rrb.View | rrb.Container] = [rrb.Grid(contents=shown, grid_columns=2), *_moving(recorder, space)]
     shares = [2.0, 1.0]

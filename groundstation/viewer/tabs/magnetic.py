@@ -25,7 +25,7 @@ def magnetic(recorder: Recorder, results: FlightResults) -> rrb.Container | None
     recorder.document("magnetic/answer", markdown(section))
 
     def views(*names: str) -> list[rrb.View]:
-        return [view for name in names for view in panels_of(recorder, plot_of(name, results))]
+        return [view for name in names for view in panels_of(recorder, plot_of(recorder, name, results))]
 
     left = views("magnetic.deviation", "magnetic.branches", "magnetic.ground_runs")
     middle = [*views("magnetic.held_out", "magnetic.modulus"), *_applied(recorder, results)]

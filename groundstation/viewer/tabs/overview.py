@@ -105,7 +105,7 @@ PLOTS = (
 
 def overview(recorder: Recorder, results: FlightResults) -> rrb.Container:
     """Log the overview: whatever there is of track, plots and lanes, and always the summary."""
-    recorder.document("summary", front_markdown(front(results)))
+    recorder.document("summary", front_markdown(front(results, recorder.systems.chapters)))
     summary = document("Flight", "summary")
     figure = results.rows_of(Overview)
     ground = None if figure is None else track(recorder, results, figure)

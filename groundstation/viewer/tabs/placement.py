@@ -29,7 +29,7 @@ def placement(recorder: Recorder, results: FlightResults) -> rrb.Container | Non
         return None
     recorder.document("placement/answer", markdown(section))
     left = [_space(recorder, answer, way, results), document("Designs and places", "placement/answer")]
-    right = panels_of(recorder, plot_of("placement.accuracy", results))
+    right = panels_of(recorder, plot_of(recorder, "placement.accuracy", results))
     columns = [rrb.Vertical(contents=left), rrb.Vertical(contents=right)]
     return rrb.Horizontal(contents=columns, column_shares=[1.6, 1.0], name="Placement")
 

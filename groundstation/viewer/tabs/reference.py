@@ -24,7 +24,7 @@ def reference(recorder: Recorder, results: FlightResults) -> rrb.Container | Non
     for page in PAGES:
         columns = []
         for subject in dict.fromkeys(data.subject.tolist()):
-            told = plot_of("reference.errors", results, f"{subject} {page}")
+            told = plot_of(recorder, "reference.errors", results, f"{subject} {page}")
             if views := panels_of(recorder, told, of=title_of(subject)):
                 columns.append(rrb.Vertical(contents=views, name=title_of(subject)))
         if columns:

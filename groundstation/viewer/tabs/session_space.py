@@ -1,7 +1,5 @@
 """The aircraft of a session in space, with 2 sigma ellipsoids, and links in the colour of their residual."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
@@ -10,11 +8,10 @@ from groundstation.base.ellipse import principal_axes
 from groundstation.base.local_frame import LocalFrame, plane_through
 from groundstation.base.records import Int64Array
 from groundstation.chapters.cooperative import trusted
-from groundstation.results.arrays.cooperative import CooperativeLinks, CooperativeTracks
+from groundstation.results.arrays.cooperative import CooperativeLinks, CooperativeTracks, SessionPoints
 from groundstation.results.arrays.typed import Texts
 from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.flight import FlightResults
-from groundstation.tables.session import GroundPoint
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour
 from groundstation.viewer.names import clean_text, path_parts
@@ -29,9 +26,7 @@ STEPS: tuple[tuple[float, Colour], ...] = ((1.0, colours.ANSWER), (2.0, colours.
 VIEW_NAME = "East, north, up; true 2σ ellipsoids; links: residual below 1σ green, 2σ yellow, 3σ orange, else red"
 
 
-def space(
-    recorder: Recorder, answer: CooperativeResult, points: Sequence[GroundPoint], results: FlightResults
-) -> list[rrb.View]:
+def space(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
     """Log the aircraft, their tracks, the ground points and the links; the view, none without a position."""
     tracks = results.rows_of(CooperativeTracks)
     if tracks is None:
@@ -39,7 +34,7 @@ def space(
     rows = tracks.algorithm == trusted(answer).algorithm
     place = np.column_stack([tracks.x_m, tracks.y_m, tracks.z_m])
     origin = plane_through(place[rows]) if answer.frame == "ecef" else None
-    shown, stations = _seen(place, origin), _stations(recorder, points, origin)
+    shown, stations = _seen(place, origin), _stations(recorder, results.rows_of(SessionPoints), origin)
     ways: dict[str, tuple[FloatArray, FloatArray]] = {}
     shades, parts = colours.for_series(len(answer.vehicle_names)), path_parts(answer.vehicle_names)
     for name, part, shade in zip(answer.vehicle_names, parts, shades, strict=True):
@@ -60,18 +55,18 @@ def _seen(position_m: FloatArray, origin: LocalFrame | None) -> FloatArray:
     return np.column_stack([plane[:, 1], plane[:, 0], -plane[:, 2]])
 
 
-def _stations(recorder: Recorder, points: Sequence[GroundPoint], origin: LocalFrame | None) -> dict[str, FloatArray]:
-    if not points:
+def _stations(recorder: Recorder, points: SessionPoints | None, origin: LocalFrame | None) -> dict[str, FloatArray]:
+    if points is None:
         return {}
-    places = _seen(np.array([point.position_m for point in points]), origin)
+    places = _seen(np.column_stack([points.x_m, points.y_m, points.z_m]), origin)
     drawn = rr.Points3D(
         places,
-        labels=[clean_text(point.name) for point in points],
-        colors=[colours.LIGHT] * len(points),
+        labels=[clean_text(name) for name in points.label],
+        colors=[colours.LIGHT] * len(places),
         radii=rr.Radius.ui_points(MARK),
     )
     recorder.static("space/stations", drawn)
-    return {point.name: place for point, place in zip(points, places, strict=True)}
+    return {str(name): place for name, place in zip(points.label, places, strict=True)}
 
 
 def _aircraft(

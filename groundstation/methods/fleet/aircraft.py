@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.quantiles import student_quantile
-from groundstation.estimators.fleet.moments import moments_of
+from groundstation.methods.fleet.moments import moments_of
 
 FloatArray = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.estimators.fleet.moments import moments_of
+from groundstation.methods.fleet.moments import moments_of
 from groundstation.methods.intervals import share_interval
 from groundstation.results.fleet import FleetCalibration
 

@@ -8,7 +8,7 @@ from groundstation.base.findings import Finding, Severity
 from groundstation.base.gaps import Gaps
 from groundstation.base.ledger import DamagedSpan, Ledger
 from groundstation.base.timescales import duration_text
-from groundstation.estimators.analysis import RestsOn
+from groundstation.systems.analysis import RestsOn
 from groundstation.tables.table import Flight
 
 SHOWN = 3

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.estimators.installation.settings import InstallationSettings
 from groundstation.results.arrays.fleet import FleetInstallationFlights
 from groundstation.results.installation import Installation, InstallationRow, InstalledFlight
 
@@ -17,9 +16,8 @@ NUMBERS = (
 BELIEVED = ("mounting_deg", "mounting_sigma_deg", "sum_deg", "sum_sigma_deg", "factor", "factor_sigma")
 
 
-def installation_rows(installations: Sequence[Installation]) -> tuple[InstallationRow, ...]:
+def installation_rows(installations: Sequence[Installation], named_probability: float) -> tuple[InstallationRow, ...]:
     """One row for each installation, numbered in their order."""
-    named = InstallationSettings().named_probability
     rows = []
     for place, one in enumerate(installations, 1):
         believed = {} if one.installed is None else {name: getattr(one.installed, name) for name in BELIEVED}
@@ -32,8 +30,8 @@ def installation_rows(installations: Sequence[Installation]) -> tuple[Installati
                 last_flight=one.lessons[-1].flight_id,
                 flights=len(one.flights),
                 taught=len(one.taught_by),
-                odd=_named(one.taught_by, one.odd, named),
-                changed=_named(one.taught_by, one.changed, named),
+                odd=_named(one.taught_by, one.odd, named_probability),
+                changed=_named(one.taught_by, one.changed, named_probability),
                 pooled=one.pooled,
                 **believed,
             )

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.estimators.fleet.aircraft import mean_over_flights
-from groundstation.estimators.fleet.calibration import calibrate
-from groundstation.estimators.fleet.changes import ChangeSettings, Chart, control_chart
-from groundstation.estimators.fleet.moments import Moments, merged
-from groundstation.estimators.fleet.outliers import FALSE_OUTLIERS, FEWEST, find_outliers
+from groundstation.methods.fleet.aircraft import mean_over_flights
+from groundstation.methods.fleet.calibration import calibrate
+from groundstation.methods.fleet.changes import ChangeSettings, Chart, control_chart
+from groundstation.methods.fleet.moments import Moments, merged
+from groundstation.methods.fleet.outliers import FALSE_OUTLIERS, FEWEST, find_outliers
 from groundstation.results.arrays.fleet import FleetChecks, FleetTrend
 from groundstation.results.arrays.typed import joined
 from groundstation.results.figures import FigureData

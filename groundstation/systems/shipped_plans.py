@@ -6,7 +6,7 @@ from typing import Generic
 
 from groundstation.base.shipped_toml import ShippedToml
 from groundstation.base.toml_settings import settings_from
-from groundstation.estimators.plan import Plan, ScenarioT
+from groundstation.systems.plan import Plan, ScenarioT
 
 
 @dataclass(frozen=True)

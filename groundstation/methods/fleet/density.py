@@ -7,7 +7,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.estimators.fleet.moments import Moments
+from groundstation.methods.fleet.moments import Moments
 from groundstation.results.fleet import Densities
 
 FloatArray = NDArray[np.float64]

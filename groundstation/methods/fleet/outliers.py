@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.estimators.fleet.robust import VALUES_PER_FREEDOM_MAD, limit_in_sigmas, sigma_of_spread
+from groundstation.methods.fleet.robust import VALUES_PER_FREEDOM_MAD, limit_in_sigmas, sigma_of_spread
 
 FloatArray = NDArray[np.float64]
 FEWEST = 8

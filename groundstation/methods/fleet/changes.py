@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.estimators.fleet.robust import (
+from groundstation.methods.fleet.robust import (
     VALUES_PER_FREEDOM_STEP,
     limit_in_sigmas,
     sigma_of_steps,

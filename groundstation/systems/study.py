@@ -1,4 +1,4 @@
-"""What every study hands back: tables, and a page of sections, told as those of a report are."""
+"""Results of studies: tables, and a page of sections, told as those of a report are."""
 
 import sys
 from collections.abc import Sequence

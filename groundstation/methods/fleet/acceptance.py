@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.estimators.fleet.confidence import (
+from groundstation.methods.fleet.confidence import (
     correlation_within,
     effective_flights,
     flights_needed,
@@ -14,7 +14,7 @@ from groundstation.estimators.fleet.confidence import (
     share_high,
     share_low,
 )
-from groundstation.estimators.fleet.ins_errors import FEWEST, Growth, InsErrors
+from groundstation.methods.fleet.ins_errors import FEWEST, Growth, InsErrors
 from groundstation.results.acceptance import (
     ENSEMBLE,
     UNKNOWN_INS,

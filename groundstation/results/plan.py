@@ -1,7 +1,0 @@
-"""What the answers of a plan have in common: they tell of something that has not been flown."""
-
-from groundstation.results.answer import Answer
-
-
-class PlanAnswer(Answer):
-    """Base of the answers of ``groundstation plan``."""

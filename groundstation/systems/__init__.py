@@ -1,0 +1,32 @@
+"""The systems of the ground station: one folder each, with everything that belongs to it.
+
+Ours are a line each below. Other people's come by entry points of the group ``groundstation.systems``: the object is
+a :class:`System`. One that fails is a line of text and never hides the others.
+"""
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from groundstation.systems.system import Systems
+
+ENTRY_POINT_GROUP = "groundstation.systems"
+OURS = (  # in the order they are shown
+    "groundstation.systems.heading.system",
+    "groundstation.systems.inertial.system",
+    "groundstation.systems.latency.system",
+    "groundstation.systems.magnetic.system",
+    "groundstation.systems.landing.system",
+    "groundstation.systems.several_logs.system",
+    "groundstation.systems.reference.system",
+    "groundstation.systems.cooperative.system",
+    "groundstation.systems.planning.system",
+)
+
+
+@cache
+def systems() -> "Systems":
+    """Return all systems, ours first, then other people's by their names."""
+    from groundstation.systems.loading import load_systems
+
+    return load_systems(OURS, ENTRY_POINT_GROUP)

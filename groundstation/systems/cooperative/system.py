@@ -1,0 +1,54 @@
+"""The cooperative system as one object."""
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from groundstation.estimators.cooperative.analysis import COOPERATIVE
+from groundstation.systems.system import Study, System, Tab
+
+if TYPE_CHECKING:
+    from groundstation.chapters.chapter import Chapter
+    from groundstation.plots.plot import Describe
+    from groundstation.systems.study import StudyResult
+
+
+def _chapters() -> "tuple[Chapter, ...]":
+    from groundstation.chapters.chapter import Chapter
+    from groundstation.chapters.cooperative import cooperative, session_front
+    from groundstation.results.cooperative import CooperativeResult
+
+    return (Chapter((CooperativeResult,), cooperative, session_front),)
+
+
+def _plots() -> "Mapping[str, Describe]":
+    from groundstation.chapters.plots import cooperative
+
+    return cooperative.PLOTS
+
+
+def _tabs() -> tuple[Tab, ...]:
+    from groundstation.viewer.tabs.cooperative import cooperative
+
+    return (Tab(("cooperative",), cooperative),)
+
+
+def _study_cooperative() -> "Callable[..., StudyResult]":
+    from groundstation.studies.cooperative import study_cooperative
+
+    return study_cooperative
+
+
+SYSTEM = System(
+    name="cooperative",
+    session_analyses=(COOPERATIVE,),
+    studies=(
+        Study(
+            "cooperative",
+            "navigation between aircraft: published figures with ours beside them, divergence, consistency",
+            _study_cooperative,
+        ),
+    ),
+    chapters=_chapters,
+    plots=_plots,
+    tabs=_tabs,
+)

@@ -1,0 +1,110 @@
+"""The heading system as one object."""
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from groundstation.estimators.heading.analysis import HEADING
+from groundstation.estimators.installation.analysis import INSTALLATION
+from groundstation.systems.system import Study, System, Tab
+
+if TYPE_CHECKING:
+    from groundstation.chapters.chapter import Chapter
+    from groundstation.plots.plot import Describe
+    from groundstation.systems.study import StudyResult
+
+
+def _chapters() -> "tuple[Chapter, ...]":
+    from groundstation.chapters.chapter import Chapter
+    from groundstation.chapters.heading import heading
+    from groundstation.chapters.installation import installation
+    from groundstation.results.heading import HeadingResult
+    from groundstation.results.installation import InstallationResult
+
+    return (
+        Chapter((InstallationResult,), installation),
+        Chapter((HeadingResult,), heading),
+    )
+
+
+def _plots() -> "Mapping[str, Describe]":
+    from groundstation.chapters.plots import heading, standstill
+
+    return {**heading.PLOTS, **standstill.PLOTS}
+
+
+def _tabs() -> tuple[Tab, ...]:
+    from groundstation.viewer.tabs.heading import heading
+    from groundstation.viewer.tabs.installation import installation
+
+    return (
+        Tab(("heading",), heading),
+        Tab(("installation",), installation),
+    )
+
+
+def _study_heading() -> "Callable[..., StudyResult]":
+    from groundstation.studies.heading import study_heading
+
+    return study_heading
+
+
+def _outcome_heading() -> type:
+    from groundstation.studies.heading_family import RunOutcome
+
+    return RunOutcome
+
+
+def _study_crew() -> "Callable[..., StudyResult]":
+    from groundstation.studies.heading_crew import study_crew
+
+    return study_crew
+
+
+def _outcome_crew() -> type:
+    from groundstation.studies.heading_crew import CrewOutcome
+
+    return CrewOutcome
+
+
+def _study_installation() -> "Callable[..., StudyResult]":
+    from groundstation.studies.installation import study_installation
+
+    return study_installation
+
+
+def _outcome_installation() -> type:
+    from groundstation.studies.installation_pool import TaxiOfPool
+
+    return TaxiOfPool
+
+
+SYSTEM = System(
+    name="heading",
+    analyses=(
+        HEADING,
+        INSTALLATION,
+    ),
+    studies=(
+        Study(
+            "heading",
+            "heading correction before take-off: errors, coverage of the interval, figures of the paper repeated",
+            _study_heading,
+            _outcome_heading,
+        ),
+        Study(
+            "crew",
+            "heading verdicts on taxi in the wind: accepted, advisory, refused; both numbers; what is no straight taxi",
+            _study_crew,
+            _outcome_crew,
+        ),
+        Study(
+            "installation",
+            "what earlier flights teach of mounting and crab: coverage and verdicts on fleets of aircraft",
+            _study_installation,
+            _outcome_installation,
+        ),
+    ),
+    chapters=_chapters,
+    plots=_plots,
+    tabs=_tabs,
+)

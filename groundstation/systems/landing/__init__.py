@@ -1,0 +1,1 @@
+"""Approaches flown: against a runway and its aids, and by two locators."""

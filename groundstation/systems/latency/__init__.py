@@ -1,0 +1,1 @@
+"""Latency between sensors that show the same motion."""

@@ -1,0 +1,49 @@
+"""Loading of systems: ours by the paths of their modules, other people's by entry points."""
+
+from collections.abc import Sequence
+from importlib import import_module
+
+from groundstation.systems.system import System, Systems
+
+
+def load_systems(ours: Sequence[str], group: str) -> Systems:
+    """Load the systems at paths of modules, each its ``SYSTEM``, and those of a group of entry points.
+
+    Returns
+    -------
+    Systems
+        With a line for each stranger's system that cannot be used: it raised, is no :class:`System`, or has a name
+        that is taken, by a system or by one of its analyses, plans, studies or settings.
+    """
+    from importlib.metadata import entry_points
+
+    every: list[System] = [import_module(path).SYSTEM for path in ours]
+    failures: list[str] = []
+    for entry in sorted(entry_points(group=group), key=lambda entry: entry.name):
+        where = f"system plug-in {entry.name!r} ({entry.value})"
+        try:
+            system = entry.load()
+            if not isinstance(system, System):
+                raise TypeError(f"{type(system).__name__} is no System")
+            taken = _names(system) & set().union(*map(_names, every))
+            if taken:
+                failures.append(f"{where} is left out: {', '.join(sorted(taken))} is taken")
+            else:
+                every.append(system)
+        except Exception as error:  # a stranger's code: whatever it raises must not stop a run
+            told = " ".join(f"{type(error).__name__}: {error}".split())
+            failures.append(f"{where} cannot be used: {told}")
+    return Systems(tuple(every), tuple(failures))
+
+
+def _names(system: System) -> set[str]:
+    """Names that must differ between systems, with what they name."""
+    analyses = (*system.analyses, *system.session_analyses)
+    return {
+        f"system {system.name}",
+        *(f"analysis {one.name}" for one in analyses),
+        *(f"settings table {one.settings_table}" for one in analyses),
+        *(f"column {column.name}" for one in analyses for column in one.columns),
+        *(f"plan {one.name}" for one in system.plans),
+        *(f"study {one.name}" for one in system.studies),
+    }

@@ -1,0 +1,1 @@
+"""Several logs of one flight: their clocks joined, and what the joining shows."""

@@ -1,0 +1,178 @@
+"""One system as one object: its analyses and plans, and all that pages, recordings and verbs show of it.
+
+Every part is optional. What costs an import is given as a function that imports inside: a run loads the analyses, a
+page the chapters and plots, a recording the tabs, a study its own simulation.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from groundstation.results.answer import Answer, PlanAnswer, SessionAnswer
+from groundstation.systems.analysis import Analysis
+from groundstation.systems.plan import Plan
+
+if TYPE_CHECKING:
+    from groundstation.chapters.chapter import Chapter, Chapters
+    from groundstation.plots.plot import Describe
+    from groundstation.results.flight import FlightResults
+    from groundstation.systems.study import StudyResult
+
+
+class Tab(NamedTuple):
+    """A tab of the recording, and the analyses whose answers it shows.
+
+    ``log(recorder, results)`` logs it and returns its layout, None where there is nothing to show. Without it the
+    answers have no tab: another one shows them.
+    """
+
+    shows: tuple[str, ...]
+    log: Callable[[Any, "FlightResults"], Any] | None
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study that ``groundstation study`` runs.
+
+    Parameters
+    ----------
+    name : str
+        The word behind ``groundstation study``.
+    title : str
+        What ``list`` says it finds out.
+    load : callable
+        Imports the study and returns it: ``study(*, runs, seed, progress) -> StudyResult``.
+    outcome : callable, optional
+        Imports the type of one run and returns it, where runs are kept: the study then takes ``kept`` and ``minutes``.
+    """
+
+    name: str
+    title: str
+    load: "Callable[[], Callable[..., StudyResult]]"
+    outcome: Callable[[], type[Any]] | None = None
+
+
+def _no_chapters() -> "tuple[Chapter, ...]":
+    return ()
+
+
+def _no_plots() -> "Mapping[str, Describe]":
+    return {}
+
+
+def _no_tabs() -> tuple[Tab, ...]:
+    return ()
+
+
+@dataclass(frozen=True)
+class System:
+    """A system of the ground station. Whatever runs, lists, tells or draws systems loops over them.
+
+    Parameters
+    ----------
+    name : str
+        The name of its folder, of its page in docs/ and of its log room: one word for the mission.
+    analyses : tuple of Analysis
+        Of a flight, in the order they are shown.
+    session_analyses : tuple of Analysis
+        Of a session of several aircraft.
+    plans : tuple of Plan
+    studies : tuple of Study
+        Monte Carlo behind its published figures.
+    chapters : callable
+        Chapters of the report, in its order: what tells which answers.
+    plots : callable
+        Descriptions of its figures, by the name that a chapter gives.
+    tabs : callable
+        Tabs of the recording, in their order.
+    """
+
+    name: str
+    analyses: tuple[Analysis, ...] = ()
+    session_analyses: tuple[Analysis, ...] = ()
+    plans: tuple[Plan[Any], ...] = ()
+    studies: tuple[Study, ...] = ()
+    chapters: "Callable[[], tuple[Chapter, ...]]" = _no_chapters
+    plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
+    tabs: Callable[[], tuple[Tab, ...]] = _no_tabs
+
+
+@dataclass(frozen=True)
+class Systems:
+    """Systems in the order they are shown, and a line for each of a stranger's that could not be loaded.
+
+    Examples
+    --------
+    >>> Systems((System("heading"), System("landing"))).names
+    ('heading', 'landing')
+    """
+
+    every: tuple[System, ...]
+    failures: tuple[str, ...] = field(default=())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the systems."""
+        return tuple(one.name for one in self.every)
+
+    @cached_property
+    def analyses(self) -> tuple[Analysis, ...]:
+        """Analyses of a flight."""
+        return tuple(analysis for one in self.every for analysis in one.analyses)
+
+    @cached_property
+    def session_analyses(self) -> tuple[Analysis, ...]:
+        """Analyses of a session."""
+        return tuple(analysis for one in self.every for analysis in one.session_analyses)
+
+    @cached_property
+    def plans(self) -> tuple[Plan[Any], ...]:
+        """Kinds of plans."""
+        return tuple(plan for one in self.every for plan in one.plans)
+
+    @cached_property
+    def studies(self) -> tuple[Study, ...]:
+        """Studies."""
+        return tuple(study for one in self.every for study in one.studies)
+
+    @cached_property
+    def answer_types(self) -> Mapping[str, type[Answer]]:
+        """Types of the answers of a saved flight, session or plan, by the name of their analysis."""
+        analyses = (*self.analyses, *self.session_analyses)
+        kinds = (*(one.answer for one in analyses), *(kind for plan in self.plans for kind in plan.answers))
+        return {kind.analysis: kind for kind in kinds}
+
+    @cached_property
+    def chapters(self) -> "Chapters":
+        """Chapters of flights, sessions and plans."""
+        from groundstation.chapters.chapter import Chapters
+
+        every = [chapter for one in self.every for chapter in one.chapters()]
+        plans = tuple(_of(every, PlanAnswer))
+        sessions = tuple(_of(every, SessionAnswer))
+        return Chapters(tuple(one for one in every if one not in (*plans, *sessions)), sessions, plans)
+
+    @cached_property
+    def plots(self) -> "Mapping[str, Describe]":
+        """Descriptions of figures, by the name that a chapter gives: those of all flights and of the systems."""
+        from groundstation.chapters.plots import PLOTS
+
+        return {**PLOTS, **{name: describe for one in self.every for name, describe in one.plots().items()}}
+
+    @cached_property
+    def tabs(self) -> tuple[Tab, ...]:
+        """Tabs of recordings."""
+        return tuple(tab for one in self.every for tab in one.tabs())
+
+    def tabs_of(self, kind: type[Answer] | None) -> Iterator[Tab]:
+        """Tabs that show answers of a kind: plans, sessions; None: of flights."""
+        special = (PlanAnswer, SessionAnswer)
+        for tab in self.tabs:
+            shown = self.answer_types.get(tab.shows[0], Answer)
+            if issubclass(shown, kind) if kind is not None else not issubclass(shown, special):
+                yield tab
+
+
+def _of(chapters: "Iterable[Chapter]", kind: type[Answer]) -> "Iterator[Chapter]":
+    return (one for one in chapters if issubclass(one.answers[0], kind))

@@ -1,0 +1,95 @@
+"""Chapters, pages and recordings with the systems that ship, for tests that do not choose them."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from groundstation.chapters import by_answer
+from groundstation.chapters.front import front as top
+from groundstation.chapters.parts import Document, Front, Section
+from groundstation.reports import flight_report, sections
+from groundstation.results.answer import Answer
+from groundstation.results.files import SavedFlight
+from groundstation.results.flight import FlightResults
+from groundstation.systems import systems
+from groundstation.systems.system import System, Systems
+from groundstation.tables.table import Flight
+from groundstation.viewer import recording
+from groundstation.viewer.recorder import Recorder
+
+PLOTS = systems().plots
+
+
+def front(results: FlightResults) -> Front:
+    """Return the top of a report."""
+    return top(results, systems().chapters)
+
+
+def answer_chapters(results: FlightResults) -> tuple[Section, ...]:
+    """Return the chapters of a flight that have an answer."""
+    return by_answer.answer_chapters(results, systems().chapters)
+
+
+def chapters_of(results: FlightResults) -> tuple[Section, ...]:
+    """Return the chapters on all answers."""
+    return by_answer.chapters_of(results, systems().chapters)
+
+
+def chapter_of(results: FlightResults, answer: Answer) -> Section:
+    """Return the chapter that tells an answer."""
+    return by_answer.chapter_of(results, answer, systems().chapters)
+
+
+def without_chapter(results: FlightResults) -> tuple[Answer, ...]:
+    """Return the answers without a chapter of their own."""
+    return by_answer.without_chapter(results, systems().chapters)
+
+
+def flight_document(saved: SavedFlight) -> Document:
+    """Return the report of a saved flight."""
+    return flight_report.flight_document(saved, systems())
+
+
+def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
+    """Return the chapters of the report of a saved flight."""
+    return sections.flight_sections(saved, systems())
+
+
+def recorder_of(stream: rr.RecordingStream, start_ns: int, has_utc: bool) -> Recorder:
+    """Return a recorder into a stream."""
+    return Recorder(stream, start_ns, has_utc, systems())
+
+
+def write_recording(path: Path, flight: Flight, results: FlightResults) -> None:
+    """Write the recording of a flight."""
+    recording.write_recording(path, flight, results, systems())
+
+
+def stream_recording(flight: Flight, results: FlightResults, *, connect_url: str) -> None:
+    """Send the recording of a flight to a viewer."""
+    recording.stream_recording(flight, results, systems(), connect_url=connect_url)
+
+
+def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResults) -> rrb.Blueprint:
+    """Send a flight to a stream."""
+    return recording.send_flight(stream, flight, results, systems())
+
+
+def shipped_but(**parts: Any) -> Systems:
+    """Return the shipped systems as one, with parts of it replaced."""
+    every = systems()
+    listed = every.chapters
+    whole = System(
+        "every",
+        every.analyses,
+        every.session_analyses,
+        every.plans,
+        every.studies,
+        lambda: (*listed.flight, *listed.session, *listed.plan),
+        lambda: every.plots,
+        lambda: every.tabs,
+    )
+    return Systems((replace(whole, **parts),))
