@@ -1,4 +1,8 @@
-"""PX4 ULog: every topic under its own definition, the canonical ones in their units, and what was lost on the way."""
+"""Reader for PX4 ULog.
+
+Every topic is read under its own definition; the canonical topics get their units. What was lost on the way is reported
+as damage.
+"""
 
 import re
 from collections.abc import Iterator
@@ -16,7 +20,9 @@ _ENCRYPTED_NAMES = (".ulge", ".ulgc")
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim what begins with the seven bytes of a ULog, or (where its start is damaged) holds several formats of it.
+    """Claim a file that begins with the seven magic bytes of a ULog.
+
+    Where the start of the file is damaged, several ULog formats in the head are enough.
 
     Raises
     ------

@@ -59,9 +59,10 @@ def _rule(source: str, fields: Mapping[str, tuple[str, float]], **derived: str) 
 
 
 def attitude_from_quaternion(rows: Numbers) -> Columns:
-    """Roll, pitch and heading of ``q`` (w, x, y, z), which turns body forward-right-down into north-east-down.
+    """Return roll, pitch and heading of the quaternion ``q`` (w, x, y, z).
 
-    A quaternion whose length is not one is none: PX4 writes zeros before the filter has started.
+    ``q`` turns body forward-right-down into north-east-down. A quaternion whose length is not one counts as missing:
+    PX4 writes zeros before the filter has started.
     """
     w, x, y, z = (rows[f"q[{k}]"] for k in range(4))
     with np.errstate(invalid="ignore", over="ignore"):

@@ -1,4 +1,4 @@
-"""The log's own definitions: formats of messages, flattened to columns with their place in a message."""
+"""Message formats that the log defines, as flat lists of columns with their offsets."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -41,7 +41,10 @@ class Format:
 
 @dataclass(frozen=True)
 class LayoutColumn:
-    """One number of a message: name (``q[0]``, ``a.b``), type of the log, and offset in the message's data."""
+    """Number in a message: its name (``q[0]``, ``a.b``), the log's type, and its offset.
+
+    The offset counts from the start of the message's data.
+    """
 
     name: str
     type: str
@@ -50,7 +53,7 @@ class LayoutColumn:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the columns of a topic stand in a message's data.
+    """Columns of a topic and their places in a message's data.
 
     Parameters
     ----------
@@ -94,7 +97,7 @@ class Layout:
 
     @cached_property
     def timestamp_offset(self) -> int | None:
-        """Where the time of publication stands; None in a format without one."""
+        """Offset of the time of publication; None in a format without one."""
         return next((c.offset for c in self.columns if c.name == TIMESTAMP and c.type == "uint64_t"), None)
 
 

@@ -1,4 +1,7 @@
-"""The second pass over a ULog: batches of every topic, raw and canonical, then remarks and damages."""
+"""Second pass over a ULog: batches of every topic, then remarks and damage.
+
+Each topic comes raw, and canonical where a rule serves it.
+"""
 
 import re
 from collections import Counter, deque
@@ -111,7 +114,10 @@ def _let_go(blocks: deque[Block]) -> Iterator[Block]:
 
 
 def _newest_before(places: Int64Array, messages_us: NDArray[np.uint64], newest_us: int) -> Int64Array:
-    """Time of the last data message before each place, microseconds; what is no time counts as none."""
+    """Return the time of the last data message before each place, in microseconds.
+
+    A data message whose time is zero or out of range is passed over.
+    """
     has_time = np.flatnonzero((messages_us > 0) & (messages_us <= MAX_TIME_US))
     if not len(has_time):
         return np.full(len(places), newest_us, dtype=np.int64)
@@ -121,7 +127,10 @@ def _newest_before(places: Int64Array, messages_us: NDArray[np.uint64], newest_u
 
 
 class _RawTopics:
-    """Batches of the log's own topics: ``raw.<topic>``, and ``raw.<topic>.<instance>`` of all instances but 0."""
+    """Batches of the log's own topics: ``raw.<topic>``, ``raw.<topic>.<instance>``.
+
+    Instance 0 has no number in its name.
+    """
 
     def __init__(self, losses: _Losses, odd_flags: set[tuple[int, str]]) -> None:
         self._losses, self._odd_flags = losses, odd_flags
@@ -159,7 +168,7 @@ class _RawTopics:
 
 
 class _CanonicalTopics:
-    """Gathers canonical columns of a block, and puts those of several sources in the order of the log."""
+    """Canonical columns of a block; rows of several sources are put in the order of the log."""
 
     def __init__(self, losses: _Losses, found: Overview) -> None:
         self._losses, self._found = losses, found
@@ -228,7 +237,7 @@ class _CanonicalTopics:
             yield from bounded(_one_row_each(batch) if topic == "event" else batch)
 
     def remarks(self) -> Iterator[Remark]:
-        """What serves as what."""
+        """Yield remarks that tell which PX4 topics serve each canonical topic."""
         sources: dict[str, list[str]] = {}
         for (source, instance), assignments in sorted(self._found.assignments.items()):
             for assignment in assignments:
@@ -242,7 +251,10 @@ class _CanonicalTopics:
 
 
 def _one_row_each(events: RecordBatch) -> RecordBatch:
-    """Events of one message as one row, their names joined: a message may both arm and change the mode."""
+    """Merge the events of one message into one row, with their names joined.
+
+    One message may both arm and change the mode.
+    """
     first = np.flatnonzero(np.diff(events.record_index, prepend=-1) > 0)
     if len(first) == len(events):
         return events

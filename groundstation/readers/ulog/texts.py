@@ -1,4 +1,4 @@
-"""Messages that are not data as topics of their own: logged text, parameters, information, drop-outs."""
+"""Topics of the messages that are not data: text, parameters, information, drop-outs."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -65,7 +65,10 @@ class TextTopics:
     _has_data: bool = False
 
     def batches(self, block: Block, newest_us: Int64Array) -> Iterator[RecordBatch]:
-        """Rows of a block's text topics; ``newest_us`` is the time of the newest data before each message of them."""
+        """Yield the rows of a block's text topics.
+
+        ``newest_us`` is the time of the newest data before each text message.
+        """
         waiting: dict[str, _Rows] = {}
         for (number, kind, body), newest in zip(block.controls(), newest_us.tolist(), strict=True):
             self._has_data |= kind in "ALC"  # the first of them ends the definitions
@@ -141,7 +144,10 @@ def _column(values: list[Any]) -> Column:
 
 
 def device_time(times_us: Any) -> Column:
-    """Device time in nanoseconds of times in microseconds; zero means none, and so does what is past any clock."""
+    """Convert device times from microseconds to nanoseconds.
+
+    Zero means no time, and so does a time past the largest that any clock has.
+    """
     times = np.asarray(times_us, dtype=np.uint64)
     present = (times > 0) & (times <= MAX_TIME_US)
     values = np.where(present, times, 0).astype(np.int64) * 1_000
