@@ -1,4 +1,7 @@
-"""How the clock by which records were received was set, by clocks whose readings are in them: offsets by record."""
+"""Steps of the clock that stamped the records on receipt, as offsets by record.
+
+They are found by clocks whose readings are in the records.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -26,9 +29,9 @@ class Jump(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Offsets:
-    """What is added to times of receipt: ``added_ns[k]`` from the record ``starts[k]`` on. Without any, nothing.
+    """Offsets added to times of receipt: ``added_ns[k]`` from record ``starts[k]`` on.
 
-    ``by`` are the numbers of the clocks that tell it.
+    Without steps, 0 is added. ``by`` has the numbers of the clocks that the offsets were found by.
     """
 
     starts: Int64Array = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
@@ -36,7 +39,7 @@ class Offsets:
     by: tuple[int, ...] = ()
 
     def at(self, record_index: Int64Array) -> Int64Array:
-        """What is added to the times of records."""
+        """Return the offset that is added to the times of some records."""
         if len(self.starts) == 1:
             return np.full(len(record_index), self.added_ns[0])
         place = np.searchsorted(self.starts, record_index, side="right") - 1
@@ -52,7 +55,10 @@ class Offsets:
 
     @property
     def stated(self) -> tuple[tuple[int, int], ...]:
-        """As the header of a log states them."""
+        """Return the offsets in the form that the header of a log states them.
+
+        Pairs of first record and nanoseconds; empty where nothing is added.
+        """
         if not self.added_ns.any():
             return ()
         return tuple(zip(self.starts.tolist(), self.added_ns.tolist(), strict=True))
@@ -65,7 +71,7 @@ class Offsets:
 
 
 class _Step(NamedTuple):
-    """The receiver's clock was set between two records, by so much, as ``readings`` of a clock tell."""
+    """Step of the receiver's clock between two records, as ``readings`` of a clock show it."""
 
     after: int
     first: int
@@ -75,7 +81,9 @@ class _Step(NamedTuple):
 
 
 def offsets_by(clocks: Mapping[int, Sequence[Stretch]], jumps: Sequence[Jump] = ()) -> Offsets:
-    """Offsets by which times of receipt go on smoothly with the readings of some clocks; none before the first step.
+    """Return offsets that make times of receipt follow the readings of some clocks smoothly.
+
+    The offset is zero before the first step.
 
     Parameters
     ----------
@@ -104,7 +112,10 @@ def _steps(clocks: Mapping[int, Sequence[Stretch]]) -> list[_Step]:
 
 
 def _united(steps: list[_Step], jumps: Sequence[Jump]) -> list[_Step]:
-    """Steps that several clocks show as one, at the first record that is known to be behind it."""
+    """Merge steps that several clocks show into one.
+
+    It is placed at the first record that is known to be behind it.
+    """
     united: list[_Step] = []
     for step in sorted(steps, key=lambda step: (step.first, step.after)):
         if united and step.after < united[-1].first:

@@ -1,4 +1,6 @@
-"""Compressed logs: gzip and zstd, told by their content, decompressed once into an unnamed temporary file.
+"""Compressed logs: gzip and zstd, told by their content.
+
+They are decompressed once into an unnamed temporary file.
 
 Sizes that the file declares are not believed: what comes out is counted, and stops at a bound. What a cut or damaged
 file still gives is kept.
@@ -33,7 +35,10 @@ _Pieces = Iterator[bytes]
 
 @dataclass(frozen=True)
 class Expanded:
-    """What came out of a compressed file: a temporary file, its size, and the damage met (None when it was whole)."""
+    """Content of a compressed file: a temporary file, its size, and the damage met.
+
+    ``damage`` is None when the file was whole.
+    """
 
     file: BinaryIO
     size: int
@@ -94,7 +99,10 @@ def expand(stream: BinaryIO, compression: str, compressed_size: int, name: str) 
 
 
 def _unnamed_file() -> BinaryIO:
-    """An empty temporary file that is closed with its last user, without Python's warning of one left open."""
+    """Return an empty temporary file that is closed with its last user.
+
+    Python does not warn that it was left open.
+    """
     with tempfile.TemporaryFile() as made:
         descriptor = os.dup(made.fileno())
     file = os.fdopen(descriptor, "w+b", closefd=False)
@@ -156,7 +164,9 @@ class _FrameCount:
 
 
 def _gzip_pieces(stream: BinaryIO) -> _Pieces:
-    """Decompressed pieces of all members of a gzip file; zero bytes after the last one are padding.
+    """Yield decompressed pieces of all members of a gzip file.
+
+    Zero bytes after the last member are padding.
 
     The frame of a member is read here: zlib's own reader withholds what it has when the checksum behind is wrong.
     """
@@ -195,7 +205,7 @@ def _gzip_pieces(stream: BinaryIO) -> _Pieces:
 
 
 def _last_pieces(member: Any, data: bytes) -> _Pieces:
-    """What a member still gives, byte by byte, before the place where it breaks."""
+    """Yield what a broken member still gives before the place where it breaks, byte by byte."""
     for at in range(len(data)):
         try:
             piece = member.decompress(data[at : at + 1])
@@ -206,7 +216,7 @@ def _last_pieces(member: Any, data: bytes) -> _Pieces:
 
 
 def _behind_gzip_header(data: bytes, at: int) -> int:
-    """Where the header of the member that begins at ``at`` ends (RFC 1952)."""
+    """Return the end of the header of the gzip member that begins at ``at`` (RFC 1952)."""
     if not data.startswith(GZIP_MAGIC, at):
         raise _Broken("corrupt", "it makes no sense from here on")
     flags, at = (data[at + 3] if len(data) > at + 3 else 0), at + 10

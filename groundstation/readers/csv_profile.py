@@ -1,4 +1,6 @@
-"""Tables of any layout, described by a profile (TOML): one of the shipped ones, or the user's.
+"""Reader for tables of any layout, described by a TOML profile.
+
+The profile is one of those shipped, or the user's.
 
 ``record_index`` is the line number in the file (from 1). Columns that the profile does not name are kept under the
 profile's raw topic.
@@ -79,7 +81,10 @@ def _begins_with_rows(source: Source) -> bool:
 
 
 def _stands_below(source: Source, profile: Profile) -> bool:
-    """Tell whether the profile's first line stands below the rows of another log, of which the beginning is lost."""
+    """Tell whether the profile's first line stands below the rows of another log.
+
+    The beginning of that other log is lost.
+    """
     return any(b"\n" + line.encode() in source.head for line in profile.first_lines)
 
 
@@ -99,7 +104,10 @@ def claim_by(source: Source, profile: Path) -> Claim:
 
 
 def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
-    """Yield the header, batches, remarks and damages of a table, by ``profile`` or the shipped one that fits."""
+    """Yield the header, batches, remarks and damage of a table.
+
+    It is read by ``profile``, or by the shipped profile that fits.
+    """
     from groundstation.readers.table_reader import TableReader, truncated_header
 
     if profile is not None:
@@ -126,7 +134,10 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
 
 
 def _rows_of_another(fit: Fit) -> Dialect | None:
-    """Form of the rows above the header, where they are those of another log with the same columns."""
+    """Return the dialect of the rows above the header, if they belong to another log.
+
+    That log has the same columns.
+    """
     if not fit.profile.first_lines or len(fit.rows_above) < FEWEST_ROWS:
         return None
     below = [line for line in fit.above if line.number > fit.rows_above[-1].number]
@@ -230,6 +241,9 @@ def _utc_of_zero(fit: Fit, metadata: Mapping[str, str]) -> tuple[int | None, lis
 
 
 def _slips(fit: Fit) -> dict[tuple[str, str], tuple[str, str]]:
-    """Columns that are almost ones of the profile, by raw topic and name: their name, and what was perhaps meant."""
+    """Find columns whose names are almost those of the profile.
+
+    Returns, by raw topic and name, the name found and the name that was probably meant.
+    """
     known = (*(rule.name for rule in fit.profile.columns), *(name for name in fit.profile.time.columns))
     return {(fit.profile.raw_topic, name): (name, meant) for name, meant in slips(fit.names, known).items()}

@@ -17,7 +17,9 @@ _LOOKED_AT = 1 << 16  # bytes at the end of a file and at the beginning of the n
 
 @dataclass(frozen=True)
 class JoinedSource(Source):
-    """Files that were written one after the other, as one: their bytes stand behind one another.
+    """Files that were written one after the other, seen as one file.
+
+    Their bytes follow one another.
 
     Containers of messages are read file by file, from ``files``.
 
@@ -38,7 +40,7 @@ class JoinedSource(Source):
 
     @property
     def compression(self) -> str:
-        """Nothing: the files are decompressed one by one."""
+        """Return an empty text: the files are decompressed one by one."""
         return ""
 
     @cached_property
@@ -53,7 +55,7 @@ class JoinedSource(Source):
 
     @cached_property
     def is_empty(self) -> bool:
-        """Whether none has any bytes."""
+        """Tell whether all files are empty."""
         return all(file.is_empty for file in self.files)
 
     def open(self) -> BinaryIO:
@@ -85,12 +87,12 @@ class BytesSource(Source):
 
     @property
     def size(self) -> int:
-        """How many they are."""
+        """Number of bytes."""
         return len(self.content)
 
     @property
     def compression(self) -> str:
-        """Nothing."""
+        """Return an empty text: nothing is compressed."""
         return ""
 
     @property
@@ -100,7 +102,7 @@ class BytesSource(Source):
 
     @property
     def is_empty(self) -> bool:
-        """Whether there are none."""
+        """Tell whether there are no bytes."""
         return not self.content
 
     def open(self) -> BinaryIO:
@@ -134,7 +136,10 @@ class _Chain(io.RawIOBase):
         return self._at
 
     def readinto(self, buffer: Any) -> int:
-        """Fill ``buffer`` from the position on, at most to the end of the file there; returns how many bytes."""
+        """Fill ``buffer`` from the position on and return the number of bytes.
+
+        It stops at the end of the file that the position is in.
+        """
         number = bisect_right(self._ends, self._at)
         if number == len(self._ends):
             return 0
@@ -160,7 +165,7 @@ class _Chain(io.RawIOBase):
 
 
 def _runs_together(before: Source, behind: Source) -> bool:
-    """Whether a row ends a file without a line end, and a whole line begins the next."""
+    """Tell whether a file ends in a row without line end, before a file that begins a line."""
     with before.open() as stream:
         stream.seek(max(0, before.size - _LOOKED_AT))
         lines = stream.read().splitlines(keepends=True)
@@ -176,6 +181,9 @@ def _runs_together(before: Source, behind: Source) -> bool:
 
 
 def _cells(line: bytes, like: bytes) -> int:
-    """Cells of a row, parted as those of another one: by the delimiter that it has most of, else by blanks."""
+    """Return the number of cells of a row, split like the row ``like``.
+
+    The delimiter is the one that ``like`` has most of, else blanks.
+    """
     mark = max((delimiter.encode() for delimiter in DELIMITERS), key=like.count)
     return line.count(mark) + 1 if mark in like else len(line.split())

@@ -1,4 +1,7 @@
-"""What the columns of a delimited table mean: which canonical field each one feeds, and how the time is written."""
+"""Layout of a delimited table: the field of each column, and the form of the time.
+
+The fields are canonical ones.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -21,7 +24,9 @@ FloatArray: TypeAlias = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Rule:
-    """Where one column of the file goes: canonical value = number in the cell x ``factor`` + ``offset``.
+    """Rule for one column of a file: its topic, its field, and how its cells are converted.
+
+    Canonical value = number in the cell x ``factor`` + ``offset``.
 
     Parameters
     ----------
@@ -86,7 +91,10 @@ class TimeRule:
 
 @dataclass(frozen=True)
 class Method:
-    """A way to derive fields from others: names and units of its inputs, what it gives, what to tell the user."""
+    """Method that derives fields from others.
+
+    It states the names and units of its inputs, what it gives, and the text for the user.
+    """
 
     inputs: tuple[str, ...]
     units: tuple[str, ...]
@@ -97,7 +105,9 @@ class Method:
 
 @dataclass(frozen=True)
 class Derivation:
-    """Fields of a topic that the reader computes row by row from other fields times ``factors`` (1 where empty).
+    """Fields of a topic that the reader computes row by row from other fields.
+
+    Each input is multiplied by its entry of ``factors`` (1 where empty).
 
     A zero of an input that is named in ``not_zero`` is no value.
     """
@@ -146,7 +156,9 @@ def velocity_from_track(track_deg: FloatArray, speed_mps: FloatArray) -> tuple[F
 
 
 def wind_from_direction(from_deg: FloatArray, speed_mps: FloatArray) -> tuple[FloatArray, ...]:
-    """Velocity of the air north and east from the true direction the wind blows from, and its speed.
+    """Return the wind velocity north and east of a wind direction and speed.
+
+    The direction is true, and the one the wind blows from.
 
     Examples
     --------

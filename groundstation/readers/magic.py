@@ -42,7 +42,10 @@ def companion(source: Source) -> str | None:
 
 
 def is_mostly_text(source: Source) -> bool:
-    """Whether most of the head is lines without a control character, whatever its first bytes are; by samples."""
+    """Tell whether most of the head is lines without control characters.
+
+    The first bytes do not matter; samples of the head are looked at.
+    """
     step = max(_SAMPLE_BYTES, len(source.head) // _SAMPLES)
     sample = b"".join(source.head[at : at + _SAMPLE_BYTES] + b"\n" for at in range(0, len(source.head), step))
     text = sum(len(line) + 1 for line in sample.split(b"\n") if not _CONTROL.search(line))
@@ -50,7 +53,7 @@ def is_mostly_text(source: Source) -> bool:
 
 
 def is_binary(source: Source) -> bool:
-    """Whether the head is no text: NUL bytes, or many control characters."""
+    """Tell whether the head is no text: it has NUL bytes, or many control characters."""
     sample = source.head[:4096]
     control = sum(byte < 32 and byte not in (9, 10, 12, 13) for byte in sample)
     return b"\0" in sample or control * 20 > len(sample)

@@ -1,10 +1,12 @@
-"""MILUV ultra-wideband ranges (range_data.csv): one log of several quadrotors, with their poses by motion capture.
+"""Reader for MILUV ultra-wideband ranges (range_data.csv) of several quadrotors.
+
+One log holds all of them, with their poses by motion capture.
 
 A range from tag 10 to tag or anchor 31 is a row of ``link.10-31``; the pose of ifo001 is ``truth.ifo001``. World axes
 of the data have z up and bodies forward-left-up; here both are turned by 180 deg about x. Columns that no rule names
-are kept under ``raw.miluv``: ``gt_range`` and ``bias`` among them, which are wrong in some versions of the file (the
-true range is that of the poses). Whose tags the numbers are stands in other files of the set (tags.yaml,
-anchors.yaml): :func:`arms`.
+are kept under ``raw.miluv``, among them ``gt_range`` and ``bias``, which are wrong in some versions of the file (the
+true range is that of the poses). Other files of the set (tags.yaml, anchors.yaml) tell which vehicle carries which tag:
+:func:`arms` reads them.
 
 Source: Shalaby, Ahmed, Dahdah, Cossette, Le Ny and Forbes, MILUV: a multi-UAV indoor localization dataset with UWB and
 vision, 2025 (arXiv 2504.14376).
@@ -132,7 +134,10 @@ def _pose(place: Column | None, turn: Column | None, n: int) -> tuple[dict[str, 
 
 
 def _vectors(column: Column | None, size: int, n: int) -> FloatArray:
-    """Cells such as ``[1.0 2.0 3.0]`` as rows, shape (n, size); NaN where one is anything else."""
+    """Parse cells such as ``[1.0 2.0 3.0]`` into rows, shape (n, size).
+
+    NaN where a cell is anything else.
+    """
     out = np.full((n, size), np.nan)
     if column is None:
         return out
@@ -147,7 +152,9 @@ def _vectors(column: Column | None, size: int, n: int) -> FloatArray:
 
 
 def arms(source: Source) -> dict[str, dict[int, tuple[float, float, float]]]:
-    """Tags (or anchors) by vehicle (or constellation): places in its axes, forward-right-down (north-east-down).
+    """Read the positions of tags by vehicle, or of anchors by constellation.
+
+    Tags are in the vehicle's axes forward-right-down, anchors in north-east-down.
 
     Raises
     ------

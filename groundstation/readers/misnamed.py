@@ -1,4 +1,4 @@
-"""Columns of a table under names that are almost known ones: kept as raw, and told as lost."""
+"""Columns of a table whose names are almost known ones: kept as raw, and reported as lost."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping

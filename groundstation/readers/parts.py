@@ -1,4 +1,4 @@
-"""What several sources give to one topic, as one batch in the order of the log."""
+"""Merge of what several sources give to one topic, in the order of the log."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,10 @@ from groundstation.base.records import (
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Columns of one topic that one source gave, with place, device time and, where it is another, time of validity."""
+    """Columns of one topic from one source, with their places in the log and device time.
+
+    ``validity_ns`` is the time of validity, where it differs from the device time.
+    """
 
     index: Int64Array
     time: Column
@@ -45,7 +48,10 @@ def occupied(part: Part) -> Part | None:
 
 
 def merged(topic: str, parts: Sequence[Part]) -> RecordBatch:
-    """One batch of parts from different messages, in the order of the log; each row has the fields of its source."""
+    """Merge parts from different messages into one batch, in the order of the log.
+
+    Each row has the fields of its source.
+    """
     if len(parts) == 1:
         one = parts[0]
         return RecordBatch(topic, one.index, one.time, one.columns, validity_time_ns=one.validity_ns)
@@ -83,7 +89,7 @@ def _values(pieces: Sequence[tuple[Int64Array, Column]], rows: int) -> NDArray[A
 
 
 def _present(pieces: Sequence[tuple[Int64Array, Column]], rows: int) -> BoolArray | None:
-    """Where there is a value; None when everywhere."""
+    """Return where there is a value; None when there is one everywhere."""
     present = np.zeros(rows, dtype=bool)
     for at, piece in pieces:
         present[at] = True if piece.present is None else piece.present

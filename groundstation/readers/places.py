@@ -52,7 +52,7 @@ def zeroed(kind: str, fields: Mapping[str, Column], is_zero: BoolArray) -> dict[
 
 
 def placed(topic: str, columns: Mapping[str, Column]) -> tuple[dict[str, Column], Int64Array]:
-    """Columns of a topic without what falls away at latitude and longitude 0, and the rows that stand there.
+    """Drop the values of fixes at latitude and longitude 0, and return the rows of these.
 
     A fix without a place has no integrity. Columns of which nothing is left are left out.
 

@@ -1,4 +1,6 @@
-"""Profiles: TOML files that say what the columns of a table mean. A slip in one is an error that names its key.
+"""Profiles: TOML files that map the columns of a table to canonical fields.
+
+A mistake in one raises an error that names its key.
 
 The value of a field is ``(number in the cell x scale x sign + offset)`` in ``unit``, brought to the field's unit.
 docs/profiles.md describes every key.
@@ -57,7 +59,10 @@ class InputRule:
 
 @dataclass(frozen=True)
 class DerivedRule:
-    """Fields of a topic computed from others by a method of :data:`groundstation.readers.layout.METHODS`."""
+    """Fields of a topic that a method computes from other fields.
+
+    The methods are :data:`groundstation.readers.layout.METHODS`.
+    """
 
     method: str
     topic: str
@@ -67,7 +72,9 @@ class DerivedRule:
 
 @dataclass(frozen=True)
 class TimeColumns:
-    """Time of a row: kind as in :class:`groundstation.readers.layout.TimeRule`, its columns, its unit.
+    """Time of a row: its kind, its columns, its unit.
+
+    The kinds are those of :class:`groundstation.readers.layout.TimeRule`.
 
     ``is_utc``: date and time of kind ``local`` are UTC.
     """
@@ -81,7 +88,7 @@ class TimeColumns:
 
 @dataclass(frozen=True)
 class Variation:
-    """The column of the magnetic variation, and the factor that makes it degrees, east positive."""
+    """Column of the magnetic variation, and the factor to degrees, east positive."""
 
     column: str
     factor: float

@@ -105,7 +105,11 @@ class Fit:
 
     @property
     def units(self) -> dict[str, str]:
-        """Units by column: a comment above the header, or a row below it that is left out, that has as many cells."""
+        """Return the units by column.
+
+        They stand in a comment above the header, or in a row below it that is left out; either has as many cells as the
+        header.
+        """
         comments = [line.text for line in self.above if line.text.startswith("#")]
         below = [line.text for line in self.behind[: self.profile.rows_after_header]]
         for cells in map(self._cells, (*comments, *below)):

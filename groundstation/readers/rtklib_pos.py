@@ -1,4 +1,6 @@
-"""RTKLIB solutions (.pos): position and velocity of a receiver with their covariances, every column kept.
+"""Reader for RTKLIB solutions (.pos): position and velocity with covariances.
+
+Every column is kept.
 
 The line of names says which form it is: latitude and longitude (degrees, or degrees, minutes and seconds), ECEF, or a
 baseline east, north, up from the base station; in GPS time, UTC or Japan's, as date and time or as week and second. A
@@ -98,7 +100,10 @@ def _rows(source: Source, governed: Sequence[Governed], losses: Losses) -> Itera
 
 
 class _Tabs(io.RawIOBase):
-    """The rows of a file with one tab between cells; lines stay lines. At most ``left`` bytes of it are read."""
+    """Rows of a file with one tab between cells; lines stay lines.
+
+    At most ``left`` bytes of the file are read.
+    """
 
     def __init__(self, stream: BinaryIO, left: int | None) -> None:
         self._stream, self._left, self._rest, self._ready = stream, left, b"", b""
@@ -159,7 +164,7 @@ class _Tabbed(Source):
 
     @property
     def head(self) -> bytes:
-        """That of the whole file."""
+        """Head of the whole file."""
         return self.whole.head
 
     def open(self) -> BinaryIO:

@@ -1,8 +1,9 @@
-"""SBET, the smoothed best estimate of trajectory of an INS with GNSS: records of 17 doubles without a header.
+"""Reader for SBET, the smoothed best estimate of trajectory of an INS with GNSS.
 
-Times are seconds of the GPS week; which week, the file does not say: a date in its name does (``sbet_20250708.out``),
-else the flight has no date. Beside ``sbet_X.out`` stands ``smrmsg_X.out`` with the accuracies, which are read along.
-Heading and velocity are those of a platform that a wander angle turns from north: which way, the positions tell.
+The file has records of 17 doubles and no header. Times are seconds of the GPS week. The file does not say which week: a
+date in its name does (``sbet_20250708.out``), else the flight has no date. The accuracies stand in ``smrmsg_X.out``
+beside ``sbet_X.out``, and are read along. Heading and velocity are those of a platform that a wander angle turns from
+north; the positions tell which way.
 
 Source: Applanix, POSPac MMS file formats (SBET, SMRMSG).
 """
@@ -50,8 +51,11 @@ _SPECIFIC_FORCE = (0.8 * MPS2_PER_G, 1.2 * MPS2_PER_G)
 
 @dataclass(frozen=True)
 class _Sense:
-    """What the file does not say and its data tell: ``wander_sign`` turns heading and velocity back, ``force_sign``
-    makes the accelerations a specific force (0: they are without gravity)."""
+    """Signs that the file does not state, found in its data.
+
+    ``wander_sign`` turns heading and velocity back, ``force_sign`` makes the accelerations a specific force (0: they
+    are without gravity).
+    """
 
     wander_sign: int
     force_sign: int
@@ -73,7 +77,10 @@ def sniff(source: Source) -> Claim | None:
 
 
 def _records_at(source: Source, first: int) -> NDArray[Any]:
-    """Some records from one on; behind damage that has moved them, from where they begin again."""
+    """Read some records from number ``first`` on.
+
+    Where damage has shifted them, they are read from the place where they begin again.
+    """
     with source.open() as stream:
         stream.seek(first * RECORD.itemsize)
         data = stream.read(2 * _LOOKED_AT * RECORD.itemsize)
@@ -84,7 +91,10 @@ def _records_at(source: Source, first: int) -> NDArray[Any]:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, then ``ins`` and ``raw.sbet``, remarks, and a last record that was cut."""
+    """Yield the header, ``ins`` and ``raw.sbet``, remarks, and damage.
+
+    A last record that was cut is damage.
+    """
     head = np.frombuffer(source.head, RECORD, len(source.head) // RECORD.itemsize)
     if not len(head):
         raise UnreadableLogError(source.name, "less than one record", f"{RECORD.itemsize} bytes", "the file was cut")
@@ -127,7 +137,10 @@ class _Placeless:
 
 
 class _Walk:
-    """Iterates over the sound records of a file; behind a damaged one the next is looked for at every byte."""
+    """Iterator over the sound records of a file.
+
+    After a damaged record the next one is searched for at every byte.
+    """
 
     def __init__(self, source: Source) -> None:
         self._source, self._skipped = source, SkippedBytes("record")
@@ -145,7 +158,7 @@ class _Walk:
             self._finish(base, base + len(data))
 
     def damages(self) -> Iterator[Damage]:
-        """What belongs to no record, and a last record that was cut."""
+        """Yield the bytes that belong to no record, and a last record that was cut."""
         yield from self._skipped.damages()
         if self._cut is not None:
             what = "bytes of a record that was cut"
@@ -184,7 +197,10 @@ class _Walk:
 
 
 def _week_of(name: str, first_s: float) -> int | None:
-    """GPS week by the date in the name of the file: that of the day, or the one in which the first second lies."""
+    """Return the GPS week by the date in the name of the file.
+
+    It is the week of that day, or the one in which the first second lies.
+    """
     match = _DATE.search(name)
     if match is None:
         return None
@@ -206,7 +222,10 @@ def _time(week: int | None, week_s: FloatArray) -> Column:
 
 
 def _sense_of(records: NDArray[Any]) -> _Sense:
-    """Compare the velocities with the way between the first records, and the accelerations with gravity."""
+    """Find the signs by comparing velocities and accelerations with the first positions.
+
+    Velocities are compared with the way between the first records, accelerations with gravity.
+    """
     with np.errstate(all="ignore"):
         meridian, normal = curvature_radii_m(np.rad2deg(records["latitude"]))
         step_s = np.diff(records["time"])
@@ -226,7 +245,10 @@ def _sense_of(records: NDArray[Any]) -> _Sense:
 
 
 def _turned(records: NDArray[Any], wander_sign: int) -> tuple[FloatArray, FloatArray]:
-    """Velocities north and east, the platform's x axis standing at ``wander_sign`` times the wander angle."""
+    """Return the velocities north and east.
+
+    The platform's x axis stands at ``wander_sign`` times the wander angle.
+    """
     azimuth = wander_sign * records["wander_angle"]
     x, y = records["x_velocity"], records["y_velocity"]
     return x * np.cos(azimuth) - y * np.sin(azimuth), x * np.sin(azimuth) + y * np.cos(azimuth)
@@ -269,7 +291,10 @@ def _batches(
 
 
 def accuracies_beside(path: Path) -> Path | None:
-    """Where the accuracies of an SBET would stand; None where the name of the file tells of none."""
+    """Return the path where the accuracies of an SBET would stand.
+
+    None where the file's name does not begin with ``sbet``.
+    """
     name, is_sbet = re.subn(r"(?i)^sbet", "smrmsg", path.name)
     return path.with_name(name) if is_sbet else None
 

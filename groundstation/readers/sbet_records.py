@@ -115,7 +115,10 @@ def are_sound(records: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 def _are_zeros_of_a_record(records: NDArray[Any]) -> NDArray[np.bool_]:
-    """Tell which records with next to no latitude are some: it is 0, and beside a place of 0, 0 stands something."""
+    """Tell which records with a latitude of 0 are real records.
+
+    Their latitude is exactly 0, and the longitude or another value is not.
+    """
     is_one = np.logical_or.reduce([records[name] != 0.0 for name in ("altitude", "x_velocity", "platform_heading")])
     is_one &= records["time"] > 0.0
     return np.asarray((records["latitude"] == 0.0) & ((records["longitude"] != 0.0) | is_one))

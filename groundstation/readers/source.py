@@ -1,4 +1,7 @@
-"""A log file as readers see it before one of them claims it; gzip and zstd files are seen decompressed."""
+"""Log file as readers see it before one of them claims it.
+
+Files in gzip and zstd are seen decompressed.
+"""
 
 import io
 from collections.abc import Iterator
@@ -76,7 +79,7 @@ class Source:
 
     @cached_property
     def is_empty(self) -> bool:
-        """Whether the file has no bytes."""
+        """Tell whether the file has no bytes."""
         return self._file_size == 0
 
     @cached_property
@@ -130,7 +133,7 @@ class Claim:
 
 @runtime_checkable
 class Reader(Protocol):
-    """What a reader module (or a third party's object) offers."""
+    """Interface of a reader: a module of ours, or an object of a plug-in."""
 
     NAME: str
 

@@ -46,7 +46,9 @@ def _number(text: str) -> float:
 
 
 def utc_of_zero(metadata: Mapping[str, str]) -> tuple[int | None, list[Remark]]:
-    """UTC nanoseconds of device time zero by ``start_utc``, None without it, and what was assumed.
+    """Return the UTC nanoseconds of device time zero by ``start_utc``, and remarks.
+
+    None without ``start_utc``. The remarks tell what was assumed.
 
     Examples
     --------
@@ -206,7 +208,10 @@ def _levels(zeros_ns: Int64Array) -> list[_Level]:
 
 
 def _without_excursions(levels: list[_Level]) -> list[_Level]:
-    """Levels but for late messages: unexplained ones that are short, or after which all is as before."""
+    """Drop levels that late messages cause.
+
+    These are unexplained levels that are short, or after which all is as before.
+    """
     kept: list[_Level] = []
     for at, one in enumerate(levels):
         neighbours = levels[max(at - 1, 0) : at] + levels[at + 1 : at + 2]

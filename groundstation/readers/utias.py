@@ -57,7 +57,10 @@ class Landmark(NamedTuple):
 
 
 def _kind(source: Source) -> str:
-    """What a file of the set holds, by the lines on its top; empty for any other file."""
+    """Return what a file of the data set holds, by the lines at its top.
+
+    Empty for any other file.
+    """
     if not source.head.removeprefix(b"\xef\xbb\xbf").startswith(MARK):
         return ""
     top = source.head[:2000].decode("utf-8", errors="replace")
@@ -98,7 +101,10 @@ def read(source: Source) -> Iterator[Item]:
 
 
 def _by_barcode(items: Iterator[Item]) -> Iterator[Item]:
-    """Rows of the camera by the barcode they tell of; those without one are counted and left out."""
+    """Split the rows of the camera by barcode.
+
+    Rows without a barcode are counted and left out.
+    """
     losses = Losses()
     for item in items:
         if not isinstance(item, RecordBatch):

@@ -1,4 +1,4 @@
-"""Channels made of others for programs that do not know ours: positions for a map, poses for 3-D, lines for a log.
+"""Channels derived for other programs: map positions, 3-D poses, lines of a log.
 
 Messages of Foxglove's schemas, which Foxglove and Rerun's own loader draw by themselves. Reading skips them.
 
@@ -65,7 +65,9 @@ class DerivedWriter(ChannelWriter):
 
 
 class LocationFixWriter(DerivedWriter):
-    """Positions of a GNSS topic as ``foxglove.LocationFix``, which gives them a map in any viewer.
+    """Writer of the positions of a GNSS topic as ``foxglove.LocationFix``.
+
+    Any viewer can show them on a map.
 
     The covariance is that of the receiver's own sigmas, else of the dilutions of precision and the range error that
     the GPS performance standard states; without either it is absent. The frame is named after the topic.
@@ -109,7 +111,10 @@ class LocationFixWriter(DerivedWriter):
 
 
 def position_variances_m2(batch: RecordBatch) -> FloatArray:
-    """Variances of positions east, north and up, shape (n, 3); NaN where the batch does not tell."""
+    """Return the variances of positions east, north and up, shape (n, 3), in m2.
+
+    NaN where the batch does not tell.
+    """
     across, up = _values(batch, "horizontal_sigma_m") / np.sqrt(2.0), _values(batch, "vertical_sigma_m")
     hdop, pdop = _values(batch, "hdop"), _values(batch, "pdop")
     with np.errstate(invalid="ignore", over="ignore"):
@@ -121,7 +126,7 @@ def position_variances_m2(batch: RecordBatch) -> FloatArray:
 
 
 class Origin:
-    """Where the local frame of a file's poses begins: its first position, whichever topic it is of."""
+    """Origin of the local frame of a file's poses: the first position, of whichever topic."""
 
     def __init__(self) -> None:
         self.place: tuple[float, float, float] | None = None
@@ -139,7 +144,7 @@ class Origin:
 
 
 class PoseWriter(DerivedWriter):
-    """Attitude and position of an INS topic as ``foxglove.PoseInFrame``, which gives it a place in 3-D.
+    """Writer of attitude and position of an INS topic as ``foxglove.PoseInFrame``, for 3-D.
 
     Body axes are forward-left-up, the frame is east-north-up at the first position of the file. Ten poses a second at
     most; where a row of attitude has no position of its own it has the last one. Single precision: they are to be seen.
@@ -180,7 +185,10 @@ class PoseWriter(DerivedWriter):
         return [*self.timestamp(b"\x0a", batch.time_ns), frame, *values]
 
     def _places(self, batch: RecordBatch, rows: Int64Array) -> FloatArray:
-        """East, north and up of rows, shape (n, 3): geodetic, else of the log's own local frame; 0 where not known."""
+        """Return east, north and up of rows, shape (n, 3).
+
+        From geodetic positions, else from the log's own local frame; 0 where not known.
+        """
         height = "altitude_ellipsoid_m" if "altitude_ellipsoid_m" in batch.columns else "altitude_msl_m"
         geodetic = [self._held(batch, name, rows) for name in ("latitude_deg", "longitude_deg", height)]
         local = [self._held(batch, f"position_{axis}_m", rows) for axis in ("east", "north", "down")]
@@ -191,7 +199,10 @@ class PoseWriter(DerivedWriter):
         return np.where(np.abs(place) < MOST_METRES, place, 0.0)
 
     def _held(self, batch: RecordBatch, name: str, rows: Int64Array) -> FloatArray:
-        """Values of a column at rows, shape (n,), held where a row has none, from earlier batches too."""
+        """Return values of a column at rows, shape (n,), held where a row has none.
+
+        The value held may come from an earlier batch.
+        """
         before, column = self._last.get(name, np.nan), batch.columns.get(name)
         known = np.zeros(0, np.int64) if column is None else np.flatnonzero(column.mask & np.isfinite(column.values))
         if column is None or not len(known):
@@ -202,7 +213,10 @@ class PoseWriter(DerivedWriter):
 
 
 class LogWriter(DerivedWriter):
-    """Findings and events as ``foxglove.Log``: gathered until the file is finished, for findings come last."""
+    """Writer of findings and events as ``foxglove.Log``.
+
+    They are gathered until the file is finished, for findings come last.
+    """
 
     def __init__(self, emit: Callable[[Chunk], None], has_utc: bool) -> None:
         super().__init__(0, LOG_TOPIC, "event", emit, Log_pb2.Log.DESCRIPTOR, has_utc)
@@ -218,7 +232,10 @@ class LogWriter(DerivedWriter):
             self._entries.append((time_ns, LEVELS["info"], name, batch.topic))
 
     def finish(self, channel_id: int, findings: Iterable[Finding], first_ns: int, last_ns: int) -> None:
-        """Write all lines in order of time; a finding without a time in the file stands at its beginning."""
+        """Write all lines in order of time.
+
+        A finding without a time in the file is written at its beginning.
+        """
         self.id = channel_id
         for one in findings:
             time_ns = place_time_ns(one.place, first_ns, has_utc=self._has_utc)
@@ -274,7 +291,10 @@ def _with_imports(file: FileDescriptor, found: dict[str, FileDescriptor]) -> dic
 
 
 def _timestamps(time_ns: Int64Array) -> NDArray[np.void]:
-    """google.protobuf.Timestamp of each time: varints padded to five bytes, so that all are equally long."""
+    """Encode each time as google.protobuf.Timestamp.
+
+    Varints are padded to five bytes, so that all are equally long.
+    """
     seconds, nanos = np.divmod(time_ns, NS_PER_S)
     out = np.empty((len(time_ns), 12), np.uint8)
     for at, tag, value in ((0, 0x08, seconds), (6, 0x10, nanos)):

@@ -1,4 +1,6 @@
-"""MCAP at the level of records: chunks, their messages, the summary. Nothing here trusts a length that a file states.
+"""MCAP at the level of records: chunks, their messages, the summary.
+
+Nothing here trusts a length that a file states.
 
 Source: MCAP format specification, https://mcap.dev/spec.
 """
@@ -85,7 +87,10 @@ def parse_record(opcode: int, payload: bytes) -> McapRecord | None:
 
 
 def parse_records(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Records that stand one after the other: opcode and whole bytes; ends where a length leads outside."""
+    """Yield opcode and whole bytes of consecutive records.
+
+    It ends where a length leads outside the data.
+    """
     at = 0
     while at + RECORD_PREFIX <= len(data):
         opcode, length = _PREFIX.unpack_from(data, at)
@@ -97,7 +102,10 @@ def parse_records(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def message_index(channel_id: int, log_time: Int64Array, starts: Int64Array) -> bytes:
-    """MessageIndex record of a chunk: time and place of each message (mcap.records would take a list of pairs)."""
+    """Return the MessageIndex record of a chunk: time and place of each message.
+
+    The one in mcap.records would take a list of pairs.
+    """
     entries = np.empty(len(log_time), INDEX_ENTRY)
     entries["time"] = log_time
     entries["offset"] = starts
@@ -105,7 +113,9 @@ def message_index(channel_id: int, log_time: Int64Array, starts: Int64Array) -> 
 
 
 def read_message_index(data: bytes) -> tuple[int, int, int, int] | None:
-    """Channel, number of messages, first and last time of a MessageIndex record at the start of ``data``, if it is one.
+    """Read a MessageIndex record at the start of ``data``.
+
+    Returns its channel, number of messages, first and last time; None where there is no such record.
 
     ``data`` needs the whole record: entries must be in order of time and of place to be believed.
     """
@@ -124,7 +134,7 @@ def read_message_index(data: bytes) -> tuple[int, int, int, int] | None:
 
 @dataclass(frozen=True)
 class ChunkHead:
-    """What stands before a chunk's compressed data.
+    """Fields that stand before a chunk's compressed data.
 
     ``length`` is that of the whole record, ``data_at`` the place of the data in it.
     """
@@ -139,7 +149,10 @@ class ChunkHead:
 
 
 def chunk_head(start_time: int, end_time: int, uncompressed_size: int, crc: int, data_length: int) -> bytes:
-    """What stands before a chunk's zstd data (mcap.records would copy the data twice)."""
+    """Return the bytes that stand before a chunk's zstd data.
+
+    mcap.records would copy the data twice.
+    """
     tail = b"zstd" + struct.pack("<Q", data_length)
     length = _CHUNK_HEAD.size + len(tail) + data_length - RECORD_PREFIX
     return _CHUNK_HEAD.pack(Opcode.CHUNK, length, start_time, end_time, uncompressed_size, crc, 4) + tail
@@ -201,7 +214,10 @@ def decompress(compression: str, data: Buffer, size: int, crc: int | None) -> By
 
 
 def _zstd(data: Buffer, size: int) -> bytes:
-    """One zstd frame; its own claim of a size is compared first, since the library allocates by it."""
+    """Decompress one zstd frame.
+
+    The size that the frame claims is compared first, since the library allocates by it.
+    """
     claimed = zstandard.get_frame_parameters(data).content_size
     if claimed not in (size, zstandard.CONTENTSIZE_UNKNOWN):
         raise ChunkError("has another size than it claims")
@@ -265,7 +281,10 @@ class Summary:
 
     @property
     def message_counts(self) -> dict[int, int]:
-        """Messages by channel, as statistics that agree with themselves tell; empty where there are none."""
+        """Return the number of messages by channel, by statistics that agree with themselves.
+
+        Empty where there are none.
+        """
         found = self.statistics
         if not self.is_intact or found is None or sum(found.channel_message_counts.values()) != found.message_count:
             return {}
@@ -302,7 +321,10 @@ def _footer(file: BinaryIO, size: int) -> tuple[bytes, Footer] | None:
 
 
 def ends_whole(file: BinaryIO, size: int) -> bool:
-    """Whether a file has a footer at its end: whatever happened inside, it was not cut."""
+    """Tell whether a file has a footer at its end: if so, it was not cut.
+
+    There may be damage inside all the same.
+    """
     return _footer(file, size) is not None
 
 
@@ -312,7 +334,10 @@ def _summary_crc(data: bytes, end: bytes) -> int:
 
 
 def _shifted_summary(file: BinaryIO, end: bytes, footer: Footer, stop: int) -> bytes:
-    """The summary between the end of data and the footer, where its checksum is right; else nothing."""
+    """Return the summary between the end of data and the footer, if its checksum is right.
+
+    Else nothing.
+    """
     file.seek(max(0, stop - SHIFTED_BYTES))
     tail = file.read(min(stop, SHIFTED_BYTES))
     at = tail.rfind(_DATA_END)
@@ -321,10 +346,10 @@ def _shifted_summary(file: BinaryIO, end: bytes, footer: Footer, stop: int) -> b
 
 
 def read_summary(file: BinaryIO, size: int) -> Summary | None:
-    """Summary of a file of ``size`` bytes; None when it has no footer at its end or no summary.
+    """Read the summary of a file of ``size`` bytes.
 
-    One that does not stand where the footer says is looked for behind the end of data. One with a wrong checksum is
-    read as far as it goes, ``is_intact`` False.
+    None when it has no footer at its end, or no summary. A summary that does not stand where the footer says is looked
+    for behind the end of data. A summary with a wrong checksum is read as far as it goes, ``is_intact`` False.
     """
     found = _footer(file, size)
     if found is None:

@@ -1,4 +1,7 @@
-"""Bytes by which a file of the store is recognised. No import, so that every other log is opened without the store."""
+"""Bytes by which a file of the store is recognised.
+
+Nothing is imported, so that every other log is opened without the store.
+"""
 
 MAGIC = b"\x89MCAP0\r\n"
 PACKAGE = "groundstation"  # of the message types

@@ -1,4 +1,4 @@
-"""Message records as they lie in a chunk: their head, where each starts, which of them are alike."""
+"""Message records as they lie in a chunk: their head, their starts, which are alike."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -76,13 +76,18 @@ class Messages:
         return int(np.frombuffer(self.buffer, HEAD, 1, int(self.starts[0]))[0]["sequence"])
 
     def column(self, dtype: np.dtype[Any], offset: int) -> NDArray[Any]:
-        """Values that stand ``offset`` bytes into every record of an even stride, shape (n,), a strided view."""
+        """Return the values ``offset`` bytes into every record, shape (n,), as a strided view.
+
+        The records must have an even stride.
+        """
         values: NDArray[Any] = self.matrix()[:, offset : offset + dtype.itemsize].view(dtype)[:, 0]
         return values
 
 
 def at_any_byte(buffer: ByteArray, dtype: np.dtype[Any]) -> NDArray[Any]:
-    """View of a buffer in which entry ``k`` is the value that starts at byte ``k``; entries overlap.
+    """Return a view of a buffer whose entry ``k`` is the value that starts at byte ``k``.
+
+    Entries overlap.
 
     Indexing it with many places moves whole values, five to ten times faster than a matrix of byte indices.
     """

@@ -1,4 +1,4 @@
-"""Read a store file: facts, then batches chunk by chunk, and an account of what is damaged."""
+"""Read a store file: facts, then batches chunk by chunk, then the damage."""
 
 import os
 import zlib
@@ -52,7 +52,12 @@ def read_info(path: str | os.PathLike[str]) -> StoreInfo:
 
 @dataclass(frozen=True)
 class Part:
-    """Part of a store file: records from ``start_ns`` on and before ``end_ns``, of the topics that ``wants`` says."""
+    """Part of a store file: the records from ``start_ns`` on and before ``end_ns``.
+
+    Only topics for which ``wants`` is true belong to it.
+
+    Of the topics for which ``wants`` is true.
+    """
 
     start_ns: int
     end_ns: int
@@ -113,7 +118,10 @@ def read(path: str | os.PathLike[str], part: Part | None = None) -> Iterator[Ite
 
 
 class _Missing:
-    """What the ledger in the file counts and what of it is there: a chunk may be gone with all that told of it."""
+    """Comparison of the rows that the file's ledger counts with those that are there.
+
+    A chunk may be gone with all that told of it.
+    """
 
     def __init__(self, info: StoreInfo) -> None:
         self._left = Counter({topic: entry.rows for topic, entry in info.ledger.topics.items()})
@@ -127,7 +135,10 @@ class _Missing:
             self._is_told = True
 
     def damages(self) -> Iterator[Damage]:
-        """What is missing by the ledger, where no loss is told that may be the same."""
+        """Yield the rows that are missing by the ledger.
+
+        Nothing where a loss was reported that may be the same.
+        """
         for topic, count in self._left.items():
             if count > 0 and not self._is_told:
                 what = "messages that the ledger in the file counts and that are not in it"
@@ -148,7 +159,10 @@ def _opened(path: str | os.PathLike[str]) -> Iterator[tuple[BinaryIO, int]]:
 
 @dataclass(frozen=True)
 class _Definition:
-    """How to decode a channel: its topic and the fields its columns come from; ``fields`` None: do not."""
+    """Decoding of a channel: its topic and the fields that its columns come from.
+
+    With ``fields`` None the channel is not decoded.
+    """
 
     topic: str
     fields: tuple[WireField, ...] | None
@@ -243,7 +257,10 @@ class _Reading:
                 yield Damage("corrupt", place, unreadable, "messages that are not of their schema", definition.topic)
 
     def _is_next(self, messages: Messages) -> bool:
-        """Whether a chunk is in order of time and follows those before; a damaged disk may repeat or move one."""
+        """Tell whether a chunk is in order of time and follows those before.
+
+        A damaged disk may repeat or move a chunk.
+        """
         time_ns = messages.log_time
         if (time_ns[1:] < time_ns[:-1]).any() or int(time_ns[0]) < self._last_ns.get(messages.channel_id, 0):
             return False
@@ -257,7 +274,7 @@ class _Reading:
         return (messages.channel_id, messages.first_sequence) in self._seen
 
     def damage(self, lost: Lost) -> Damage:
-        """What a stretch of lost bytes means."""
+        """Return a stretch of lost bytes as damage."""
         known = [self._definitions[number] for number in lost.channels if number in self._definitions]
         topic = ", ".join(definition.topic for definition in known)
         loses = not known or not all(definition.is_derived for definition in known)
@@ -291,7 +308,10 @@ def _parts(messages: Messages, field_count: int) -> Iterator[Messages]:
 
 
 def _batch(messages: Messages, decoded: Decoded, definition: _Definition) -> RecordBatch:
-    """Batch of decoded messages; those without a record index are not the store's and left out."""
+    """Return the batch of decoded messages.
+
+    Messages without a record index are not the store's, and are left out.
+    """
     assert definition.fields is not None
     if decoded.rows is not None:
         messages = messages.take(decoded.rows)

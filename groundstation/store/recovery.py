@@ -63,7 +63,7 @@ class Intact:
 
 @dataclass(frozen=True)
 class Lost:
-    """Bytes ``start`` to ``end`` of the file that could not be used, and what is known of them.
+    """Unusable bytes ``start`` to ``end`` of the file, and what is known of them.
 
     ``channels`` are the ids, ``count`` the messages and ``span`` their first and last log time, where known;
     ``is_cut`` when the file ends there without its summary.
@@ -103,7 +103,10 @@ class _Bounded:
 
 
 def bounded(file: BinaryIO, size: int) -> BinaryIO:
-    """The file, for work on ``size`` bytes of it: reading more than is due to them raises an error."""
+    """Return the file with a bound on reading, for work on ``size`` bytes of it.
+
+    Reading more than is due to them raises an error.
+    """
     return cast(BinaryIO, _Bounded(file, _READ_AGAIN * size + MAX_RECORD_BYTES))
 
 
@@ -121,7 +124,10 @@ def _opened(data: memoryview, compression: str, size: int, crc: int) -> list[Mes
 
 
 def index_fits(file: BinaryIO, summary: Summary) -> bool:
-    """Whether chunks stand where the indexes say; one may be damaged, two show that bytes were lost or added."""
+    """Tell whether chunks stand where the indexes say.
+
+    One misplaced chunk may be damaged; two show that bytes were lost or added.
+    """
     astray = 0
     for index in summary.chunks:
         head = read_chunk_head(_read(file, index.chunk_start_offset, PEEK_BYTES))
@@ -234,7 +240,10 @@ def _chunk_at(peek: bytes, at: int, size: int) -> ChunkHead | None:
 
 
 def _record_end(file: BinaryIO, at: int, size: int, peek: bytes) -> int | None:
-    """Where the record at ``at`` ends; None when there is no whole record other than a chunk."""
+    """Return the end of the record at ``at``.
+
+    None when there is no whole record other than a chunk.
+    """
     if len(peek) < RECORD_PREFIX:
         return None
     length = int.from_bytes(peek[1:RECORD_PREFIX], "little")
@@ -247,7 +256,7 @@ def _record_end(file: BinaryIO, at: int, size: int, peek: bytes) -> int | None:
 
 
 def _is_plausible(file: BinaryIO, at: int, size: int) -> bool:
-    """Whether a record starts at ``at``, or the file ends there."""
+    """Tell whether a record starts at ``at``, or the file ends there."""
     if at == size:
         return True
     peek = _read(file, at, PEEK_BYTES)
@@ -267,7 +276,10 @@ def find_chunk(file: BinaryIO, start: int, size: int) -> int:
 
 
 def find_bytes(file: BinaryIO, needle: bytes, start: int) -> int | None:
-    """Place of the first ``needle`` from ``start`` on; the file is searched in blocks, small ones first."""
+    """Return the place of the first ``needle`` from ``start`` on.
+
+    The file is searched in blocks, small ones first.
+    """
     at, size = start, PEEK_BYTES
     while True:
         block = _read(file, at, size)
@@ -281,7 +293,10 @@ def find_bytes(file: BinaryIO, needle: bytes, start: int) -> int | None:
 
 
 def find_facts(file: BinaryIO) -> tuple[dict[str, str], bool]:
-    """Strings of the file's metadata record or of its copy, and whether they are as they were written."""
+    """Return the strings of the file's metadata record, or of its copy.
+
+    Also whether they are as they were written.
+    """
     fallback: dict[str, str] = {}
     for name in (METADATA_NAME, COPY_NAME):
         needle = struct.pack("<I", len(name)) + name.encode()
@@ -296,7 +311,10 @@ def find_facts(file: BinaryIO) -> tuple[dict[str, str], bool]:
 
 
 def _facts_at(file: BinaryIO, place: int, name_bytes: int) -> dict[str, str]:
-    """Strings of a Metadata record whose name stands at ``place``; by the length of its map, not of the record."""
+    """Return the strings of a Metadata record whose name stands at ``place``.
+
+    The length of its map is used, not that of the record.
+    """
     (length,) = struct.unpack("<I", _read(file, place + name_bytes, 4).ljust(4, b"\0"))
     if length > MAX_RECORD_BYTES:
         return {}
@@ -314,7 +332,10 @@ def chunk_bytes(file: BinaryIO, size: int) -> int:
 
 
 def definitions_in(file: BinaryIO, start: int, end: int) -> Iterator[tuple[Schema | Channel, bytes]]:
-    """Schemas and channels that begin in a part of a file, told by their form: each record and its bytes."""
+    """Yield the schemas and channels that begin in a part of a file, and their bytes.
+
+    They are recognised by their form.
+    """
     with suppress(_TooMuchReadError):
         yield from _definitions_in(bounded(file, end - start), start, end)
 
@@ -339,7 +360,7 @@ def _definitions_in(file: BinaryIO, start: int, end: int) -> Iterator[tuple[Sche
 
 
 def is_own_schema(schema: Schema) -> bool:
-    """Whether a schema is a message type of the store."""
+    """Tell whether a schema is a message type of the store."""
     try:
         return schema.name.startswith(f"{PACKAGE}.") and bool(message_type(schema.data, schema.name))
     except GroundstationError:
@@ -371,7 +392,7 @@ def search_definitions(file: BinaryIO, size: int, checksums: Mapping[str, int]) 
 
 
 def _is_usable(record: Schema | Channel) -> bool:
-    """Whether messages could be read by a definition."""
+    """Tell whether messages could be read by a definition."""
     if isinstance(record, Channel):
         return DERIVED_KEY in record.metadata or own_columns(record.metadata.get(COLUMNS_KEY, "")) is not None
     return is_own_schema(record)

@@ -1,4 +1,6 @@
-"""Message types of the store's channels: compiled ones for canonical topics, made at run time for all others.
+"""Message types of the store's channels.
+
+Those of canonical topics are compiled, all others are made at run time.
 
 Fields 1 and 2 of every message are ``device_time_ns`` and ``record_index``; the topic's own fields follow from 3 on.
 A message type describes its fields to numpy (:class:`WireField`) and itself to other programs (a descriptor set).
@@ -137,7 +139,10 @@ def _compiled_files() -> Mapping[str, FileDescriptorProto]:
 
 @cache
 def canonical_type(kind: str) -> MessageType:
-    """Message type of a canonical topic kind (``"ins"``), with every field of schemas/<kind>.proto."""
+    """Return the message type of a canonical topic kind (``"ins"``).
+
+    It has every field of schemas/<kind>.proto.
+    """
     file = _compiled_files()[MESSAGE_OF_KIND[kind]]
     return message_type(FileDescriptorSet(file=[file]).SerializeToString(), f"{PACKAGE}.{file.message_type[0].name}")
 
@@ -273,7 +278,10 @@ class GrowingType:
         return tuple(sorted(self._fields.values(), key=lambda field: field.number))
 
     def message_type(self, units: Mapping[str, str] = MappingProxyType({})) -> MessageType:
-        """The type as it stands now; ``units`` of columns, as the source tells them, describe fields made for them."""
+        """Return the type as it stands now.
+
+        ``units`` of columns, as the source tells them, describe fields made for them.
+        """
         if self._canonical is not None:
             return self._canonical
         fields = (*self.common_fields, *self.own_fields)
@@ -293,12 +301,17 @@ def identifier(text: str) -> str:
 
 
 def _name_key(name: str) -> str:
-    """What must differ between fields of a message: protobuf's JSON names drop underscores and change case."""
+    """Return the form of a name that must differ between fields of a message.
+
+    Protobuf's JSON names drop underscores and change case.
+    """
     return name.replace("_", "").lower()
 
 
 def _describe(name: str, fields: Sequence[WireField], units: Mapping[str, str]) -> bytes:
-    """Serialised descriptor set of a message made at run time, every field with explicit presence.
+    """Return the serialised descriptor set of a message type made at run time.
+
+    Every field has explicit presence.
 
     A field's unit is its comment, as if it stood before it in a .proto file.
     """

@@ -1,4 +1,4 @@
-"""Sequence numbers of the messages of one channel: whether a chunk is missing between others."""
+"""Sequence numbers of the messages of one channel; they show whether a chunk is missing."""
 
 from dataclasses import dataclass
 

@@ -50,7 +50,7 @@ class Slot(NamedTuple):
 
     @property
     def has_many_widths(self) -> bool:
-        """Whether the texts that are present differ in length."""
+        """Tell whether the texts that are present differ in length."""
         if self.lengths is None:
             return False
         lengths = self.lengths if self.present is None else self.lengths[self.present]
@@ -61,7 +61,10 @@ class Slot(NamedTuple):
         return Slot(self.prefix, self.values[rows], present, None if self.lengths is None else self.lengths[rows])
 
     def alike(self) -> tuple[bytes, NDArray[Any]]:
-        """What stands before each value, and the values, where all are present and texts have one length."""
+        """Return the bytes before each value, and the values.
+
+        For a slot whose values are all present and whose texts have one length.
+        """
         if self.lengths is None:
             return self.prefix, self.values
         length = int(self.lengths[0])
@@ -69,7 +72,10 @@ class Slot(NamedTuple):
         return self.prefix + varint(length), narrow
 
     def blocks(self) -> Iterator[Block]:
-        """Rows whose bytes have one width: their positions, the bytes before each value, the values as (k, width)."""
+        """Yield the rows whose bytes have one width.
+
+        Their positions, the bytes before each value, the values as (k, width).
+        """
         rows: Rows = slice(None)
         if self.present is not None and not self.present.all():
             rows = np.flatnonzero(self.present)
@@ -112,7 +118,10 @@ def slot_of(field: WireField, values: NDArray[Any], present: BoolArray | None) -
 
 
 def encode_text(values: NDArray[np.str_]) -> NDArray[np.bytes_]:
-    """UTF-8 of each text, dtype kind ``S``; each run of equal texts (modes, states) is encoded once."""
+    """Encode texts as UTF-8, dtype kind ``S``.
+
+    Each run of equal texts (modes, states) is encoded once.
+    """
     if not len(values):
         return np.empty(0, "S1")
     starts = np.concatenate(([0], np.flatnonzero(values[1:] != values[:-1]) + 1))
@@ -174,7 +183,10 @@ def _blocks(slots: Iterable[Slot]) -> list[Block]:
 
 
 def _alike(slots: Sequence[Slot], count: int) -> list[tuple[Rows, list[Slot]]] | None:
-    """Rows in groups that have the same fields present, and the slots of those; None where few are alike."""
+    """Return groups of rows that have the same fields present, with the slots of those.
+
+    None where few are alike.
+    """
     masks = {identity: mask for identity, mask in _masks(slots).items() if not mask.all()}
     absent = {identity for identity, mask in masks.items() if not mask.any()}
     partial = {identity: mask for identity, mask in masks.items() if identity not in absent}
@@ -198,7 +210,10 @@ def _alike(slots: Sequence[Slot], count: int) -> list[tuple[Rows, list[Slot]]] |
 
 
 def _lay_out(channel_id: int, slots: Sequence[Slot]) -> ByteArray:
-    """Records that all have the same fields, shape (n, size): filled by columns over a copy of the constant bytes."""
+    """Return records that all have the same fields, shape (n, size).
+
+    They are filled by columns over a copy of the constant bytes.
+    """
     pairs = [slot.alike() for slot in slots]
     body = b"".join(prefix + bytes(values.itemsize) for prefix, values in pairs)
     head = _record_head(channel_id, len(body))
@@ -220,7 +235,10 @@ def _record_head(channel_id: int, rest_bytes: int) -> bytes:
 
 
 def _scatter(channel_id: int, slots: Sequence[Slot]) -> tuple[ByteArray, Int64Array]:
-    """Records of mixed fields and where each starts: every block's bytes go to the next free place of its rows."""
+    """Return records of mixed fields, and the start of each.
+
+    Every block's bytes go to the next free place of its rows.
+    """
     blocks = _blocks(slots)
     sizes = np.full(len(slots[0].values), len(_record_head(channel_id, 0)), np.int64)
     for rows, prefix, values in blocks:
@@ -292,10 +310,10 @@ def decode(messages: Messages, fields: Sequence[WireField]) -> Iterator[Decoded]
 
 
 def _template(messages: Messages, fields: Sequence[WireField]) -> list[tuple[int, int] | None] | None:
-    """Place and width of each field's value (None: absent) in records that are all laid out like the first.
+    """Return place and width of each field's value in records laid out like the first.
 
-    Returns None when they are not, or when the first has anything but the fields asked for, each once, with one-byte
-    bools: such messages are walked one by one.
+    An absent field is None. The result is None when some record has another layout, or when the first has anything but
+    the fields asked for, each once, with one-byte bools: such messages are walked one by one.
     """
     by_tag = {field.tag: k for k, field in enumerate(fields)}
     matrix = messages.matrix()
@@ -327,7 +345,10 @@ def _template(messages: Messages, fields: Sequence[WireField]) -> list[tuple[int
 
 
 def _after_varint(data: bytes, at: int) -> int:
-    """Place after the variable-length integer that starts at ``at``; no more than five bytes are taken."""
+    """Return the place after the variable-length integer that starts at ``at``.
+
+    At most five bytes are taken.
+    """
     end = min(at + 5, len(data))
     while at < end and data[at] & 0x80:
         at += 1
@@ -374,7 +395,10 @@ def absent_column(field: WireField, count: int) -> Column:
 
 
 def _decode_text(matrix: ByteArray) -> NDArray[np.str_]:
-    """Text of each row of UTF-8 bytes padded with zeros; each run of equal rows is decoded once."""
+    """Return the text of each row of UTF-8 bytes padded with zeros.
+
+    Each run of equal rows is decoded once.
+    """
     count, width = matrix.shape
     if not count or not width:
         return np.full(count, "", "U1")

@@ -1,4 +1,7 @@
-"""Write a store file: chunks go to a spool as they fill, and into the file in order of time when all are known."""
+"""Write a store file.
+
+Chunks go to a spool as they fill, and into the file in order of time when all are known.
+"""
 
 import glob
 import hashlib
@@ -53,7 +56,10 @@ MAX_CHANNELS = 65_535  # MCAP's channel ids have 16 bits
 
 @dataclass
 class _Finished:
-    """A chunk and its message index: in memory, or at a place of the spool where there are no ``parts``."""
+    """Chunk and its message index, in memory or in the spool.
+
+    It stands at a place of the spool where there are no ``parts``.
+    """
 
     parts: tuple[bytes, ...]
     place: int
@@ -165,7 +171,9 @@ class StoreWriter:
             part.unlink(missing_ok=True)
 
     def write(self, batch: RecordBatch) -> None:
-        """Take in a batch with ``time_ns`` set; times of a topic never decrease from one batch to the next.
+        """Take in a batch with ``time_ns`` set.
+
+        Times of a topic never decrease from one batch to the next.
 
         Raises
         ------
@@ -229,7 +237,10 @@ class StoreWriter:
         return name
 
     def _hand_over(self, chunk: Chunk) -> None:
-        """Let the thread spool a chunk; waits while too many are on their way, and tells what went wrong with those."""
+        """Let the thread spool a chunk.
+
+        Waits while too many are on their way, and raises what went wrong with those.
+        """
         self._on_their_way.append(self._thread.submit(self._spool_chunk, chunk))
         self._wait_until_left(MOST_ON_THEIR_WAY)
 
