@@ -1,4 +1,7 @@
-"""Cuts a recording into blocks of packets; what belongs to no packet, and packets that are damaged, are counted."""
+"""Cut a recording into blocks of packets.
+
+Bytes that belong to no packet, and damaged packets, are counted.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -96,12 +99,15 @@ class Walk:
         self.tally.filler_bytes = int(self._state[scan.FILLER])
 
     def damages(self) -> Iterator[Damage]:
-        """What was skipped and what was damaged."""
+        """Yield the bytes that were skipped and the packets that were damaged."""
         yield from self._skipped.damages()
         yield from self.tally.damages()
 
     def _longer(self, data: NDArray[np.uint8], size: int, stream: BinaryIO) -> tuple[NDArray[np.uint8], int, bool]:
-        """The data with the next bytes of the file behind them, how many they are, and whether those were the last."""
+        """Append the next bytes of the file to the data.
+
+        Returns the data, the number of bytes appended, and whether those were the last.
+        """
         whole = np.empty(size + BLOCK_BYTES + _SLACK, dtype=np.uint8)
         whole[:size] = data[:size]
         try:

@@ -1,4 +1,6 @@
-"""What is recorded beside bus words: bytes of messages and frames, discretes, events, the times of time packets.
+"""Recorded data other than bus words: bytes, discretes, events, times of time packets.
+
+The bytes are those of messages and frames.
 
 Bytes, ``raw.bytes.<kind>.<channel>``, stand in records of up to 64, eight in a number of 64 bits, the first in its
 lowest eight: ``bytes_00``, ``bytes_08`` ...; ``piece`` counts the records of one message from 0, ``size`` is that of
@@ -25,7 +27,12 @@ _STAMP_ALWAYS, _STAMP_IF_FLAGGED = True, False
 
 
 class _Stamped(NamedTuple):
-    """Messages behind headers: always with a time, or where bit 31 of the specific word says so; header, length."""
+    """Layout of messages that stand behind headers: their time, their header, their length.
+
+    Each message has a time, always or where bit 31 of the specific word says so.
+
+    A time is always there, or where bit 31 of the specific word says so.
+    """
 
     name: str
     is_always_timed: bool

@@ -52,7 +52,7 @@ def _sum16(data: Any, at: int, words: int) -> int:
 
 @in_place
 def _is_header(data: Any, at: int, size: int) -> bool:
-    """Whether a packet may begin at a place: sync, checksum, lengths that fit each other."""
+    """Tell whether a packet may begin at a place: sync, checksum, lengths that fit."""
     if at + HEADER_BYTES > size or data[at] != 0x25 or data[at + 1] != 0xEB:
         return False
     if _sum16(data, at, 11) != _u16(data, at + 22):
@@ -69,7 +69,7 @@ def _is_header(data: Any, at: int, size: int) -> bool:
 
 @in_place
 def _header_inside(data: Any, syncs: Any, start: int, end: int, size: int) -> int:
-    """Where a header begins between two places; NOWHERE when none does."""
+    """Return the first place between two others where a header begins; NOWHERE without one."""
     number = np.searchsorted(syncs, start)
     while number < len(syncs) and syncs[number] < end:
         if _is_header(data, syncs[number], size):
@@ -80,7 +80,10 @@ def _header_inside(data: Any, syncs: Any, start: int, end: int, size: int) -> in
 
 @in_place
 def _checksum_is_right(data: Any, halves: Any, words: Any, at: int, start: int, end: int) -> bool:
-    """Whether the data checksum at the end of a packet is the sum of what precedes it, filler among it."""
+    """Tell whether the data checksum at the end of a packet is right.
+
+    It is the sum of what precedes it, filler included.
+    """
     kind = int(data[at + 14]) & 3
     total = 0
     if kind == 1:
@@ -172,7 +175,10 @@ def scan(
 
 @in_place
 def _stamp(data: Any, at: int, packet: Any) -> int:
-    """Time of a message in counts of 100 ns: its own counter, or the packet's and how much later it is."""
+    """Return the time of a message in counts of 100 ns.
+
+    It is the message's own counter, or that of the packet plus how much later the message is.
+    """
     flags = packet[FLAGS]
     if not flags & STAMPS_ARE_SECONDARY or not flags & HAS_SECONDARY:
         return _u48(data, at)
@@ -224,7 +230,10 @@ def messages_1553(data: Any, packets: Any, places: Any, times: Any, heads: Any, 
 
 @in_place
 def see_1553(data: Any, packets: Any, seen: Any) -> None:
-    """Mark the command words of all messages in ``seen``, ndarray of bool of shape (65536,): see messages_1553."""
+    """Mark the command words of all messages in ``seen``: see messages_1553.
+
+    ``seen`` is an ndarray of bool of shape (65536,).
+    """
     for k in range(len(packets)):
         at, end = packets[k, BODY], packets[k, BODY_END]
         while at + 16 <= end:
@@ -237,7 +246,10 @@ def see_1553(data: Any, packets: Any, seen: Any) -> None:
 
 @in_place
 def see_429(data: Any, packets: Any, seen: Any) -> None:
-    """Mark bus (from 0) and label byte of all words in ``seen``, ndarray of bool of shape (65536,)."""
+    """Mark bus (from 0) and label byte of all words in ``seen``.
+
+    ``seen`` is an ndarray of bool of shape (65536,).
+    """
     for k in range(len(packets)):
         for at in range(packets[k, BODY], packets[k, BODY_END] - 7, 8):
             seen[int(data[at + 3]) << 8 | int(data[at + 4])] = True
@@ -277,7 +289,9 @@ def messages_stamped(
     times: Any,
     sizes: Any,
 ) -> int:
-    """Messages that tell their length in a header behind their time (UART, Ethernet, message, CAN); how many.
+    """Find messages whose length stands in a header behind their time; return their number.
+
+    Such are UART, Ethernet, message and CAN.
 
     Parameters
     ----------
@@ -306,7 +320,7 @@ def messages_stamped(
 
 @in_place
 def samples(time_ns: Any, fields: Any, span_ns: int, sample: Any) -> int:
-    """Which words are of one sample; how many samples there are.
+    """Group words into samples and return the number of samples.
 
     A sample ends where a word tells a field again, or comes more than a span after its first word.
 

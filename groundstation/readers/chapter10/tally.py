@@ -1,4 +1,7 @@
-"""What a recording holds and lacks by its packets' headers: types, sums, sequence numbers, what TMATS says of it."""
+"""Account of a recording by its packets' headers: types, sums, sequence numbers, TMATS.
+
+It tells what the recording holds and lacks, and what TMATS says of it.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -26,7 +29,10 @@ class _Wrong(NamedTuple):
 
 @dataclass
 class _Sequence:
-    """Sequence number and counter of a channel's last packet, and how many packets are missing by the number."""
+    """Sequence number and counter of a channel's last packet, and its missing packets.
+
+    The number of missing packets follows from the sequence number.
+    """
 
     last: int
     last_rtc: int
@@ -82,7 +88,7 @@ class Tally:
             sequence.missing += int(missing.sum())
 
     def remarks(self, tmats: Tmats) -> Iterator[Remark]:
-        """What was checked, and where TMATS says otherwise."""
+        """Yield remarks on what was checked, and where TMATS says otherwise."""
         types: dict[int, int] = {}
         for (_channel, kind), count in self.by_channel.items():
             types[kind] = types.get(kind, 0) + count

@@ -1,4 +1,7 @@
-"""UTC of the relative time counter, by the time packets; their year, where they have none, from elsewhere."""
+"""UTC of the relative time counter, by the time packets.
+
+Where these have no year, it comes from elsewhere.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -25,7 +28,7 @@ _LABEL_260 = 0x0D  # octal 260 as it stands in a word, its first bit last
 
 @dataclass(frozen=True)
 class Reading:
-    """What a time packet tells.
+    """Time that a time packet states.
 
     Parameters
     ----------
@@ -88,7 +91,9 @@ def reading(channel: int, device_ns: int, specific_word: int, body: bytes) -> Re
 
 
 def dates_in(words: NDArray[np.uint32]) -> Counter[date]:
-    """Dates that ARINC-429 words with label 260 tell, and how often; the year is of this century.
+    """Return the dates of ARINC-429 words with label 260, and how often each occurs.
+
+    The year is of this century.
 
     Source: ARINC 429, part 1: day in bits 24 to 29, month in 19 to 23, year in 11 to 18, binary coded decimals.
     """
@@ -119,10 +124,11 @@ class Start:
 
 
 def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) -> Start:
-    """UTC of the counter's zero: the median over the readings of the channel that has most of them.
+    """Return the UTC of the counter's zero: the median over the readings of one channel.
 
-    Of a time source that was set in the recording, the readings count that it told in the end. A date that is behind
-    that of TMATS by whole rollovers of the GPS week is of a source that missed them.
+    It is the channel that has most readings. Of a time source that was set in the recording, the readings count that it
+    told in the end. A date that is behind that of TMATS by whole rollovers of the GPS week is of a source that missed
+    them.
 
     Examples
     --------
@@ -212,7 +218,7 @@ def _every_zero(used: Iterable[Reading], year: int) -> Int64Array:
 
 
 def _spread(zeros: Int64Array, channel: int) -> Iterable[Remark]:
-    """What is to be said when the readings do not run with the counter."""
+    """Yield a remark when the readings do not run with the counter."""
     spread_ns = int(zeros.max() - zeros.min())
     if spread_ns > _SPREAD_NS:
         text = (

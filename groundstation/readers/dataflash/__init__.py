@@ -1,4 +1,7 @@
-"""ArduPilot DataFlash logs (.BIN): every message kept, navigation mapped to the canonical topics."""
+"""Reader for ArduPilot DataFlash logs (.BIN).
+
+Every message is kept; navigation is mapped to the canonical topics.
+"""
 
 import re
 from collections.abc import Iterator
@@ -13,7 +16,10 @@ _ENOUGH_DEFINITIONS = 3
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim a file that begins with a definition, or (where its start is damaged) holds several of them."""
+    """Claim a file that begins with a format definition.
+
+    Where the start of the file is damaged, several definitions in the head are enough.
+    """
     if _DEFINITION.match(source.head):
         return Claim(NAME)
     found = zip(range(_ENOUGH_DEFINITIONS), _DEFINITION.finditer(source.head), strict=False)

@@ -1,4 +1,7 @@
-"""Cuts a log into blocks of records that the definitions in force describe; what belongs to no record is counted."""
+"""Cut a log into blocks of records that the definitions in force describe.
+
+Bytes that belong to no record are counted.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -52,7 +55,10 @@ class Block:
     definitions: dict[int, Definition]
 
     def groups(self) -> Iterator[tuple[Definition, Int64Array]]:
-        """Each type that occurs and which of the block's records (numbered from 0) are of it, increasing."""
+        """Yield each record type that occurs, and the numbers of its records in the block.
+
+        Records are numbered from 0; the numbers increase.
+        """
         order = np.argsort(self.types, kind="stable")
         counts = np.bincount(self.types)
         ends = np.cumsum(counts)
@@ -83,7 +89,7 @@ class _Places(NamedTuple):
 
 
 class _Chunk(NamedTuple):
-    """Data that were at hand at once: how many bytes, how many of them are done with, and their blocks."""
+    """Data that were at hand at once: their bytes, how many of them are done, their blocks."""
 
     length: int
     done: int
@@ -99,7 +105,7 @@ class Spans:
     cut: tuple[int, int, str] | None = None
 
     def damages(self) -> Iterator[Damage]:
-        """What was skipped, in the order of the file."""
+        """Yield the skipped bytes and a record cut off by the end, in the order of the file."""
         yield from self.skipped.damages()
         if self.cut is not None:
             start, end, name = self.cut
@@ -170,7 +176,9 @@ class Scanner:
         self._finish(data)
 
     def again(self) -> Iterator[Block]:
-        """The same blocks once more; records are looked for again only where they were too many to keep their places.
+        """Yield the same blocks once more.
+
+        Records are searched for again only where they were too many to keep their places.
 
         Raises
         ------
@@ -202,7 +210,10 @@ class Scanner:
             ) from error
 
     def _blocks(self, data: NDArray[np.uint8], is_last: bool) -> Iterator[Block]:
-        """Blocks of the data at hand: one, and more where a definition changes or there are very many records."""
+        """Yield the blocks of the data at hand.
+
+        There are several where a definition changes or where there are very many records.
+        """
         offsets = np.empty(len(data) // HEADER_BYTES + 1, dtype=np.int64)
         types = np.empty(len(offsets), dtype=np.uint8)
         magic = scan.magic_places(data)
@@ -255,7 +266,7 @@ class Scanner:
         return None
 
     def _contradicts(self, type_id: int, types: NDArray[np.uint8]) -> bool:
-        """Whether records of an id that a new definition is for were met under another one."""
+        """Tell whether records of the id of a new definition were met under another one."""
         pending = types[: int(self._state[scan.COUNT])]
         return type_id in self.definitions and (bool(self._seen[type_id]) or bool((pending == type_id).any()))
 
@@ -280,7 +291,7 @@ class Scanner:
 
 
 def _time_kind(definition: Definition) -> int:
-    """How the scan finds the time of a record of this type."""
+    """Return the code by which the scan finds the time of a record of this type."""
     time = definition.time_field
     if time is None or definition.fields[0].name != time[0]:
         return scan.NO_TIME

@@ -1,4 +1,7 @@
-"""Canonical topics from the records of a block: ins, gnss, magnetometer, baro, air, electric, discrete."""
+"""Canonical topics from the records of a block.
+
+These are ins, gnss, magnetometer, baro, air, electric and discrete.
+"""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
@@ -23,7 +26,7 @@ RANGE_GOOD, FACING_DOWN = 4, 25
 
 
 class Mapper:
-    """Gathers the canonical records of a block and yields them merged, in the order of the file.
+    """Gatherer of the canonical records of a block; yields them merged, in file order.
 
     Parameters
     ----------
@@ -58,7 +61,10 @@ class Mapper:
                 yield piece
 
     def damages(self) -> Iterator[Damage]:
-        """Pressures and positions that are none, values in unknown units; the log's own values are kept."""
+        """Yield counts of refused values; the log's own values are kept.
+
+        Refused are pressures and positions that are none, and values in unknown units.
+        """
         for (topic, what), count in self._refused.items():
             yield Damage("unreadable_cells", topic, count, what, topic, loses_data=False)
         yield from (nowhere(topic, count) for topic, count in self._nowhere.items() if count)
@@ -77,7 +83,7 @@ class Mapper:
             self._refused[topic, what] = self._refused.get((topic, what), 0) + count
 
     def _all_takers(self) -> Mapping[Unit, list[tuple[str, Callable[[str, Rows], dict[str, Column]]]]]:
-        """For each sensor the topics it gives to, and the function that makes the columns."""
+        """Return, for each sensor, its topics and the functions that make their columns."""
         choices = self._choices
         takers: dict[Unit, list[tuple[str, Callable[[str, Rows], dict[str, Column]]]]] = {}
 
@@ -108,7 +114,10 @@ class Mapper:
         return takers
 
     def _values(self, topic: str, rows: Rows, wanted: tuple[Rule, ...]) -> dict[str, FloatArray]:
-        """Values of the rules whose field the type has, in canonical units; none of a field in an unknown unit."""
+        """Return the values of the rules whose field the type has, in canonical units.
+
+        A field in an unknown unit has none.
+        """
         found = {}
         definition, units = rows.definition, self._found.units
         for rule in wanted:
@@ -126,7 +135,10 @@ class Mapper:
         return found
 
     def _placed(self, topic: str, values: Mapping[str, FloatArray], claimed: BoolArray | bool = True) -> BoolArray:
-        """Records with a position among those that claim one; zeros in its place are counted, a NaN stays one."""
+        """Return which of the records that claim a position have one.
+
+        Zeros in place of a position are counted as missing; a NaN stays a NaN.
+        """
         latitude, longitude = values["latitude_deg"], values["longitude_deg"]
         placed = has_position(latitude, longitude) | np.isnan(latitude) | np.isnan(longitude)
         self._nowhere[topic] += int(np.count_nonzero(claimed & ~placed))
@@ -163,7 +175,10 @@ class Mapper:
     def _of_core(
         self, core: int | None, wanted: tuple[Rule, ...], is_solution: bool
     ) -> Callable[[str, Rows], dict[str, Column]]:
-        """Columns that are present while this core of the filter is the one in use; at first the first one told."""
+        """Return the function for columns that are present while this filter core is in use.
+
+        Until the log tells the core in use, it is the first one that it tells.
+        """
         primary = self._choices.primary_core
 
         def columns_of(topic: str, rows: Rows) -> dict[str, Column]:

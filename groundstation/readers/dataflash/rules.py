@@ -1,4 +1,7 @@
-"""Which fields of which record types become canonical fields, and in what unit they are when the log does not say."""
+"""Rules that map fields of record types to canonical fields, and their documented units.
+
+A documented unit is used when the log does not say the unit.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -57,7 +60,9 @@ class Rule:
     integer_multiplier: float | None = None
 
     def scale(self, definition: Definition, units: Units) -> float | None:
-        """Factor from the values of the raw column to the canonical unit; None when the log's unit is unknown.
+        """Return the factor from the values of the raw column to the canonical unit.
+
+        None when the log's unit is unknown.
 
         The unit of FMTU counts if it measures what the field measures. Where it is another of ArduPilot's units, it is
         a slip (HDop in m, the longitude in us, ACC in m/s) and the documented unit counts. A multiplier counts for

@@ -1,4 +1,7 @@
-"""Values of records as columns: implied scales applied, texts ended at their first NUL, times in nanoseconds."""
+"""Values of records as columns.
+
+Implied scales are applied, texts end at their first NUL, times are in nanoseconds.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -136,7 +139,10 @@ def _decoded(text: bytes) -> str:
 
 
 def _hexadecimal(values: NDArray[np.bytes_]) -> NDArray[np.str_]:
-    """Bytes of a file that the autopilot logged in pieces: no text, kept as hexadecimal digits."""
+    """Return bytes as hexadecimal digits.
+
+    They are of a file that the autopilot logged in pieces, and are no text.
+    """
     width = values.dtype.itemsize
     digits = np.frombuffer(b"0123456789abcdef", dtype=np.uint8)
     raw = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), width)

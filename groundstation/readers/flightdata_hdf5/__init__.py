@@ -1,4 +1,7 @@
-"""Airliner flight data in HDF5 (FlightDataAnalyzer): every parameter, and the canonical ones in their units."""
+"""Reader for airliner flight data in HDF5 (FlightDataAnalyzer).
+
+It reads every parameter, and the canonical ones in their units.
+"""
 
 from collections.abc import Iterator
 
@@ -11,7 +14,10 @@ _MARKS = (b"series", b"supf_offset")
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim an HDF5 file whose first bytes name the group or the attribute that only these recordings have."""
+    """Claim an HDF5 file by a group or attribute name in its first bytes.
+
+    Only these recordings have it.
+    """
     if not source.head.startswith(_MAGIC) or not any(mark in source.head for mark in _MARKS):
         return None
     return Claim(NAME)

@@ -1,4 +1,4 @@
-"""Which parameters feed which canonical fields, with their units and signs.
+"""Rules that map parameters to canonical fields, with their units and signs.
 
 A topic has the times of its leading parameter, the first of its rules that the file has; the others are interpolated to
 them between two neighbouring samples. The samples as recorded stay in ``raw.<parameter>``.
@@ -22,9 +22,10 @@ Way = Literal["plain", "circle", "step"]
 
 @dataclass(frozen=True)
 class Rule:
-    """A parameter and the field it feeds: ``sign`` times the value; ``unit`` where the file names none.
+    """Parameter and the field it feeds: ``sign`` times the value.
 
-    ``way``: how it is brought to another time; ``step`` keeps the last sample.
+    ``unit`` counts where the file names none. ``way`` is the way to bring it to another time; ``step`` keeps the last
+    sample.
     """
 
     parameter: str
@@ -119,7 +120,10 @@ def track_feed(container: Container) -> Feed | None:
 
 
 def _factor(unit: str, usual: str) -> float | None:
-    """Factor from the file's unit (the usual one where it names none) to that of the field; None for another kind."""
+    """Return the factor from the file's unit to that of the field.
+
+    Where the file names no unit, the usual one counts. None when the unit is of another kind.
+    """
     wanted = _UNITS.get(usual, usual)
     found = _UNITS.get(unit, unit) or wanted
     if found == wanted and wanted not in CONVERSIONS:
@@ -130,7 +134,10 @@ def _factor(unit: str, usual: str) -> float | None:
 
 
 def values_at(feed: Feed, times_ns: Int64Array) -> tuple[FloatArray, BoolArray]:
-    """Values of a feed at given times, and where it has one; between samples only if both neighbours are valid."""
+    """Return the values of a feed at given times, and where it has one.
+
+    A value between samples needs both neighbours to be valid.
+    """
     parameter = feed.parameter
     nothing = np.zeros(len(times_ns)), np.zeros(len(times_ns), dtype=bool)
     if not len(times_ns):

@@ -1,4 +1,6 @@
-"""The HDF5 container: parameters with their data, masks and rates. Only this module imports h5py.
+"""HDF5 container: parameters with their data, masks and rates.
+
+Only this module imports h5py.
 
 Nothing in a file is believed before it is checked: links, data stored elsewhere or never written, more data than a file
 of its size holds and attributes of any type are refused, each with its reason.
@@ -74,7 +76,7 @@ class Parameter:
         return min(int(around[np.argmax(reached)]) if reached.any() else int(around[-1]) + 1, self.samples)
 
     def read(self, first: int, last: int) -> "Samples":
-        """Values and where they are valid, samples [first, last); those that are lost are not valid.
+        """Read the samples [first, last) and which of them are valid; lost ones are not.
 
         Raises one of :data:`FAILURES` where the library cannot read it.
         """
@@ -117,9 +119,10 @@ class Refused:
 
 @dataclass(frozen=True, eq=False)
 class Container:
-    """What a recording holds: start (UTC seconds since 1970, None where it is not told), parameters, refused ones.
+    """Contents of a recording: start, parameters, refused ones.
 
-    ``missing_bytes``: how much was cut off; ``mended``: where heaps of text without an end were given one.
+    The start is in UTC seconds since 1970, None where it is not told. ``missing_bytes``: how much was cut off;
+    ``mended``: places of heaps of text without an end that were given one.
     """
 
     start_utc_s: float | None
@@ -201,7 +204,10 @@ class _Mended(io.RawIOBase):
 
 
 def _announced_size(head: bytes) -> int:
-    """Size of the file by its superblock (HDF5 file format 3.0, II.A), 0 where it cannot be told or believed."""
+    """Return the size of the file by its superblock (HDF5 file format 3.0, II.A).
+
+    0 where it cannot be told or believed.
+    """
     place = {0: 40, 1: 44, 2: 28, 3: 28}.get(head[8] if len(head) > 8 else -1)
     if place is None or len(head) < place + 8:
         return 0
@@ -211,7 +217,7 @@ def _announced_size(head: bytes) -> int:
 
 @dataclass
 class _Room:
-    """How much more a file of its size may hold: bytes that are stored in it, and bytes that come out of those."""
+    """Room left in a file of its size: bytes stored in it, and bytes unpacked from those."""
 
     stored_bytes: int
     held_bytes: int
@@ -278,7 +284,7 @@ def _dataset(group: Any, part: str, size: int) -> Storage:
 
 
 def _place_of(group: Any, name: str) -> int:
-    """Where a member of a group stands in the file, -1 for one that is only a link."""
+    """Return the place of a group's member in the file; -1 for one that is only a link."""
     if not isinstance(group.get(name, getlink=True), h5py.HardLink):
         return -1
     return int(h5o.get_info(group.id, name.encode("utf-8", "surrogateescape")).addr)

@@ -1,4 +1,7 @@
-"""Items of a recording: every parameter under its own name, the canonical topics beside them, in slices of time."""
+"""Items of a recording: every parameter under its own name, and the canonical topics.
+
+They come in slices of time.
+"""
 
 import math
 import re
@@ -28,7 +31,7 @@ _ODD = re.compile(r"[^A-Za-z0-9_\-]+")
 
 @dataclass
 class _Losses:
-    """Parameters whose data turned out to be damaged, and by what; positions that are none, by topic."""
+    """Damaged parameters with the reason, and missing positions by topic."""
 
     broken: dict[str, str] = field(default_factory=dict)
     lost: dict[str, int] = field(default_factory=dict)
@@ -193,7 +196,10 @@ def _batch(topic: str, times_ns: Int64Array, columns: dict[str, Column]) -> Reco
 
 
 def _numbered(batch: RecordBatch, instants: Int64Array, next_index: int) -> Iterator[RecordBatch]:
-    """A batch, in parts that are not too long, with its place in the source: instants are numbered in order of time."""
+    """Yield a batch, in parts that are not too long, with its places in the source.
+
+    Instants are numbered in order of time.
+    """
     index = next_index + np.searchsorted(instants, batch.device_time_ns.values).astype(np.int64)
     yield from bounded(RecordBatch(batch.topic, index, batch.device_time_ns, batch.columns))
 

@@ -1,4 +1,4 @@
-"""Where the samples of a dataset stand in the file, and which of them can be believed.
+"""Places of a dataset's samples in the file, and which of them can be believed.
 
 The library gives zeros for samples that were never written, and whatever stood in memory where a piece unpacks to less
 than its samples take. So each dataset is placed first: in one block, in its header, or in pieces.
@@ -21,7 +21,7 @@ _LITERAL, _LONG = 32, 7  # of LZF: first control byte of a copy, length that has
 
 @dataclass(frozen=True)
 class Piece:
-    """One piece of a dataset: its place and bytes in the file, and the filters that it was not put through (bits)."""
+    """Piece of a dataset: its place and bytes in the file, and the filters left out (bits)."""
 
     place: int
     nbytes: int
@@ -72,7 +72,10 @@ class Storage:
         return max(len(self.pieces) * self.per_piece, self.samples) * self.sample_bytes
 
     def lost(self, first: int, last: int) -> Iterator[tuple[int, int, str]]:
-        """Samples of [first, last) that are not there or cannot be believed: first, last (exclusive) and the reason."""
+        """Yield the samples of [first, last) that are missing or cannot be believed.
+
+        Each entry: first, last (exclusive) and the reason.
+        """
         if not self.per_piece:
             if last > self.whole:
                 yield max(first, self.whole), last, "cut off"
@@ -90,7 +93,7 @@ class Storage:
         return self._reasons[number]
 
     def _fault(self, number: int, piece: Piece) -> str:
-        """What is wrong with a piece; empty for a sound one."""
+        """Return the fault of a piece; empty for a sound one."""
         if piece.place + piece.nbytes > self.file_bytes:
             return "cut off"
         wanted = self.per_piece * self.sample_bytes

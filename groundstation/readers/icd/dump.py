@@ -1,4 +1,7 @@
-"""An ICD as the text of a DTS file: what :func:`groundstation.readers.icd.load.load` reads back as it was."""
+"""ICD as the text of a DTS file.
+
+:func:`groundstation.readers.icd.load.load` reads it back unchanged.
+"""
 
 import re
 from collections.abc import Iterable, Mapping

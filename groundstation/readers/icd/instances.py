@@ -1,4 +1,4 @@
-"""Which unit each word or message belongs to: two that feed the same signal are two units, ``ins.1`` and ``ins.2``."""
+"""Units of words and messages: two that feed the same signal are ``ins.1`` and ``ins.2``."""
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
@@ -20,7 +20,9 @@ class _Unit:
 def numbered(
     words: tuple[Word429, ...], messages: tuple[Message1553, ...]
 ) -> tuple[tuple[Word429, ...], tuple[Message1553, ...]]:
-    """Words and messages whose signals found by name are numbered where there are several units of a kind.
+    """Number words and messages where there are several units of a kind.
+
+    Only signals found by name are numbered.
 
     A unit is all words of a bus, or all messages of a terminal; of two messages of one terminal that hold the same
     signal (inertial alone and blended with GNSS) each is a unit. Signals that the ICD states are left as they are.
@@ -62,7 +64,7 @@ def _plain(holder: Holder) -> Any:
 
 
 def _is_numbered(element: Element) -> bool:
-    """Whether the signal was found by name; a fine part has that of its word."""
+    """Tell whether the signal was found by name; a fine part has that of its word."""
     return element.is_by_name and not (isinstance(element, Element429) and element.fine_of)
 
 
@@ -86,7 +88,10 @@ def _place(holder: Holder) -> Hashable:
 
 
 def _unit_of(units: list[_Unit], place: Hashable, signals: set[str]) -> int:
-    """Number of the unit that speaks there and has none of the signals yet; a new one where there is none."""
+    """Return the number of the unit at a place that has none of the signals yet.
+
+    A new unit is made where there is none.
+    """
     for number, unit in enumerate(units):
         if unit.place == place and not unit.signals & signals:
             unit.signals |= signals

@@ -1,7 +1,8 @@
-"""Reads an ICD: a DTS file in YAML for 1553 messages, ARINC 429 words or both. A slip names the file, word and key.
+"""Read an ICD: a DTS file in YAML for 1553 messages, ARINC 429 words or both.
 
-Keys of our own: ``channel`` and ``subchannel`` of a word or message; ``signal``, ``sign``, ``transform``, ``status``,
-``step``, ``fine_of`` and ``valid_if`` of an element. docs/chapter10.md describes them.
+The error of a mistake names the file, word and key. We add these keys: ``channel`` and ``subchannel`` of a word or
+message; ``signal``, ``sign``, ``transform``, ``status``, ``step``, ``fine_of`` and ``valid_if`` of an element.
+docs/chapter10.md describes them.
 """
 
 from collections.abc import Callable, Mapping
@@ -84,7 +85,10 @@ def shipped(name: str) -> Icd:
 
 
 def usual_status(schema: str, unit: str) -> Status:
-    """How the sign/status matrix of an element is read that does not say so; bits without a unit are discrete."""
+    """Return the reading of the sign/status matrix of an element that does not state it.
+
+    Bits without a unit are discrete.
+    """
     return STATUS_OF.get(schema, "bnr" if unit else "discrete")
 
 
@@ -102,7 +106,10 @@ def named_icd(name: str) -> Icd:
 
 @dataclass
 class _Checker:
-    """Turns the mappings into words and messages; every complaint names the file, the word and the key."""
+    """Parser of the mappings into words and messages.
+
+    Every error names the file, the word and the key.
+    """
 
     where: str
     unknown: dict[str, int] = field(default_factory=dict)
@@ -126,7 +133,7 @@ class _Checker:
         return value
 
     def named(self, value: Value, place: str, make: Callable[[str, str, dict[str, Value]], Any]) -> tuple[Any, ...]:
-        """What ``make`` gives for every named entry; nothing where there are no entries."""
+        """Return the results of ``make`` for every named entry; empty without entries."""
         if value is None:
             return ()
         entries = self.table(value, place)

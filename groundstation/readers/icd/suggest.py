@@ -1,7 +1,8 @@
-"""A start of an ICD from what is on the buses: known equipment under its names, all else as numbers with their range.
+"""Draft of an ICD from what is on the buses.
 
-Equipment is known by what it sends together, never by one label or address alone: labels mean other things on other
-equipment's buses. Whoever uses the file has to check it.
+Known equipment is put in under its names, all else as numbers with their range. Equipment is known by what it sends
+together, never by one label or address alone: labels mean other things on other equipment's buses. Whoever uses the
+file has to check it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -35,7 +36,7 @@ HEAD = (
 
 
 class BusEntry(Protocol):
-    """What is on a bus under one command word or label, with some of its words.
+    """Entry of a bus: one command word or label, with some of its words.
 
     ``key`` is the command word or the label as a number; ``sub_channel`` is None on 1553; ``sample`` has words of
     shape (m,), or messages of shape (m, words) as recorded, command words first.
@@ -65,7 +66,10 @@ class _Units:
     count: dict[str, int] = field(default_factory=dict)
 
     def named(self, holders: Sequence[Holder]) -> list[Holder]:
-        """Words or messages of one piece of equipment, as the next unit of every kind that it feeds."""
+        """Return the words or messages of one piece of equipment, as the next units.
+
+        They are the next unit of every kind that the equipment feeds.
+        """
         kinds = {kind_of(one.signal) for holder in holders for one in holder.elements if one.signal}
         for kind in kinds:
             self.count[kind] = self.count.get(kind, 0) + 1
@@ -164,7 +168,10 @@ def _range_429(entry: BusEntry, element: Element429) -> str:
 
 
 def _message(entry: BusEntry, units: _Units) -> list[Message1553]:
-    """The message of a command word; none for the receiver of what another terminal sends, which its sender names."""
+    """Return the message of a command word.
+
+    None for the receiver of what another terminal sends: the message is named by its sender.
+    """
     data = _data(entry)
     if data is None:
         return []
@@ -185,7 +192,10 @@ def _message(entry: BusEntry, units: _Units) -> list[Message1553]:
 
 
 def _data(entry: BusEntry) -> Data1553 | None:
-    """Data words of the sample, shape (m, n): behind the command word, of a sender behind its status word too."""
+    """Return the data words of the sample, shape (m, n).
+
+    They follow the command word, of a sender the status word too.
+    """
     rows, count = entry.sample, entry.key & 31 or 32
     if entry.key >> 5 & 31 in (0, 31):
         return None  # a mode code
@@ -248,13 +258,16 @@ def _fits_egi(data: Data1553) -> bool:
 
 
 def _fits_b100(data: Data1553) -> bool:
-    """Nothing in the words that are not used, and a position."""
+    """Tell whether the unused words are zero and there is a position."""
     unused = [1, *range(16, 20), *range(25, 32)]
     return not data[:, unused].any() and _is_position(*_named_values(data, "b100", "latitude", "longitude"))
 
 
 def _fits_f15(data: Data1553) -> bool:
-    """Nothing in the spare words, a position, and a ground speed that is that of its parts."""
+    """Tell whether the spare words are zero, there is a position, and ground speed agrees.
+
+    The ground speed must be that of its north and east parts.
+    """
     latitude_deg, longitude_deg, north, east, speed = _named_values(
         data, "f15_ins", "latitude", "longitude", "velocity_north", "velocity_east", "ground_speed"
     )

@@ -1,4 +1,6 @@
-"""ARINC 429 words to values and back. Bits count from 1, label, to 32, parity; whole arrays at once.
+"""Conversion of ARINC 429 words to values and back, whole arrays at once.
+
+Bits count from 1, label, to 32, parity.
 
 Source: ARINC Specification 429 part 1, chapter 2 (word formats; sign/status matrix, tables 2-1 to 2-3); value of the
 most significant bit as in the DTS files.
@@ -27,7 +29,7 @@ def status_of(words: Words429) -> NDArray[np.uint32]:
 
 
 def has_odd_parity(words: Words429) -> NDArray[np.bool_]:
-    """Whether the number of ones in each word is odd, as it is in every sound one."""
+    """Tell whether the number of ones in each word is odd, as in every sound one."""
     return np.asarray(np.bitwise_count(words) & np.uint8(1) == 1)
 
 
@@ -83,7 +85,9 @@ def step_429(element: Element429) -> float:
 
 
 def encode_429(word: Word429, values: Mapping[str, FloatArray], *, sdi: int = 0) -> Words429:
-    """Words that hold values, the inverse of :func:`decode_429`: rounded, of odd parity, saturated at full scale.
+    """Encode values as words: rounded, of odd parity, saturated at full scale.
+
+    The inverse of :func:`decode_429`.
 
     An angle whose full scale is a half turn goes on at its other end. NaN in any element becomes "no computed data".
 
