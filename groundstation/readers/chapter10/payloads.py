@@ -29,8 +29,6 @@ _STAMP_ALWAYS, _STAMP_IF_FLAGGED = True, False
 class _Stamped(NamedTuple):
     """Layout of messages that stand behind headers: their time, their header, their length.
 
-    Each message has a time, always or where bit 31 of the specific word says so.
-
     A time is always there, or where bit 31 of the specific word says so.
     """
 

@@ -1,4 +1,7 @@
-"""Satellite receivers: UBX, NMEA 0183 and NovAtel OEM in one stream, RTCM 3 between them counted."""
+"""Reader for satellite receivers: UBX, NMEA 0183 and NovAtel OEM in one stream.
+
+RTCM 3 frames between them are counted.
+"""
 
 import re
 from collections.abc import Iterator
@@ -21,7 +24,10 @@ _LEADING = 2  # bytes in front of the first frame that are still a beginning: th
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim what begins with a frame, or holds several in its first 64 KiB, alone or in a computer's text."""
+    """Claim a file that begins with a frame, or has several in its first 64 KiB.
+
+    The frames may stand alone, or in text that a computer wrote.
+    """
     head = source.head[:_LOOKED_AT]
     found = 0
     for tried, match in enumerate(_START.finditer(head)):

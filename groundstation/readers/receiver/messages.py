@@ -1,4 +1,7 @@
-"""Binary messages of a block: their fields as columns under the receiver's own names, one topic a message."""
+"""Binary messages of a block: their fields as columns, one topic a message.
+
+Columns have the receiver's own names.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -62,7 +65,10 @@ class Messages:
 
     @property
     def topic(self) -> str:
-        """``raw.<name>``; with the bytes of the payload behind it where that is shorter than the layout."""
+        """Topic ``raw.<name>``, or ``raw.<name>.<bytes>`` for a payload shorter than the layout.
+
+        The bytes are those of the payload.
+        """
         is_usual = self.layout is None or self.size >= self.layout.size
         return f"raw.{self.name}" if is_usual else f"raw.{self.name}.{self.size}"
 
@@ -76,18 +82,21 @@ class Messages:
         return self._head
 
     def has(self, member: str) -> bool:
-        """Whether the heads have a member."""
+        """Tell whether the heads have a member."""
         return self.layout is not None and self.layout.head.ends.get(member, self.size + 1) <= self.size
 
     @property
     def is_short(self) -> bool:
-        """Whether payloads are shorter than the layout, and of no older version that is known."""
+        """Tell whether payloads are shorter than the layout, and of no known older version."""
         if self.layout is None or self.size >= self.layout.size:
             return False  # also of a text that its layout does not fit: is_sound tells that
         return not self.is_sound or self.size >= self.layout.needed
 
     def misfits(self) -> BoolArray:
-        """Messages whose payload is longer than the layout, or does not hold the group as often as it says."""
+        """Tell which messages have a payload that does not fit the layout.
+
+        It is longer than the layout, or does not hold the group as often as it says.
+        """
         if self.layout is None or self.size < self.layout.size:
             return np.zeros(len(self), dtype=bool)
         behind = self.payload_sizes - self.layout.size
@@ -104,7 +113,10 @@ class Messages:
         return self.layout.head.values(self.head(), self.layout.count).astype(np.int64)
 
     def group(self) -> tuple[NDArray[Any], Int64Array, Int64Array]:
-        """Members of the repeated groups: structures, which message each is of, and its place in the file."""
+        """Return the members of the repeated groups, the message of each, its place in the file.
+
+        The members are structures.
+        """
         assert self.layout is not None and self.layout.group is not None
         width = self.layout.group.dtype.itemsize
         fits = np.maximum(self.payload_sizes - self.layout.size, 0) // width
@@ -126,7 +138,10 @@ def _repeated(counts: Int64Array) -> tuple[Int64Array, Int64Array]:
 
 
 def raw_batches(messages: Messages, time: Column) -> Iterator[RecordBatch]:
-    """Batches of ``raw.<name>``, and of ``raw.<name>.group`` where a group repeats: a row for each of its members."""
+    """Yield batches of ``raw.<name>``, and of ``raw.<name>.group`` where a group repeats.
+
+    The latter have a row for each member of the group.
+    """
     topic, layout = messages.topic, messages.layout
     columns = {} if layout is None else layout.head.columns(messages.head(), messages.size)
     if layout is None or not columns:

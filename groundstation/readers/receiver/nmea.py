@@ -24,7 +24,7 @@ _CENTURY = 80  # two digits of a year from here on are of the last century
 
 @dataclass(frozen=True)
 class Choice:
-    """Which sentences of a stream give ``gnss``.
+    """Choice of the sentences of a stream that give ``gnss``.
 
     Parameters
     ----------
@@ -93,7 +93,9 @@ class Epochs:
     def values(
         self, formatter: str, names: tuple[str, ...], rows_of: Callable[[Sentences], BoolArray] | None = None
     ) -> Columns:
-        """Fields of a formatter by epoch; where an epoch has several such sentences the last that has the field.
+        """Return the fields of a formatter by epoch.
+
+        Where an epoch has several such sentences the last that has the field counts.
 
         ``rows_of`` tells which sentences count, all where it is left out.
         """
@@ -148,7 +150,7 @@ def epochs_of(sentences: Mapping[str, Sentences], choice: Choice = ALL, arrivals
 
 
 def _with_fractions(told_ns: Int64Array, is_whole: BoolArray) -> Int64Array:
-    """Times in whole seconds that stand behind one with a fraction in the same second take that time."""
+    """Give times in whole seconds the fraction of an earlier time in the same second."""
     if not len(told_ns) or not is_whole.any() or is_whole.all():
         return told_ns
     last = np.maximum.accumulate(np.where(is_whole, -1, np.arange(len(told_ns))))
@@ -158,7 +160,10 @@ def _with_fractions(told_ns: Int64Array, is_whole: BoolArray) -> Int64Array:
 
 
 def epoch_start(frames: Frames, sentences: Mapping[str, Sentences], choice: Choice = ALL) -> int:
-    """Number of the frame with which the last second of a block begins, ``len(frames)`` where none has a time."""
+    """Return the number of the frame with which the last second of a block begins.
+
+    ``len(frames)`` where no frame has a time.
+    """
     epochs = epochs_of(sentences, choice)
     if not len(epochs):
         return len(frames)
@@ -169,10 +174,10 @@ def epoch_start(frames: Frames, sentences: Mapping[str, Sentences], choice: Choi
 
 
 def full_times(sentences: Mapping[str, Sentences]) -> tuple[Int64Array, Int64Array]:
-    """Places and UTC nanoseconds of the sentences that tell date and time: RMC (two digits of the year) and ZDA.
+    """Return places and UTC nanoseconds of the sentences that state date and time.
 
-    Makers' sentences tell it where there is none of these. Where an RMC calls its fix valid those that do not are left
-    out: before it a receiver guesses.
+    These are RMC (two digits of the year) and ZDA, or makers' sentences where there is none of them. Where some RMC
+    calls its fix valid, those that do not are left out: before the fix a receiver guesses.
     """
     places, utc_ns = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
     has_standard = any(one.formatter in ("RMC", "ZDA") for one in sentences.values())
@@ -200,7 +205,10 @@ def full_times(sentences: Mapping[str, Sentences]) -> tuple[Int64Array, Int64Arr
 
 
 class DayTimes:
-    """Tells UTC of the epochs of one block after the other; the time of the day, counted on, where no date is told."""
+    """UTC of the epochs of consecutive blocks.
+
+    Where no date is stated it is the time of the day, counted on past midnight.
+    """
 
     def __init__(self, anchors: Anchors) -> None:
         self._anchors = anchors

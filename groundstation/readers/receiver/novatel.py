@@ -1,4 +1,4 @@
-"""NovAtel OEM messages of a block: names, times, and the canonical topics ``gnss`` and ``ins``.
+"""NovAtel OEM messages of a block: names, times, canonical topics ``gnss`` and ``ins``.
 
 NovAtel's vehicle has y forward, x right and z up: roll about y is right wing down positive, pitch about x nose up,
 azimuth clockwise from north, as here. INSPVA's height is above the ellipsoid; others tell it above the sea, with the
@@ -85,7 +85,7 @@ class Timed(Messages):
 
     @property
     def frame_at(self) -> Int64Array:
-        """Where the frames begin in the data of the block."""
+        """Places where the frames begin in the data of the block."""
         return self.places - self.frames.first_byte
 
 
@@ -128,7 +128,10 @@ def _by_size(name: str, frames: Frames, at: Int64Array, payload_at: Int64Array, 
 
 
 def epoch_start(frames: Frames) -> int:
-    """Number of the first message of the last epoch in a block, ``len(frames)`` where there is none."""
+    """Return the number of the first message of the last epoch in a block.
+
+    ``len(frames)`` where there is none.
+    """
     which = frames.of(scan.NOVATEL, scan.NOVATEL_TEXT)
     if not len(which):
         return len(frames)
@@ -173,7 +176,10 @@ def gnss_batch(block: Block, leader: str, tally: Tally) -> RecordBatch | None:
 
 @np.errstate(all="ignore")
 def ins_batch(block: Block, source: str, tally: Tally) -> RecordBatch | None:
-    """Position, velocity and attitude of the receiver's inertial filter, or the heading of its two antennas."""
+    """Return position, velocity and attitude of the receiver's inertial filter.
+
+    Or the heading of its two antennas.
+    """
     messages, fields = block.get(source), block.fields(source)
     if not isinstance(messages, Timed) or fields is None:
         return None
@@ -189,7 +195,10 @@ def ins_batch(block: Block, source: str, tally: Tally) -> RecordBatch | None:
 
 
 def _solution_time(messages: Timed, fields: Mapping[str, NDArray[Any]]) -> Column:
-    """Time of validity: the week and second inside the message where it has them, else those of its header."""
+    """Return the time of validity: the week and second inside the message, or of its header.
+
+    Those of the header count where the message has none.
+    """
     if "seconds" not in fields:
         return messages.time()
     week, seconds = fields["week"].astype(np.int64), fields["seconds"]
@@ -267,7 +276,10 @@ def _spreads(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 def _covariance(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """Roots of the diagonals: position and velocity x east, y north, z up; attitude about x (pitch), y (roll), z."""
+    """Return the roots of the diagonals of the covariances.
+
+    Position and velocity: x east, y north, z up. Attitude: about x (pitch), y (roll), z.
+    """
 
     def root(kind: str, *axes: int) -> Column:
         return Column(np.sqrt(sum(fields[f"{kind}_cov_{axis}"] for axis in axes)))

@@ -1,4 +1,7 @@
-"""The second pass over a stream: batches of every message and sentence, raw and canonical, remarks and damages."""
+"""Second pass over a stream: batches of every message, raw and canonical, then damage.
+
+Remarks come before the damage; NMEA sentences are messages too.
+"""
 
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -28,7 +31,7 @@ _WITH_CHECKSUM = re.compile(rb"[$!][A-Z][A-Z0-9]{2,29},[^\r\n$*]{0,500}\*[0-9A-F
 
 
 def items(source: Source) -> Iterator[Item]:
-    """Yield the header, batches in the order of the blocks of the stream, then remarks and damages.
+    """Yield the header, batches in the order of the blocks of the stream, remarks and damage.
 
     Raises
     ------

@@ -53,7 +53,7 @@ class Frames:
         return self.first_byte + self.offsets
 
     def of(self, *kinds: int) -> Int64Array:
-        """Which frames are of these protocols, increasing."""
+        """Return the numbers of the frames of these protocols, increasing."""
         return np.flatnonzero(np.isin(self.kinds, kinds))
 
     def bytes_at(self, offsets: Int64Array, width: int) -> NDArray[np.uint8]:
@@ -121,7 +121,7 @@ class Stream:
         self._finish(data, base)
 
     def damages(self) -> Iterator[Damage]:
-        """What was skipped, in the order of the file."""
+        """Yield the bytes that were skipped, in the order of the file."""
         yield from self._skipped.damages()
         if self._cut is not None:
             start, end = self._cut
@@ -129,7 +129,7 @@ class Stream:
             yield Damage("truncated", bytes_place(start, end), end - start, what, between_records=(start - 1, start))
 
     def _held_back(self, block: Frames) -> int:
-        """How many frames of a block are given now."""
+        """Return how many frames of a block are given now."""
         if self._epoch_start is None or not len(block):
             return len(block)
         first = self._epoch_start(block)
@@ -177,7 +177,10 @@ class Stream:
                 return
 
     def _strange_texts(self, frames: Frames) -> list[list[int]]:
-        """Texts around the frames that are none of the computer's, from start to end; the frames lose them."""
+        """Remove texts around the frames that are not the computer's.
+
+        Returns them as pairs of start and end.
+        """
         strange: list[list[int]] = []
         if frames.texts is None or self._is_hosts is None:
             return strange

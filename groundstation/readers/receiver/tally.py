@@ -1,4 +1,4 @@
-"""Counts of what a stream tells that cannot be, or cannot be read, and what is told of it once the stream was read."""
+"""Counts of values that cannot be or cannot be read, and their report at the end."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -38,7 +38,7 @@ _LENGTHS = {
 
 @dataclass
 class Tally:
-    """Rows, messages and cells by what is odd about them, and the byte of the file at which the first stands.
+    """Counts of odd rows, messages and cells by kind, each with the byte of the first.
 
     Parameters
     ----------
@@ -62,7 +62,10 @@ class Tally:
         self._count(self._rows, (what, topic), places)
 
     def add_lengths(self, messages: Messages, is_poll: bool) -> None:
-        """Count the messages whose payload their layout does not fit; one that asks for an answer has none."""
+        """Count the messages whose payload does not fit their layout.
+
+        A message that asks for an answer has no payload.
+        """
         if messages.is_short and not is_poll:
             self._count(self._lengths, (SHORTER, messages.name), messages.places)
         if messages.layout is None and not messages.is_sound:

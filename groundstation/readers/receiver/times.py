@@ -1,4 +1,6 @@
-"""Absolute times of a stream: receivers write the time of the week or of the day, and the date in some messages only.
+"""Absolute times of a stream.
+
+Receivers write the time of the week or of the day, and the date in some messages only.
 
 Every message that tells the full time is an anchor; another takes the week or day that brings it nearest to the anchor
 before it. So weeks and days roll over by themselves, also where the message that tells them comes late. GPS time is
@@ -51,8 +53,11 @@ class LateStretch:
 
 @dataclass(frozen=True, eq=False)
 class Anchors:
-    """Places in the file (increasing) at which the full time is known, UTC nanoseconds, and the week's milliseconds
-    told there (-1: none). ``late`` are stretches of sentences whose times of the day are late."""
+    """Places in the file (increasing) where the full time is known, in UTC nanoseconds.
+
+    ``week_ms`` are the week's milliseconds told there (-1: none). ``late`` are stretches of sentences whose times of
+    the day are late.
+    """
 
     places: Int64Array
     utc_ns: Int64Array
@@ -63,9 +68,10 @@ class Anchors:
         return len(self.places)
 
     def of_week(self, places: Int64Array, week_ms: Int64Array) -> Column:
-        """UTC of times of the week in milliseconds; that of the anchor itself where both are of one epoch.
+        """Return the UTC of times of the week in milliseconds.
 
-        Without an anchor the times of the week, counted on.
+        It is that of the anchor itself where both are of one epoch. Without an anchor it is the time of the week,
+        counted on.
         """
         if not len(self):
             return Column(unrolled(week_ms, WEEK_MS) * NS_PER_MS, week_ms < WEEK_MS)
@@ -80,7 +86,10 @@ class Anchors:
         return self._credible(places, utc_ns, week_ms < WEEK_MS)
 
     def of_day(self, places: Int64Array, day_ns: Int64Array) -> Column:
-        """UTC of times of the day in nanoseconds; without an anchor the times of the day, counted on."""
+        """Return the UTC of times of the day in nanoseconds.
+
+        Without an anchor it is the time of the day, counted on.
+        """
         day_ns = self._in_time(places, day_ns)
         if not len(self):
             return Column(unrolled(day_ns, DAY_NS))
@@ -209,7 +218,9 @@ def unrolled(values: Int64Array, period: int) -> Int64Array:
 
 
 def fine_utc_ns(utc_ns: Int64Array, week_ms: Int64Array) -> tuple[Int64Array, Int64Array]:
-    """UTC of a fix by its time of the week with the fraction of its UTC, and how many seconds the told UTC was wrong.
+    """Return the UTC of a fix by its time of the week, and the error of its stated UTC.
+
+    The fraction is that of its UTC. The error is in whole seconds.
 
     Parameters
     ----------

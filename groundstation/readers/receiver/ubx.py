@@ -78,7 +78,10 @@ def time_of(messages: Messages, anchors: Anchors) -> Column:
 
 
 def timed(frames: Frames, anchors: Anchors) -> list[tuple[Messages, Column]]:
-    """Messages of a block with their times; one that tells none has that of the message with a time before it."""
+    """Return the messages of a block with their times.
+
+    A message without a time has that of the message with a time before it.
+    """
     several = [(messages, time_of(messages, anchors)) for messages in messages_of(frames)]
     known = [(messages.places[time.mask], time.values[time.mask]) for messages, time in several]
     if not known:
@@ -146,7 +149,7 @@ class FullTimes:
         self._add(places, time.values, np.full(len(places), -1), time.mask)
 
     def anchors(self) -> Anchors:
-        """What was gathered, in the order of the file."""
+        """Return the gathered anchors, in the order of the file."""
         if not self._places:
             return NO_ANCHORS
         places, utc_ns, week_ms = (np.concatenate(parts) for parts in (self._places, self._utc_ns, self._week_ms))
@@ -168,7 +171,10 @@ class FullTimes:
         self._add(messages.places, utc_ns, week_ms, np.asarray(sound))
 
     def _of_calendar(self, messages: Messages, head: NDArray[Any]) -> None:
-        """Dates and times of fixes that are called valid. Nanoseconds may be negative: they are added."""
+        """Take in dates and times of fixes that are called valid.
+
+        Nanoseconds may be negative: they are added.
+        """
         year, month, day = (head[name].astype(np.int64) for name in ("year", "month", "day"))
         midnight_ns, sound = calendar_ns(year, month, day)
         needed = 7 if messages.name.endswith("TIMEUTC") else 3
@@ -186,9 +192,10 @@ class FullTimes:
 
 
 def epoch_start(frames: Frames, leader: str) -> int:
-    """Number of the first message of the last epoch in a block, ``len(frames)`` where there is none.
+    """Return the number of the first message of the last epoch in a block.
 
-    Messages of the class of the leading one count: the others of its epoch stand beside it.
+    ``len(frames)`` where there is none. Messages of the class of the leading one count: the others of its epoch stand
+    beside it.
     """
     which = frames.of(scan.UBX)
     at = frames.offsets[which]

@@ -1,4 +1,6 @@
-"""MAVLink messages as canonical signals. Units and frames are those of the message definitions (common.xml).
+"""MAVLink messages as canonical signals.
+
+Units and frames are those of the message definitions (common.xml).
 
 The vehicle's axes are forward-right-down, those of the earth north-east-down: nothing is turned.
 """

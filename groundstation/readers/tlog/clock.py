@@ -1,8 +1,9 @@
-"""The vehicle's clock in a telemetry log: when values were true, though frames arrive late and in bursts.
+"""Vehicle's clock in a telemetry log: times of validity, though frames arrive late.
 
-Most messages tell the time since the sender was switched on (``time_boot_ms``, ``time_usec``), or since 1970. Receipt
-less clock is never below the offset between the two: its lower envelope places the clock on the time of receipt.
-SYSTEM_TIME tells UTC. A message without a time is placed by those that its system sent before and behind it.
+Frames also arrive in bursts. Most messages state the time since the sender was switched on (``time_boot_ms``,
+``time_usec``), or since 1970. Receipt less clock is never below the offset between the two: its lower envelope places
+the clock on the time of receipt. SYSTEM_TIME states UTC. A message without a time is placed by those that its system
+sent before and behind it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -95,7 +96,10 @@ class TimeReader:
     unwrapped: _Unwrapped = field(default_factory=_Unwrapped)
 
     def read(self, block: Block, which: Int64Array) -> tuple[Int64Array, BoolArray]:
-        """Times in nanoseconds, -1 where there is none, and which count from 1970; shape (n,) each."""
+        """Return times in nanoseconds, and which of them count from 1970; shape (n,) each.
+
+        A time is -1 where there is none.
+        """
         one = time_fields()[self.number]
         numbers = block.rows(which, messages()[self.number])[one.name]
         if one.unit_ns == NS_PER_MS:
@@ -163,7 +167,7 @@ class SenderClock:
         return found
 
     def late_ns(self, record_index: Int64Array, received_ns: Int64Array, clock_ns: Int64Array) -> Int64Array:
-        """How late records arrived, by the ground station's clock."""
+        """Return how late records arrived, by the ground station's clock."""
         found = received_ns - clock_ns
         if len(self.epochs) == 1:
             return np.asarray(found - self.epochs[0].line.at(clock_ns))
@@ -174,7 +178,10 @@ class SenderClock:
         return np.asarray(found)
 
     def lateness(self, track: Track, since_1970: bool) -> "Lateness":
-        """How late the readings of a message arrived; those whose relation to the clock is known."""
+        """Return how late the readings of a message arrived.
+
+        Only those whose relation to the clock is known.
+        """
         own_ns = self.by_its_clock(track.clock_ns, np.full(len(track), since_1970))
         known = track.take(own_ns >= 0)
         late_ns = self.late_ns(known.record_index, known.receipt_ns, own_ns[own_ns >= 0])
@@ -209,7 +216,10 @@ class Clocks:
     ground_ns: int
 
     def texts(self, vehicle: int, most_late_ns: int) -> Iterator[str]:
-        """What a user must know; ``most_late_ns`` is how late a frame arrived at most."""
+        """Yield texts on the clocks for the user.
+
+        ``most_late_ns`` is how late a frame arrived at most.
+        """
         for record, size_ns in self.offsets.steps():
             yield f"the ground station's clock was set by {size_ns / NS_PER_S:+.3f} s before frame {record}"
         if self.ground_ns:
@@ -342,7 +352,7 @@ class ClockSurvey:
 
 
 class Lateness(NamedTuple):
-    """How late some records arrived, and their places among all of their message; shape (n,) each."""
+    """Lateness of some records, and their places among all of their message; shape (n,) each."""
 
     record_index: Int64Array
     number: Int64Array
@@ -362,7 +372,10 @@ def _level(track: Track) -> int:
 
 
 def _go_together(reference: Lateness, other: Lateness) -> bool:
-    """Whether the times of a message are by the clock of its sender: mostly as late as those that are read for it."""
+    """Tell whether the times of a message are by the clock of its sender.
+
+    They are when they are mostly as late as those that are read for it.
+    """
     if len(other.late_ns) == 0:
         return False
     off_ns = other.late_ns - np.interp(other.record_index, reference.record_index, reference.late_ns)
@@ -371,7 +384,10 @@ def _go_together(reference: Lateness, other: Lateness) -> bool:
 
 
 def _utc_within(utc: Track | None, first: int, end: int, line: Line) -> int | None:
-    """UTC less the clock by SYSTEM_TIME between two records: its last level; None where it does not tell."""
+    """Return UTC less the clock by SYSTEM_TIME between two records: its last level.
+
+    None where SYSTEM_TIME does not tell.
+    """
     if utc is None:
         return None
     within = utc.take((utc.record_index >= first) & (utc.record_index < end))
@@ -384,7 +400,10 @@ def _utc_within(utc: Track | None, first: int, end: int, line: Line) -> int | No
 
 
 def _ground_ns(senders: Mapping[int, SenderClock], by: Mapping[int, Track], vehicle: int) -> int:
-    """What is added to the ground station's clock to have UTC, by the vehicle, or by another sender that tells it."""
+    """Return what must be added to the ground station's clock to get UTC.
+
+    It follows from the vehicle, or another sender that states UTC.
+    """
     for sender in sorted(senders, key=lambda sender: (sender != vehicle, sender)):
         for epoch in reversed(senders[sender].epochs):
             if epoch.utc_ns is not None:

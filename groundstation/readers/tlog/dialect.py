@@ -1,4 +1,6 @@
-"""What MAVLink messages hold: the tables of pymavlink (LGPL), which is installed beside by `groundstation[tlog]`.
+"""Fields of MAVLink messages, from the tables of pymavlink (LGPL).
+
+``groundstation[tlog]`` installs it.
 
 Only its tables of fields are used; frames are found and read by our own code.
 """
@@ -32,7 +34,7 @@ _DTYPES = {
 
 @dataclass(frozen=True)
 class Message:
-    """Layout of one message: its dtype, the fields that are text, and those that are arrays with their length."""
+    """Layout of one message: its dtype, its text fields, and its arrays with their length."""
 
     name: str
     dtype: np.dtype[Any]

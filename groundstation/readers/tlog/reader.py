@@ -1,4 +1,7 @@
-"""Items of a telemetry log: batches of every message, raw and canonical, then remarks and damages."""
+"""Items of a telemetry log: batches of every message, then remarks and damage.
+
+Each message comes raw, and canonical where a rule serves it.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -88,7 +91,7 @@ class _Frames:
                 self.skipped.add(base + start, base + end, count + before)
 
     def damages(self) -> Iterator[Damage]:
-        """What was skipped or cut."""
+        """Yield the bytes that were skipped or cut."""
         yield from self.skipped.damages()
         if self.cut is not None:
             start, end = self.cut
@@ -99,7 +102,7 @@ class _Frames:
 
 
 def _begins_frame(data: NDArray[np.uint8]) -> bool:
-    """Whether bytes are a time and the beginning of a frame, or the beginning of a time."""
+    """Tell whether bytes are a time and the beginning of a frame, or the beginning of a time."""
     return len(data) < 18 or int(data[8]) in (0xFE, 0xFD)
 
 
@@ -186,7 +189,7 @@ def _part(block: Block, which: Int64Array, message: Message, validity_ns: Int64A
 
 
 def _served(met: Mapping[str, frozenset[str]]) -> dict[str, list[Assignment]]:
-    """What messages with these columns feed, by their names."""
+    """Return, by message name, the canonical topics that messages with these columns feed."""
     names = {INSTANCES.get(name, (name, 0)): name for name in met}
     offers = [Offer(*source, met[name]) for source, name in names.items()]
     served: dict[str, list[Assignment]] = {}
@@ -198,7 +201,7 @@ def _served(met: Mapping[str, frozenset[str]]) -> dict[str, list[Assignment]]:
 def _take(
     canonical: dict[str, list[Part]], part: Part, assignments: Sequence[Assignment], nowhere: Counter[str]
 ) -> None:
-    """Add what a message gives to canonical topics; ``nowhere`` counts positions that are none."""
+    """Add the values of a message to canonical topics; ``nowhere`` counts missing positions."""
     if not assignments:
         return
     with np.errstate(invalid="ignore"):  # of a NaN that signals
@@ -242,7 +245,7 @@ class _Arming:
 
 
 def _remarks(served: Mapping[str, Sequence[Assignment]], clock_texts: Iterable[str]) -> Iterator[Remark]:
-    """What serves as what, and by which clock."""
+    """Yield remarks on what serves each topic, and by which clock."""
     sources: dict[str, list[str]] = {}
     for name, several in served.items():
         for one in several:

@@ -1,4 +1,7 @@
-"""When the values in the frames of a telemetry log were true, block by block, by the clocks of their senders."""
+"""Times of validity of the frames of a telemetry log, block by block.
+
+They follow from the clocks of the senders.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -33,7 +36,10 @@ class Timer:
         self._device_ns: Int64Array = np.zeros(0, dtype=np.int64)  # when the last frame before the block was received
 
     def validity_ns(self, block: Block, following: Block | None) -> Int64Array | None:
-        """Times of validity of a block's frames by the ground station's clock, shape (n,); None without any clock."""
+        """Return the times of validity of a block's frames, shape (n,).
+
+        They are by the ground station's clock; None without any clock.
+        """
         if not self._clocks.senders:
             return None
         own = self._references or self._read_references(block)
@@ -84,7 +90,10 @@ class Timer:
         return self._clocks.senders[sender].by_its_clock(*reader.read(block, which))
 
     def _read_references(self, block: Block) -> dict[int, NDArray[np.int64]]:
-        """The frames of each sender that are read for its clock: record, receipt, clock; those that can be true."""
+        """Read the frames of each sender that serve its clock: record, receipt, clock.
+
+        Only those that can be true.
+        """
         found = {}
         received_ns = self._received_ns(block)
         for sender, number, which in block.groups:
@@ -141,7 +150,10 @@ class Timer:
     def _of_sender(
         self, sender: int, rows: Int64Array, known: NDArray[np.int64], is_known: BoolArray
     ) -> NDArray[np.int64]:
-        """Frames of a sender whose time is known, with the last before the block and the first behind it."""
+        """Return the frames of a sender whose time is known.
+
+        The last one before the block and the first one behind it are included.
+        """
         nothing = np.zeros((3, 0), dtype=np.int64)
         behind = self._references.get(sender, nothing)[:, :1]
         if behind.shape[1]:
@@ -178,7 +190,10 @@ def _near(short_ns: Int64Array, clock_ns: Int64Array) -> Int64Array:
 
 
 def _between(index: Int64Array, received_ns: Int64Array, known: NDArray[np.int64]) -> Int64Array:
-    """UTC of frames between others, by the time of receipt, or by their order where that is one."""
+    """Return the UTC of frames between others by the time of receipt.
+
+    Where the receipt is the same, the order of the frames counts.
+    """
     at = np.searchsorted(known[0], index)
     low, high = np.maximum(at - 1, 0), np.minimum(at, known.shape[1] - 1)
     records, times, utc = known
