@@ -1,4 +1,7 @@
-"""Robots' logs: MCAP of other programs, ROS 1 bags (.bag), ROS 2 bags (sqlite3, MCAP, split ones by their folder)."""
+"""Reader for robots' logs: MCAP of other programs, ROS 1 bags, ROS 2 bags.
+
+ROS 1 bags end with .bag; ROS 2 bags are sqlite3 or MCAP, split ones are read by their folder.
+"""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +14,10 @@ NAME = "bag"
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim a file by its first bytes, the metadata of a bag of ROS 2, and what has lost them but holds a chunk."""
+    """Claim a file by its first bytes, by ROS 2 metadata, or by a chunk in it.
+
+    The chunk counts where the first bytes are lost.
+    """
     kind = kind_of(source)
     return Claim(NAME, kind, confidence=1.0 if is_begun(source) else 0.5) if kind else None
 

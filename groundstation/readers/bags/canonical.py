@@ -1,4 +1,4 @@
-"""Messages of robots as canonical signals: which fields a message gives, in which unit and frame.
+"""Canonical signals from robots' messages: fields, units and frames by message type.
 
 Units and frames are those of the message definitions and of REP 103, 105 and 145: metres, radians, tesla; east-north-up
 and forward-left-up.
@@ -27,7 +27,7 @@ EARTH_FRAMES = frozenset({"map", "earth", "enu", "world", "utm", "ned", "local_e
 
 @dataclass(frozen=True)
 class Message:
-    """What a message type gives.
+    """Message type and the canonical columns that it gives.
 
     Parameters
     ----------
@@ -45,12 +45,18 @@ class Message:
 
 
 def is_ned(values: Values) -> bool:
-    """Whether a message names a frame that is north-east-down already (REP 103: its name ends with ``_ned``)."""
+    """Tell whether a message names a frame that is north-east-down already.
+
+    By REP 103 the name of such a frame ends with ``_ned``.
+    """
     return _frame(values) == "ned" or _frame(values).endswith("_ned")
 
 
 def is_earth_frame(values: Values) -> bool:
-    """Whether a message names a frame whose axes are those of the earth (REP 105: ``odom`` begins anywhere)."""
+    """Tell whether a message names a frame whose axes are those of the earth.
+
+    By REP 105 ``odom`` begins anywhere.
+    """
     return _frame(values) in EARTH_FRAMES or _frame(values).endswith(("_enu", "_ned"))
 
 
@@ -59,7 +65,10 @@ def _frame(values: Values) -> str:
 
 
 def imu(values: Values) -> Columns:
-    """Attitude, rates and specific force; a covariance that begins with -1 says that a driver has no such value."""
+    """Return attitude, rates and specific force.
+
+    A covariance that begins with -1 says that a driver has no such value.
+    """
     known = {name: _is_known(values, f"{name}_covariance[0]") for name in _IMU_PARTS}
     columns: Columns = {}
     if values.has_triple("orientation"):
@@ -89,7 +98,10 @@ def navsatfix(values: Values) -> Columns:
 
 
 def sigmas(values: Values, present: np.ndarray) -> Columns:
-    """Standard deviations of a position by its covariance, east-north-up, where the message says that it is known."""
+    """Return the standard deviations of a position by its covariance, east-north-up.
+
+    Only where the message says that the covariance is known.
+    """
     if not all(name in values for name in _COVARIANCE):
         return {}
     east, north, up = (values[name] for name in _COVARIANCE[:3])
@@ -118,7 +130,10 @@ def location_fix(values: Values) -> Columns:
 
 
 def gps_fix(values: Values) -> Columns:
-    """Position, velocity and dilution of gps_msgs/GPSFix (gpsd); NaN is a value that it does not have."""
+    """Return position, velocity and dilution of gps_msgs/GPSFix (gpsd).
+
+    NaN is a value that the message does not have.
+    """
     has_fix = values["status.status"] >= 0.0
     track, speed = values["track"], values["speed"]
     has_track = has_fix & np.isfinite(track) & np.isfinite(speed)
@@ -168,7 +183,10 @@ def wheel_odometry(values: Values) -> Columns:
 
 
 def odometry(values: Values) -> Columns:
-    """Attitude, local position and velocity of an odometry whose frame has the axes of the earth."""
+    """Return attitude, local position and velocity of an odometry in an earth frame.
+
+    Its frame must have the axes of the earth.
+    """
     x, y, z = rotated(values, "pose.pose.orientation", "twist.twist.linear")
     velocity = _ned(values, x, y, z, VELOCITY)
     rates = body(values, "twist.twist.angular", RATES, DEG_PER_RAD, None, is_turned=not is_ned(values))

@@ -1,7 +1,8 @@
-"""Three clocks of a bag: log time, publish time, header stamp. Which of them was set, and which is believed.
+"""Three clocks of a bag: log time, publish time, header stamp.
 
-Log time is the recorder's computer's. Where it steps while stamps go on smoothly it was set: it is moved by as much.
-Stamps are believed where they go with the log time, or where they go on smoothly while messages were logged in bursts.
+This module finds which of them was set, and which is believed. Log time is that of the recorder's computer. Where it
+steps while stamps go on smoothly, the clock was set: log time is moved by as much. Stamps are believed where they go
+with the log time, or where they go on smoothly while messages were logged in bursts.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -31,7 +32,9 @@ _LARGEST_LAG_NS = int(LARGEST_LAG_S * NS_PER_S)
 
 
 def was_set(jumps: Sequence[Jump], offsets: Offsets) -> bool:
-    """Whether a corrected log time falls by a second or more, or leaps from before 1980, for more than a few messages.
+    """Tell whether a corrected log time falls by a second or more, or leaps from before 1980.
+
+    A slip of a few messages does not count.
 
     Parameters
     ----------
@@ -51,13 +54,16 @@ def was_set(jumps: Sequence[Jump], offsets: Offsets) -> bool:
 
 
 def _is_back(jump: Jump, later: Jump) -> bool:
-    """Whether the log time is a few messages behind a jump where it was."""
+    """Tell whether the log time returns to its old course a few messages after a jump."""
     return later.number - jump.number < FEWEST_READINGS and 0 <= later.time_ns - jump.before_ns < _SLIP_NS
 
 
 @dataclass
 class Sample:
-    """Columns of integers, thinned evenly as they grow: each row that is kept stands for ``stride`` rows."""
+    """Columns of integers, thinned evenly as they grow.
+
+    Each row that is kept stands for ``stride`` rows.
+    """
 
     columns: int
     stride: int = 1
@@ -126,12 +132,12 @@ class Stamped:
         return stretches_of(self.track)
 
     def line(self, connection: Connection) -> Line:
-        """When the connection was written."""
+        """Return the log times at which the connection was written."""
         return Line(connection, np.sort(self.log.all()[0]), self.log.stride)
 
 
 def told(offsets: Offsets, names: Mapping[int, str]) -> str:
-    """What was set when, for people; ``names`` are topics by their numbers."""
+    """Describe for people how the clock was set; ``names`` are topics by their numbers."""
     parts = [f"by {size_ns / NS_PER_S:+.3f} s before record {record}" for record, size_ns in offsets.steps()]
     if not parts:
         added_s = int(offsets.added_ns[0]) / NS_PER_S
@@ -141,7 +147,9 @@ def told(offsets: Offsets, names: Mapping[int, str]) -> str:
 
 
 def offsets_of(stamped: Mapping[int, Stamped]) -> Offsets:
-    """How log times are to be moved so that they go on smoothly with the stamps; zero where they were set right.
+    """Return offsets that make log times go on smoothly with the stamps.
+
+    Zero where the clock was set right.
 
     Parameters
     ----------
@@ -160,7 +168,10 @@ def offsets_of(stamped: Mapping[int, Stamped]) -> Offsets:
 
 
 def _added_where_right(track: Track, offsets: Offsets) -> tuple[int, int] | None:
-    """Last stretch of the log time that is plausible and near the stamps: its first record, and what was added."""
+    """Return first record and offset of the last stretch of log time that can be right.
+
+    It is plausible and near the stamps.
+    """
     for place in range(len(offsets.starts) - 1, -1, -1):
         end = offsets.starts[place + 1] if place + 1 < len(offsets.starts) else np.iinfo(np.int64).max
         within = track.take((track.record_index >= offsets.starts[place]) & (track.record_index < end))
@@ -172,7 +183,10 @@ def _added_where_right(track: Track, offsets: Offsets) -> tuple[int, int] | None
 
 
 def _least_unset(tracks: Iterable[Track], offsets: Offsets) -> int | None:
-    """Least difference of a log time that was never set and stamps that are a time; None where there are none."""
+    """Return the least difference between a log time that was never set and dated stamps.
+
+    None where there are none.
+    """
     levels = []
     for track in tracks:
         is_date = track.clock_ns >= FIRST_NS
@@ -184,7 +198,7 @@ def _least_unset(tracks: Iterable[Track], offsets: Offsets) -> int | None:
 
 @dataclass(frozen=True, eq=False)
 class Lags:
-    """How long after their stamps the messages of a source were logged.
+    """Lags of a source's messages: how long after their stamps they were logged.
 
     Parameters
     ----------
@@ -244,7 +258,7 @@ class Lags:
 
     @property
     def usual_ns(self) -> int:
-        """Their median."""
+        """Median of the lags."""
         return int(np.sort(self.lag_ns)[len(self.lag_ns) // 2]) if len(self.lag_ns) else 0
 
     @property
@@ -254,19 +268,19 @@ class Lags:
 
     @property
     def are_good(self) -> bool:
-        """Whether the stamps are believed."""
+        """Tell whether the stamps are believed."""
         if self.is_stopped or self.share < BELIEVED_SHARE:
             return self.is_stopped
         return bool(self.believed(self.lag_ns).mean() >= USUAL_SHARE)
 
     def believed(self, lag_ns: Int64Array) -> BoolArray:
-        """Which stamps are near enough to the log time, shape (n,)."""
+        """Tell which stamps are near enough to the log time, shape (n,)."""
         if self.is_stopped:
             return np.ones(len(lag_ns), dtype=bool)
         return (lag_ns >= -_LARGEST_LAG_NS) & (lag_ns <= self.most_ns)
 
     def may_be_late(self, lag_ns: Int64Array) -> BoolArray:
-        """Which messages may have waited, if their stamps are in order, shape (n,)."""
+        """Tell which messages may have waited, if their stamps are in order, shape (n,)."""
         return (lag_ns > 0) & (lag_ns <= round(MOST_QUEUED_S * NS_PER_S))
 
     def text(self) -> str:
@@ -279,7 +293,7 @@ class Lags:
 
 
 def _is_stopped(one: Stamped) -> bool:
-    """Whether the log time stands still while stamps that are a date go on."""
+    """Tell whether the log time stands still while stamps that are a date go on."""
     _record, log_ns, stamp_ns = one.stamps.all()
     if len(log_ns) < FEWEST_READINGS or np.ptp(one.log.all()[0]) or stamp_ns.min() < FIRST_NS:
         return False
@@ -292,7 +306,10 @@ def _is_near(track: Track) -> bool:
 
 
 def _astray(track: Track, stretches: Sequence[Stretch]) -> Int64Array:
-    """Records of readings that are not of the stretches, and of a few in a row that did not merely wait."""
+    """Return the records of readings that are not of the stretches.
+
+    A few readings in a row that did not merely wait are included.
+    """
     sound = [track.record_index[:0], *(one.track.record_index for one in stretches)]
     kept = np.concatenate(sound)
     found = [np.setdiff1d(track.record_index, kept) if len(kept) < len(track) else kept[:0]]
@@ -307,7 +324,10 @@ def _astray(track: Track, stretches: Sequence[Stretch]) -> Int64Array:
 
 
 def _is_queued(late: Int64Array) -> bool:
-    """Whether messages waited, by their lags, log times and stamps: the stamps are evener than the log times."""
+    """Tell whether messages waited, by their lags, log times and stamps.
+
+    If they did, the stamps are evener than the log times.
+    """
     if not np.any(late[0] > _LARGEST_LAG_NS):
         return True  # none did
     stamp, log = (float(np.mean(np.abs(change - np.median(change)))) for change in np.diff(late[[2, 1]], axis=1))

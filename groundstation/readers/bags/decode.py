@@ -88,16 +88,19 @@ class Decoder:
 
     @property
     def has_places(self) -> bool:
-        """Whether the values of messages stand at places that many share."""
+        """Tell whether the values of messages stand at places that many messages share."""
         return self._definition is not None and not self.reason
 
     def stands_at_one_place(self, name: str) -> bool:
-        """Whether a value stands at one place in all messages."""
+        """Tell whether a value stands at one place in all messages."""
         shape = next(iter(self._shapes.values()), None)
         return shape is not None and shape.at_one_place(name) is not None
 
     def values_at_one_place(self, block: Block, name: str) -> tuple[Int64Array, Column] | None:
-        """Rows of messages that are long enough, and a value of them that stands at one place in all; None else."""
+        """Return the rows of messages that are long enough, and one value of each.
+
+        The value must stand at one place in all messages; None otherwise.
+        """
         shape = next(iter(self._shapes.values()), None)
         leaf = shape.at_one_place(name) if shape is not None else None
         if shape is None or leaf is None:
@@ -273,7 +276,7 @@ def _column(values: list[Any], kind: str) -> Column:
 
 
 def _fits(value: Any, kind: str) -> bool:
-    """Whether a value can stand in a column of flags, integers of 64 bits or other numbers."""
+    """Tell whether a value fits in a column of flags, 64-bit integers or other numbers."""
     if kind == "b" or isinstance(value, bool) or value is None:
         return kind == "b" and isinstance(value, bool)
     if not isinstance(value, int | float):

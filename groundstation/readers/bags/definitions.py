@@ -1,4 +1,6 @@
-"""Message definitions of ROS 1 and ROS 2 as a bag carries them: the text of the type, then those of its parts.
+"""Message definitions of ROS 1 and ROS 2 as a bag carries them.
+
+The text of the type comes first, then those of its parts.
 
 Source: http://wiki.ros.org/msg (ROS 1); https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html (ROS 2).
 """

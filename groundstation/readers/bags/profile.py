@@ -1,6 +1,6 @@
-"""Profiles of messages (TOML): which path of which message is which quantity, in which unit and frame.
+"""Profiles of messages (TOML): the quantity, unit and frame of paths in messages.
 
-docs/bags.md describes every key; what is not said there is that of the profiles of tables.
+docs/bags.md describes every key; all other keys are those of the profiles of tables.
 """
 
 from collections.abc import Callable, Mapping
@@ -39,7 +39,10 @@ ATTITUDE = "attitude"  # of a quaternion x, y, z, w: flu in enu, or frd in ned
 
 @dataclass(frozen=True)
 class VectorRule:
-    """A vector of the message: where it goes, what it is, its frame, and the factor to the unit of the fields."""
+    """Rule for a vector of the message: its topic, quantity, frame and factor.
+
+    The factor is to the unit of the fields.
+    """
 
     name: str
     topic: str
@@ -48,7 +51,7 @@ class VectorRule:
     factor: float = 1.0
 
     def columns(self, values: Values) -> Columns:
-        """Its fields; none where the message lacks it."""
+        """Return the fields of the vector; none where the message lacks it."""
         if not values.has_triple(self.name) or (self.quantity == ATTITUDE and f"{self.name}.w" not in values):
             return {}
         if self.quantity == ATTITUDE:
@@ -62,7 +65,7 @@ class VectorRule:
 
 @dataclass(frozen=True)
 class MessageRule:
-    """What the messages of a topic, or of a type, mean."""
+    """Rule for the messages of a topic, or of a type."""
 
     topic: str
     type: str
@@ -72,7 +75,7 @@ class MessageRule:
     time: tuple[str, str] | None = None
 
     def serves(self, connection: Connection) -> bool:
-        """Whether the rule is for a connection's messages."""
+        """Tell whether the rule is for a connection's messages."""
         return fnmatchcase(connection.topic, self.topic) and (not self.type or connection.type == self.type)
 
     @property
@@ -109,7 +112,10 @@ class MessageRule:
         return np.asarray(whole.astype(np.int64) * unit_ns + np.rint((number - whole) * unit_ns).astype(np.int64))
 
     def told(self, present: Mapping[str, Column]) -> tuple[str, tuple[str, ...]]:
-        """What the rule understood, with units and frames, and the names it has that the messages lack."""
+        """Describe what the rule maps, and list its names that the messages lack.
+
+        The description has units and frames.
+        """
         parts, missing = [], []
         for rule in self.columns:
             factor = f" x {rule.factor:g}" if rule.factor != 1.0 else ""

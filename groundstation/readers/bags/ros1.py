@@ -1,4 +1,4 @@
-"""Bags of ROS 1 (version 2.0): records of a header and data, most of them in compressed chunks.
+"""Bags of ROS 1 (version 2.0): records of a header and data, mostly in compressed chunks.
 
 The index at the end tells the connections before the first chunk is read, and how many messages there should be; a bag
 that was cut has none, and is read without. A bag has no checksums.
@@ -103,7 +103,10 @@ class Ros1Bag:
             yield from self._messages(records.read(start, end - start), bytes_place(start, end))
 
     def _missing(self, index: Index) -> Iterator[Missing | Damage]:
-        """Messages and chunks that the bag counts and that were not met; a bag without its index was cut."""
+        """Yield the messages and chunks that the bag counts and that were not met.
+
+        A bag without its index was cut.
+        """
         is_told = False
         if not self._source.head.startswith(MAGIC) and not self._skipped:
             yield Damage("corrupt", "byte 0", 1, "header of the bag is missing", loses_data=False)
@@ -175,9 +178,9 @@ class Ros1Bag:
             )
 
     def _behind(self, content: bytes, at: int) -> int:
-        """Where the next record stands behind bytes that are none; the end of the content when none does.
+        """Return the place of the next record behind bytes that are none.
 
-        Where that was asked too often the rest is given up.
+        The end of the content when there is no record, or when this was asked too often: then the rest is given up.
         """
         self._searched += 1
         if self._searched > MOST_SEARCHED:
@@ -197,7 +200,10 @@ class Ros1Bag:
         self._known_message(content, at, found)
 
     def _known_message(self, content: bytes, at: int, found: dict[int, _Gathered]) -> int:
-        """Take in a message whose header is known but for its time; returns where it ends, 0 when it is another."""
+        """Take in a message whose header is known but for its time; return its end.
+
+        0 when it is another message.
+        """
         length = int.from_bytes(content[at : at + 4], "little")
         place = at + self._time_places.get(length, 0)
         number = self._heads.get(content[at + 4 : place] + content[place + 8 : at + 4 + length]) if place > at else None
@@ -227,7 +233,10 @@ class Ros1Bag:
 
 
 def _decompress(compression: bytes, data: bytes, size: int) -> tuple[bytes, str]:
-    """What a chunk holds, no more than it claims, and why it is not all; damaged ones give what stands before."""
+    """Decompress a chunk to at most the size it claims, and say why it is not all.
+
+    A damaged chunk gives what stands before the damage.
+    """
     if compression in (b"none", b""):
         return data[:size], ""
     if compression not in (b"bz2", b"lz4"):

@@ -1,4 +1,6 @@
-"""Records of a bag of ROS 1 that stand in no chunk: found one after the other, searched for where bytes are damaged.
+"""Records of a ROS 1 bag that stand in no chunk.
+
+They are found one after the other, and searched for where bytes are damaged.
 
 Source: http://wiki.ros.org/Bags/Format/2.0.
 """
@@ -77,7 +79,10 @@ def head_at(data: bytes, at: int) -> Head | None:
 
 @dataclass
 class Tries:
-    """How often a header may still be looked for before what looks like an operation and is none."""
+    """Number of false headers that may still be met in the search for records.
+
+    Their bytes look like the operation of a record and are none.
+    """
 
     left: int = MOST_TRIES
 
@@ -100,14 +105,17 @@ def heads_in(block: bytes, ops: re.Pattern[bytes], tries: Tries, start: int = 0)
 
 
 def has_chunk(head: bytes) -> bool:
-    """Whether a chunk of a bag begins in the first bytes of a file, whatever stands before it."""
+    """Tell whether a chunk of a bag begins in the first bytes of a file.
+
+    Anything may stand before it.
+    """
     heads = islice(heads_in(head[:LOOKED_AT], OP_OUTSIDE, Tries()), MOST_TRIED)
     return any(one.op == CHUNK and {b"compression", b"size"} <= one.fields.keys() for _, one in heads)
 
 
 @dataclass(frozen=True)
 class Record:
-    """A record in the bytes ``start`` to ``end`` of the file; without a head, bytes that are none.
+    """Record in the bytes ``start`` to ``end`` of the file; without a head, bytes of none.
 
     ``is_cut``: the file ends before the record does.
     """
@@ -120,7 +128,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Records:
-    """Iterates over the records of a bag that stand in no chunk, and over the bytes between them.
+    """Iterable over the records of a bag that stand in no chunk, and the bytes between them.
 
     Parameters
     ----------
@@ -154,9 +162,10 @@ class Records:
         return Record(at, inside) if inside else Record(at, head.end, head)
 
     def _inside(self, head: Head) -> int:
-        """Where the next record begins within one behind which none does; 0 for a record that ends where it says.
+        """Return the place of the next record inside one that states too large a length.
 
-        Bytes are missing in such a record, and its length leads too far.
+        Bytes are missing in such a record, and no other begins where it says that it ends. 0 for a record that ends
+        where it says.
         """
         if head.end >= self.size or self.head(head.end) is not None:
             return 0
@@ -169,7 +178,10 @@ class Records:
         return None if head is None else head._replace(data_at=at + head.data_at, end=at + head.end)
 
     def _next(self, start: int, end: int, ops: re.Pattern[bytes] = OP) -> int:
-        """Where a record begins from ``start`` on, told by its operation; ``end`` when none does before it."""
+        """Return the first place from ``start`` on where a record begins, by its operation.
+
+        ``end`` when none does before it.
+        """
         at = start
         while at < end:
             block = self.read(at, min(SEARCH_BYTES, end - at) + 64)
@@ -191,7 +203,7 @@ class Records:
 
 @dataclass
 class Index:
-    """What a bag says of itself.
+    """Statements of a bag about itself.
 
     Attributes
     ----------
@@ -214,7 +226,7 @@ class Index:
 
     @property
     def is_there(self) -> bool:
-        """Whether anything of the index was found."""
+        """Tell whether anything of the index was found."""
         return bool(self.listed or self.connections)
 
     @classmethod

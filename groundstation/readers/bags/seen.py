@@ -1,4 +1,7 @@
-"""What the first pass over a bag keeps of a connection: columns of its first messages, its stamps and log times."""
+"""Facts that the first pass over a bag keeps of a connection.
+
+Columns of its first messages, its stamps and log times.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,7 +23,7 @@ STAMPS = ("header.stamp_ns", "timestamp_ns")
 
 @dataclass
 class Seen:
-    """What was seen of one connection, or of all those of one source.
+    """Facts seen of one connection, or of all connections of one source.
 
     Attributes
     ----------
@@ -49,7 +52,7 @@ class Seen:
 
     @classmethod
     def of(cls, several: Sequence["Seen"]) -> "Seen":
-        """What was seen of a source, of all its connections in their order."""
+        """Join the facts of all connections of a source, in their order."""
         return replace(
             several[0],
             numbers=tuple(one.connection.number for one in several),
@@ -78,7 +81,10 @@ class Seen:
         self.stamped[0].take(block.record_index, block.log_time_ns, rows, stamp_ns)
 
     def _stamps(self, block: Block, decoder: Decoder) -> tuple[Int64Array, Int64Array]:
-        """Messages that have a stamp, and the stamps: of all where it stands at one place in all, else of some."""
+        """Return the messages that have a stamp, and the stamps.
+
+        Those of all messages where the stamp stands at one place in all, else of some.
+        """
         found: list[tuple[Int64Array, Int64Array]] = []
         for part_rows, columns in self._looked_into(block, decoder):
             self.columns = self.columns or columns
@@ -117,7 +123,10 @@ class Seen:
         return name or ("timestamp" if px4.is_px4(self.connection.type) and "timestamp" in self.columns else "")
 
     def stamp_of(self, columns: dict[str, Column]) -> Int64Array | None:
-        """When values of messages were true by the messages themselves, shape (n,); None where they do not tell."""
+        """Return the times of validity that messages state themselves, shape (n,).
+
+        None where they state none.
+        """
         if self.rule is not None and self.rule.time is not None:
             return self.rule.stamp_ns(columns)
         name = next((name for name in (*STAMPS, "timestamp") if name in columns), "")

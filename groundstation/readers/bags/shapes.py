@@ -1,8 +1,8 @@
-"""Where the values of a message stand: found once for all messages that are laid out alike.
+"""Places of the values of a message, found once for all messages that are laid out alike.
 
-A message of ROS has no offsets: what stands behind a text or a sequence moves with its length. One message is walked;
-its shape is the place of every value and every length met. All messages of the same size with the same lengths in the
-same places have that shape, so numpy reads them together.
+A message of ROS has no offsets: values behind a text or a sequence move with its length. One message is walked; its
+shape is the place of every value and every length met. All messages of the same size with the same lengths in the same
+places have that shape, so numpy reads them together.
 
 Source: OMG DDS-XTypes 1.3, 7.4.1 (CDR); http://wiki.ros.org/ROS/Technical%20Overview (ROS 1).
 """
@@ -34,7 +34,7 @@ class ShapeError(Exception):
 
 @dataclass(frozen=True)
 class Serialisation:
-    """How values follow each other.
+    """Serialisation of values: where they start, their byte order, their alignment.
 
     Parameters
     ----------
@@ -64,7 +64,10 @@ CDR: Mapping[bytes, Serialisation] = {
 
 
 class Leaf(NamedTuple):
-    """One column: name, place, and how it is read (``number``, ``bool``, ``time``, ``text``, ``empty``)."""
+    """Column of a message: its name, its place, and how it is read.
+
+    ``kind`` is ``number``, ``bool``, ``time``, ``text`` or ``empty``.
+    """
 
     name: str
     offset: int
@@ -100,7 +103,7 @@ class Shape:
     steps: int = 0
 
     def holds(self, buffer: ByteArray, starts: Int64Array) -> BoolArray:
-        """Which messages of this size have this shape, shape (n,)."""
+        """Tell which messages of this size have this shape, shape (n,)."""
         fits = np.ones(len(starts), dtype=bool)
         words = at_any_byte(buffer, np.dtype(f"{self.order}u4"))
         for offset, value in self.guards:
@@ -108,7 +111,10 @@ class Shape:
         return fits
 
     def at_one_place(self, name: str) -> Leaf | None:
-        """The value of that name where no length before it moves it: it stands there in all messages of the type."""
+        """Return the value of a name if it stands at one place in all messages of the type.
+
+        No length before it may move it.
+        """
         leaf = next((leaf for leaf in self.leaves if leaf.name == name), None)
         lengths = [offset for offset, _value in self.guards[1 if self.start else 0 :]]
         return None if leaf is None or any(offset < leaf.offset for offset in lengths) else leaf
@@ -142,7 +148,10 @@ def values_of(leaf: Leaf, buffer: ByteArray, starts: Int64Array) -> NDArray[Any]
 
 
 def at_any_byte(buffer: ByteArray, dtype: np.dtype[Any]) -> NDArray[Any]:
-    """View of a buffer in which entry ``k`` is the value that starts at byte ``k``; entries overlap."""
+    """Return a view of a buffer whose entry ``k`` is the value that starts at byte ``k``.
+
+    Entries overlap.
+    """
     return np.ndarray((max(len(buffer) - dtype.itemsize + 1, 0),), dtype, buffer.data, strides=(1,))
 
 

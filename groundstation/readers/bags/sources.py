@@ -1,7 +1,8 @@
-"""Who wrote a topic: connections of one topic that interlace are several sources, those one after the other are one.
+"""Sources of a topic: the connections that wrote it, put together by who wrote them.
 
-A node that is started again opens another connection, and a recording that was split goes on with one of the next file:
-the source stays. Two nodes that publish on one topic at the same time are two, whatever the name of the topic.
+Connections of one topic that interlace are several sources, those one after the other are one. A node that is started
+again opens another connection, and a recording that was split goes on with one of the next file: the source stays. Two
+nodes that publish on one topic at the same time are two, whatever the name of the topic.
 """
 
 import re
@@ -20,14 +21,17 @@ Key: TypeAlias = tuple[str, str, str, bytes]
 
 @dataclass(frozen=True)
 class Line:
-    """When a connection was written: log times in their order, each of which stands for ``stride`` messages."""
+    """Log times at which a connection was written, in their order.
+
+    Each stands for ``stride`` messages.
+    """
 
     connection: Connection
     time_ns: Int64Array
     stride: int
 
     def overlaps(self, other: "Line") -> bool:
-        """Whether messages of both interlace."""
+        """Tell whether messages of both interlace."""
         pairs = ((self, other), (other, self))
         counts = [one._within(two) for one, two in pairs]
         shares = [count / len(one.time_ns) for count, (one, _two) in zip(counts, pairs, strict=True)]
@@ -40,7 +44,7 @@ class Line:
 
 
 def key_of(connection: Connection) -> Key:
-    """What connections of one source have in common."""
+    """Return the key that connections of one source have in common."""
     return connection.topic, connection.type, connection.encoding, connection.schema
 
 

@@ -1,8 +1,9 @@
-"""Bags of ROS 2 in sqlite3 (.db3). A file that was cut or has damaged pages gives the rows that sqlite still finds.
+"""Bags of ROS 2 in sqlite3 (.db3).
 
-A database is a program as well: views, triggers, generated columns and virtual tables compute what they give. Only
-plain tables are read, sqlite may do nothing else (its authorizer sees to it), and the steps of its machine and the
-bytes that come out are bounded by the size of the file.
+A file that was cut or has damaged pages gives the rows that sqlite still finds. A database is a program as well: views,
+triggers, generated columns and virtual tables compute what they give. Only plain tables are read, sqlite may do nothing
+else (its authorizer sees to it), and the steps of its machine and the bytes that come out are bounded by the size of
+the file.
 
 Source: rosbag2_storage_sqlite3 (schema versions 1 to 4).
 """
@@ -101,7 +102,7 @@ class Ros2Sqlite:
             yield Damage("dropped_channel", "the whole log", self._unknown, what)
 
     def _missing(self, database: "_Database", topics: set[str]) -> Iterator[Missing]:
-        """What the bag's own account counts and was not met."""
+        """Yield the messages that the bag's own account counts and that were not met."""
         gone = {name: count - self._met.get(name, 0) for name, count in database.metadata.messages.items()}
         gone = {name: count for name, count in gone.items() if count > 0 and name in topics}
         if sum(gone.values()) > self._odd + self._unknown:  # else it is those
@@ -169,7 +170,7 @@ class _Database:
 
     @property
     def is_spent(self) -> bool:
-        """Whether it gave or did more than its file can hold."""
+        """Tell whether the database gave or did more than its file can hold."""
         return self.looks <= 0 or self.bytes <= 0
 
     def execute(self, query: str, *values: Any) -> sqlite3.Cursor:
@@ -259,12 +260,15 @@ class _Database:
 
 
 def _is_sound(row: Any) -> bool:
-    """Whether the number, topic and time of a message are integers."""
+    """Tell whether the number, topic and time of a message are integers."""
     return isinstance(row[1], int) and isinstance(row[2], int) and isinstance(row[3], int)
 
 
 def _authorized(action: int, first: str | None, _second: str | None, _base: str | None, inside: str | None) -> int:
-    """Whether sqlite may do something: read plain tables, with the functions that the queries here have."""
+    """Return whether sqlite may do something, as its code.
+
+    It may read plain tables, with the functions that the queries here have.
+    """
     if action == sqlite3.SQLITE_SELECT and inside is None:
         return sqlite3.SQLITE_OK
     if action == sqlite3.SQLITE_READ and inside is None and first in _READABLE:
