@@ -44,7 +44,7 @@ class Cells:
 
 
 def trimmed(text: Any) -> Any:
-    """Cells without padding; cells of nothing but padding become empty (null)."""
+    """Trim cells; a cell of nothing but padding becomes empty (null)."""
     stripped = pc.utf8_trim_whitespace(text)
     return pc.if_else(pc.equal(stripped, arrow.EMPTY_TEXT), arrow.NO_TEXT, stripped)
 
@@ -66,7 +66,7 @@ def _column(array: Any, filler: float | int) -> Column:
 
 
 def numbers(text: Any) -> Cells:
-    """Decimal numbers as float64; ``nan`` in a cell is a NaN that the device wrote.
+    """Convert decimal numbers to float64; ``nan`` in a cell is a NaN that the device wrote.
 
     Examples
     --------
@@ -81,7 +81,7 @@ def numbers(text: Any) -> Cells:
 
 
 def ready_numbers(array: Any) -> Cells:
-    """A float64 column that the CSV parser itself has converted."""
+    """Wrap a float64 column that the CSV parser itself has converted."""
     return Cells(_column(array, float("nan")), np.zeros(len(array), dtype=bool))
 
 
@@ -95,12 +95,12 @@ def are_numbers(text: Any) -> bool:
 
 
 def _one_sign(text: Any) -> Any:
-    """Numbers such as ``+-2.5`` as ``-2.5``."""
+    """Convert numbers such as ``+-2.5`` to ``-2.5``."""
     return pc.replace_substring_regex(text, _TWO_SIGNS, "-")
 
 
 def flags(text: Any) -> Cells:
-    """``0``, ``1``, ``true``, ``false`` (any case) as bool.
+    """Convert ``0``, ``1``, ``true``, ``false`` (any case) to bool.
 
     Examples
     --------
@@ -183,7 +183,7 @@ def _exact(text: str, digits: int) -> int | None:
 
 
 def integers_ns(text: Any) -> Cells:
-    """Whole numbers of nanoseconds."""
+    """Convert whole numbers of nanoseconds."""
     array, unreadable = _cast(text, pa.int64(), _INTEGER)
     filled = arrow.is_valid(text)
     return _times(arrow.values(array, 0), filled, filled & ~unreadable)

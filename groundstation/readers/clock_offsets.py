@@ -15,7 +15,7 @@ from groundstation.readers.two_clocks import Stretch, Track
 
 
 class Jump(NamedTuple):
-    """Two records in turn between which the receiver's clock falls, or leaps.
+    """Two consecutive records between which the receiver's clock falls, or leaps.
 
     ``number`` is the place of the second among those of its source; then records and times of both.
     """
@@ -46,11 +46,11 @@ class Offsets:
         return np.asarray(self.added_ns[np.maximum(place, 0)])
 
     def plus(self, added_ns: int) -> "Offsets":
-        """The same with as much more everywhere."""
+        """Return the offsets with ``added_ns`` added everywhere."""
         return Offsets(self.starts, self.added_ns + added_ns, self.by)
 
     def moved(self, track: Track) -> Track:
-        """Readings by the corrected time of receipt."""
+        """Return readings with the corrected time of receipt."""
         return Track(track.record_index, track.receipt_ns + self.at(track.record_index), track.clock_ns, track.number)
 
     @property
@@ -64,7 +64,7 @@ class Offsets:
         return tuple(zip(self.starts.tolist(), self.added_ns.tolist(), strict=True))
 
     def steps(self) -> Iterable[tuple[int, int]]:
-        """Records before which the clock was set, and by how much, nanoseconds."""
+        """Yield the records before which the clock was set, and by how much, nanoseconds."""
         for at, by in enumerate(np.diff(self.added_ns).tolist(), start=1):
             if by:
                 yield int(self.starts[at]), -by
@@ -128,7 +128,7 @@ def _united(steps: list[_Step], jumps: Sequence[Jump]) -> list[_Step]:
 
 
 def _behind(step: _Step, jumps: Sequence[Jump]) -> Iterable[int]:
-    """Records behind the step, by jumps of about its size between the readings that show it."""
+    """Yield records after the step, by jumps of about its size between its readings."""
     for jump in jumps:
         if step.after < jump.record < step.first and abs(jump.time_ns - jump.before_ns) > abs(step.size_ns) // 2:
             yield jump.record

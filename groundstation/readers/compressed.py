@@ -46,7 +46,7 @@ class Expanded:
 
 
 def compression_of(start: bytes) -> str:
-    """``gzip``, ``zstd`` or nothing, by the first bytes of a file.
+    """Return ``gzip``, ``zstd`` or an empty text, by the first bytes of a file.
 
     Examples
     --------
@@ -151,7 +151,7 @@ class _Broken(Exception):  # noqa: N818 -- a signal inside this module
 
 
 class _FrameCount:
-    """Counts members or frames; a file of hardly anything but their headers is no log."""
+    """Count of members or frames; a file of little but their headers is no log."""
 
     def __init__(self) -> None:
         self._count = self._bytes = 0

@@ -49,7 +49,7 @@ def sniff(source: Source) -> Claim | None:
 
 
 def _best(source: Source) -> tuple[float, Fit] | None:
-    """The shipped profile that fits a file, and how sure that is."""
+    """Return the shipped profile that fits a file, and how sure that is."""
     first = source.head[:4096].removeprefix(b"\xef\xbb\xbf").decode("utf-8", errors="replace").lstrip()
     profiles = [profile for profile in _shipped() if profile.first_lines]
     is_one = any(first.startswith(profile.first_lines) for profile in profiles)
@@ -76,7 +76,7 @@ def _best(source: Source) -> tuple[float, Fit] | None:
 
 
 def _begins_with_rows(source: Source) -> bool:
-    """Tell whether a file begins with numbers, be the first row cut."""
+    """Tell whether a file begins with numbers, even if the first row is cut."""
     return any(line.strip()[:1] in _OF_NUMBERS for line in source.head[:4096].split(b"\n", 2)[:2])
 
 
@@ -89,7 +89,7 @@ def _stands_below(source: Source, profile: Profile) -> bool:
 
 
 def claim_by(source: Source, profile: Path) -> Claim:
-    """Claim of a file by the user's profile.
+    """Claim a file by the user's profile.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def _fitted(source: Source, profile: Profile) -> Fit:
 
 
 def _above(fit: Fit) -> Iterator[Damage]:
-    """Rows that stand above the header: nothing names their columns."""
+    """Yield damage for rows above the header: nothing names their columns."""
     if fit.rows_above:
         first, last = fit.rows_above[0].number, fit.rows_above[-1].number
         place = f"row {first}" if first == last else f"rows {first} to {last}"

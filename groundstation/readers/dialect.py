@@ -111,7 +111,7 @@ def detect_delimiter(header: str) -> str:
 
 
 def split_cells(line: str, delimiter: str) -> list[str]:
-    """Cells of one line, trimmed, quotes removed; broken quoting falls back to a plain split.
+    """Split a line into trimmed cells without quotes; a plain split if quoting is broken.
 
     Examples
     --------
@@ -131,7 +131,7 @@ def split_cells(line: str, delimiter: str) -> list[str]:
 
 
 def normal_form(line: str, delimiter: str) -> str:
-    """A line with its cells trimmed: equal for header lines that differ in padding alone."""
+    """Return a line with its cells trimmed, so that padding makes no difference."""
     return delimiter.join(split_cells(line, delimiter))
 
 

@@ -75,17 +75,17 @@ class _Top:
 
     @property
     def is_flat(self) -> bool:
-        """Tell whether there is a time column, and one of ``<topic>.<field>``."""
+        """Tell whether there is a time column, and a column ``<topic>.<field>``."""
         return _are_flat(self.names)
 
     @property
     def time_kind(self) -> str:
-        """Time of a row, as it is written."""
+        """Form in which the time of a row is written."""
         return next(kind for name, kind in TIME_COLUMNS.items() if name in self.names)
 
     @cached_property
     def dialect(self) -> Dialect:
-        """Form of the rows below."""
+        """Dialect of the rows below."""
         return Dialect(
             self.encoding,
             self.delimiter,
@@ -155,7 +155,7 @@ def sniff(source: Source) -> Claim | None:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, batches, remarks and damages of a flat CSV.
+    """Yield the header, batches, remarks and damage of a flat CSV.
 
     Raises
     ------
@@ -336,7 +336,7 @@ def _derivations(rules: tuple[Rule, ...]) -> tuple[Derivation, ...]:
 
 
 def _mistakes(top: _Top) -> list[Remark]:
-    """Columns that name no canonical field: they are kept as raw, and the user is told."""
+    """Return a remark on columns that name no canonical field: they are kept as raw."""
     unknown = [name for name in _unknown(top) if "." in name and not name.startswith(RAW_PREFIX)]
     if not unknown:
         return []
@@ -360,7 +360,7 @@ def _slips(top: _Top) -> Mapping[tuple[str, str], tuple[str, str]]:
 
 
 def _with_near(name: str) -> str:
-    """A column with the canonical one that was perhaps meant.
+    """Name a column, with the canonical one that was probably meant.
 
     Examples
     --------

@@ -23,7 +23,7 @@ def sniff(source: Source) -> Claim | None:
 
 
 def claim_by(source: Source, profile: Path) -> Claim:
-    """Claim of a bag whose messages the user's profile explains.
+    """Claim a bag whose messages the user's profile explains.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def claim_by(source: Source, profile: Path) -> Claim:
 
 
 def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
-    """Yield the header, batches of every topic (raw and canonical), remarks and damages."""
+    """Yield the header, batches of every topic (raw and canonical), remarks and damage."""
     from groundstation.readers.bags.profile import load
     from groundstation.readers.bags.reader import items
 

@@ -122,7 +122,7 @@ class Bag:
 
     @cached_property
     def size(self) -> int:
-        """Bytes of all its files that are there."""
+        """Bytes of all files of the bag that are present."""
         size = 0
         for file in self.files():
             try:

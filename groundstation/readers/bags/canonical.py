@@ -85,7 +85,7 @@ def _is_known(values: Values, covariance: str) -> np.ndarray | None:
 
 
 def navsatfix(values: Values) -> Columns:
-    """Position where the receiver has a fix; an altitude that is NaN is none."""
+    """Return the position where the receiver has a fix; a NaN altitude is absent."""
     has_fix = values["status.status"] >= 0.0
     altitude = values["altitude"]
     return {
@@ -120,7 +120,7 @@ _UNKNOWN = ("UNKNOWN", "COVARIANCE_TYPE_UNKNOWN", "")  # names of the number 0, 
 
 
 def location_fix(values: Values) -> Columns:
-    """Position of Foxglove's LocationFix; an altitude of exactly 0 is one that was not set."""
+    """Return the position of Foxglove's LocationFix; an altitude of exactly 0 was not set."""
     columns = {"latitude_deg": values["latitude"], "longitude_deg": values["longitude"]}
     found = {name: Column(part, ~np.isnan(part)) for name, part in columns.items()}
     if "altitude" in values:
@@ -175,7 +175,7 @@ def magnetic_field(values: Values) -> Columns:
 
 
 def wheel_odometry(values: Values) -> Columns:
-    """Speed forward and rate of turn to the right, of odometry whose frame begins anywhere."""
+    """Return speed forward and rate of turn to the right of odometry with a free origin."""
     return {
         "speed_mps": Column(values["twist.twist.linear.x"]),
         "turn_rate_dps": Column(-values["twist.twist.angular.z"] * DEG_PER_RAD),
@@ -207,12 +207,12 @@ def _ned(values: Values, x: np.ndarray, y: np.ndarray, z: np.ndarray, fields: tu
 
 
 def pose(name: str) -> Callable[[Values], Columns]:
-    """Rule of a pose that stands in the field ``name``."""
+    """Return the rule for a pose in the field ``name``."""
     return lambda values: _pose(values, name)
 
 
 def twist(name: str) -> Callable[[Values], Columns]:
-    """Rule of a velocity along the axes of the earth that stands in the field ``name``."""
+    """Return the rule for a velocity along the axes of the earth in the field ``name``."""
     return lambda values: _ned(values, *values.triple(f"{name}.linear"), VELOCITY)
 
 

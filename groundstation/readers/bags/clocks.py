@@ -82,7 +82,7 @@ class Sample:
             self._size, self.stride = self._kept[0].shape[1], 2 * self.stride
 
     def all(self) -> Int64Array:
-        """The rows that are kept, shape (columns, n)."""
+        """Return the rows that are kept, shape (columns, n)."""
         return np.concatenate([np.zeros((self.columns, 0), dtype=np.int64), *self._kept], axis=1)
 
 
@@ -108,7 +108,7 @@ class Stamped:
     _last: Int64Array = field(default_factory=lambda: np.zeros((2, 0), dtype=np.int64))
 
     def take(self, record_index: Int64Array, log_ns: Int64Array, rows: Int64Array, stamp_ns: Int64Array) -> None:
-        """Add messages in the order of the log; ``stamp_ns`` are those of the messages ``rows``."""
+        """Add messages in the order of the log; ``stamp_ns`` are the stamps of ``rows``."""
         self.log.take(log_ns)
         self.stamps.take(record_index[rows], log_ns[rows], stamp_ns)
         self.readings.take(record_index[rows], log_ns[rows], stamp_ns)
@@ -128,7 +128,7 @@ class Stamped:
 
     @cached_property
     def stretches(self) -> list[Stretch]:
-        """The same, parted where one of the clocks was set."""
+        """Readings of the stamps, parted where one of the clocks was set."""
         return stretches_of(self.track)
 
     def line(self, connection: Connection) -> Line:
@@ -222,7 +222,7 @@ class Lags:
 
     @classmethod
     def of(cls, several: Sequence[Stamped], offsets: Offsets) -> "Lags":
-        """The lags of a source, by what was seen of its connections."""
+        """Compute the lags of a source from what was seen of its connections."""
         if several and all(map(_is_stopped, several)):
             lag_ns = np.concatenate([cls._of([one], offsets).lag_ns for one in several])
             return cls(lag_ns, 1.0, True, offsets, is_stopped=True)
@@ -263,7 +263,7 @@ class Lags:
 
     @property
     def most_ns(self) -> int:
-        """The longest that is believed."""
+        """Longest lag that is believed."""
         return round((MOST_QUEUED_S if self.is_queued else LARGEST_LAG_S) * NS_PER_S)
 
     @property
@@ -284,7 +284,7 @@ class Lags:
         return (lag_ns > 0) & (lag_ns <= round(MOST_QUEUED_S * NS_PER_S))
 
     def text(self) -> str:
-        """The middle one, and their range."""
+        """Describe the lags: the median and the range."""
         if self.is_stopped:
             return "unknown, log time stands still"
         lags_s = np.sort(self.lag_ns) / NS_PER_S

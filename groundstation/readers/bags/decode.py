@@ -41,7 +41,7 @@ class Decoded:
 
 @dataclass
 class Decoder:
-    """Decodes the messages of one connection.
+    """Decoder of the messages of one connection.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ class Decoder:
         return rows, Column(values_of(leaf, block.buffer, block.starts[rows]))
 
     def decode(self, block: Block) -> Iterator[Decoded]:
-        """Columns of the messages; those that cannot be read have their length alone."""
+        """Yield columns of the messages; unreadable ones have their length alone."""
         bad: list[Int64Array] = []
         if self.reason:
             bad.append(np.arange(len(block), dtype=np.int64))
@@ -191,7 +191,7 @@ class Decoder:
         yield from self._laid_out(block, np.array(rows, dtype=np.int64), found)
 
     def _laid_out(self, block: Block, rows: Int64Array, found: list[dict[str, Any]]) -> Iterator[Decoded]:
-        """Columns of flat objects; those without a value have their length."""
+        """Yield columns of flat objects; those without any value have their length."""
         columns: dict[str, Column] = {}
         for name in dict.fromkeys(name for one in found for name in one):
             if name not in self.kinds and len(self.kinds) >= MOST_COLUMNS:
@@ -221,7 +221,7 @@ def _sizes(block: Block, rows: Int64Array) -> Decoded:
 
 
 def _definition(connection: Connection) -> tuple[Definition | None, str]:
-    """Definition of a connection, or why there is none."""
+    """Return the definition of a connection, or the reason why there is none."""
     usual = {"ros1": "ros1msg", "cdr": "ros2msg"}[connection.encoding]
     try:
         found = known(connection.type) if connection.encoding == "cdr" else None
@@ -264,7 +264,7 @@ def _kind(value: Any) -> str:
 
 
 def _column(values: list[Any], kind: str) -> Column:
-    """A column of one kind; a value that is none of it is absent."""
+    """Return a column of one kind; values of another kind are absent."""
     if kind == "U":
         present = np.array([value is not None for value in values])
         texts = [str(value)[:MAX_TEXT_CHARACTERS] if value is not None else "" for value in values]

@@ -88,7 +88,7 @@ def plain_name(name: str) -> str:
 
 
 def parse(root: str, text: str) -> Definition:
-    """The definition in a text.
+    """Parse the text of a definition.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def parse(root: str, text: str) -> Definition:
 
 @cache
 def known(type_name: str) -> Definition | None:
-    """Definition of a common type of ROS 2, for bags that carry none."""
+    """Return the definition of a common ROS 2 type, for bags that carry none."""
     text = KNOWN_TYPES.get(type_name)
     return None if text is None else parse(type_name, text)
 
@@ -162,7 +162,7 @@ def _full_name(name: str, owner: str, texts: Mapping[str, str]) -> str:
 
 
 def _refuse_circles(types: Mapping[str, tuple[Field, ...]]) -> None:
-    """A type that holds itself has no end."""
+    """Refuse a type that contains itself."""
     left = {name: {field.type for field in fields} & types.keys() for name, fields in types.items()}
     while ready := [name for name, parts in left.items() if not parts & left.keys()]:
         for name in ready:

@@ -220,7 +220,7 @@ def _object(table: _Table, fields: list[_Table]) -> _Object:
 
 @dataclass
 class _Message:
-    """Reads one message."""
+    """Reader of one message."""
 
     schema: _Schema
     data: bytes
@@ -252,7 +252,7 @@ class _Message:
         return found
 
     def _value(self, kind: _Type, at: int, depth: int) -> Any:
-        """A value that stands at a place, or is led to from there."""
+        """Return a value that stands at a place, or that the place leads to."""
         if kind.base == _STRING:
             text = _text(self.data, at)
             self._left -= len(text)
@@ -289,13 +289,13 @@ class _Message:
         return self.schema.objects[index]
 
     def _named(self, kind: _Type, value: Any) -> Any:
-        """A number, of an enumeration its name."""
+        """Return a number, or its name where it is of an enumeration."""
         if value is None or not 0 <= kind.index < len(self.schema.enumerations):
             return value
         return self.schema.enumerations[kind.index].names.get(value, str(value))
 
     def _union(self, one: _Field, table: _Table, place: int, depth: int) -> Any:
-        """The table of a union, whose kind the field before it tells."""
+        """Return the table of a union; the field before it states its kind."""
         if not place or not 0 <= one.type.index < len(self.schema.enumerations):
             return None
         objects = self.schema.enumerations[one.type.index].objects

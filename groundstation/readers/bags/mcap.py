@@ -19,7 +19,7 @@ _HEAD_BYTES = 31  # of a message record, before its payload
 
 
 class Mcap:
-    """Iterates over the messages of an MCAP.
+    """Iterable over the messages of an MCAP.
 
     Parameters
     ----------

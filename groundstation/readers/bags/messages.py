@@ -16,7 +16,7 @@ ByteArray = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Connection:
-    """A topic as one writer wrote it.
+    """Topic as one writer wrote it.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Block:
         return len(self.starts)
 
     def take(self, rows: NDArray[np.int64] | slice) -> "Block":
-        """The messages that ``rows`` selects; the buffer is shared."""
+        """Return the messages that ``rows`` selects; the buffer is shared."""
         return Block(
             self.connection,
             self.buffer,

@@ -80,12 +80,12 @@ class MessageRule:
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """Canonical topics that it feeds."""
+        """Canonical topics that the rule feeds."""
         fed = [*(rule.topic for rule in self.columns), *(vector.topic for vector in self.vectors)]
         return tuple(dict.fromkeys(fed))
 
     def feeding(self, topic: str) -> Callable[[Values], Columns]:
-        """The function from messages to the fields of one canonical topic."""
+        """Return the function from messages to the fields of one canonical topic."""
 
         def columns(values: Values) -> Columns:
             found: Columns = {}
@@ -99,7 +99,7 @@ class MessageRule:
         return columns
 
     def stamp_ns(self, columns: Mapping[str, Column]) -> Int64Array | None:
-        """Time of validity of messages by the rule, shape (n,); None where they lack it."""
+        """Return the time of validity of messages by the rule, shape (n,); None without one."""
         if self.time is None or self.time[0] not in columns:
             return None
         digits, multiple = TIME_UNITS[self.time[1]]
@@ -173,7 +173,7 @@ def load(path: Path) -> MessageProfile:
 
 
 class _Checker(Checker):
-    """Turns the TOML tables into the rules of messages."""
+    """Parser of the TOML tables into rules of messages."""
 
     def messages(self, table: dict[str, Any]) -> MessageProfile:
         self.table(table, "", ("name", "description", "messages"), ("name", "messages"))

@@ -21,7 +21,7 @@ def is_px4(type_name: str) -> bool:
 
 
 def log_topic(type_name: str) -> str:
-    """Topic of PX4's own log for a type of px4_msgs.
+    """Return the topic of PX4's own log for a type of px4_msgs.
 
     Examples
     --------

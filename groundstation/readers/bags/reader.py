@@ -40,7 +40,7 @@ _ODD = re.compile(r"[^A-Za-z0-9_\-/]")
 
 
 def items(source: Source, reader_name: str, profile: MessageProfile | None = None) -> Iterator[Item]:
-    """Items of a bag; ``profile`` says what messages of its own mean."""
+    """Yield the items of a bag; ``profile`` says what its own messages mean."""
     bag = Bag(source)
     found = survey(bag, profile)
     names = _raw_names(found)
@@ -123,7 +123,7 @@ def _fits_in(time_ns: Int64Array, record_index: Int64Array, is_far: BoolArray) -
 
 
 class _Topics:
-    """Decodes blocks and lays them on topics."""
+    """Decoder of blocks into batches of topics."""
 
     def __init__(self, found: Survey, names: dict[int, str], work: Work) -> None:
         self._work = work
@@ -134,7 +134,7 @@ class _Topics:
         self._nowhere: Counter[str] = Counter()
 
     def batches(self, gathered: dict[int, list[Block]]) -> Iterator[RecordBatch]:
-        """Batches of blocks that stand together in the log."""
+        """Yield the batches of blocks that stand together in the log."""
         canonical: dict[str, list[Part]] = {}
         raw: dict[str, list[Part]] = {}
         for block in joined(gathered):
@@ -155,7 +155,7 @@ class _Topics:
             yield from bounded(one_row_each(merged(topic, parts)) if len(parts) > 1 else merged(topic, parts))
 
     def _part(self, block: Block, decoded: Decoded) -> Part:
-        """Raw columns of decoded messages, with their three times."""
+        """Return raw columns of decoded messages, with their three times."""
         log_ns, publish_ns = block.log_time_ns[decoded.rows], block.publish_time_ns[decoded.rows]
         is_time = (log_ns >= 0) & (log_ns < LATEST_NS)
         columns = dict(decoded.columns)

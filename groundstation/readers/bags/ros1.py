@@ -56,7 +56,7 @@ class _Gathered:
 
 
 class Ros1Bag:
-    """Iterates over the messages of a bag.
+    """Iterable over the messages of a bag.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ class Ros1Bag:
         yield from self._messages(content, place, is_told=len(content) != size)
 
     def _messages(self, content: bytes, place: str, *, is_told: bool = False) -> Iterator[Part]:
-        """Messages that stand one after the other; definitions among them are taken in."""
+        """Read consecutive messages; definitions among them are taken in."""
         found: dict[int, _Gathered] = {}
         at = lost = 0
         most = most_messages(self._source.size) + 1  # that many are told to be too many

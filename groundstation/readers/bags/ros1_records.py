@@ -37,7 +37,7 @@ class Head(NamedTuple):
 
 
 def parse_header(data: bytes) -> dict[bytes, bytes] | None:
-    """Fields of a header; None when the bytes are none.
+    """Parse the fields of a header; None when the bytes are no header.
 
     Examples
     --------
@@ -59,13 +59,13 @@ def parse_header(data: bytes) -> dict[bytes, bytes] | None:
 
 
 def number_of(fields: dict[bytes, bytes], name: bytes) -> int | None:
-    """An unsigned number of a header; None when it lacks it."""
+    """Return an unsigned number of a header; None when the header lacks it."""
     value = fields.get(name)
     return int.from_bytes(value, "little") if value is not None and len(value) <= 8 else None
 
 
 def head_at(data: bytes, at: int) -> Head | None:
-    """The record at a place of ``data``, which may end behind its header."""
+    """Return the record at a place of ``data``, which may end behind its header."""
     length = int.from_bytes(data[at : at + 4], "little")
     if not 8 <= length <= MAX_HEADER_BYTES or at + 8 + length > len(data):
         return None
@@ -88,7 +88,7 @@ class Tries:
 
 
 def heads_in(block: bytes, ops: re.Pattern[bytes], tries: Tries, start: int = 0) -> Iterator[tuple[int, Head]]:
-    """Headers of records in some bytes, told by their operation, with where each begins."""
+    """Yield the headers of records in some bytes and their places, by their operation."""
     for match in ops.finditer(block, start):
         tries.left -= 1
         if tries.left < 0:
@@ -173,7 +173,7 @@ class Records:
         return place if place < head.end else 0
 
     def head(self, at: int) -> Head | None:
-        """The header of the record at a place of the file."""
+        """Return the header of the record at a place of the file."""
         head = head_at(self.read(at, MAX_HEADER_BYTES + 8), 0)
         return None if head is None else head._replace(data_at=at + head.data_at, end=at + head.end)
 
@@ -194,7 +194,7 @@ class Records:
         return end
 
     def read(self, at: int, size: int) -> bytes:
-        """Bytes of the file; none from a place beyond its end, which damaged bytes may name."""
+        """Read bytes of the file; none beyond its end, which damaged bytes may name."""
         if at >= self.size:
             return b""
         self.stream.seek(at)
@@ -231,7 +231,7 @@ class Index:
 
     @classmethod
     def of(cls, stream: BinaryIO, size: int) -> "Index":
-        """The index of a file, looked for among its records where it does not stand at its place."""
+        """Read the index of a file; if it is not at its place, search the records for it."""
         records, found = Records(stream, size), cls()
         first = records.head(len(MAGIC)) if records.read(0, len(MAGIC)) == MAGIC else None
         if first is not None and first.op == HEADER:

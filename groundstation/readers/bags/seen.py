@@ -64,11 +64,11 @@ class Seen:
 
     @property
     def first_stamps(self) -> Int64Array:
-        """Stamps of its first messages that have one."""
+        """Stamps of the first messages that have one."""
         return np.concatenate([np.zeros(0, dtype=np.int64), *self._first_stamps])
 
     def take(self, block: Block, decoder: Decoder) -> None:
-        """Count a block, and look into it."""
+        """Count a block, and decode some of it."""
         rows, stamp_ns = self._stamps(block, decoder)
         if len(rows):
             self.has_header = True
@@ -103,7 +103,7 @@ class Seen:
         return rows[order], np.concatenate([stamp_ns for _rows, stamp_ns in found])[order]
 
     def _looked_into(self, block: Block, decoder: Decoder) -> Iterable[tuple[Int64Array, dict[str, Column]]]:
-        """Some messages of a block, decoded."""
+        """Yield some messages of a block, decoded."""
         rows = np.arange(min(len(block), SAMPLE - self._looked_at), dtype=np.int64)
         if decoder.has_places and not self.columns:
             rows = rows[:LOOKED_AT]
@@ -116,7 +116,7 @@ class Seen:
             yield rows[part.rows], part.columns
 
     def _stamp_name(self) -> str:
-        """The column that tells when values were true."""
+        """Return the name of the column with the time of validity."""
         if self.rule is not None and self.rule.time is not None:
             return self.rule.time[0]
         name = next((name for name in STAMPS if name in self.columns), "")

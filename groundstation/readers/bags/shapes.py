@@ -27,7 +27,7 @@ COUNT = ".count"  # behind the name of an array of which the length alone is kep
 
 
 class ShapeError(Exception):
-    """A message that its definition does not describe; ``steps`` that it took to find out."""
+    """Message that its definition does not describe; ``steps`` taken to find out."""
 
     steps: int = 0
 
@@ -143,7 +143,7 @@ class Shape:
 
 
 def values_of(leaf: Leaf, buffer: ByteArray, starts: Int64Array) -> NDArray[Any]:
-    """One value of messages in which it stands at one place."""
+    """Return one value of messages in which it stands at one place."""
     return _values(at_any_byte(buffer, leaf.dtype)[starts + leaf.offset], leaf.kind)
 
 
@@ -168,14 +168,14 @@ def _values(values: NDArray[Any], kind: str) -> NDArray[Any]:
 
 
 def decoded_text(values: NDArray[Any]) -> NDArray[np.str_]:
-    """Texts of bytes in UTF-8; each different one is decoded once."""
+    """Decode UTF-8 texts; each different one is decoded once."""
     found, place = np.unique(values, return_inverse=True)
     texts = np.array([text.decode("utf-8", "replace").replace("\0", "") for text in found.tolist()], dtype=np.str_)
     return np.asarray(texts[place])
 
 
 def walk(definition: Definition, message: bytes, serialisation: Serialisation) -> Shape:
-    """The shape of a message.
+    """Return the shape of a message.
 
     Raises
     ------
@@ -203,7 +203,7 @@ def _walked(walker: "_Walker", definition: Definition, message: bytes, serialisa
 
 
 class _Walker:
-    """Goes through one message and notes what stands where."""
+    """Walk through one message that notes the place of each value."""
 
     def __init__(self, definition: Definition, message: bytes, serialisation: Serialisation) -> None:
         self._types, self._message, self._how = definition.types, message, serialisation
@@ -215,7 +215,7 @@ class _Walker:
         self.shortened: list[str] = []
 
     def part(self, name: str, prefix: str) -> None:
-        """A message or a part of one."""
+        """Walk through a message or a part of one."""
         fields = self._types[name]
         if not fields and self._how.alignment > 1:
             self._pass(1, 1)  # CDR has no empty type: ROS 2 writes a byte
@@ -227,7 +227,7 @@ class _Walker:
                 self.array(field.type, path, field.count)
 
     def array(self, kind: str, path: str, count: int) -> None:
-        """An array of fixed length, or (-1) one whose length stands before it."""
+        """Walk through an array of fixed length, or (-1) with its length before it."""
         is_told = count < 0
         if is_told:
             count = self._length()
@@ -250,7 +250,7 @@ class _Walker:
             self.value(kind, f"{path}[{number}]")
 
     def value(self, kind: str, path: str) -> None:
-        """One value, or one part."""
+        """Walk over one value, or one part."""
         self.steps += 1
         if self.steps > MOST_STEPS:
             raise ShapeError("too many values")
@@ -295,7 +295,7 @@ class _Walker:
         return value
 
     def _pass(self, size: int, alignment: int) -> int:
-        """Go behind a value of so many bytes; returns its place."""
+        """Pass a value of so many bytes and return its place."""
         step = min(alignment, self._how.alignment)
         place = self.at + -(self.at - self._how.start) % step
         self.at = place + size

@@ -49,7 +49,7 @@ def key_of(connection: Connection) -> Key:
 
 
 def in_order(connection: Connection) -> tuple[str, list[tuple[int, str]], int]:
-    """Key to sort connections by: topic, then publisher, numbers in it by their size."""
+    """Return the sort key of a connection: topic, then publisher, numbers by size."""
     parts = re.findall(r"\d+|\D+", connection.publisher)
     return (
         connection.topic,
@@ -59,7 +59,7 @@ def in_order(connection: Connection) -> tuple[str, list[tuple[int, str]], int]:
 
 
 def sources_of(lines: Iterable[Line]) -> list[list[int]]:
-    """Numbers of the connections of each source, in the order in which they were first met."""
+    """Return the numbers of each source's connections, in order of first appearance."""
     topics: dict[Key, list[Line]] = {}
     for line in lines:
         topics.setdefault(key_of(line.connection), []).append(line)
@@ -69,7 +69,7 @@ def sources_of(lines: Iterable[Line]) -> list[list[int]]:
 
 
 def _of_topic(lines: Sequence[Line]) -> list[list[Line]]:
-    """The connections of a topic, those together that one source wrote one after the other."""
+    """Group the connections of a topic that one source wrote one after the other."""
     sources: list[list[Line]] = []
     for line in sorted(lines, key=lambda line: (int(line.time_ns[0]), line.connection.number)):
         free = [source for source in sources if not any(line.overlaps(one) for one in source)]

@@ -44,7 +44,7 @@ _READABLE = frozenset({TOPICS, MESSAGES, DEFINITIONS, METADATA, "sqlite_master",
 
 
 class Ros2Sqlite:
-    """Iterates over the messages of a .db3.
+    """Iterable over the messages of a .db3.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class Ros2Sqlite:
                 yield Missing(name, count, counted_by("metadata in the database"))
 
     def _blocks(self, rows: list[Any], connections: dict[int, Connection]) -> Iterator[Block]:
-        """Rows of one stretch by topic."""
+        """Yield the rows of one stretch by topic."""
         sound = [row for row in rows if type(row[1]) is type(row[2]) is type(row[3]) is int]
         self._odd += len(rows) - len(sound)
         known = [row for row in sound if row[2] in connections]
@@ -130,7 +130,7 @@ class Ros2Sqlite:
             yield Block(connections[number], buffer, starts, sizes, times, times, index[which])
 
     def _payload(self, data: Any) -> bytes:
-        """Bytes of a message, decompressed where the bag compresses its messages."""
+        """Return the bytes of a message, decompressed where the bag compresses them."""
         content = data if isinstance(data, bytes) else b""
         if not content.startswith(_ZSTD):
             return content
@@ -148,7 +148,7 @@ class Ros2Sqlite:
 
 @dataclass
 class _Database:
-    """A database of a stranger, of which tables are read within bounds.
+    """Untrusted database whose tables are read within bounds.
 
     Attributes
     ----------
@@ -174,7 +174,7 @@ class _Database:
         return self.looks <= 0 or self.bytes <= 0
 
     def execute(self, query: str, *values: Any) -> sqlite3.Cursor:
-        """A query; one that goes on when the bounds are spent fails."""
+        """Run a query; it fails when the bounds are spent."""
         self.connection.set_progress_handler(self._look, STEPS)
         return self.connection.execute(query, values)
 
@@ -183,7 +183,7 @@ class _Database:
         return self.looks <= 0
 
     def refuse_programs(self) -> None:
-        """See that topics and messages are plain tables, and let sqlite read such tables only.
+        """Check that topics and messages are plain tables, and let sqlite read only those.
 
         Raises
         ------
@@ -217,14 +217,14 @@ class _Database:
             pass  # before schema version 4
 
     def newest(self) -> int:
-        """The largest number of a row."""
+        """Return the largest row number."""
         try:
             return int(self.execute("SELECT max(_rowid_) FROM messages").fetchone()[0] or 0) if self.has_rowid else 0
         except (*_FAILURES, TypeError, ValueError):
             return 0
 
     def next_rows(self, last: int) -> tuple[list[Any], bool]:
-        """The rows behind the one of number ``last``, and whether reading failed behind them.
+        """Return the rows after number ``last``, and whether reading failed after them.
 
         Each is (number of the row, id, topic_id, timestamp, data). A table without row numbers is read in one go.
         """
@@ -300,7 +300,7 @@ def _connections(database: _Database) -> dict[int, Connection]:
 
 @contextmanager
 def _connected(source: Source) -> Iterator[_Database]:
-    """The database, read only; a compressed one is laid beside in a file for the time."""
+    """Open the database read-only; a compressed one is unpacked to a temporary file."""
     if not source.compression:
         with closing(_open(source.path, source.name)) as connection:
             yield _bounded(connection, source)

@@ -116,7 +116,7 @@ def survey(bag: Bag, profile: MessageProfile | None = None) -> Survey:
 
 
 def _map(found: Survey) -> None:
-    """Lay the messages on canonical topics, those of the profile first."""
+    """Map the messages to canonical topics, those of the profile first."""
     named = _map_by_rules(found)
     served = [seen for seen in found.sources if seen.rule is None and _serves(seen)]
     units = _units([seen for seen in served if MESSAGES[seen.connection.type].role in _ORDER])
@@ -203,7 +203,7 @@ def _kind_of(unit: list[Seen]) -> str:
 
 
 def _map_by_rules(found: Survey) -> set[str]:
-    """Lay messages on topics as the profile says; returns the kinds of topics that it names."""
+    """Map messages to topics as the profile says; return the kinds of topics it names."""
     kinds: set[str] = set()
     served: dict[int, list[Seen]] = {}
     for seen in sorted(found.sources, key=lambda seen: in_order(seen.connection)):

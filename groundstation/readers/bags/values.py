@@ -126,7 +126,7 @@ def level(east: FloatArray, north: FloatArray, up: FloatArray, fields: tuple[str
 
 
 def rotated(values: Values, quaternion: str, vector: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """A vector of the body along the axes that its quaternion turns it into."""
+    """Rotate a vector of the body into the axes that its quaternion refers to."""
     x, y, z = values.triple(quaternion)
     w = values[f"{quaternion}.w"]
     a, b, c = values.triple(vector)

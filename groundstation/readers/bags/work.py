@@ -14,7 +14,7 @@ STEPS_PER_VALUE, BYTES_PER_STEP = 3, 16
 
 @dataclass
 class Work:
-    """Steps that are left.
+    """Work in steps that are left.
 
     Parameters
     ----------

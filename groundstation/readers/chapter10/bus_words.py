@@ -32,7 +32,7 @@ ANY_ERROR = MESSAGE_ERROR | FORMAT_ERROR | TIME_OUT | WORD_COUNT_ERROR | SYNC_ER
 
 
 def bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
-    """A batch in pieces that are not too long."""
+    """Yield a batch in pieces that are not too long."""
     for start in range(0, len(batch), MAX_BATCH_ROWS):
         yield batch if len(batch) <= MAX_BATCH_ROWS else batch.take(slice(start, start + MAX_BATCH_ROWS))
 

@@ -128,7 +128,7 @@ class _Counts:
 
 
 class BusContents:
-    """Counts what is on the buses, batch by batch."""
+    """Counter of what is on the buses, batch by batch."""
 
     def __init__(self) -> None:
         self._counts: dict[str, _Counts] = {}
@@ -181,7 +181,7 @@ class BusContents:
 
 
 def named_by(entry: OnBus, icds: Iterable[Icd]) -> tuple[Word429 | Message1553, ...]:
-    """Words or messages of ICDs that name what is on a bus."""
+    """Return the words or messages of ICDs that name an entry of a bus."""
     found: list[Word429 | Message1553] = []
     for icd in icds:
         if entry.sub_channel is not None:

@@ -58,7 +58,7 @@ class Seen:
         return self._keys.setdefault(topic, np.zeros(KEYS, dtype=bool))
 
     def places(self, holder: Word429 | Message1553, names: BusNames) -> list[tuple[int, int | None]]:
-        """Channels (and of 429 their buses, from 1) where a word or message is."""
+        """Return the channels (for 429 also the buses, from 1) where a word or message is."""
         prefix = TOPIC_429 if isinstance(holder, Word429) else TOPIC_1553
         found: list[tuple[int, int | None]] = []
         for topic, keys in sorted(self._keys.items(), key=lambda one: channel_of(one[0])):
@@ -147,11 +147,11 @@ class _Table:
         self.holders[self.group[key]].append(holder)
 
     def each(self) -> list[Any]:
-        """Every word or message once."""
+        """Yield every word or message once."""
         return list({id(holder): holder for several in self.holders for holder in several}.values())
 
     def rows(self, keys: NDArray[np.uint16]) -> Iterator[tuple[Any, NDArray[np.int64]]]:
-        """Each word or message that occurs, and its rows; those of one key share them."""
+        """Yield each word or message that occurs, and its rows; those of one key share them."""
         groups = self.group[keys]
         wanted = np.flatnonzero(groups >= 0)
         groups = groups[wanted]
@@ -162,7 +162,7 @@ class _Table:
 
 
 class Namer:
-    """Makes signals of batches of bus words.
+    """Converter of bus words to signals.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ class Namer:
                 self._tables.setdefault(f"{TOPIC_1553}{message.channel}", _Table()).add(side, message)
 
     def signals(self, batch: RecordBatch) -> Iterator[RecordBatch]:
-        """Batches of the signals that a batch of bus words holds."""
+        """Yield batches of the signals in a batch of bus words."""
         table = self._tables.get(batch.topic)
         if table is None:
             return
@@ -208,7 +208,7 @@ class Namer:
                 yield from bounded(self._placed(made))
 
     def _placed(self, batch: RecordBatch) -> RecordBatch:
-        """The batch without positions of zeros, which a unit sends before it has one."""
+        """Drop positions of zeros, which a unit sends before it has one."""
         columns, zeros = placed(batch.topic, batch.columns)
         if not len(zeros):
             return batch
@@ -350,7 +350,7 @@ def _key(holder: Any) -> str:
 
 
 def _title(holder: Any) -> str:
-    """Name and place of a word or message, for people."""
+    """Return name and place of a word or message, for people."""
     bus = f"{holder.bus} (channel {holder.channel}" if holder.bus else f"channel {holder.channel}"
     place = f"{bus})" if holder.bus else bus
     if isinstance(holder, Word429):

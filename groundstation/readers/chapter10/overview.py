@@ -62,7 +62,7 @@ def overview(source: Source, *, with_buses: bool) -> Overview:
 
 
 def _dates(block: Block) -> Counter[date]:
-    """Dates that words with label 260 tell, by the places of words alone."""
+    """Count the dates in ARINC-429 words with label 260."""
     found: Counter[date] = Counter()
     for packet in block.of(ARINC_429):
         whole = max(0, packet[scan.BODY_END] - packet[scan.BODY]) // _WORD_BYTES

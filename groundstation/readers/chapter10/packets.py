@@ -63,7 +63,7 @@ class Block:
 
 
 class Walk:
-    """Iterates over the blocks of a recording; what it met is known at the end.
+    """Iterator over the blocks of a recording; the damage is known at the end.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ class Walk:
         return whole[: (size + count + _SLACK) // 4 * 4], size + count, count < BLOCK_BYTES
 
     def _blocks(self, data: NDArray[np.uint8], size: int, is_last: bool) -> Iterator[Block]:
-        """Packets of the data at hand: one block, more where there are very many damaged places."""
+        """Yield the packets of the data at hand: one block, more if damage is frequent."""
         packets = np.empty((size // _SMALLEST_PACKET + 1, scan.COLUMNS), dtype=np.int64)
         halves, words, state = data.view("<u2"), data.view("<u4"), self._state
         syncs = magic_places(data[:size], scan.SYNC)

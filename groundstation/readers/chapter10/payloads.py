@@ -62,7 +62,7 @@ _WHOLE: Mapping[int, str] = MappingProxyType(
 
 
 def batch_of(block: Block, kind: int, channel: int, packets: Int64Array, tmats: Tmats) -> RecordBatch | None:
-    """Records of a channel in a block; None where there are none, or the type is but counted."""
+    """Return the records of a channel in a block; None without any, or if only counted."""
     if kind in _STAMPED:
         return _messages(block, _STAMPED[kind], channel, packets)
     if kind in _WHOLE:
@@ -170,7 +170,7 @@ def _events(block: Block, packets: Int64Array, tmats: Tmats) -> RecordBatch | No
 
 
 def _times(block: Block, channel: int, packets: Int64Array) -> RecordBatch | None:
-    """Time packets that tell a time: ``day_of_year`` and ``time_of_day_ms``."""
+    """Return the time packets that state a time: ``day_of_year``, ``time_of_day_ms``."""
     told = [
         (
             packet,

@@ -42,7 +42,7 @@ class Piece:
     fine_of: str = ""
 
     def take(self, rows: Int64Array | BoolArray) -> "Piece":
-        """The samples that ``rows`` selects."""
+        """Return the samples that ``rows`` selects."""
         fields = {name: (values[rows], known[rows]) for name, (values, known) in self.fields.items()}
         return replace(self, index=self.index[rows], time_ns=self.time_ns[rows], fields=fields)
 
@@ -102,14 +102,14 @@ def _nearest(one: Piece, other: Piece) -> tuple[Int64Array, Int64Array]:
 
 
 def _closest(times: Int64Array, among: Int64Array) -> Int64Array:
-    """Place of the nearest of ``among``, which increase, to each time."""
+    """Return the place of the nearest of ``among``, which increase, to each time."""
     after = np.minimum(np.searchsorted(among, times), len(among) - 1)
     before = np.maximum(after - 1, 0)
     return np.where(times - among[before] < among[after] - times, before, after)
 
 
 def _with_fine(piece: Piece, fine: Piece) -> Piece:
-    """Values with their fine parts added; a sample without one stays as it is."""
+    """Add fine parts to values; a sample without one stays as it is."""
     rows, parts = _nearest(piece, fine)
     fields = dict(piece.fields)
     for name, (values, known) in piece.fields.items():

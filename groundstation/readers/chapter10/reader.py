@@ -53,7 +53,7 @@ def _recorded(source: Source, found: Overview) -> Iterator[Item]:
 
 
 def metadata(tmats: Tmats) -> dict[str, str]:
-    """Facts for the header: what the recording is of, and the name of each channel's bus."""
+    """Return facts for the header: the recording's subject, and each channel's bus name."""
     facts = {key: value for key, pattern in _FACTS.items() if (value := tmats.get(pattern))}
     if facts.get("tmats.test_item"):
         facts["aircraft"] = facts["tmats.test_item"]

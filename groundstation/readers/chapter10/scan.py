@@ -191,7 +191,7 @@ def _stamp(data: Any, at: int, packet: Any) -> int:
 
 @scanner
 def messages_1553(data: Any, packets: Any, places: Any, times: Any, heads: Any, words: Any, lost: Any) -> int:
-    """Messages of MIL-STD-1553 packets; how many there are.
+    """Find the messages of MIL-STD-1553 packets and return their number.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def see_429(data: Any, packets: Any, seen: Any) -> None:
 
 @scanner
 def words_429(data: Any, packets: Any, places: Any, times: Any, heads: Any, words: Any, lost: Any) -> int:
-    """Words of ARINC-429 packets; how many there are.
+    """Find the words of ARINC-429 packets and return their number.
 
     ``heads`` is each word's header (bus, errors, gap to the word before), ``words`` the word; both uint32, shape (n,).
     The first word has the packet's time, and each gap is counted in its unit. Else as :func:`messages_1553`.

@@ -56,7 +56,7 @@ class Tally:
     wrong: list[_Wrong] = field(default_factory=list)
 
     def add(self, packets: Int64Array, base: int) -> None:
-        """Count packets, damaged ones among them; ``base`` is the place of their places."""
+        """Count packets, damaged ones too; ``base`` is the byte that their places count from."""
         self.packets += len(packets)
         flags, channels, types = (packets[:, column] for column in (scan.FLAGS, scan.CHANNEL, scan.TYPE))
         has_secondary = (flags & scan.HAS_SECONDARY) > 0
@@ -114,7 +114,7 @@ class Tally:
                 yield Remark("tmats_contradicted", text)
 
     def damages(self) -> Iterator[Damage]:
-        """Damaged packets, and packets that were never written."""
+        """Yield damaged packets, and packets that were never written."""
         setup = [one for one in self.wrong if one.kind == kinds.TMATS and one.verdict == scan.WRONG_CHECKSUM]
         if setup:
             what = "TMATS packets with a wrong data checksum, read all the same"

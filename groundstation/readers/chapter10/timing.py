@@ -56,7 +56,7 @@ class Reading:
 
 
 def reading(channel: int, device_ns: int, specific_word: int, body: bytes) -> Reading | None:
-    """Read a time packet of format 1, None where it tells no time.
+    """Read a time packet of format 1; None where it states no time.
 
     Source: IRIG 106-22 Chapter 11, 11.2.3.2; binary coded decimals, hundredths of a second first.
 
@@ -166,7 +166,7 @@ def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) ->
 
 
 def _of_tmats(tmats: Tmats) -> tuple[OtherDate, ...]:
-    """The date of TMATS, which may be some weeks older than the recording."""
+    """Return the date of TMATS; it may be some weeks older than the recording."""
     if tmats.day is None:
         return ()
     day, code = tmats.day
@@ -195,14 +195,14 @@ def _year_of(first: Reading, dates: Counter[date], tmats: Tmats) -> tuple[int | 
 
 
 def _last_start(used: Sequence[Reading]) -> int:
-    """The first reading behind the counter's last restart."""
+    """Return the place of the first reading after the counter's last restart."""
     steps = np.diff(np.array([one.device_ns for one in used], dtype=np.int64))
     restarts = np.flatnonzero(steps < _RESTART_NS)
     return int(restarts[-1]) + 1 if len(restarts) else 0
 
 
 def _every_zero(used: Iterable[Reading], year: int) -> Int64Array:
-    """UTC less the counter, of each reading; a day that falls begins a new year."""
+    """Return UTC less the counter for each reading; a day that falls begins a new year."""
     zeros: list[int] = []
     before: Reading | None = None
     for one in used:

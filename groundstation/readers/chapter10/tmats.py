@@ -73,7 +73,7 @@ class Tmats:
 
 
 def parse(text: bytes) -> Tmats:
-    """Read TMATS; what is no attribute is passed over.
+    """Parse TMATS; text that is no attribute is passed over.
 
     Examples
     --------

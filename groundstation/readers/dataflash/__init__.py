@@ -27,7 +27,7 @@ def sniff(source: Source) -> Claim | None:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, then the log's batches, then remarks and damages."""
+    """Yield the header, the log's batches, remarks and damage."""
     from groundstation.readers.dataflash.reader import items  # brings numba
 
     return items(source)

@@ -120,7 +120,7 @@ class Spans:
 
 
 class Scanner:
-    """Iterates over the blocks of a log.
+    """Iterator over the blocks of a log.
 
     Definitions are taken in as they come. One that contradicts an earlier one of the same id is believed while no
     record of that id was met, or when a new log has begun in the file (logs joined end to end): a flipped bit in a late
@@ -198,7 +198,7 @@ class Scanner:
                 data = data[chunk.done :]
 
     def _longer(self, data: NDArray[np.uint8], stream: BinaryIO) -> tuple[NDArray[np.uint8], bool]:
-        """The data with the next block of the file behind it, and whether that was the last."""
+        """Append the next block of the file to the data; tell whether it was the last."""
         whole = np.empty(len(data) + BLOCK_BYTES, dtype=np.uint8)
         whole[: len(data)] = data
         try:
@@ -250,7 +250,7 @@ class Scanner:
             yield block
 
     def _accepted(self, payload: bytes, types: NDArray[np.uint8], place: int) -> Definition | None:
-        """The definition of a FMT record where it is new and believed."""
+        """Return the definition of a FMT record if it is new and believed."""
         type_id = payload[0]
         if type_id == FMT_ID or self.payloads.get(type_id) == payload:
             return None
@@ -276,7 +276,7 @@ class Scanner:
         self._time_kind[new.type_id] = _time_kind(new)
 
     def _finish(self, data: NDArray[np.uint8]) -> None:
-        """Account for what stands behind the last record."""
+        """Account for the bytes behind the last record."""
         size = self._base + len(data)
         cut_at, skip_start = int(self._state[scan.CUT_AT]), int(self._state[scan.SKIP_START])
         if cut_at != scan.NOWHERE:

@@ -53,7 +53,7 @@ class Mapper:
                 self._parts.setdefault(topic, []).append(part)
 
     def batches(self) -> Iterator[RecordBatch]:
-        """Yield what was taken in since the last call."""
+        """Yield the records taken in since the last call."""
         parts, self._parts = self._parts, {}
         for topic, of_topic in sorted(parts.items()):
             for piece in bounded(merged(topic, of_topic)):
@@ -71,7 +71,7 @@ class Mapper:
         yield from self._unknown.damages()
 
     def remarks(self) -> Iterator[Remark]:
-        """Multipliers of floats that were passed over."""
+        """Yield remarks on multipliers of floats that were passed over."""
         for (topic, field), (multiplier, source) in self._passed_over.items():
             text = (
                 f"{source} is a float in its unit; the multiplier {multiplier:g} that the log gives it is not applied"
@@ -222,7 +222,7 @@ class Mapper:
         return columns | self._speed_sigma(rows, has_3d)
 
     def _speed_sigma(self, rows: Rows, has_fix: BoolArray) -> dict[str, Column]:
-        """Speed accuracy that the receiver gave in a record of its own, with the time of this one."""
+        """Return the speed accuracy that the receiver logged separately at the same time."""
         times, sigmas = self._found.speed_sigma.get((rows.definition.name, rows.instance), (None, None))
         if times is None or sigmas is None or not len(times):
             return {}

@@ -83,7 +83,7 @@ class Choices:
 
 
 def choose(found: Overview, vehicle: str) -> Choices:
-    """Choose by the parameters, and by what has records."""
+    """Choose sources by the parameters, and by what has records."""
     ekf = _filter_in_use(found)
     is_second = not ekf and found.parameters.get("AHRS_EKF_USE") == 0.0 and "AHRS_EKF_TYPE" not in found.parameters
     yaw, origin = _yaw(found, ekf)

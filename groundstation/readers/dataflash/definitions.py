@@ -150,7 +150,7 @@ class Definition:
 
 
 def fmt_definition() -> Definition:
-    """The definition of definitions, which a log need not hold."""
+    """Return the definition of FMT records, which a log need not hold."""
     return parse(FMT_ID, FMT_BYTES, "FMT", "BBnNZ", ["Type", "Length", "Name", "Format", "Columns"])
 
 
@@ -167,7 +167,7 @@ def parse_fmt(payload: bytes) -> Definition | None:
 
 
 def parse(type_id: int, length: int, name: str, characters: str, labels: Sequence[str]) -> Definition:
-    """Definition from the parts of a FMT record; what contradicts itself is a ``fault``.
+    """Return a definition from the parts of a FMT record; a contradiction is a ``fault``.
 
     Examples
     --------
@@ -201,7 +201,7 @@ def parse(type_id: int, length: int, name: str, characters: str, labels: Sequenc
 
 
 def _distinct(labels: Sequence[str]) -> list[str]:
-    """Labels without empty and repeated ones."""
+    """Return labels without empty and repeated ones."""
     names: list[str] = []
     for at, label in enumerate(labels):
         name = label or f"unnamed_{at + 1}"

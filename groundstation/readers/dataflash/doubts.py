@@ -60,7 +60,7 @@ WANTED: Mapping[str, tuple[str, ...]] = MappingProxyType(
 def doubts(
     payloads: Mapping[int, bytes], definitions: Mapping[int, Definition], counts: Mapping[int, int]
 ) -> Iterator[Damage]:
-    """Say of which types the definition is doubtful, with the number of records read by it.
+    """Yield damage for types with a doubtful definition; it counts the records read by it.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def doubts(
 
 
 def odd_instances(counts: Mapping[str, int]) -> Iterator[Damage]:
-    """Say of which topics ``raw.<type>.<instance>`` the instance is one that no autopilot has."""
+    """Yield damage for topics ``raw.<type>.<instance>`` whose instance no autopilot has."""
     for topic, count in counts.items():
         instance = topic.split(".")[-1]
         if instance.isdecimal() and int(instance) >= MOST_SENSORS and topic.split(".")[1] in WANTED:

@@ -114,7 +114,7 @@ def utc_of_power_up(times: GpsTimes, firmware: str = "") -> tuple[int | None, li
 
 
 def _dated(times: GpsTimes) -> BoolArray:
-    """Fixes whose week can be that of a log, shape (n,); else a few that agree on any."""
+    """Tell which fixes have a credible week, shape (n,); else a few that agree on any."""
     in_week = (times.week_ms >= 0) & (times.week_ms < _MS_PER_WEEK)
     good = in_week & (times.week >= _FIRST_WEEK) & (times.week < _LAST_WEEK)
     early = in_week & (times.week > 0) & (times.week < _FIRST_WEEK)
@@ -122,7 +122,7 @@ def _dated(times: GpsTimes) -> BoolArray:
 
 
 def _earliest(firmware: str) -> Earliest:
-    """Year before which a firmware did not exist; without a version that of the format.
+    """Return the year before which a firmware, or else the format, did not exist.
 
     Examples
     --------

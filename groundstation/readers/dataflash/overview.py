@@ -35,7 +35,7 @@ class States:
     values: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def at(self, record_index: Int64Array, before: int) -> Int64Array:
-        """The state at places in the log; ``before`` where none was logged yet."""
+        """Return the state at places in the log; ``before`` where none was logged yet."""
         at = np.searchsorted(self.record_index, record_index, side="right")
         return np.concatenate(([before], self.values))[at]
 
@@ -112,7 +112,7 @@ def overview(scanner: Scanner) -> Overview:
 
 
 class _Survey:
-    """Collects an :class:`Overview` block by block."""
+    """Collector of an :class:`Overview`, block by block."""
 
     def __init__(self) -> None:
         self._units = Units()
@@ -142,7 +142,7 @@ class _Survey:
         }
 
     def add(self, block: Block) -> None:
-        """Take in one block; units first, as they say which field tells instances apart."""
+        """Take in one block; units first, as they tell the field of instances."""
         self._definitions = block.definitions
         groups = sorted(block.groups(), key=lambda group: group[0].name not in ("UNIT", "MULT", "FMTU"))
         for definition, which in groups:

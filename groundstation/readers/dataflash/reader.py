@@ -84,7 +84,7 @@ class _Topics:
         self._layouts: dict[str, tuple[int, object]] = {}
 
     def of(self, rows: Rows) -> str:
-        """``raw.<type>`` or ``raw.<type>.<instance>``."""
+        """Return ``raw.<type>`` or ``raw.<type>.<instance>``."""
         name = self._name(rows.definition)
         return f"raw.{name}" if rows.instance is None else f"raw.{name}.{rows.instance}"
 

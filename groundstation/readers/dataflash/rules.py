@@ -89,7 +89,7 @@ class Rule:
         return factor * multiplier
 
     def passed_over(self, definition: Definition, units: Units) -> float | None:
-        """The log's multiplier of a float that is not applied, None where there is none."""
+        """Return the log's multiplier of a float that is not applied; None without one."""
         spec, stated = definition.find(self.source), units.of(definition, self.source).multiplier
         assert spec is not None
         if stated is None or isclose(stated, 1.0) or spec.divisor is not None or spec.is_integer:
@@ -98,7 +98,7 @@ class Rule:
 
 
 class UnknownUnits:
-    """Counts the values that stay raw because the log gives them a unit that nobody knows."""
+    """Count of values that stay raw because the log gives them an unknown unit."""
 
     def __init__(self) -> None:
         self._counts: dict[tuple[str, str, str], int] = {}
@@ -109,7 +109,7 @@ class UnknownUnits:
         self._counts[key] = self._counts.get(key, 0) + count
 
     def damages(self) -> Iterator[Damage]:
-        """One for each field; the log's own values are kept."""
+        """Yield one damage for each field; the log's own values are kept."""
         for (source, unit, topic), count in self._counts.items():
             what = f"values of {source} in the unit {unit!r}, which is unknown, kept as raw values alone"
             yield Damage("unreadable_cells", f"raw.{source}", count, what, topic, loses_data=False)

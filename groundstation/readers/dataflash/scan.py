@@ -45,7 +45,7 @@ def magic_places(data: NDArray[np.uint8], magic: int = MAGIC_BYTES) -> NDArray[n
 
 @in_place
 def _length_at(data: Any, at: int, lengths: Any) -> int:
-    """Length of the record that begins at a place, 0 when none does."""
+    """Return the length of the record that begins at a place, 0 when none does."""
     if at + 3 > len(data) or data[at] != 0xA3 or data[at + 1] != 0x95:
         return 0
     return int(lengths[data[at + 2]])
@@ -53,7 +53,7 @@ def _length_at(data: Any, at: int, lengths: Any) -> int:
 
 @in_place
 def _time_us(data: Any, at: int, time_kind: Any) -> int:
-    """The record's time in microseconds, -1 when it has none."""
+    """Return the record's time in microseconds, -1 when it has none."""
     kind = time_kind[data[at + 2]]
     if kind == NO_TIME:
         return -1

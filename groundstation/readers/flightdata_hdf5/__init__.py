@@ -24,7 +24,7 @@ def sniff(source: Source) -> Claim | None:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, batches, remarks and damages of a recording.
+    """Yield the header, batches, remarks and damage of a recording.
 
     Raises
     ------

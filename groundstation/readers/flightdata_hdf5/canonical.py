@@ -79,7 +79,7 @@ _SAID: Mapping[str, str] = {
 
 @dataclass(frozen=True, eq=False)
 class Feed:
-    """A parameter laid on a field: value times factor."""
+    """Parameter that feeds a field: value times factor."""
 
     parameter: Parameter
     field: Field
@@ -88,7 +88,7 @@ class Feed:
 
 
 def feeds_of(container: Container) -> tuple[dict[str, tuple[Feed, ...]], tuple[tuple[str, str], ...]]:
-    """Feeds by topic, the leading one first, and (topic, remark) for what is told of them."""
+    """Return feeds by topic, the leading one first, and remarks by topic."""
     by_name = {parameter.name: parameter for parameter in container.parameters}
     feeds: dict[str, tuple[Feed, ...]] = {}
     remarks: list[tuple[str, str]] = []

@@ -104,7 +104,7 @@ class Samples:
 
 
 def _runs(wanted: BoolArray) -> list[tuple[int, int]]:
-    """First and last number (exclusive) of each run of true ones."""
+    """Yield first and last number (exclusive) of each run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], wanted, [False]))))
     return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
 
@@ -169,7 +169,7 @@ def _unreadable(source: Source, error: BaseException) -> UnreadableLogError:
 
 
 class _Mended(io.RawIOBase):
-    """A file with zeros in place of what was cut off, and other bytes at some places.
+    """File with zeros in place of what was cut off, and other bytes at some places.
 
     The library refuses a file that is shorter than it says, and reads heaps without an end for ever.
     """
@@ -291,7 +291,7 @@ def _place_of(group: Any, name: str) -> int:
 
 
 def _inside(group: Any, name: str, kind: type) -> Any:
-    """A member of a group that lies in the same file and is of that kind; no link is followed."""
+    """Return a group's member of a kind in the same file; no link is followed."""
     link = group.get(name, getlink=True)
     if link is None:
         raise ValueError(f"no {name}")
@@ -304,7 +304,7 @@ def _inside(group: Any, name: str, kind: type) -> Any:
 
 
 def _attribute(attributes: Any, name: str, kinds: frozenset[int] = _NUMBERS) -> Any:
-    """An attribute of one of these kinds of values, None where there is none or a large one."""
+    """Return an attribute of one of these kinds; None without one, or if it is large."""
     try:
         found = attributes.get_id(name)
         if found.get_type().get_class() not in kinds or found.get_storage_size() > MOST_ATTRIBUTE_BYTES:
@@ -323,7 +323,7 @@ def _number(attributes: Any, name: str) -> float:
 
 
 def _text(value: Any) -> str:
-    """Text of any encoding in one line, without what cannot be shown."""
+    """Return text of any encoding in one line, without unprintable characters."""
     if isinstance(value, bytes):
         value = value.decode("utf-8", errors="replace")
     text = value if isinstance(value, str) else ""

@@ -49,7 +49,7 @@ class _Losses:
 
 
 def items(source: Source, reader_name: str) -> Iterator[Item]:
-    """Items of a recording, all slices of time one after the other."""
+    """Yield the items of a recording, one slice of time after the other."""
     with opened(source) as container:
         start = container.start_utc_s
         utc_ns = None if start is None else round(start * NS_PER_S)
@@ -167,7 +167,7 @@ def _canonical_batches(
 
 
 def _apart(columns: dict[str, Column], placed: dict[str, Column]) -> dict[str, Column]:
-    """Positions but for those beside a row of zeros, which were interpolated from it."""
+    """Drop positions next to a row of zeros, which were interpolated from it."""
     is_zero = columns["latitude_deg"].mask & ~placed["latitude_deg"].mask
     beside = np.append(False, is_zero[:-1]) | np.append(is_zero[1:], False)
     names = ("latitude_deg", "longitude_deg")
@@ -175,7 +175,7 @@ def _apart(columns: dict[str, Column], placed: dict[str, Column]) -> dict[str, C
 
 
 def _with_velocities(columns: dict[str, Column]) -> None:
-    """Velocities in place of the track, which ``ins`` has no field for."""
+    """Replace the track by velocities, as ``ins`` has no field for it."""
     track, speed = columns.pop("track_deg", None), columns.get(SPEED)
     if track is None or speed is None:
         return

@@ -59,14 +59,14 @@ class Storage:
 
     @property
     def stored_bytes(self) -> int:
-        """Bytes of the file that it takes."""
+        """Bytes of the file that the dataset takes."""
         if not self.per_piece:
             return self.whole * self.sample_bytes
         return sum(piece.nbytes for piece in self.pieces.values())
 
     @property
     def held_bytes(self) -> int:
-        """Bytes that come out of it when all is read."""
+        """Bytes that come out of the dataset when all is read."""
         if not self.per_piece:
             return self.samples * self.sample_bytes
         return max(len(self.pieces) * self.per_piece, self.samples) * self.sample_bytes
@@ -155,12 +155,12 @@ def _pieces(dataset: Any, per_piece: int) -> dict[int, Piece]:
 
 
 def inflated_length(packed: bytes, most: int) -> int:
-    """Bytes that a deflated piece unpacks to; ``most`` + 1 where they are more."""
+    """Return the bytes that a deflated piece unpacks to; ``most`` + 1 if more."""
     return len(zlib.decompressobj().decompress(packed, most + 1))
 
 
 def lzf_length(packed: bytes) -> int:
-    """Bytes that a piece packed by LZF unpacks to.
+    """Return the bytes that a piece packed by LZF unpacks to.
 
     Examples
     --------

@@ -122,5 +122,5 @@ def _common(one: Element, holders: tuple[str, ...]) -> list[str]:
 
 
 def _text(text: str) -> str:
-    """A text as it may stand in a flow mapping: in quotes where it is no plain word."""
+    """Return a text for a flow mapping, in quotes where it is no plain word."""
     return text if PLAIN.fullmatch(text) else "'" + " ".join(text.split()).replace("'", "''") + "'"

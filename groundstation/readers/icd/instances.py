@@ -11,7 +11,7 @@ Holder: TypeAlias = Word429 | Message1553
 
 @dataclass
 class _Unit:
-    """A piece of equipment of one kind: where it speaks, and the signals that are known of it."""
+    """Equipment of one kind: its place on the buses, and its known signals."""
 
     place: Hashable
     signals: set[str] = field(default_factory=set)
@@ -44,7 +44,7 @@ def numbered(
 
 
 def _with_fine(words: list[Word429]) -> tuple[Word429, ...]:
-    """Words whose fine parts feed the signal of their word on the same bus."""
+    """Make fine parts feed the signal of their word on the same bus."""
     coarse = {(_place(word), word.name): word.elements[0] for word in words if word.elements}
 
     def of(word: Word429, element: Element429) -> Element429:
@@ -59,7 +59,7 @@ def _holding(holder: Any, elements: list[Any]) -> Any:
 
 
 def _plain(holder: Holder) -> Any:
-    """The holder with the signals found by name as they are without numbers."""
+    """Return the holder without numbers in the signals that were found by name."""
     return _holding(holder, [_unnumbered(one) for one in holder.elements])
 
 

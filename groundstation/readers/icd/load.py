@@ -119,7 +119,7 @@ class _Checker:
         raise SettingsError(place, found, expected, "see docs/chapter10.md")
 
     def told(self) -> tuple[str, ...]:
-        """One note for each key that is not known here."""
+        """Yield one note for each unknown key."""
         return tuple(f"{self.where}: key {key!r} is not known, {count} times" for key, count in self.unknown.items())
 
     def known(self, table: Mapping[str, Value], _place: str, keys: tuple[str, ...]) -> None:
@@ -279,7 +279,7 @@ class _Checker:
     def with_validity(
         self, words: tuple[Element1553, ...], bits: tuple[Element1553, ...], table: dict[str, Value], place: str
     ) -> tuple[Element1553, ...]:
-        """Elements of a message, each with the bit that ``valid_if`` names."""
+        """Return the elements of a message, each with the bit that ``valid_if`` names."""
         by_bit = {bit.name: bit for bit in bits}
         entries = {**self.table(table.get("bit_elem") or {}, place), **self.table(table.get("word_elem") or {}, place)}
         twice = [word.name for word in words if word.name in by_bit]
@@ -314,7 +314,7 @@ class _Checker:
         return replace(word, elements=made)
 
     def fine(self, words: tuple[Word429, ...]) -> None:
-        """Refuse a fine part of a word that is not there."""
+        """Refuse a fine part of a word that does not exist."""
         names = {word.name for word in words}
         for word in words:
             for element in word.elements:
@@ -359,7 +359,7 @@ class _Checker:
         return {"msbval": msbval, "unit": unit, "description": text}
 
     def signal(self, element: AnyElement, table: dict[str, Value], place: str, holders: tuple[str, ...]) -> AnyElement:
-        """The element with the signal that the ICD states, else with what its name makes plain."""
+        """Return the element with the signal that the ICD states, or that its name implies."""
         signal = self.text(table, "signal", place)
         if "fine_of" in table and signal:
             self.fail(f"{place}: signal", repr(signal), "none beside fine_of: it is that of the word it is added to")

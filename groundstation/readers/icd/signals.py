@@ -118,7 +118,7 @@ def unit_of(signal: str) -> str | None:
 
 
 def by_name(element: AnyElement, holders: Iterable[str]) -> AnyElement:
-    """The element with the signal that its name and unit make plain; itself where they do not.
+    """Return the element with the signal that its name and unit imply, else unchanged.
 
     A name of the holder or its equipment with ``gps`` or ``gnss`` in it makes it ``gnss``, all else is ``ins``.
 
@@ -141,7 +141,9 @@ def by_name(element: AnyElement, holders: Iterable[str]) -> AnyElement:
 
 
 def is_count(element: Element) -> bool:
-    """Check for a plain count: bits without a value, of which the unit says nothing.
+    """Tell whether an element is a plain count: whole numbers without a scale.
+
+    Its unit says nothing then.
 
     Examples
     --------

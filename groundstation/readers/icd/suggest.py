@@ -86,7 +86,7 @@ class _Units:
 
 
 def suggest(entries: Iterable[BusEntry]) -> str:
-    """YAML text of an ICD that names everything on the buses, for its reader to go on with.
+    """Return a draft ICD in YAML that names everything on the buses.
 
     A bus is taken for an inertial reference's, a GNSS receiver's or an air data computer's when it has at least two of
     the labels that tell it, with values that may be used. A message is taken for one of the public layouts when its
@@ -143,13 +143,13 @@ def _words(on_bus: Sequence[BusEntry], units: _Units) -> Iterator[Word429]:
 
 
 def _usable(word: Word429, by_label: Mapping[int, BusEntry]) -> FloatArray:
-    """Values of a word's first element, none where less than half of its words may be used."""
+    """Return values of a word's first element; none if less than half may be used."""
     values, usable = decode_429(by_label[word.label].sample, word.elements[0])
     return values[usable] if 2 * int(np.count_nonzero(usable)) > len(usable) else values[:0]
 
 
 def _with_position(found: dict[int, Word429], by_label: Mapping[int, BusEntry]) -> dict[int, Word429]:
-    """The words without a latitude or longitude that is no part of a position."""
+    """Drop latitudes and longitudes that are no part of a position."""
     for pair in _POSITIONS:
         there = [_usable(found[label], by_label) for label in pair if label in found]
         if len(there) < 2 or not _is_position(*there):
@@ -214,7 +214,7 @@ def _data(entry: BusEntry) -> Data1553 | None:
 
 
 def _counts_1553(data: Data1553) -> Iterator[Element1553]:
-    """A count for every word that changes; words that do not are left out."""
+    """Return a count for every word that changes; constant words are left out."""
     for place in np.flatnonzero((data != data[:1]).any(axis=0)).tolist():
         name = f"word_{place + 1:02d}"
         yield Element1553(name, "SIGNED16", 0.0, "", _range(data[:, place].view(np.int16)), offset=place)
@@ -244,7 +244,7 @@ def _named_values(data: Data1553, layout: str, *names: str) -> list[FloatArray]:
 
 
 def _is_position(latitude_deg: FloatArray, longitude_deg: FloatArray) -> bool:
-    """A place on the Earth, but not 0, 0, that does not jump by more than a degree."""
+    """Tell whether values are a place on Earth, not 0, 0, without jumps over a degree."""
     if not len(latitude_deg) or not len(longitude_deg) or not latitude_deg.all():
         return False
     is_inside = np.abs(latitude_deg).max() <= 90.0 and np.abs(longitude_deg).max() <= 180.0
@@ -252,7 +252,7 @@ def _is_position(latitude_deg: FloatArray, longitude_deg: FloatArray) -> bool:
 
 
 def _fits_egi(data: Data1553) -> bool:
-    """Direction cosines of length one."""
+    """Tell whether the direction cosines have length one."""
     cxx, cxy, cxz, longitude_deg = _named_values(data, "egi", "cxx", "cxy", "cxz", "longitude")
     return bool(np.abs(np.sqrt(cxx**2 + cxy**2 + cxz**2) - 1.0).max() < 1e-3) and _is_position(cxz, longitude_deg)
 

@@ -203,7 +203,7 @@ def _to_caps(values: FloatArray) -> UInt64Array:
 
 
 def _from_1750(field: UInt64Array) -> FloatArray:
-    """Mantissa of 24 bits and exponent of 8, both in two's complement."""
+    """Convert MIL-STD-1750A floats: mantissa of 24 bits, exponent of 8, two's complement."""
     mantissa = (field.astype(np.int64) << 32) >> 40
     exponent = (field.astype(np.int64) << 56) >> 56
     return np.asarray(np.ldexp(mantissa / 2.0**23, exponent))
@@ -223,7 +223,7 @@ def _to_1750(values: FloatArray) -> UInt64Array:
 
 
 def _from_16(field: UInt64Array) -> FloatArray:
-    """Sign, eleven bits of mantissa, four bits of exponent to the base of 16."""
+    """Convert floats with sign, eleven bits of mantissa, four bits of exponent to base 16."""
     mantissa = ((field >> np.uint64(4)) & np.uint64(0x7FF)).astype(np.float64)
     scale = 16.0 ** (field & np.uint64(0xF)).astype(np.float64)
     return np.asarray(np.where(field >> np.uint64(15) == 1, -mantissa, mantissa) * scale)

@@ -140,5 +140,5 @@ def _field(values: FloatArray, element: Element429) -> NDArray[np.int64]:
 
 
 def _digits(field: NDArray[np.int64], bit_count: int) -> list[NDArray[np.int64]]:
-    """Decimal digits, the last first; the first of a number may have fewer than four bits."""
+    """Return decimal digits, the last first; the first may have fewer than four bits."""
     return [(field >> place) & 0xF for place in range(0, bit_count, 4)]

@@ -88,7 +88,7 @@ class _Open:
 
 @dataclass
 class _Builder:
-    """Puts the events of a parser together."""
+    """Builder of a value from the events of a parser."""
 
     where: str
     root: Value = None
