@@ -55,7 +55,7 @@ class Offsets:
 
     @property
     def stated(self) -> tuple[tuple[int, int], ...]:
-        """Return the offsets in the form that the header of a log states them.
+        """Offsets in the form in which the header of a log states them.
 
         Pairs of first record and nanoseconds; empty where nothing is added.
         """

@@ -129,13 +129,13 @@ class Window(io.RawIOBase):
         return self._at
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Move to a position; returns it."""
+        """Move to a position and return it."""
         base = {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._size}[whence]
         self._at = max(0, base + offset)
         return self._at
 
     def readinto(self, buffer: Any) -> int:
-        """Fill ``buffer`` from the position on; returns how many bytes there were."""
+        """Fill ``buffer`` from the position on and return the number of bytes."""
         self._file.seek(self._at)
         count: int = self._file.readinto(buffer)  # type: ignore[attr-defined]
         self._at += count

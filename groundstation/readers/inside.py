@@ -43,7 +43,7 @@ def new_logs(
 
 
 def _new_log(first: int, facts: Mapping[str, str], zero_ns: int | None) -> NewLog:
-    """A log with the UTC of its time zero, where it states one."""
+    """Return a log with the UTC of its time zero, where it states one."""
     own_ns = utc_of_zero(facts)[0]
     return NewLog(first, facts, own_ns if own_ns is None or zero_ns is None else zero_ns)
 
@@ -73,7 +73,7 @@ def with_own_zeros(time: Column, numbers: Int64Array, lines: Mapping[int, str], 
 
 
 def _zero_ns(text: str) -> int | None:
-    """UTC of time zero that a line states."""
+    """Return the UTC of time zero that a line states."""
     return utc_of_zero(_entry(text))[0]
 
 

@@ -1,4 +1,4 @@
-"""Consecutive files of one recording, seen as one file; and a few bytes, seen as one."""
+"""Consecutive files of one recording, seen as one file; bytes in memory, seen as a file."""
 
 import io
 from bisect import bisect_right
@@ -35,17 +35,17 @@ class JoinedSource(Source):
 
     @cached_property
     def size(self) -> int:
-        """Bytes of all of them, decompressed."""
+        """Bytes of all files, decompressed."""
         return self._ends[-1]
 
     @property
     def compression(self) -> str:
-        """Return an empty text: the files are decompressed one by one."""
+        """Empty text: the files are decompressed one by one."""
         return ""
 
     @cached_property
     def head(self) -> bytes:
-        """The first bytes, of as many files as it takes."""
+        """First bytes, of as many files as it takes."""
         head = b""
         for piece in self._pieces:
             head += piece if isinstance(piece, bytes) else piece.head
@@ -59,7 +59,7 @@ class JoinedSource(Source):
         return all(file.is_empty for file in self.files)
 
     def open(self) -> BinaryIO:
-        """Open for reading bytes; errors as of a single file."""
+        """Open for reading bytes; errors are those of a single file."""
         return io.BufferedReader(_Chain(self._pieces, self._ends))
 
     def damages(self) -> tuple[Damage, ...]:
@@ -68,7 +68,7 @@ class JoinedSource(Source):
 
     @cached_property
     def _pieces(self) -> "tuple[Source | bytes, ...]":
-        """The files, and a line feed between two where rows of a table would run into one another."""
+        """Files, and a line feed between two where rows of a table would run together."""
         pieces: list[Source | bytes] = [self.files[0]]
         for before, file in zip(self.files, self.files[1:], strict=False):
             pieces += [*([b"\n"] if _runs_together(before, file) else []), file]
@@ -81,7 +81,7 @@ class JoinedSource(Source):
 
 @dataclass(frozen=True)
 class BytesSource(Source):
-    """Bytes at hand, under the name of a file."""
+    """Bytes in memory, under the name of a file."""
 
     content: bytes = b""
 
@@ -92,12 +92,12 @@ class BytesSource(Source):
 
     @property
     def compression(self) -> str:
-        """Return an empty text: nothing is compressed."""
+        """Empty text: nothing is compressed."""
         return ""
 
     @property
     def head(self) -> bytes:
-        """The first of them."""
+        """First bytes."""
         return self.content[:HEAD_BYTES]
 
     @property
@@ -111,7 +111,7 @@ class BytesSource(Source):
 
 
 class _Chain(io.RawIOBase):
-    """A read-only view of files behind one another, each opened when it is first read."""
+    """Read-only view of consecutive files, each opened when it is first read."""
 
     def __init__(self, pieces: "Sequence[Source | bytes]", ends: Sequence[int]) -> None:
         self._pieces, self._ends, self._at = pieces, ends, 0
@@ -130,7 +130,7 @@ class _Chain(io.RawIOBase):
         return self._at
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Move to a position; returns it."""
+        """Move to a position and return it."""
         base = {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._ends[-1]}[whence]
         self._at = max(0, base + offset)
         return self._at
@@ -154,7 +154,7 @@ class _Chain(io.RawIOBase):
         return count
 
     def close(self) -> None:
-        """Close it, and the file that is open."""
+        """Close the view, and the file that is open."""
         self._close()
         super().close()
 

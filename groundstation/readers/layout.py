@@ -59,13 +59,13 @@ class Rule:
 
     @property
     def target(self) -> str:
-        """``topic.field``, for messages."""
+        """Text ``topic.field``, for messages."""
         return f"{self.topic}.{self.field}"
 
 
 @dataclass(frozen=True)
 class TimeRule:
-    """Time of a row, as it is written.
+    """Rule for the time of a row: the form in which it is written.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class Derivation:
 
 @dataclass(frozen=True)
 class Layout:
-    """The meaning of a table: time, columns, derived fields."""
+    """Layout of a table: time, columns, derived fields."""
 
     time: TimeRule
     rules: tuple[Rule, ...]
@@ -132,7 +132,7 @@ class Layout:
 
 
 def true_from_magnetic(magnetic_deg: FloatArray, variation_deg: FloatArray) -> tuple[FloatArray, ...]:
-    """True direction, degrees in [0, 360): magnetic + declination, east positive.
+    """Return true direction, degrees in [0, 360): magnetic + declination, east positive.
 
     Examples
     --------
@@ -143,7 +143,7 @@ def true_from_magnetic(magnetic_deg: FloatArray, variation_deg: FloatArray) -> t
 
 
 def velocity_from_track(track_deg: FloatArray, speed_mps: FloatArray) -> tuple[FloatArray, ...]:
-    """Velocities north and east from true track and ground speed.
+    """Return velocities north and east from true track and ground speed.
 
     Examples
     --------
@@ -170,7 +170,7 @@ def wind_from_direction(from_deg: FloatArray, speed_mps: FloatArray) -> tuple[Fl
 
 
 def pressure_altitude(indicated_m: FloatArray, setting_inhg: FloatArray) -> tuple[FloatArray, ...]:
-    """Altitude above 1013.25 hPa from the altitude indicated with another altimeter setting.
+    """Return altitude above 1013.25 hPa from one indicated with another altimeter setting.
 
     To the indicated altitude is added that of the setting in the standard atmosphere; 1013.25 hPa are 29.92126 inHg.
 
@@ -218,12 +218,12 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 def rule_for(
     column: int, topic: str, known: Field, factor: float = 1.0, offset: float = 0.0, raw: Key | None = None
 ) -> Rule:
-    """Rule that feeds a canonical field from a column."""
+    """Return the rule that feeds a canonical field from a column."""
     return Rule(column, topic, known.name, known.kind, factor, offset, known.is_heading, raw)
 
 
 def apply(derivation: Derivation, known: Mapping[Key, Column]) -> dict[Key, Column]:
-    """Columns that a derivation gives and the file has not: present where all its inputs are.
+    """Return the columns that a derivation adds: present where all its inputs are.
 
     A column of the file is not filled from others where it is empty: a Garmin G5 without a fix writes no velocity
     beside a speed of 150 kt.

@@ -44,7 +44,7 @@ class Losses:
         tally.first, tally.last = min(tally.first, first), max(tally.last, last)
 
     def damages(self) -> Iterator[Damage]:
-        """One :class:`Damage` for each kind of loss, in the order they were first met."""
+        """Yield one :class:`Damage` for each kind of loss, in the order they were first met."""
         for (kind, what, where, topic, loses_data), tally in self._tallies.items():
             lines = f"row {tally.first}" if tally.first == tally.last else f"rows {tally.first} to {tally.last}"
             yield Damage(kind, f"{where}, {lines}" if where else lines, tally.count, what, topic, loses_data)

@@ -26,12 +26,12 @@ _AT_START: tuple[tuple[bytes, str], ...] = (
 
 
 def recognise(source: Source) -> str | None:
-    """Name of the format that a file's first bytes show, None when they show none."""
+    """Return the format that a file's first bytes show, None when they show none."""
     return next((name for magic, name in _AT_START if source.head.startswith(magic)), None)
 
 
 def companion(source: Source) -> str | None:
-    """Name a file that belongs to a log and is none itself; None for any other.
+    """Name a file that belongs to a log and is no log itself; None for any other.
 
     RTKLIB writes beside a log it records when which of its bytes came: ``TIMETAG RTKLIB`` and its version, 60 bytes.
     """

@@ -55,7 +55,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class Role:
-    """Something that a canonical topic tells, and the rules for it, best first.
+    """Part of a canonical topic, and the rules for it, best first.
 
     ``has_instances``: each instance of the source is a topic of its own (``gnss.1``, ``gnss.2``).
     """
@@ -115,7 +115,7 @@ def mapped(sources: Mapping[str, Sequence[str]]) -> Iterator[Remark]:
 
 
 def scaled(fields: Mapping[str, tuple[str, float]]) -> Callable[[Numbers], Columns]:
-    """Columns of plain factors: canonical field -> (column, factor)."""
+    """Return columns of plain factors: canonical field -> (column, factor)."""
 
     def columns(numbers: Numbers) -> Columns:
         return {field: Column(numbers[name] * factor) for field, (name, factor) in fields.items() if name in numbers}
@@ -138,5 +138,5 @@ def pressure_altitude(pressure_pa: FloatArray) -> Columns:
 
 
 def direction(values_deg: FloatArray, present: BoolArray | None = None) -> Column:
-    """A direction in [0, 360)."""
+    """Return a direction in [0, 360)."""
     return Column(np.asarray(wrap_360(values_deg)), present)

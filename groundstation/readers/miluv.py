@@ -38,7 +38,7 @@ _GROUP = re.compile(r"""^["']?(\w+)["']?\s*:\s*$""")
 
 
 def _header(source: Source) -> tuple[Line, list[str]] | None:
-    """The header row, where it is that of this format."""
+    """Return the header row, if it is that of this format."""
     lines = head_lines(source, "utf-8", 1)
     names = split_cells(lines[0].text, ",") if lines else []
     wanted = {RANGE, *ENDS, TIME}
@@ -51,7 +51,7 @@ def sniff(source: Source) -> Claim | None:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, batches, remarks and damages."""
+    """Yield the header, batches, remarks and damage."""
     from groundstation.readers.table_reader import TableReader, truncated_header
 
     found = _header(source)
@@ -85,7 +85,7 @@ def read(source: Source) -> Iterator[Item]:
 
 
 def _parted(batch: RecordBatch, vehicles: list[str], losses: Losses) -> Iterator[RecordBatch]:
-    """A batch of rows as links, poses and what is left."""
+    """Split a batch of rows into links, poses and the rest."""
     columns = dict(batch.columns)
     distance, ends = columns.pop(RANGE), [columns.pop(name) for name in ENDS]
     ids = [np.where(end.mask, end.values, -1.0) for end in ends]

@@ -11,7 +11,7 @@ Key = tuple[str, str]
 
 
 def misnamed(items: Iterator[Item], wanted: Mapping[Key, tuple[str, str]], row: int) -> Iterator[Item]:
-    """The items, then what of them stands under names that are almost known ones.
+    """Yield the items, then damage for columns whose names are almost known ones.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ class Part:
 
 
 def occupied(part: Part) -> Part | None:
-    """The rows that have any value; None when there are none."""
+    """Return the rows that have any value; None when there are none."""
     columns = part.columns.values()
     if not part.columns or any(column.present is None for column in columns):
         return part if part.columns else None
@@ -79,7 +79,7 @@ def merged(topic: str, parts: Sequence[Part]) -> RecordBatch:
 
 
 def _values(pieces: Sequence[tuple[Int64Array, Column]], rows: int) -> NDArray[Any]:
-    """Values of several pieces that stand at given places."""
+    """Return the values of several pieces at given places."""
     kind = np.result_type(*(piece.values.dtype for _at, piece in pieces))
     first = pieces[0][1].values[:1]  # one text throughout is one run to write
     values = np.full(rows, np.nan if kind.kind == "f" else first[0] if len(first) else 0, dtype=kind)
@@ -97,13 +97,13 @@ def _present(pieces: Sequence[tuple[Int64Array, Column]], rows: int) -> BoolArra
 
 
 def bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
-    """The batch in pieces of at most ``MAX_BATCH_ROWS`` rows."""
+    """Yield the batch in pieces of at most ``MAX_BATCH_ROWS`` rows."""
     for start in range(0, len(batch), MAX_BATCH_ROWS):
         yield batch if len(batch) <= MAX_BATCH_ROWS else batch.take(slice(start, start + MAX_BATCH_ROWS))
 
 
 def one_row_each(batch: RecordBatch) -> RecordBatch:
-    """Records that are valid at the same time as one row: what a unit says of one instant.
+    """Merge records that are valid at the same time into one row.
 
     Those of an instant at which two have the same field stay as they are.
     """

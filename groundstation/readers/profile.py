@@ -137,7 +137,7 @@ def load(path: Path) -> Profile:
 
 
 def read_table(path: Path) -> dict[str, Any]:
-    """The TOML of a profile, not checked yet.
+    """Read the TOML of a profile without checks.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def read_table(path: Path) -> dict[str, Any]:
 
 
 class Checker:
-    """Checks the values of a profile; every complaint names the file and the key."""
+    """Checker of the values of a profile; every error names the file and the key."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -215,7 +215,7 @@ class Checker:
 
 
 class _Checker(Checker):
-    """Turns the TOML tables into the rules of a table's columns."""
+    """Parser of the TOML tables into rules for a table's columns."""
 
     def profile(self, table: dict[str, Any]) -> Profile:
         allowed = (

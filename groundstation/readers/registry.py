@@ -1,4 +1,4 @@
-"""Finds the reader of a file by its content.
+"""Registry of the readers: find the one for a file by its content.
 
 Built-in readers are listed here; third parties add theirs through entry points of the group
 ``groundstation.readers``: a module or object with ``NAME``, ``sniff(source)`` and ``read(source)``. A plug-in that
@@ -94,7 +94,7 @@ def _readers() -> dict[str, Reader]:
 
 
 def plug_in_failures() -> tuple[str, ...]:
-    """One line for each third-party reader that could not be loaded."""
+    """List one line for each third-party reader that could not be loaded."""
     return _plug_ins()[1]
 
 
@@ -165,12 +165,12 @@ def _in_silence(items: Iterator[Item]) -> Iterator[Item]:
 
 
 def _of_the_source(source: Source) -> Iterator[Item]:
-    """Damage of the compressed file; known only when all was read."""
+    """Yield the damage of the compressed file, which is known when all was read."""
     yield from source.damages()
 
 
 def _guarded(reader: Reader, claim: Claim, source: Source) -> Iterator[Item]:
-    """Items of a stranger's reader; whatever it raises becomes one line."""
+    """Yield the items of a third-party reader; whatever it raises becomes one line."""
     try:
         yield from reader.read(source)
     except GroundstationError:
@@ -271,7 +271,7 @@ def _has_records(claim: Claim, source: Source) -> bool:
 
 
 def _own(claim: Any, name: str) -> Claim | None:
-    """A reader's answer, as its own claim."""
+    """Return a reader's answer as our own claim."""
     if claim is None:
         return None
     return Claim(name, str(claim.detail), float(claim.confidence))

@@ -39,12 +39,12 @@ class Block:
 
 
 def restore_delimiters(text: str, delimiter: str) -> str:
-    """Give a text cell the delimiters back that stood inside quotes."""
+    """Restore the delimiters that stood inside quotes in a text cell."""
     return text.replace(_QUOTED_DELIMITER, delimiter)
 
 
 class RowScanner:
-    """Iterates over the blocks of sound rows of a source; counts losses into ``losses``."""
+    """Iterator over the blocks of sound rows of a source; counts losses into ``losses``."""
 
     def __init__(self, source: Source, dialect: Dialect, losses: Losses) -> None:
         self._source, self._dialect, self._losses = source, dialect, losses
@@ -107,7 +107,7 @@ class RowScanner:
         return b""
 
     def _clean(self, piece: bytes) -> bytes:
-        """UTF-8 text with LF line ends; bytes that cannot stand in a text are replaced by a mark."""
+        """Return UTF-8 text with LF line ends; a mark replaces bytes that are no text."""
         if not piece.isascii():
             encoding = self._dialect.encoding
             piece = piece.decode(encoding, errors="replace").encode("utf-8")

@@ -54,7 +54,7 @@ def sniff(source: Source) -> Claim | None:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, rows as ``raw.pos`` and as ``gnss``, then remarks and damages."""
+    """Yield the header, rows as ``raw.pos`` and as ``gnss``, remarks and damage."""
     first = form_of(source)
     if first is None:
         raise UnreadableLogError(source.name, "no line of names", "%  GPST latitude(deg) ... of RTKLIB")
@@ -70,7 +70,7 @@ def read(source: Source) -> Iterator[Item]:
 
 
 def _rows(source: Source, governed: Sequence[Governed], losses: Losses) -> Iterator[Item]:
-    """Rows below headers that name the same columns."""
+    """Yield the rows below headers that name the same columns."""
     from groundstation.readers.table_reader import TableReader
 
     form, first = governed[0].form, governed[0]
@@ -115,7 +115,7 @@ class _Tabs(io.RawIOBase):
         return True
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """The rows are read once, from the first on."""
+        """Return 0 without moving: the rows are read once, from the first on."""
         return 0
 
     def close(self) -> None:
@@ -139,7 +139,7 @@ class _Tabs(io.RawIOBase):
 
 
 def _parted(rows: bytes) -> bytes:
-    """Rows with a tab between numbers that touch: where a digit stands right before a sign.
+    """Insert a tab between numbers that touch: where a sign follows a digit.
 
     Examples
     --------
@@ -156,7 +156,10 @@ def _parted(rows: bytes) -> bytes:
 
 @dataclass(frozen=True)
 class _Tabbed(Source):
-    """Another source, rows parted by tabs, from ``first_byte`` to ``end_byte`` (None: end)."""
+    """Another source with tabs between cells, from ``first_byte`` to ``end_byte``.
+
+    ``end_byte`` None is the end of the file.
+    """
 
     whole: Source
     first_byte: int
@@ -168,7 +171,7 @@ class _Tabbed(Source):
         return self.whole.head
 
     def open(self) -> BinaryIO:
-        """The rows, from the first on."""
+        """Open the rows, from the first on."""
         stream = self.whole.open()
         stream.seek(self.first_byte)
         return io.BufferedReader(_Tabs(stream, None if self.end_byte is None else self.end_byte - self.first_byte))
@@ -192,7 +195,7 @@ def _in_utc(batch: RecordBatch, form: Form) -> RecordBatch:
 
 
 def _gnss(batch: RecordBatch, form: Form, losses: Losses) -> RecordBatch | None:
-    """The canonical row of each solution."""
+    """Return the canonical row of each solution."""
     columns = _Cells(batch)
     found = _placed(_position(columns, form), batch, losses)
     if "Q" in columns:
@@ -220,7 +223,7 @@ class _Cells(dict[str, Column]):
         super().__init__(batch.columns)
 
     def vector(self, *names: str) -> tuple[FloatArray, Any] | None:
-        """Three columns as (n, 3), and where all are present; None where the form lacks one."""
+        """Return three columns as (n, 3), and where all are present; None if one is missing."""
         if not all(name in self for name in names):
             return None
         parts = [self[name] for name in names]
@@ -254,7 +257,7 @@ def _of_minutes(columns: _Cells, name: str) -> Column:
 
 
 def _of_vectors(columns: _Cells, form: Form) -> dict[str, Column]:
-    """Positions in ECEF, or east, north, up of a base station whose place the file tells."""
+    """Return positions in ECEF, or east, north, up of a base station with a known place."""
     ecef, baseline = (
         columns.vector("x-ecef", "y-ecef", "z-ecef"),
         columns.vector("e-baseline", "n-baseline", "u-baseline"),

@@ -62,7 +62,7 @@ class _Sense:
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim a file whose records are places on Earth in order, as near as the speeds say.
+    """Claim a file whose records are consecutive places on Earth, as near as speeds say.
 
     Some hundred records are looked at on top, and of a longer file in its middle or at its end.
     """
@@ -123,14 +123,14 @@ class _Placeless:
     last: int = 0
 
     def add(self, first: int, is_placed: NDArray[np.bool_]) -> None:
-        """Count those of some records."""
+        """Count the records without a place among some."""
         none = np.flatnonzero(~is_placed)
         if len(none):
             self.first = self.first if self.count else first + int(none[0])
             self.count, self.last = self.count + len(none), first + int(none[-1])
 
     def damages(self) -> Iterator[Damage]:
-        """One that tells of them, where there are any."""
+        """Yield one damage for all records without a place, if there are any."""
         if self.count:
             place = f"record {self.first}" if self.count == 1 else f"records {self.first} to {self.last}"
             yield Damage("no_position", place, self.count, NO_POSITION, "ins", loses_data=False)
@@ -165,7 +165,7 @@ class _Walk:
             yield Damage("truncated", bytes_place(*self._cut), self._cut[1] - self._cut[0], what)
 
     def _of(self, data: bytes, base: int) -> Generator[NDArray[Any], None, int]:
-        """Records of the data at hand; returns how many bytes are done with."""
+        """Yield the records of the data at hand; return how many bytes are done."""
         at, origin, records = 0, 1, np.zeros(0, RECORD)
         while len(data) - at >= RECORD.itemsize:
             if (at - origin) % RECORD.itemsize or at >= origin + records.nbytes:  # others than those judged already
@@ -300,7 +300,7 @@ def accuracies_beside(path: Path) -> Path | None:
 
 
 def _accuracies(path: Path) -> NDArray[Any]:
-    """Records of the file of accuracies beside an SBET; none where there is no such file."""
+    """Read the accuracies beside an SBET; none where there is no such file."""
     beside = accuracies_beside(path)
     if beside is None:
         return np.zeros(0, ACCURACY)
@@ -317,7 +317,7 @@ def _accuracies(path: Path) -> NDArray[Any]:
 
 
 def _sigmas(week_s: FloatArray, accuracies: NDArray[Any]) -> dict[str, Column]:
-    """Accuracies at the times of the records, interpolated between two that are near."""
+    """Interpolate accuracies to the times of the records, between two that are near."""
     if len(accuracies) < 2:
         return {}
     times = unrolled_s(accuracies["time"])

@@ -1,4 +1,4 @@
-"""Records of an SBET: their layout, which bytes are one, where the next one begins.
+"""Records of an SBET: their layout, which bytes are records, where the next one begins.
 
 Source: Applanix, POSPac MMS file formats (SBET, SMRMSG).
 """
@@ -93,7 +93,7 @@ def next_start(data: bytes, at: int) -> int | None:
 
 
 def unrolled_s(week_s: FloatArray) -> FloatArray:
-    """Seconds of the week that count on past its end; what is no number stays."""
+    """Count seconds of the week on past its end; a NaN stays."""
     finite = np.isfinite(week_s) & (np.abs(week_s) < 1e9)
     ms = unrolled((np.where(finite, week_s, 0.0) * 1e3).astype(np.int64), S_PER_WEEK * 1000)
     turns = np.round((ms / 1e3 - np.where(finite, week_s, 0.0)) / S_PER_WEEK)

@@ -13,7 +13,7 @@ STRETCHES_SHOWN = 20
 
 
 class _Stretch(NamedTuple):
-    """First byte, the first after it, and the index of the first record behind it."""
+    """First byte, end byte (exclusive), and index of the first record behind it."""
 
     start: int
     end: int
@@ -22,7 +22,7 @@ class _Stretch(NamedTuple):
 
 @dataclass
 class SkippedBytes:
-    """Stretches in the order of the file.
+    """Skipped stretches of bytes in the order of the file.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ HEAD_BYTES = 1 << 20  # a header row of 10 000 columns takes about 300 kB
 
 @dataclass(frozen=True)
 class Source:
-    """A file, its size and its first bytes. Nothing is read before it is asked for.
+    """File, its size and its first bytes; nothing is read before it is asked for.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Source:
 
     @property
     def compression(self) -> str:
-        """``gzip``, ``zstd`` or nothing, told by the content (something must come out of it)."""
+        """Compression, ``gzip``, ``zstd`` or empty, by the content (it must decompress)."""
         return self._beginning[0]
 
     @property
@@ -138,7 +138,7 @@ class Reader(Protocol):
     NAME: str
 
     def sniff(self, source: Source) -> Claim | None:
-        """Say whether this reader can read the source; looks at ``source.head`` only."""
+        """Claim the source if this reader can read it; looks at ``source.head`` only."""
 
     def read(self, source: Source) -> Iterator[Item]:
-        """Yield the header, then batches, remarks and damages."""
+        """Yield the header, batches, remarks and damage."""

@@ -1,4 +1,4 @@
-"""UTC of a recorder's time zero, from the metadata of a log or a clock that it carries."""
+"""UTC of a recorder's time zero, from the metadata of a log or a clock in it."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -76,7 +76,7 @@ _HALF_DAY_NS = 43_200 * NS_PER_S
 
 @dataclass(frozen=True, eq=False)
 class ToldZero:
-    """UTC of the recorder's zero by the readings of another clock.
+    """UTC of the recorder's time zero by the readings of another clock.
 
     Parameters
     ----------
@@ -94,11 +94,11 @@ class ToldZero:
 
     @property
     def spread_s(self) -> float:
-        """Nine tenths of the readings are within it."""
+        """Spread in seconds that contains nine tenths of the readings."""
         return float(np.quantile(np.abs(self.zeros_ns - self.ns), 0.9)) / NS_PER_S
 
     def remarks(self, clock: str) -> Iterator[Remark]:
-        """A line on each level that does not count; ``clock`` names what told them."""
+        """Yield a remark on each level that does not count; ``clock`` names its source."""
         for count, away_ns in self.passed_over:
             weeks, late_s = whole_weeks(away_ns), leap_seconds_late(away_ns)
             begins = f"{clock}: {count} reading{'s' if count > 1 else ''}"
@@ -129,7 +129,7 @@ class _Level:
 
 
 def told_at_zero(told_ns: Int64Array, device_ns: Int64Array) -> ToldZero:
-    """Time by another clock when the recorder's was at zero.
+    """Return the time by another clock when the recorder's was at zero.
 
     Of readings that repeat a time only the first counts, for the others are older than they say: a clock may tell whole
     seconds. When the log's first time was told first is not known where times repeat.
@@ -152,7 +152,7 @@ def told_at_zero(told_ns: Int64Array, device_ns: Int64Array) -> ToldZero:
 
 
 def zero_of_readings(zeros_ns: Int64Array) -> ToldZero:
-    """Zero by readings of another clock; where that was set, the last level counts.
+    """Return the zero by readings of another clock; if that was set, the last level counts.
 
     A receiver tells UTC some seconds late until it has heard of the leap seconds, and a date of the past until it knows
     the week. So the latest date counts, and of levels on that date the last; of a receiver that started again in the
@@ -188,7 +188,7 @@ def _middle(values: Int64Array) -> int:
 
 
 def _levels(zeros_ns: Int64Array) -> list[_Level]:
-    """Levels of readings in their order; none where all agree, or hardly any two do."""
+    """Group readings into levels; none where all agree, or hardly any two do."""
     jumps = np.flatnonzero(np.abs(np.diff(zeros_ns)) > _JUMP_NS) + 1
     if not 0 < len(jumps) < _MOST_PIECES:
         return []
@@ -226,7 +226,7 @@ def _without_excursions(levels: list[_Level]) -> list[_Level]:
 
 
 def _goes_on(zeros_ns: Int64Array, level: _Level, first: int, middle_ns: int) -> bool:
-    """Check for a piece of the level before it: after an outlier, or as clocks drift."""
+    """Tell whether readings continue a level: after an outlier, or as clocks drift."""
     _first, stop = level.pieces[-1]
     return (
         abs(middle_ns - level.middle_ns) < _SAME_NS

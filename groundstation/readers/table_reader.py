@@ -41,7 +41,7 @@ MAX_BATCH_BYTES = 32 << 20  # a text field is as wide as its longest value: a ba
 
 
 class TableReader:
-    """Iterator of items over one delimited file, section by section.
+    """Reader of one delimited file, section by section.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class TableReader:
         self._sections = self._settled(sections)
 
     def items(self, header: LogHeader) -> Iterator[Item]:
-        """The header, batches in the order of the file, then remarks and damages."""
+        """Yield the header, batches in the order of the file, remarks and damage."""
         yield header
         lines: dict[int, str] = {}
         facts: dict[int, Mapping[str, str]] = {}
@@ -179,7 +179,7 @@ class TableReader:
         return columns
 
     def _places(self) -> Iterator[tuple[str, dict[str, Rule]]]:
-        """Topics whose rows tell a place, and their rules by field; truth is left alone."""
+        """Yield topics whose rows state a position, with rules by field; truth is left out."""
         topics: dict[str, dict[str, Rule]] = {}
         for rule in self._layout.rules:
             topics.setdefault(rule.topic, {})[rule.field] = rule
@@ -190,7 +190,7 @@ class TableReader:
     def _placed(
         self, topic: str, by_field: Mapping[str, Rule], columns: Mapping[Key, Column], lines: Int64Array
     ) -> dict[Key, Column]:
-        """Columns of a topic without values that have no place, and the raw numbers beside them."""
+        """Drop values without a position; keep their raw numbers in raw columns."""
         latitude, longitude = (columns[topic, f"{name}_deg"] for name in ("latitude", "longitude"))
         is_zero = without_place(latitude, longitude)
         self._losses.add("no_position", NO_POSITION, lines[is_zero], topic=topic, loses_data=False)
@@ -305,7 +305,7 @@ def _zero_of(header: LogHeader, section: Section) -> int | None:
 
 
 def _shifted(time: Column, shift_ns: int | None) -> Column:
-    """Times by the clock of the log's header; none where nothing tells the shift."""
+    """Return times by the clock of the log's header; none where the shift is unknown."""
     if shift_ns is None:
         return Column(time.values, np.zeros(len(time), dtype=bool))
     return Column(time.values + shift_ns, time.present) if shift_ns else time

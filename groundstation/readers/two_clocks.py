@@ -168,7 +168,7 @@ def stretches_of(track: Track, *, receipt_step_s: float = STEP_S) -> list[Stretc
 
 
 def _slips(track: Track) -> BoolArray:
-    """Single readings that are far from those before and behind, which are near each other."""
+    """Tell which single readings are far from two neighbours that are near each other."""
     late_ns, step_ns = track.late_ns, STEP_S * NS_PER_S
     found = np.zeros(len(track), dtype=bool)
     changes = np.abs(np.diff(late_ns)) > step_ns
@@ -264,7 +264,7 @@ class Line:
 
 
 def lower_line(track: Track) -> Line:
-    """The line below all differences of receipt and clock that is nearest to them.
+    """Fit the line below all differences of receipt and clock that is nearest to them.
 
     It goes through the edge of their lower hull above which the middle of the clock's times lies. A clock that runs off
     by more than :data:`MOST_SKEW_PPM` counts no seconds: then the least difference holds throughout.
@@ -307,7 +307,7 @@ def _lower_hull(x: Int64Array, y: Int64Array) -> list[int]:
 
 
 def _lowest(x: Int64Array, y: Int64Array) -> Sequence[int]:
-    """The lowest point of each of at most some thousand stretches of ``x``."""
+    """Return the lowest point of each of at most some thousand stretches of ``x``."""
     width = max(int(x[-1] - x[0]) // 4_096, 1)
     cell = (x - x[0]) // width
     order = np.lexsort((y, cell))

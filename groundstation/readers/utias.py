@@ -76,7 +76,7 @@ def sniff(source: Source) -> Claim | None:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, batches, remarks and damages of a file of a robot."""
+    """Yield the header, batches, remarks and damage of a file of a robot."""
     from groundstation.readers.table_reader import TableReader
 
     kind = _kind(source)
@@ -126,7 +126,7 @@ def _by_barcode(items: Iterator[Item]) -> Iterator[Item]:
 
 
 def barcodes(source: Source) -> tuple[dict[int, int], tuple[Damage, ...]]:
-    """Subject by barcode, and the rows that are none.
+    """Return the subject of each barcode, and damage for unreadable rows.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def barcodes(source: Source) -> tuple[dict[int, int], tuple[Damage, ...]]:
 
 
 def landmarks(source: Source) -> tuple[tuple[Landmark, ...], tuple[Damage, ...]]:
-    """Landmarks of a set, and the rows that are none. Raises as :func:`barcodes` does."""
+    """Return the landmarks of a set, and damage for unreadable rows."""
     rows, damages = _table(source, "Landmark Groundtruth")
     return tuple(Landmark(int(row[0]), row[1], -row[2]) for row in rows), damages
 

@@ -57,12 +57,12 @@ class Pace:
 
     @property
     def span_ns(self) -> int:
-        """Time between two boundaries: four times as long after each ``MOST_SMALL`` small chunks."""
+        """Time between two boundaries, four times as long after each ``MOST_SMALL`` small chunks."""
         return CHUNK_SPAN_NS << 2 * min(self._small // MOST_SMALL, 12)
 
 
 class ChannelWriter:
-    """Turn batches of one topic into chunks.
+    """Writer of the batches of one topic as chunks.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class ChannelWriter:
         self._last_ns = 0
 
     def slots(self, batch: RecordBatch) -> list[Slot]:
-        """Values of a batch as they are written, in order of their field numbers."""
+        """Return the values of a batch as they are written, in order of field numbers."""
         raise NotImplementedError
 
     def definition(self, metadata: Mapping[str, str] = MappingProxyType({})) -> tuple[Schema, Channel]:
@@ -168,7 +168,7 @@ class TopicWriter(ChannelWriter):
         self._device_time, self._record_index = self._type.common_fields
 
     def slots(self, batch: RecordBatch) -> list[Slot]:
-        """Common fields, then the batch's columns in order of their numbers."""
+        """Return common fields, then the batch's columns in order of their numbers."""
         device_time = batch.device_time_ns
         fields = {name: self._type.field_for(name, column.values.dtype) for name, column in batch.columns.items()}
         common = [
@@ -208,14 +208,14 @@ class TopicWriter(ChannelWriter):
 
 
 def channel_record(channel_id: int, topic: str, metadata: Mapping[str, str]) -> Channel:
-    """Record of a channel whose schema has its number."""
+    """Return the record of a channel whose schema has the same number."""
     return Channel(
         id=channel_id, topic=topic, message_encoding="protobuf", metadata=dict(metadata), schema_id=channel_id
     )
 
 
 def _width(dtype: np.dtype[Any]) -> int:
-    """About as many bytes as a value takes in a message."""
+    """Return about as many bytes as a value takes in a message."""
     return dtype.itemsize // 4 if dtype.kind == "U" else dtype.itemsize
 
 

@@ -51,11 +51,11 @@ class DerivedWriter(ChannelWriter):
         self._metadata: dict[str, str] = {}
 
     def timestamp(self, prefix: bytes, time_ns: Int64Array | None) -> list[Slot]:
-        """The timestamp behind its tag, on an absolute clock."""
+        """Return the timestamp behind its tag, on an absolute clock."""
         return [Slot(prefix + b"\x0c", _timestamps(time_ns))] if self._has_utc and time_ns is not None else []
 
     def definition(self, metadata: Mapping[str, str] = MappingProxyType({})) -> tuple[Schema, Channel]:
-        """Foxglove's schema; the channel's metadata says that reading skips it."""
+        """Return Foxglove's schema; the channel's metadata says that reading skips it."""
         files = FileDescriptorSet()
         for descriptor in _with_imports(self._message.file, {}).values():
             descriptor.CopyToProto(files.file.add())
@@ -132,7 +132,7 @@ class Origin:
         self.place: tuple[float, float, float] | None = None
 
     def enu_m(self, geodetic: FloatArray) -> FloatArray:
-        """East, north and up of latitudes, longitudes (deg) and heights (m), shape (n, 3)."""
+        """Return east, north and up of latitudes, longitudes (deg) and heights (m), (n, 3)."""
         known = np.flatnonzero(np.isfinite(geodetic[:, :2]).all(axis=1))
         if self.place is None and len(known):
             latitude, longitude, height = geodetic[known[0]].tolist()
@@ -269,7 +269,7 @@ class LogWriter(DerivedWriter):
 
 
 def _values(batch: RecordBatch, name: str) -> FloatArray:
-    """A column as float64, shape (n,), NaN where absent."""
+    """Return a column as float64, shape (n,), NaN where absent."""
     column = batch.columns.get(name)
     if column is None:
         return np.full(len(batch), np.nan)
@@ -277,13 +277,13 @@ def _values(batch: RecordBatch, name: str) -> FloatArray:
 
 
 def _constant(tag: bytes, text: str, count: int) -> Slot:
-    """The same text in every message."""
+    """Return a slot with the same text in every message."""
     encoded = text.encode()
     return Slot(tag + bytes([len(encoded)]) + encoded, np.empty(count, "V0"))
 
 
 def _with_imports(file: FileDescriptor, found: dict[str, FileDescriptor]) -> dict[str, FileDescriptor]:
-    """A file's descriptor and all that it imports, imported ones first."""
+    """Return a file's descriptor and all that it imports, imported ones first."""
     for imported in file.dependencies:
         _with_imports(imported, found)
     found[file.name] = file

@@ -78,7 +78,7 @@ class UnknownChannel:
 
 @dataclass(frozen=True)
 class Missing:
-    """Messages of a topic that are not in the file, by what the file itself tells."""
+    """Messages of a topic that the file counts and that are not in it."""
 
     topic: str
     count: int
@@ -89,7 +89,7 @@ Found: TypeAlias = ForeignMessages | ForeignLost | UnknownChannel | Missing
 
 
 def read_header(head: bytes) -> Header | None:
-    """The header in the first bytes of an MCAP."""
+    """Read the header in the first bytes of an MCAP."""
     start = len(MAGIC) + RECORD_PREFIX
     length = int.from_bytes(head[len(MAGIC) + 1 : start], "little")
     is_header = head.startswith(MAGIC + bytes([Opcode.HEADER])) and start + length <= len(head)
@@ -98,7 +98,7 @@ def read_header(head: bytes) -> Header | None:
 
 
 class ForeignMcap:
-    """Iterates over what a file holds, in its order.
+    """Iterator over the content of a file, in its order.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ class ForeignMcap:
         return self._file.read(length)
 
     def find_chunk(self, start: int) -> int:
-        """Place of the next chunk from ``start`` on, the size of the file when there is none."""
+        """Return the place of the next chunk from ``start`` on, or the size of the file."""
         at = start
         while at < self._size:
             block = self._read(at, SEARCH_BYTES + PEEK_BYTES)
@@ -221,7 +221,7 @@ class ForeignMcap:
             yield ForeignLost(at, end, "bytes of a chunk's content that are no record", start - whole, self._count)
 
     def _records(self, raw: ByteArray, at: int, end: int) -> Iterator[Found]:
-        """Messages among records that stand one after the other, definitions taken in."""
+        """Yield the messages among consecutive records; definitions are taken in."""
         found = find_messages(raw)
         if found is None:
             yield from self._stretches(raw, at, end)

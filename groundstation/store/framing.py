@@ -62,11 +62,11 @@ Buffer: TypeAlias = bytes | memoryview
 
 
 class ChunkError(Exception):
-    """A chunk that cannot be used; the text says why."""
+    """Error of a chunk that cannot be used; the text says why."""
 
 
 def to_bytes(*records: McapRecord) -> bytes:
-    """MCAP records as bytes, one after the other."""
+    """Return MCAP records as bytes, one after the other."""
     builder = RecordBuilder()
     for record in records:
         record.write(builder)
@@ -74,7 +74,7 @@ def to_bytes(*records: McapRecord) -> bytes:
 
 
 def parse_record(opcode: int, payload: bytes) -> McapRecord | None:
-    """The record in a payload; None when the payload is not exactly one record of that kind."""
+    """Parse a payload; None when it is not exactly one record of that kind."""
     kind = _READABLE.get(opcode)
     if kind is None:
         return None
@@ -159,7 +159,7 @@ def chunk_head(start_time: int, end_time: int, uncompressed_size: int, crc: int,
 
 
 def read_chunk_head(data: bytes, *, need_lengths: bool = True) -> ChunkHead | None:
-    """Head of the chunk record at the start of ``data``; None when it contradicts itself.
+    """Read the head of the chunk at the start of ``data``; None when it is inconsistent.
 
     Without ``need_lengths`` only the places are used: for a chunk whose extent an index tells.
     """
@@ -179,7 +179,7 @@ def read_chunk_head(data: bytes, *, need_lengths: bool = True) -> ChunkHead | No
 
 
 def decompress(compression: str, data: Buffer, size: int, crc: int | None) -> ByteArray:
-    """Records of a chunk, checksum checked.
+    """Decompress the records of a chunk and check its checksum.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def _zstd(data: Buffer, size: int) -> bytes:
 
 
 def split_messages(buffer: ByteArray) -> list[Messages] | None:
-    """Messages of a chunk by channel; None when the chunk is not a row of whole records."""
+    """Split a chunk into messages by channel; None when it is not made of whole records."""
     if not len(buffer):
         return []
     even = _evenly_spaced(buffer)
@@ -246,7 +246,7 @@ def split_messages(buffer: ByteArray) -> list[Messages] | None:
 
 
 def _evenly_spaced(buffer: ByteArray) -> Messages | None:
-    """The messages of a chunk in which all have one length and one channel."""
+    """Return the messages of a chunk in which all have one length and one channel."""
     if len(buffer) < HEAD.itemsize or buffer[0] != MESSAGE_OPCODE:
         return None
     head = np.frombuffer(buffer, HEAD, 1)[0]
@@ -281,7 +281,7 @@ class Summary:
 
     @property
     def message_counts(self) -> dict[int, int]:
-        """Return the number of messages by channel, by statistics that agree with themselves.
+        """Number of messages by channel, by statistics that agree with themselves.
 
         Empty where there are none.
         """
@@ -307,7 +307,7 @@ class Summary:
 
 
 def _footer(file: BinaryIO, size: int) -> tuple[bytes, Footer] | None:
-    """The last bytes of a file and the footer in them; None when there is none at its end."""
+    """Return the last bytes of a file and the footer in them; None without a footer."""
     tail = FOOTER_BYTES + len(MAGIC)
     if size < len(MAGIC) + tail:
         return None
@@ -329,7 +329,7 @@ def ends_whole(file: BinaryIO, size: int) -> bool:
 
 
 def _summary_crc(data: bytes, end: bytes) -> int:
-    """Checksum of a summary and of the footer behind it."""
+    """Return the checksum of a summary and of the footer behind it."""
     return zlib.crc32(end[: FOOTER_BYTES - 4], zlib.crc32(data))
 
 

@@ -28,7 +28,7 @@ class _WithFindings:
 
 
 def _plain(value: Any) -> Any:
-    """Numpy scalars and mappings as plain Python, for JSON."""
+    """Convert numpy scalars and mappings to plain Python, for JSON."""
     if isinstance(value, Mapping):
         return {str(key): entry for key, entry in value.items()}
     if hasattr(value, "item"):
@@ -150,7 +150,7 @@ def is_intact(strings: Mapping[str, str]) -> bool:
 
 
 def from_strings(strings: Mapping[str, str]) -> StoreInfo:
-    """The facts in a metadata record; entries that cannot be read are left at their defaults."""
+    """Read the facts in a metadata record; unreadable entries keep their defaults."""
     values: dict[str, Any] = {}
     defaults = StoreInfo()
     for entry in fields(StoreInfo):

@@ -49,17 +49,17 @@ class Messages:
         return len(self.starts)
 
     def matrix(self) -> ByteArray:
-        """The records as rows of bytes, shape (n, stride), for a stride that is not 0."""
+        """Return the records as rows of bytes, shape (n, stride), for a stride that is not 0."""
         first = int(self.starts[0])
         return self.buffer[first : first + len(self) * self.stride].reshape(len(self), self.stride)
 
     def take(self, rows: Any) -> "Messages":
-        """The messages that ``rows`` (slice or positions) selects."""
+        """Return the messages that ``rows`` (slice or positions) selects."""
         stride = self.stride if isinstance(rows, slice) and rows.step in (None, 1) else 0
         return Messages(self.buffer, self.channel_id, self.starts[rows], self.sizes[rows], stride)
 
     def head(self, name: str) -> Int64Array:
-        """An entry of every record's head (``"log_time"``) as int64, shape (n,)."""
+        """Return an entry of every record's head (``"log_time"``) as int64, shape (n,)."""
         dtype, offset = HEAD.fields[name][:2]  # type: ignore[index]
         if self.stride:
             return self.column(dtype, offset).astype(np.int64)

@@ -38,7 +38,9 @@ PLACES_BYTES = 64 << 20  # bound of the working arrays for one piece of a chunk
 
 
 def read_info(path: str | os.PathLike[str]) -> StoreInfo:
-    """Facts about a store file, blank where it lost them; without a name that of the file.
+    """Read the facts about a store file, blank where they are lost.
+
+    A lost source name is that of the file.
 
     Raises
     ------
@@ -64,7 +66,7 @@ class Part:
     wants: Callable[[str], bool] = lambda _topic: True
 
     def cut(self, batch: RecordBatch) -> RecordBatch:
-        """The rows of a batch that belong to the part; none of a topic that is not wanted."""
+        """Return the rows of a batch that belong to the part; none of an unwanted topic."""
         assert batch.time_ns is not None
         if not self.wants(batch.topic):
             return batch.take(slice(0, 0))
@@ -73,7 +75,7 @@ class Part:
 
 
 def read(path: str | os.PathLike[str], part: Part | None = None) -> Iterator[Item]:
-    """Items of a store file: one LogHeader, then batches and damages in the order of the file.
+    """Yield the items of a store file: one LogHeader, then batches and damage in file order.
 
     Batches have ``time_ns`` and, where it differs, ``validity_time_ns``; their columns are those that the topic had,
     in the source's names and types. The header's ``utc_of_zero_ns`` is 0 when times are UTC, None for NOTIME.
@@ -128,7 +130,7 @@ class _Missing:
         self._is_told = False
 
     def take(self, item: RecordBatch | Damage) -> None:
-        """Count what is there, and what is told to be lost already."""
+        """Count rows that are there, and note loss that was reported already."""
         if isinstance(item, RecordBatch):
             self._left[item.topic] -= len(item)
         elif item.loses_data:
@@ -147,7 +149,7 @@ class _Missing:
 
 @contextmanager
 def _opened(path: str | os.PathLike[str]) -> Iterator[tuple[BinaryIO, int]]:
-    """The file and its size, when it is one of the store; errors of reading in one line."""
+    """Open a store file and give its size; errors of reading come in one line."""
     try:
         with Path(path).open("rb") as file:
             if not is_groundstation_mcap(path):
@@ -172,7 +174,7 @@ class _Definition:
 def _definitions(
     file: BinaryIO, size: int, summary: Summary | None, checksums: dict[str, int]
 ) -> dict[int, _Definition]:
-    """Definitions by channel id: from an intact summary, else any that are found in the file.
+    """Return definitions by channel id: from an intact summary, else any in the file.
 
     Where the metadata has their checksums, only definitions that agree with them count.
     """
@@ -202,7 +204,7 @@ def _definition(channel: Channel, schema: Schema | None) -> _Definition:
 
 
 def _narrowed(summary: Summary, part: Part, definitions: dict[int, _Definition]) -> Summary:
-    """The summary with the indexes of those chunks alone that may hold records of a part."""
+    """Return the summary with only the chunks that may hold records of a part."""
     unwanted = {number for number, one in definitions.items() if one.is_derived or not part.wants(one.topic)}
     chunks = [
         index
@@ -222,7 +224,7 @@ def _cut(items: Iterator[RecordBatch | Damage], part: Part) -> Iterator[RecordBa
 
 
 class _Reading:
-    """Chunks to items, by the definitions of one file."""
+    """Conversion of chunks to items, by the definitions of one file."""
 
     def __init__(self, definitions: dict[int, _Definition], has_utc: bool) -> None:
         self._definitions = definitions
@@ -231,7 +233,7 @@ class _Reading:
         self._seen: set[tuple[int, int]] = set()  # channel and sequence number of the first message of each chunk
 
     def batches(self, chunk: Intact) -> Iterator[RecordBatch | Damage]:
-        """Batches of a chunk's messages."""
+        """Yield the batches of a chunk's messages."""
         for messages in chunk.messages:
             definition = self._definitions.get(messages.channel_id)
             if definition is not None and definition.is_derived:
@@ -298,7 +300,7 @@ class _Reading:
 
 
 def _parts(messages: Messages, field_count: int) -> Iterator[Messages]:
-    """Messages in parts that a batch may have and whose working arrays stay bounded."""
+    """Split messages into parts small enough for a batch and its working arrays."""
     most = max(1, min(MAX_BATCH_ROWS, PLACES_BYTES // (16 * field_count)))
     if len(messages) <= most:
         yield messages

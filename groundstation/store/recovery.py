@@ -55,7 +55,7 @@ _INDEX_BYTES = RECORD_PREFIX + 6  # of a MessageIndex without its entries
 
 @dataclass(frozen=True)
 class Intact:
-    """A chunk with the right checksum: its messages by channel."""
+    """Chunk with the right checksum: its messages by channel."""
 
     start: int
     messages: list[Messages]
@@ -82,11 +82,11 @@ Found: TypeAlias = Intact | Lost
 
 
 class _TooMuchReadError(Exception):
-    """More was read than a file that is damaged by accident asks for."""
+    """Error of reading more than a file that is damaged by accident asks for."""
 
 
 class _Bounded:
-    """A file of which no more than so many bytes are read."""
+    """File of which at most so many bytes are read."""
 
     def __init__(self, file: BinaryIO, most: int) -> None:
         self._file, self._left = file, most
@@ -116,7 +116,7 @@ def _read(file: BinaryIO, at: int, length: int) -> bytes:
 
 
 def _opened(data: memoryview, compression: str, size: int, crc: int) -> list[Messages]:
-    """Messages of a chunk's compressed data; ChunkError when it is not intact."""
+    """Return the messages of a chunk's compressed data; ChunkError when it is not intact."""
     messages = split_messages(decompress(compression, data, size, crc))
     if messages is None:
         raise ChunkError("its records do not fit together")
@@ -138,7 +138,7 @@ def index_fits(file: BinaryIO, summary: Summary) -> bool:
 
 
 def chunks_by_index(file: BinaryIO, summary: Summary) -> Iterator[Found]:
-    """Chunks of a file with an intact summary, in the order of the file."""
+    """Yield the chunks of a file with an intact summary, in the order of the file."""
     free_from = len(MAGIC)
     for index in sorted(summary.chunks, key=lambda index: index.chunk_start_offset):
         start, length = index.chunk_start_offset, index.chunk_length
@@ -168,7 +168,7 @@ def _lost(index: ChunkIndex, count: int | None, reason: str) -> Lost:
 
 
 def chunks_by_walk(file: BinaryIO, size: int) -> Iterator[Found]:
-    """Chunks of a file without a usable summary, in the order of the file.
+    """Yield the chunks of a file without a usable summary, in the order of the file.
 
     The last item is a :class:`Lost` of ``is_cut`` when the file ends before its data does, without bytes where a whole
     record stands before the cut.
@@ -207,7 +207,7 @@ def _walked(file: BinaryIO, at: int, size: int, has_end: bool) -> Iterator[Found
 
 
 def _try_chunk(file: BinaryIO, at: int, size: int, head: ChunkHead) -> tuple[Found, int]:
-    """The chunk at ``at`` and the place to go on from."""
+    """Return the chunk at ``at`` and the place to go on from."""
     data = _read(file, at, head.length)
     end = at + head.length
     try:
@@ -234,7 +234,7 @@ def _index_record(file: BinaryIO, at: int) -> bytes:
 
 
 def _chunk_at(peek: bytes, at: int, size: int) -> ChunkHead | None:
-    """Head of a chunk that lies wholly inside the file."""
+    """Return the head of a chunk that lies wholly inside the file."""
     head = read_chunk_head(peek)
     return head if head is not None and head.length <= min(size - at, MAX_CHUNK_BYTES) else None
 
@@ -264,7 +264,7 @@ def _is_plausible(file: BinaryIO, at: int, size: int) -> bool:
 
 
 def find_chunk(file: BinaryIO, start: int, size: int) -> int:
-    """Place of the next chunk from ``start`` on, ``size`` when there is none."""
+    """Return the place of the next chunk from ``start`` on, ``size`` when there is none."""
     at = start + SIGNATURE_AT
     while (hit := find_bytes(file, SIGNATURE, at)) is not None:
         peek = _read(file, hit - SIGNATURE_AT, PEEK_BYTES)
@@ -323,7 +323,7 @@ def _facts_at(file: BinaryIO, place: int, name_bytes: int) -> dict[str, str]:
 
 
 def chunk_bytes(file: BinaryIO, size: int) -> int:
-    """Bytes of a file that stand in chunks, by their heads alone."""
+    """Count the bytes of a file that stand in chunks, by their heads alone."""
     total, at = 0, find_chunk(file, 0, size)
     while (head := _chunk_at(_read(file, at, PEEK_BYTES), at, size)) is not None:
         total += head.length
@@ -368,7 +368,7 @@ def is_own_schema(schema: Schema) -> bool:
 
 
 def search_definitions(file: BinaryIO, size: int, checksums: Mapping[str, int]) -> Summary:
-    """Schemas and channels wherever they stand in the file.
+    """Search schemas and channels wherever they stand in the file.
 
     Of each id the one counts that agrees with its checksum; without checksums one that can be used, and of those the
     one that is there most often, or the first.

@@ -60,7 +60,7 @@ _TYPE_OF_DTYPE: Mapping[str, int] = {
 
 
 def varint(value: int) -> bytes:
-    """Protobuf's variable-length integer.
+    """Encode an integer as protobuf's variable-length integer.
 
     Examples
     --------
@@ -148,7 +148,7 @@ def canonical_type(kind: str) -> MessageType:
 
 
 def message_type(descriptor_set: bytes, name: str, columns: str = "") -> MessageType:
-    """Message type from what a file says of a channel.
+    """Return the message type from what a file says of a channel.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def _dtype_key(dtype: np.dtype[Any]) -> str:
 
 
 def columns_text(fields: Iterable[WireField]) -> str:
-    """Names and dtypes of columns as one line of JSON, for the channel's metadata.
+    """Return names and dtypes of columns as one line of JSON, for the channel's metadata.
 
     Only this tells a reader that field ``Alt_ft`` was column ``Alt (ft)`` of int16, and which fields the log had.
     """
@@ -209,7 +209,7 @@ def columns_text(fields: Iterable[WireField]) -> str:
 
 
 def own_columns(text: str) -> tuple[str, ...] | None:
-    """Names of the fields that :func:`columns_text` noted; None when the text is not usable."""
+    """Parse the field names that :func:`columns_text` noted; None when not usable."""
     try:
         return tuple(str(entry[0]) for entry in json.loads(text))
     except (ValueError, TypeError, LookupError, RecursionError):
@@ -217,7 +217,7 @@ def own_columns(text: str) -> tuple[str, ...] | None:
 
 
 class GrowingType:
-    """Message type of one topic's channel, growing with the columns that its batches bring.
+    """Message type of one topic's channel, which grows with the columns of its batches.
 
     Canonical topics take their fields from the compiled schemas; every other topic gets a type made from its columns,
     numbered in order of their first appearance.
@@ -239,7 +239,7 @@ class GrowingType:
         self._taken = {_name_key(DEVICE_TIME), _name_key(RECORD_INDEX)}
 
     def field_for(self, column: str, dtype: np.dtype[Any]) -> WireField:
-        """Field that carries a column, a new one at its first appearance.
+        """Return the field that carries a column, a new one at its first appearance.
 
         Raises
         ------
@@ -289,7 +289,7 @@ class GrowingType:
 
 
 def identifier(text: str) -> str:
-    """Protobuf field name for a column's name.
+    """Return the protobuf field name for a column's name.
 
     Examples
     --------

@@ -28,7 +28,7 @@ def _agrees(entry: Any, shape: Mapping[str, str]) -> bool:
 
 
 def sound_damages(entries: Any) -> list[Any]:
-    """Entries that may be damages.
+    """Return the entries that may be damage.
 
     Examples
     --------
@@ -39,7 +39,7 @@ def sound_damages(entries: Any) -> list[Any]:
 
 
 def sound_remarks(entries: Any) -> list[Any]:
-    """Entries that may be remarks."""
+    """Return the entries that may be remarks."""
     return [entry for entry in _listed(entries) if _agrees(entry, _REMARK)]
 
 

@@ -135,7 +135,7 @@ class Walker:
         self.left = interpreted_bytes
 
     def choose(self, function: Callable[..., Any], buffer: ByteArray) -> tuple[Callable[..., Any], Any]:
-        """The function, and the buffer in the form that is fastest for it."""
+        """Return the function, and the buffer in the form that is fastest for it."""
         if len(buffer) > self.left:
             self.left = 0
             return _compiled(function), buffer

@@ -1,4 +1,4 @@
-"""Columns <-> MCAP message records with protobuf payloads, a whole chunk at a time.
+"""Conversion of columns to MCAP messages with protobuf payloads and back, by chunks.
 
 A message record is a fixed head (opcode, length, channel, sequence, log and publish time) and a payload of
 ``tag value tag value ...``. As numbers have fixed width, rows with the same fields present differ in nothing but the
@@ -29,7 +29,7 @@ Block = tuple[Rows, bytes, ByteArray]  # rows, the bytes before each value, the 
 
 
 class Slot(NamedTuple):
-    """One field's values on their way into messages.
+    """Values of one field on their way into messages.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Slot(NamedTuple):
         return len(lengths) > 0 and bool(lengths.min() != lengths.max())
 
     def take(self, rows: Rows, present: BoolArray | None = None) -> "Slot":
-        """The slot of some rows, which are present as ``present`` tells."""
+        """Return the slot of some rows, which are present where ``present`` says."""
         return Slot(self.prefix, self.values[rows], present, None if self.lengths is None else self.lengths[rows])
 
     def alike(self) -> tuple[bytes, NDArray[Any]]:
@@ -97,7 +97,7 @@ class Slot(NamedTuple):
 
 
 def taken(slots: Sequence[Slot], rows: Rows) -> list[Slot]:
-    """Slots of some rows; those that share a mask still do."""
+    """Return the slots of some rows; those that share a mask still do."""
     if isinstance(rows, slice) and rows.indices(len(slots[0].values)) == (0, len(slots[0].values), 1):
         return list(slots)
     masks = {id(mask): mask[rows] for mask in _masks(slots).values()}
@@ -105,12 +105,12 @@ def taken(slots: Sequence[Slot], rows: Rows) -> list[Slot]:
 
 
 def _masks(slots: Sequence[Slot]) -> dict[int, BoolArray]:
-    """The different masks of slots."""
+    """Return the different masks of slots."""
     return {id(slot.present): slot.present for slot in slots if slot.present is not None}
 
 
 def slot_of(field: WireField, values: NDArray[Any], present: BoolArray | None) -> Slot:
-    """The slot of a field; ``values`` in the field's wire dtype, or text."""
+    """Return the slot of a field; ``values`` in the field's wire dtype, or text."""
     if field.wire_dtype is not None:
         return Slot(field.tag, values, present)
     encoded = encode_text(values)
@@ -139,7 +139,7 @@ def _utf8(values: NDArray[np.str_]) -> NDArray[np.bytes_]:
 def encode(
     channel_id: int, first_sequence: int, log_time: Int64Array, publish_time: Int64Array, slots: Sequence[Slot]
 ) -> tuple[ByteArray, Int64Array]:
-    """Message records of rows, in the order of the rows.
+    """Encode rows as message records, in the order of the rows.
 
     Parameters
     ----------
@@ -230,7 +230,7 @@ def _lay_out(channel_id: int, slots: Sequence[Slot]) -> ByteArray:
 
 
 def _record_head(channel_id: int, rest_bytes: int) -> bytes:
-    """Opcode, length and channel of a record that has so many bytes behind them."""
+    """Return opcode, length and channel of a record with so many bytes behind them."""
     return bytes([MESSAGE_OPCODE]) + (2 + rest_bytes).to_bytes(8, "little") + channel_id.to_bytes(2, "little")
 
 
@@ -280,7 +280,7 @@ class Decoded:
 
 
 def decode(messages: Messages, fields: Sequence[WireField]) -> Iterator[Decoded]:
-    """Columns of messages, one per field, mostly in one piece.
+    """Yield columns of messages, one per field, mostly in one piece.
 
     Absent stays absent; fields that are not asked for are skipped. Text is as wide as the longest of a piece: pieces
     get smaller when a few long texts among many short ones would blow it up.
@@ -390,7 +390,7 @@ def _filler(field: WireField) -> Any:
 
 
 def absent_column(field: WireField, count: int) -> Column:
-    """A column of ``count`` absent values."""
+    """Return a column of ``count`` absent values."""
     return Column(np.full(count, _filler(field), field.dtype), np.zeros(count, dtype=bool))
 
 

@@ -70,7 +70,7 @@ class _Finished:
 
 
 class _Digested:
-    """A file that is written from its beginning to its end, and the digest of what was."""
+    """File that is written from beginning to end, with a digest of its content."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file, self._digest, self._at = file, hashlib.sha256(), 0
@@ -97,7 +97,7 @@ class _Digested:
 
 
 class StoreWriter:
-    """Write batches of corrected records into an MCAP file.
+    """Writer of batches of corrected records into an MCAP file.
 
     The file appears under its name when the ``with`` block ends without an exception; until then its chunks are in
     memory, or, beyond ``MEMORY_BYTES``, in an unnamed temporary file of the same folder. Chunks stand in order of their
@@ -206,7 +206,7 @@ class StoreWriter:
             yield self._derived_of[topic]
 
     def _derived(self, channel_id: int, topic: str) -> ChannelWriter | None:
-        """The channel made from a topic for other programs; None where there is none."""
+        """Return the channel made from a topic for other programs; None without one."""
         kind = kind_of(topic)
         if kind == "gnss":
             return LocationFixWriter(channel_id, topic, self._hand_over, self._has_utc)
@@ -224,7 +224,7 @@ class StoreWriter:
             self._channels[LOG_TOPIC] = self._log
 
     def _name_for(self, topic: str) -> str:
-        """Full message name of a topic that is not canonical, unlike that of any other."""
+        """Return a unique full message name for a topic that is not canonical."""
         if is_canonical(topic):
             return ""
         words = [word for word in re.split(r"[^A-Za-z0-9]+", topic.removeprefix("raw.")) if word]
@@ -312,7 +312,7 @@ class StoreWriter:
         file.write(_summary(groups, file.tell()) + MAGIC)
 
     def _copy_chunk(self, file: _Digested, chunk: _Finished) -> ChunkIndex:
-        """Copy a chunk from the spool; returns its index with the places it now has."""
+        """Copy a chunk from the spool; return its index with its new places."""
         assert self._spool is not None
         start = file.tell()
         if chunk.parts:
@@ -350,7 +350,7 @@ class StoreWriter:
 
 
 def clear_parts(path: Path) -> None:
-    """Remove what processes that died while they wrote a file have left beside it."""
+    """Remove the partial files of processes that died while they wrote a file."""
     for part in path.parent.glob(f".{glob.escape(path.name)}.*{PART}"):
         number = part.name.removesuffix(PART).rpartition(".")[2]
         if number.isdecimal() and not _is_alive(int(number)):
@@ -374,12 +374,12 @@ def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
 
 
 def _order(chunk: _Finished) -> tuple[int, str, int]:
-    """Chunks by first log time; of equal times by topic, and of one topic as they came."""
+    """Sort chunks by first log time, then by topic, then as they came."""
     return chunk.index.message_start_time, chunk.topic, chunk.ordinal
 
 
 def _summary(groups: list[tuple[Opcode, list[McapRecord]]], start: int) -> bytes:
-    """The summary section with its offsets and the footer, which has the checksum of both."""
+    """Return the summary section with its offsets and the footer, which has the checksum."""
     body, offsets = b"", []
     for opcode, records in groups:
         data = to_bytes(*records)

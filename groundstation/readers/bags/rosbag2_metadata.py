@@ -43,7 +43,7 @@ class BagMetadata:
 
 
 def _items(text: str) -> list[str]:
-    """Yield the topics of the list, each as its lines."""
+    """Split the list of topics into items, each as its lines."""
     head = _TOPICS.search(text)
     if head is None:
         return []

@@ -147,7 +147,7 @@ class _Table:
         self.holders[self.group[key]].append(holder)
 
     def each(self) -> list[Any]:
-        """Yield every word or message once."""
+        """Return every word or message once."""
         return list({id(holder): holder for several in self.holders for holder in several}.values())
 
     def rows(self, keys: NDArray[np.uint16]) -> Iterator[tuple[Any, NDArray[np.int64]]]:

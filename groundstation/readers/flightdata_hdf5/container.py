@@ -104,7 +104,7 @@ class Samples:
 
 
 def _runs(wanted: BoolArray) -> list[tuple[int, int]]:
-    """Yield first and last number (exclusive) of each run of true values."""
+    """Return first and last number (exclusive) of each run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], wanted, [False]))))
     return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
 

@@ -119,7 +119,7 @@ class _Checker:
         raise SettingsError(place, found, expected, "see docs/chapter10.md")
 
     def told(self) -> tuple[str, ...]:
-        """Yield one note for each unknown key."""
+        """Return one note for each unknown key."""
         return tuple(f"{self.where}: key {key!r} is not known, {count} times" for key, count in self.unknown.items())
 
     def known(self, table: Mapping[str, Value], _place: str, keys: tuple[str, ...]) -> None:

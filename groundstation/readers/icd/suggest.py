@@ -214,7 +214,7 @@ def _data(entry: BusEntry) -> Data1553 | None:
 
 
 def _counts_1553(data: Data1553) -> Iterator[Element1553]:
-    """Return a count for every word that changes; constant words are left out."""
+    """Yield a count for every word that changes; constant words are left out."""
     for place in np.flatnonzero((data != data[:1]).any(axis=0)).tolist():
         name = f"word_{place + 1:02d}"
         yield Element1553(name, "SIGNED16", 0.0, "", _range(data[:, place].view(np.int16)), offset=place)

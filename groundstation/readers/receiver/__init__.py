@@ -51,7 +51,7 @@ def _is_frame(head: bytes, at: int) -> bool:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, batches, remarks and damages of a stream."""
+    """Yield the header, batches, remarks and damage of a stream."""
     from groundstation.readers.receiver.reader import items  # brings numba
 
     return items(source)

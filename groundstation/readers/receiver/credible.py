@@ -1,4 +1,4 @@
-"""Positions and attitudes that can be: the last step of what becomes ``gnss`` and ``ins``."""
+"""Checks of positions and attitudes: the last step of ``gnss`` and ``ins``."""
 
 import numpy as np
 

@@ -35,7 +35,7 @@ _SHAPES = ((re.compile(rb"\d+"), b"0"), (re.compile(rb"[A-Za-z]+"), b"a"), (re.c
 
 
 def shape_of(text: bytes) -> bytes:
-    """Shape of a text: digits, letters and spaces one for as many as there are.
+    """Return the shape of a text: one mark for each run of digits, letters or spaces.
 
     Examples
     --------
@@ -136,7 +136,7 @@ CLOCKS = tuple(Clock(kind, re.compile(text.encode())) for kind, text in _PATTERN
 
 
 def _clock_of(texts: list[bytes]) -> Clock | None:
-    """The first clock that nearly all texts tell."""
+    """Return the first clock that reads a time in nearly all texts."""
     least = _SHARE_WITH_TIME * len(texts)
     return next((one for one in CLOCKS if sum(one.read(text) is not None for text in texts) >= least), None)
 
@@ -227,6 +227,6 @@ def _around_sentences(head: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _shapes(texts: list[bytes]) -> frozenset[bytes]:
-    """Shapes of texts that many have."""
+    """Return the shapes that many texts have."""
     counts = Counter(shape_of(text) for text in texts if text)
     return frozenset(shape for shape, count in counts.items() if count >= max(2, _SHARE_OF_SHAPE * len(texts)))

@@ -24,7 +24,7 @@ _SHARE_BESIDE = 0.9
 
 
 def texts_of(frames: Frames, is_before: bool) -> list[bytes]:
-    """Text of the computer in front of the frames of a block, or behind them."""
+    """Return the computer's text before the frames of a block, or behind them."""
     if frames.texts is None:
         return [b""] * len(frames)
     ends = frames.offsets + (0 if is_before else frames.lengths + frames.texts[:, 1])
@@ -33,7 +33,7 @@ def texts_of(frames: Frames, is_before: bool) -> list[bytes]:
 
 
 def times_of(host: HostText, frames: Frames) -> Column:
-    """Nanoseconds by the computer's clock for each frame of a block, as that clock counts."""
+    """Return the time of each frame of a block by the computer's clock, nanoseconds."""
     values, present = np.zeros(len(frames), dtype=np.int64), np.zeros(len(frames), dtype=bool)
     if host.clock is not None:
         for row, text in enumerate(texts_of(frames, host.clock_is_before)):
@@ -64,7 +64,7 @@ def raw_batch(frames: Frames, epochs: Epochs, time: Column) -> RecordBatch | Non
 
 @dataclass
 class HostTimes:
-    """Gathers the computer's times over a stream, and tells whether they serve."""
+    """Computer's times gathered over a stream; it finds out whether they are of use."""
 
     host: HostText
     lines: int = 0
@@ -133,7 +133,7 @@ class HostTimes:
 
 
 def _half_day(ns: Int64Array) -> Int64Array:
-    """Differences of times of the day, from half a day before to half a day after."""
+    """Wrap differences of times of the day to half a day before or after."""
     return np.asarray((ns + DAY_NS // 2) % DAY_NS - DAY_NS // 2, dtype=np.int64)
 
 

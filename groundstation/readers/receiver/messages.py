@@ -60,7 +60,7 @@ class Messages:
 
     @property
     def size(self) -> int:
-        """Bytes of the shortest payload: fields behind it are not there."""
+        """Bytes of the shortest payload: fields behind it are missing."""
         return int(self.payload_sizes.min())
 
     @property
@@ -108,7 +108,7 @@ class Messages:
         return np.asarray((behind != width * told) & (behind != width * told + self.layout.tail) & ~as_they_fit)
 
     def _told(self) -> Int64Array:
-        """Groups that each message says it has."""
+        """Return the number of groups that each message states."""
         assert self.layout is not None
         return self.layout.head.values(self.head(), self.layout.count).astype(np.int64)
 
@@ -132,7 +132,7 @@ class Messages:
 
 
 def _repeated(counts: Int64Array) -> tuple[Int64Array, Int64Array]:
-    """Owner of each repetition and its number within the owner."""
+    """Return the owner of each repetition and its number within the owner."""
     owner = np.repeat(np.arange(len(counts)), counts)
     return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
 
@@ -156,7 +156,7 @@ def raw_batches(messages: Messages, time: Column) -> Iterator[RecordBatch]:
 
 
 def _payloads(topic: str, messages: Messages, time: Column) -> Iterator[RecordBatch]:
-    """Payloads as hexadecimal digits, the long ones in pieces of PIECE_BYTES, each a row."""
+    """Yield payloads as hexadecimal digits, in rows of at most PIECE_BYTES."""
     owner, number = _repeated(np.maximum(-(-messages.payload_sizes // PIECE_BYTES), 1))
     for start in range(0, len(owner), PIECES_AT_ONCE):
         rows = slice(start, start + PIECES_AT_ONCE)
@@ -174,7 +174,7 @@ def _payloads(topic: str, messages: Messages, time: Column) -> Iterator[RecordBa
 
 
 def text_batches(messages: Messages, time: Column) -> Iterator[RecordBatch]:
-    """Batches of messages that are nothing but a text."""
+    """Yield batches of messages that are nothing but a text."""
     for start in range(0, len(messages), PIECES_AT_ONCE):
         rows = slice(start, start + PIECES_AT_ONCE)
         width = int(np.clip(messages.payload_sizes[rows].max(), 1, MAX_TEXT_CHARACTERS))
@@ -185,7 +185,7 @@ def text_batches(messages: Messages, time: Column) -> Iterator[RecordBatch]:
 
 
 def bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
-    """A batch in pieces of at most MAX_BATCH_ROWS rows."""
+    """Yield a batch in pieces of at most MAX_BATCH_ROWS rows."""
     if len(batch) <= MAX_BATCH_ROWS:
         yield batch
         return
@@ -210,7 +210,7 @@ class Block(dict[str, Messages]):
 
 
 def occupied(topic: str, places: Int64Array, time: Column, columns: Columns) -> RecordBatch | None:
-    """A batch of the rows that have any value."""
+    """Return a batch of the rows that have any value."""
     if not columns:
         return None
     rows = np.logical_or.reduce([column.mask for column in columns.values()])

@@ -39,7 +39,7 @@ class Choice:
 
     @property
     def timed(self) -> tuple[str, ...]:
-        """Formatters of the sentences of which each has the time of its epoch."""
+        """Formatters of the sentences that state the time of their epoch."""
         return (*TIMED, self.maker) if self.maker else TIMED
 
 
@@ -75,7 +75,7 @@ class Epochs:
         return len(self.day_ns)
 
     def time_of(self, address: str, time: Column) -> Column:
-        """Time of each sentence, given that of the epochs."""
+        """Return the time of each sentence, given that of the epochs."""
         epoch = self.epoch[address]
         if not len(self) and self.arrivals is not None:
             return _arrival(self.arrivals, self.sentences[address].places)
@@ -85,7 +85,7 @@ class Epochs:
         return Column(time.values[at], time.mask[at] & (epoch >= 0))
 
     def of(self, *formatters: str) -> list[tuple[Sentences, Int64Array]]:
-        """Sentences with a formatter, those of combined solutions (GN) last, and their epochs."""
+        """Return sentences with a formatter and their epochs, combined solutions (GN) last."""
         several = (one for one in self.sentences.values() if one.address not in self.choice.passed_over)
         found = [one for one in several if one.formatter in formatters]
         return [(one, self.epoch[one.address]) for one in sorted(found, key=lambda one: one.address.startswith("GN"))]
@@ -116,13 +116,13 @@ class Epochs:
 
 
 def _arrival(arrivals: Anchors, places: Int64Array) -> Column:
-    """Times of arrival of the sentences at given places; absent for one that has none."""
+    """Return times of arrival of the sentences at given places; absent where unknown."""
     at = np.minimum(np.searchsorted(arrivals.places, places), len(arrivals) - 1)
     return Column(arrivals.utc_ns[at], arrivals.places[at] == places)
 
 
 def epochs_of(sentences: Mapping[str, Sentences], choice: Choice = ALL, arrivals: Anchors | None = None) -> Epochs:
-    """Put the sentences of a block into epochs."""
+    """Group the sentences of a block into epochs."""
     which, day_ns, is_whole = [], [], []
     for one in sentences.values():
         if one.formatter in choice.timed:
@@ -215,7 +215,7 @@ class DayTimes:
         self._last_ns: int | None = None
 
     def of(self, epochs: Epochs) -> Column:
-        """Times of the epochs of the next block."""
+        """Return the times of the epochs of the next block."""
         time = self._anchors.of_day(epochs.places, epochs.day_ns)
         if len(self._anchors) or not len(time):
             return time

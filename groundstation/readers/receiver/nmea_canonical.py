@@ -39,7 +39,7 @@ _RANKS[[0, *map(ord, "NSMEAPDFR")]] = 0, 1, 3, 4, 5, 6, 7, 8, 9, 10
 
 
 def gnss_batch(epochs: Epochs, time: Column, tally: Tally) -> RecordBatch | None:
-    """One row an epoch that has a fix, or the word that there is none."""
+    """Return one row for each epoch that has a fix, or says that it has none."""
     columns = makers_solution(epochs)
     for formatter in STANDARD_POSITIONS:  # the last that has a position gives it
         columns |= _merged(columns, _position(epochs, formatter))
@@ -56,7 +56,7 @@ def gnss_batch(epochs: Epochs, time: Column, tally: Tally) -> RecordBatch | None
 
 
 def _merged(columns: Columns, newer: Columns) -> Columns:
-    """The newer values where there are any, the older ones elsewhere."""
+    """Merge columns: newer values where there are any, older ones elsewhere."""
     merged = {}
     for name, column in newer.items():
         before = columns.get(name)

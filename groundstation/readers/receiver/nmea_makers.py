@@ -35,7 +35,7 @@ def makers_solution(epochs: Epochs) -> Columns:
 
 
 def _of_ublox(epochs: Epochs) -> Columns:
-    """PUBX 00: heights above the ellipsoid, km/h, vertical velocity positive down."""
+    """Return columns of PUBX 00: heights above the ellipsoid, km/h, down positive."""
     numbers = ("altRef", "hAcc", "vAcc", "SOG", "COG", "vVel", "HDOP", "numSVs")
     found = epochs.values("PUBX.00", ("lat", "lon", "navStat", *numbers))
     if not found:

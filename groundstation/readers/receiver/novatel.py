@@ -50,7 +50,7 @@ _HEIGHT_IS_GIVEN, _LAST_TYPE = 2, 255  # types of position: FIXEDHEIGHT, and the
 
 
 def _fixes() -> NDArray[np.str_]:
-    """Kind of solution by NovAtel's type of position; ``other`` by a type that is not known."""
+    """Return the kind of solution by NovAtel's position type; ``other`` if unknown."""
     kinds = {"none": (0,), "2d": (2,), "3d": (8, 16), "dgnss": (17, 18, 20, 64, 65, 66), "dead_reckoning": (19,)}
     kinds |= {"ppp": (68, 69, 77, 78), "rtk_float": (32, 33, 34), "rtk_fixed": (48, 49, 50, 51)}
     kinds |= {"gnss_ins": (52, 53, 54, 55, 56, 57, 58, 59, 73, 74, 79, 80)}
@@ -116,7 +116,7 @@ def _of_text(logs: novatel_text.TextLogs | None) -> Iterator[Timed]:
 
 
 def _by_size(name: str, frames: Frames, at: Int64Array, payload_at: Int64Array, sizes: Int64Array) -> Iterator[Timed]:
-    """Messages with a layout whose payloads are shorter than it apart from the others."""
+    """Yield messages by size of payload: those shorter than the layout apart."""
     known = layout(LAYOUTS[name]) if name in LAYOUTS else None
     is_short = sizes < (known.size if known is not None else 0)
     is_odd = name.removesuffix(novatel_text.KEPT) in LAYOUTS and known is None
@@ -148,7 +148,7 @@ def epoch_start(frames: Frames) -> int:
 
 @np.errstate(all="ignore")  # doubles of a device may be anything
 def gnss_batch(block: Block, leader: str, tally: Tally) -> RecordBatch | None:
-    """One row a position, with velocity and dilution of the same moment."""
+    """Return one row for each position, with velocity and dilution of the same moment."""
     messages, fields = block.get(leader), block.fields(leader)
     if not isinstance(messages, Timed) or fields is None:
         return None
@@ -295,7 +295,7 @@ def _covariance(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 def _joined(block: Block, leader: Timed, name: str, columns_of: Any) -> Columns:
-    """Columns of another message, on the rows of the leading one that have its time."""
+    """Return columns of another message, on the rows of the leading one with its time."""
     other, fields = block.get(name), block.fields(name)
     if not isinstance(other, Timed) or fields is None:
         return {}

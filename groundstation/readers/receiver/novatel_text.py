@@ -31,7 +31,7 @@ _SHORT_STATUS = 180  # short headers do not tell it
 
 
 def _numbered(text: str, first: int = 0) -> dict[str, int]:
-    """Names in their order; ``=16`` goes on with that number."""
+    """Number names in their order; ``=16`` continues with that number."""
     found, number = {}, first
     for word in text.split():
         name, _, told = word.partition("=")
@@ -128,7 +128,7 @@ def as_binary(frames: Frames) -> TextLogs | None:
 
 
 def week_ms_of(frames: Frames, number: int) -> int:
-    """Millisecond of the week of one text by its header; -1 where it tells none."""
+    """Return the millisecond of the week in a text's header; -1 where it has none."""
     at = int(frames.offsets[number])
     head = frames.data[at : at + int(frames.lengths[number])].tobytes().partition(b";")[0]
     return int(HEADER.unpack(_header(head.decode("ascii").split(","))[1])[10])

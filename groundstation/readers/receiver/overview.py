@@ -77,7 +77,7 @@ class Overview:
 
 
 def overview(source: Source, bare: bool, host: HostText | None = None) -> Overview:
-    """Walk through a stream once; ``host`` is how a computer wrote around the sentences."""
+    """Read a stream once; ``host`` is the form of a computer's text in it."""
     found, full_times, attitudes, sound = Overview(), ubx.FullTimes(), Counter[str](), set[str]()
     places, utc_ns = [], []
     stream = Stream(source, bare, is_hosts=host.accepts if host else None)
@@ -146,7 +146,7 @@ def _choose(found: Overview, attitudes: Counter[str], sound: set[str]) -> None:
 
 
 def _choice_of(counts: Counter[str]) -> nmea.Choice:
-    """Sentences that give ``gnss``, by the addresses of a stream."""
+    """Choose the sentences that give ``gnss``, by the addresses of a stream."""
     positions = {name for name in counts if formatter_of(name) in STANDARD_POSITIONS}
     if not positions:
         return nmea.Choice(maker=next((name for name in MAKERS_POSITIONS if counts[name]), ""))
@@ -189,7 +189,7 @@ def _take_hosts(found: Overview, host_clock: HostTimes) -> None:
 
 
 def _versions(messages: Messages) -> dict[str, str]:
-    """Firmware, hardware and extensions of MON-VER; of several the last."""
+    """Return firmware, hardware and extensions of the last MON-VER."""
     assert messages.layout is not None
     head = messages.layout.head.columns(messages.head(), messages.size)
     facts = {"receiver": "u-blox"}

@@ -109,7 +109,7 @@ def _ins(block: Block, epochs: nmea.Epochs, time: Column, found: Overview, tally
 
 
 def _in_their_week(batch: RecordBatch | None, found: Overview) -> RecordBatch | None:
-    """A batch whose times were made of the week that each of its messages tells."""
+    """Correct a batch whose times were made of the week that each message states."""
     if batch is None:
         return None
     time = found.anchors.in_their_week(batch.record_index, batch.device_time_ns)

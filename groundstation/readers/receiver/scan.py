@@ -181,7 +181,7 @@ def _novatel_text(data: Any, at: int, table: Any) -> int:
 
 @in_place
 def _declared(data: Any, at: int) -> int:
-    """Length that a binary frame at a place says it has, 0 where none begins."""
+    """Return the length that a binary frame at a place states, 0 where none begins."""
     left, byte = len(data) - at, data[at]
     if byte == 0xB5 and left >= 6 and data[at + 1] == 0x62:
         return int(data[at + 4]) + 256 * int(data[at + 5]) + UBX_EXTRA

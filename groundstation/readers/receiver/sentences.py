@@ -133,7 +133,7 @@ def _is_word(byte: int) -> bool:
 
 @inlined
 def _longer(key: int, byte: int, size: int) -> int:
-    """Key of ``size`` bytes and one more."""
+    """Append a byte to a key of ``size`` bytes."""
     return 256 * key + byte if size < _EXACT_BYTES else _LONG + (31 * (key % _PRIME) + byte) % _PRIME
 
 
@@ -204,7 +204,7 @@ class Sentences:
 
     @property
     def formatter(self) -> str:
-        """``GGA`` of ``GNGGA``; a maker's own address as it is."""
+        """Formatter, such as ``GGA`` of ``GNGGA``; a maker's own address as it is."""
         return formatter_of(self.address)
 
     @property
@@ -222,7 +222,7 @@ class Sentences:
 
     @property
     def _behind_address(self) -> Int64Array:
-        """Return the places where the fields of each sentence begin.
+        """Places where the fields of each sentence begin.
 
         A sentence without an address has all of its text there.
         """
@@ -231,7 +231,7 @@ class Sentences:
 
     @property
     def _ends(self) -> Int64Array:
-        """Return the places where the last field of each sentence ends."""
+        """Places where the last field of each sentence ends."""
         checksum = np.where(self.frames.kinds[self.which] == scan.NMEA, CHECKSUM_BYTES, 0)
         return self.frames.offsets[self.which] + self.frames.lengths[self.which] - checksum
 
@@ -338,7 +338,7 @@ class Sentences:
 
     @cached_property
     def _signal(self) -> Int64Array:
-        """Return the number of the field of GSV with the signal (NMEA 4.11); -1 without one.
+        """Number of the field of GSV with the signal (NMEA 4.11); -1 without one.
 
         It follows the fields of as many satellites as the sentence has.
         """

@@ -1,4 +1,4 @@
-"""Cuts a receiver's stream into blocks of frames; what belongs to no frame is counted."""
+"""Cut a receiver's stream into blocks of frames; bytes of no frame are counted."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -57,7 +57,7 @@ class Frames:
         return np.flatnonzero(np.isin(self.kinds, kinds))
 
     def bytes_at(self, offsets: Int64Array, width: int) -> NDArray[np.uint8]:
-        """``width`` bytes at each place, shape (n, width); zeros behind the end of the data."""
+        """Return ``width`` bytes at each place, shape (n, width); zeros past the end of data."""
         if len(offsets) and int(offsets.max()) + width > len(self.data):
             padded = np.concatenate((self.data, np.zeros(width, dtype=np.uint8)))
             return np.lib.stride_tricks.sliding_window_view(padded, width)[offsets]
@@ -70,13 +70,13 @@ class Frames:
         return np.ascontiguousarray(self.bytes_at(offsets, dtype.itemsize)).view(dtype)[:, 0]
 
     def head(self, count: int) -> "Frames":
-        """The first ``count`` frames."""
+        """Return the first ``count`` frames."""
         texts = None if self.texts is None else self.texts[:count]
         return Frames(self.data, self.first_byte, self.offsets[:count], self.lengths[:count], self.kinds[:count], texts)
 
 
 class Stream:
-    """Iterates over the blocks of a stream; once through it knows what was damaged.
+    """Iterator over the blocks of a stream; knows the damage once it is through.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class Stream:
         return whole[: len(data) + count], count < BLOCK_BYTES
 
     def _blocks(self, data: NDArray[np.uint8], base: int, is_last: bool) -> Iterator[Frames]:
-        """Blocks of the data at hand: one, and more where damage is frequent."""
+        """Yield the blocks of the data at hand: one, or more where damage is frequent."""
         offsets = np.empty(len(data) // SMALLEST_FRAME + 1, dtype=np.int64)
         lengths, kinds = np.empty_like(offsets), np.empty(len(offsets), dtype=np.uint8)
         hosted = self._is_hosts is not None
@@ -194,7 +194,7 @@ class Stream:
         return strange
 
     def _finish(self, data: NDArray[np.uint8], base: int) -> None:
-        """Count what is left behind the last frame: a frame that was cut, or bytes of none."""
+        """Count the bytes behind the last frame: a frame that was cut, or bytes of none."""
         start = int(self._state[scan.SKIP_START])
         if start == scan.NOWHERE:
             return

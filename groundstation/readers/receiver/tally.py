@@ -96,7 +96,7 @@ class Tally:
             self._first.setdefault(key, int(np.min(places)))
 
     def items(self, counts: Counter[str]) -> Iterator[Item]:
-        """Remarks and damages. Of what was refused nothing is lost: the raw topics keep it.
+        """Yield remarks and damage; the raw topics keep what was refused.
 
         ``counts`` are those of all messages and sentences by name.
         """

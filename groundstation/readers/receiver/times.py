@@ -39,7 +39,7 @@ _DAYS_A_WEEK = 7
 
 @dataclass(frozen=True)
 class LateStretch:
-    """Sentences up to a place in the file whose UTC is late, for want of leap seconds.
+    """Sentences up to a place in the file whose UTC is late for lack of leap seconds.
 
     ``last_place`` is that of the last one with a date, ``first_place`` that of the first one which is right, and
     ``day_ns`` its time of the day: other sentences of its epoch may stand before it. ``late_s`` is by how much.
@@ -103,7 +103,7 @@ class Anchors:
         return self._credible(places, utc_ns, np.ones(len(places), dtype=bool))
 
     def in_their_week(self, places: Int64Array, time: Column) -> Column:
-        """UTC of messages with a week of their own, in the week that is nearest to the anchor."""
+        """Put UTC of messages with an own week into the week nearest to the anchor."""
         if not len(self):
             return time
         weeks = np.rint((self.utc_ns[self._before(places)] - time.values) / WEEK_NS).astype(np.int64)
@@ -111,7 +111,7 @@ class Anchors:
         return Column(weeks_later_ns(time.values, weeks), time.present) if weeks.any() else time
 
     def _in_time(self, places: Int64Array, day_ns: Int64Array) -> Int64Array:
-        """Times of the day without the leap seconds that were not learnt yet."""
+        """Correct times of the day for leap seconds that were not learnt yet."""
         for one in self.late:
             is_right = (places >= one.first_place) | ((places > one.last_place) & (day_ns == one.day_ns))
             day_ns = np.where(is_right, day_ns, (day_ns - one.late_s * NS_PER_S) % DAY_NS)
@@ -131,7 +131,7 @@ NO_ANCHORS = Anchors(_NOTHING, _NOTHING, _NOTHING)
 
 
 def on_one_date(anchors: Anchors, *, is_gps_time: bool) -> tuple[Anchors, tuple[tuple[int, int], ...]]:
-    """Anchors on one date, and how many were on another: (number, days before) of each.
+    """Put anchors on one date; return also (number, days before) of each other date.
 
     Times that jump by whole days and go on are of a receiver that did not know its week or date yet, or was late with a
     new one. It tells one of the past, so the latest counts that is told a few times, or last.
@@ -163,7 +163,7 @@ def on_one_date(anchors: Anchors, *, is_gps_time: bool) -> tuple[Anchors, tuple[
 
 
 def moved_on(anchors: Anchors, rollovers: int, *, is_gps_time: bool) -> Anchors:
-    """Anchors as many rollovers of the week later, as UTC of GPS time or as UTC that was told."""
+    """Move anchors by rollovers of the week, as UTC of GPS time or as stated UTC."""
     if not rollovers:
         return anchors
     if is_gps_time:
@@ -172,7 +172,7 @@ def moved_on(anchors: Anchors, rollovers: int, *, is_gps_time: bool) -> Anchors:
 
 
 def late_stretches(anchors: Anchors) -> tuple[LateStretch, ...]:
-    """Stretches of sentences before the leap seconds were learnt: then UTC falls back.
+    """Find stretches of sentences before the leap seconds were learnt: UTC falls back.
 
     It falls by whole seconds, and times go on steadily before and after. What is late by no more than the time between
     two is not seen.
@@ -205,7 +205,7 @@ def _nearest(choices: list[Int64Array], near_ns: Int64Array) -> Int64Array:
 
 
 def unrolled(values: Int64Array, period: int) -> Int64Array:
-    """Values that start again after ``period``, counted on.
+    """Count values on that start again after ``period``.
 
     Examples
     --------
@@ -244,7 +244,7 @@ def fine_utc_ns(utc_ns: Int64Array, week_ms: Int64Array) -> tuple[Int64Array, In
 
 
 def calendar_ns(year: Int64Array, month: Int64Array, day: Int64Array) -> tuple[Int64Array, BoolArray]:
-    """UTC nanoseconds at the beginning of a day, and whether there is such a day."""
+    """Return UTC nanoseconds at the beginning of days, and whether the days exist."""
     sound = (month >= 1) & (month <= 12) & (day >= 1) & (year >= 1980) & (year < 2200)
     months = (np.where(sound, year, 1980) - 1970) * 12 + np.where(sound, month, 1) - 1
     first = months.astype("datetime64[M]").astype("datetime64[D]")
@@ -254,6 +254,6 @@ def calendar_ns(year: Int64Array, month: Int64Array, day: Int64Array) -> tuple[I
 
 
 def gps_to_utc_ns(week: Int64Array, week_s: Int64Array | np.ndarray) -> Int64Array:
-    """UTC of GPS week and (fractional) seconds of the week, to about a nanosecond."""
+    """Return UTC of GPS week and (fractional) seconds of week, to about a nanosecond."""
     ns = np.round(np.asarray(week_s, dtype=np.float64) * 1e9).astype(np.int64)
     return gps_week_to_utc_ns(week, ns // NS_PER_MS) + ns % NS_PER_MS

@@ -1,4 +1,4 @@
-"""UBX messages of a block: their names, times, and the full times that they tell."""
+"""UBX messages of a block: their names, times, and the full times that they state."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -44,7 +44,7 @@ _HNR_INS = 0x02  # of the class HNR; its time stands elsewhere
 
 
 def messages_of(frames: Frames) -> Iterator[Messages]:
-    """UBX messages of a block by name; those shorter than the layout apart, by their length."""
+    """Yield UBX messages of a block by name; short ones apart, by their length."""
     which = frames.of(scan.UBX)
     at = frames.offsets[which]
     code = frames.data[at + 2].astype(np.int64) * 256 + frames.data[at + 3]
@@ -65,7 +65,7 @@ def messages_of(frames: Frames) -> Iterator[Messages]:
 
 
 def time_of(messages: Messages, anchors: Anchors) -> Column:
-    """UTC of each message; absent for those that tell no time."""
+    """Return the UTC of each message; absent for messages without a time."""
     if messages.has("iTOW"):
         return anchors.of_week(messages.places, messages.head()["iTOW"].astype(np.int64))
     if messages.has("rcvTow") and messages.has("week"):
@@ -105,7 +105,7 @@ def _is_gps_time(week: NDArray[Any], week_s: NDArray[Any]) -> BoolArray:
 
 @dataclass
 class FullTimes:
-    """Gathers the full times that the messages of a stream tell.
+    """Collector of the full times that the messages of a stream state.
 
     ``wrong_leaps`` counts the fixes whose UTC had another number of leap seconds than the day has, by the difference;
     ``leaps`` the messages that state their number.
@@ -118,7 +118,7 @@ class FullTimes:
     leaps: Counter[int] = field(default_factory=Counter)
 
     def take(self, messages: Messages) -> None:
-        """Take in messages that may tell the full time."""
+        """Take in messages that may state the full time."""
         head = messages.head() if messages.layout is not None and len(messages) and messages.has("iTOW") else None
         if messages.name in _SECONDS and head is not None:
             self._of_calendar(messages, head)
@@ -145,7 +145,7 @@ class FullTimes:
             self.leaps.update((-np.rint(head["utc_offset"][known])).astype(np.int64).tolist())
 
     def take_time(self, places: Int64Array, time: Column) -> None:
-        """Take in messages of which each tells its full time."""
+        """Take in messages that each state their full time."""
         self._add(places, time.values, np.full(len(places), -1), time.mask)
 
     def anchors(self) -> Anchors:

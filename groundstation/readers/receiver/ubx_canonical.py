@@ -92,7 +92,7 @@ def heading_as_track(block: Block, source: str) -> tuple[int, int]:
 
 
 def _solution(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """NAV-PVT and NAV-PVAT, and those of the second solution."""
+    """Return columns of NAV-PVT and NAV-PVAT, also those of the second solution."""
     kind = fields["fixType"]
     is_ok = fields["gnssFixOk"] if "gnssFixOk" in fields else fields["gnssFixOK"]
     has_fix = (kind >= DEAD_RECKONING) & (kind <= WITH_SENSORS)
@@ -125,7 +125,7 @@ def _integrity(is_ok: NDArray[Any], kind: NDArray[Any]) -> Column:
 
 
 def _high_rate(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """HNR-PVT: speed and track in place of velocities."""
+    """Return columns of HNR-PVT: speed and track in place of velocities."""
     kind = fields["gpsFix"]
     has_fix = (kind >= DEAD_RECKONING) & (kind <= WITH_SENSORS)
     speed, track = fields["gSpeed"] * MM, wrap_360(fields["headMot"])
@@ -196,7 +196,7 @@ def _status(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 def _old_solution(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """NAV-SOL, which receivers had before NAV-PVT."""
+    """Return columns of NAV-SOL, which receivers had before NAV-PVT."""
     no_carrier = np.zeros(len(fields["gpsFix"]), dtype=np.uint8)
     return {
         "integrity_ok": _integrity(fields["gpsfixOK"], fields["gpsFix"]),
@@ -241,7 +241,7 @@ def _of_pvat(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 def _of_att(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """An accuracy of zero says that the angle is not known."""
+    """Return the angles; an accuracy of zero says that an angle is not known."""
     columns: Columns = {}
     for name, source in (("roll", "roll"), ("pitch", "pitch"), ("true_heading", "heading")):
         sigma = fields[f"acc{source.capitalize()}"]
@@ -263,7 +263,7 @@ def _of_relative(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 def _of_pvt(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """Heading of the vehicle by sensor fusion; elsewhere the field repeats the track."""
+    """Return the vehicle's heading by sensor fusion; without it the field is the track."""
     if "headVeh" not in fields:
         return {}
     return {"true_heading_deg": Column(fields["headVeh"], fields["headVehValid"])}
@@ -293,7 +293,7 @@ def _added(
     fields: Mapping[str, NDArray[Any]],
     columns_of: Callable[[Mapping[str, NDArray[Any]]], Columns],
 ) -> Columns:
-    """Columns of another message, on the rows whose epoch it is of."""
+    """Return columns of another message, on the rows of the same epoch."""
     other = block.fields(name)
     if other is None:
         return {}

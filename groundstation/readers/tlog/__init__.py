@@ -54,7 +54,7 @@ def _frames_at(head: bytes, at: int, first_us: int = _FIRST_US) -> int:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, batches of every message (raw and canonical), remarks and damages."""
+    """Yield the header, batches of every message (raw and canonical), remarks and damage."""
     from groundstation.readers.tlog.reader import items
 
     yield from items(source, NAME)

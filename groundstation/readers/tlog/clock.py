@@ -42,7 +42,7 @@ _STEADY = (
 
 @dataclass(frozen=True)
 class TimeField:
-    """Field of a message that tells its time, and how."""
+    """Field of a message with its time, and how to read it."""
 
     name: str
     unit_ns: int
@@ -50,7 +50,7 @@ class TimeField:
 
     @classmethod
     def of(cls, message: Message) -> "TimeField | None":
-        """The field of a message that has one."""
+        """Return the time field of a message, None without one."""
         units = {"time_boot_ms": NS_PER_MS, "time_boot_us": NS_PER_US, "time_usec": NS_PER_US}
         for name, unit_ns in units.items():
             if message.dtype.fields is not None and name in message.dtype.fields:
@@ -60,7 +60,7 @@ class TimeField:
 
 @cache
 def time_fields() -> Mapping[int, TimeField]:
-    """Fields that tell the time, by number of message."""
+    """Return the time fields by number of message."""
     found = {number: TimeField.of(message) for number, message in messages().items()}
     return {number: one for number, one in found.items() if one is not None}
 
@@ -72,13 +72,13 @@ def _steady() -> frozenset[int]:
 
 @dataclass
 class _Unwrapped:
-    """Goes on counting where a number of 32 bits starts again."""
+    """Counter that goes on where a number of 32 bits starts again."""
 
     wraps: int = 0
     last: int | None = None
 
     def take(self, values_ms: Int64Array) -> Int64Array:
-        """Values in the order of the log."""
+        """Take in values in the order of the log and return them counted on."""
         before = np.concatenate(([values_ms[0] if self.last is None else self.last], values_ms[:-1]))
         is_end, is_start = before > _WRAP_MS - _EDGE_MS, before < _EDGE_MS
         ahead = is_end & (values_ms < _EDGE_MS)
@@ -90,7 +90,7 @@ class _Unwrapped:
 
 @dataclass
 class TimeReader:
-    """Reads the times in frames of one message of one sender."""
+    """Reader of the times in frames of one message of one sender."""
 
     number: int
     unwrapped: _Unwrapped = field(default_factory=_Unwrapped)
@@ -111,7 +111,7 @@ class TimeReader:
 
 @dataclass(frozen=True, eq=False)
 class Epoch:
-    """A sender's clock from one start to the next: what is added to its times to have UTC.
+    """Sender's clock from one start to the next: the offset from its times to UTC.
 
     ``line`` places it on the time of receipt; ``utc_ns`` is by the sender itself, None where it does not tell.
     """
@@ -121,7 +121,7 @@ class Epoch:
     utc_ns: int | None
 
     def utc_of(self, clock_ns: Int64Array, ground_ns: int) -> Int64Array:
-        """UTC of times of the clock; ``ground_ns`` is what the ground station's clock is off."""
+        """Return UTC of times of the clock; ``ground_ns`` is the ground station's error."""
         if self.utc_ns is not None:
             return np.asarray(clock_ns + self.utc_ns)
         return np.asarray(clock_ns + self.line.at(clock_ns) + ground_ns)
@@ -129,7 +129,7 @@ class Epoch:
 
 @dataclass(frozen=True, eq=False)
 class SenderClock:
-    """The clock of one sender (system x 256 + component).
+    """Clock of one sender (system x 256 + component).
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class SenderClock:
     unix_ns: int | None
 
     def epoch_of(self, record_index: Int64Array) -> Int64Array:
-        """Place of the epoch of records."""
+        """Return the number of the epoch of records."""
         starts = [epoch.first for epoch in self.epochs[1:]]
         return np.asarray(np.searchsorted(np.array(starts, dtype=np.int64), record_index, side="right"))
 
@@ -188,7 +188,7 @@ class SenderClock:
         return Lateness(known.record_index, known.number, late_ns)
 
     def by_its_clock(self, time_ns: Int64Array, since_1970: BoolArray) -> Int64Array:
-        """Times of messages by this clock, -1 where it is not known how they relate."""
+        """Return times of messages by this clock, -1 where the relation is unknown."""
         if not since_1970.any() and not self.counts_from_1970:
             return time_ns
         if self.counts_from_1970:
@@ -240,7 +240,7 @@ class Clocks:
 
 
 class ClockSurvey:
-    """Takes readings of all clocks from the frames of a log."""
+    """Collector of readings of all clocks from the frames of a log."""
 
     def __init__(self) -> None:
         self._readers: dict[tuple[int, int], TimeReader] = {}
@@ -250,7 +250,7 @@ class ClockSurvey:
         self._last: tuple[int, int] | None = None
 
     def take(self, block: Block) -> None:
-        """Take those of a block."""
+        """Take in the readings of a block."""
         received = block.received
         self._note_jumps(block.record_index, received)
         for sender, groups in block.by_sender():
@@ -297,7 +297,7 @@ class ClockSurvey:
         self._last = int(index[-1]), int(time_ns[-1])
 
     def clocks(self, vehicle: int) -> Clocks:
-        """The clocks that were found."""
+        """Return the clocks that were found."""
         tracks = {key: readings.all() for key, readings in self._readings.items()}
         parted: dict[int, list[Stretch]] = {}
         found: dict[int, Key] = {}
@@ -318,7 +318,7 @@ class ClockSurvey:
         return Clocks(senders, offsets.plus(ground_ns), ground_ns)
 
     def _ranked(self, sender: int, tracks: Mapping[Key, Track]) -> list[Key]:
-        """The messages that may be read for the clock of a sender, the best first."""
+        """Rank the messages that may serve as the clock of a sender, the best first."""
         known = messages()
         places = {name: place for place, name in enumerate(_STEADY)}
 
@@ -360,14 +360,14 @@ class Lateness(NamedTuple):
 
 
 def _pace(stretches: Sequence[Stretch]) -> float:
-    """Time of a clock over time of receipt."""
+    """Return the pace of a clock: its time over time of receipt."""
     clock = sum(int(np.ptp(one.track.clock_ns)) for one in stretches)
     receipt = sum(int(np.ptp(one.track.receipt_ns)) for one in stretches)
     return clock / receipt if receipt else float(clock > 0)
 
 
 def _level(track: Track) -> int:
-    """Least difference of receipt and clock in the last stretch of readings."""
+    """Return the least difference of receipt and clock in the last stretch of readings."""
     return stretches_of(track, receipt_step_s=RECEIPT_STEP_S)[-1].level_ns
 
 

@@ -56,7 +56,7 @@ def messages() -> dict[int, Message]:
 
 @cache
 def crc_extras() -> NDArray[np.int16]:
-    """The byte that each message's checksum ends with, by number; :data:`UNKNOWN` for others."""
+    """Return each message's extra checksum byte by number; :data:`UNKNOWN` for others."""
     extras = np.full(MOST_IDS, UNKNOWN, dtype=np.int16)
     for number, kind in _map().items():
         if 0 <= number < MOST_IDS:

@@ -58,7 +58,7 @@ class Block:
         return [(*pair, which) for pair, which in zip(pairs, np.split(order, edges), strict=False)]
 
     def by_sender(self) -> Iterator[tuple[int, list[tuple[int, Int64Array]]]]:
-        """Each sender, with its messages by their number and which frames are of them."""
+        """Each sender, with its messages by number and the frames of each."""
         for sender, groups in groupby(self.groups, key=itemgetter(0)):
             yield sender, [(number, which) for _sender, number, which in groups]
 
@@ -86,7 +86,7 @@ class Block:
         return payloads.view(message.dtype)[:, 0]
 
     def _at_any_byte(self, dtype: np.dtype[Any]) -> NDArray[Any]:
-        """View of the bytes in which entry ``k`` is the value that starts at byte ``k``."""
+        """Return a view of the bytes whose entry ``k`` is the value that starts at byte ``k``."""
         return np.ndarray((max(len(self.data) - dtype.itemsize + 1, 0),), dtype, self.data.data, strides=(1,))
 
     @cached_property

@@ -31,7 +31,7 @@ AUTOPILOT = 1  # component
 
 @dataclass
 class _Frames:
-    """Iterates over the frames of a log in blocks; again from memory where they are few."""
+    """Iterable over the frames of a log in blocks; again from memory if they are few."""
 
     source: Source
     skipped: SkippedBytes = field(default_factory=lambda: SkippedBytes("frame"))
@@ -83,7 +83,7 @@ class _Frames:
                     return
 
     def _note(self, data: NDArray[np.uint8], spans: NDArray[np.int64], base: int, count: int, ends: bool) -> None:
-        """Count stretches that belong to no frame; the last of the file is a frame that was cut."""
+        """Count stretches of no frame; the last one may be a frame that was cut."""
         for number, (start, end, before) in enumerate(spans.tolist()):
             if ends and number == len(spans) - 1 and end == len(data) and _begins_frame(data[start:end]):
                 self.cut = base + start, base + end
@@ -139,7 +139,7 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
 
 
 def _with_next(blocks: Iterable[Block]) -> Iterator[tuple[Block, Block | None]]:
-    """Each block with the one that follows."""
+    """Yield each block with the one that follows."""
     before = None
     for block in blocks:
         if before is not None:
@@ -150,7 +150,7 @@ def _with_next(blocks: Iterable[Block]) -> Iterator[tuple[Block, Block | None]]:
 
 
 def _survey(frames: Iterable[Block]) -> tuple[int, dict[str, frozenset[str]], Clocks]:
-    """The vehicle, the columns of its messages, and the clocks of all senders.
+    """Find the vehicle, the columns of its messages, and the clocks of all senders.
 
     The vehicle (system x 256 + component) is the one that tells its attitude most often.
     """

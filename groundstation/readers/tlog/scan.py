@@ -50,7 +50,7 @@ def _frame_end(data: Any, at: int, limit: int) -> int:
 
 @in_place
 def scan(data: Any, is_last: bool, extras: Any, frames: Any, skipped: Any, told: Any) -> int:
-    """Find frames; returns how many.
+    """Find frames and return their number.
 
     ``frames`` (m, 5) receives time, number of message, system x 256 + component, place and bytes of the payload;
     ``skipped`` (k, 3) first byte, the first behind, and the frames before; ``told`` (3,) how many stretches were

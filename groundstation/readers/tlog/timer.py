@@ -18,7 +18,7 @@ ASTRAY_S = 2.0  # of the time of a message from those of its sender's clock arou
 
 
 class Timer:
-    """Tells when the values of frames were true, block by block.
+    """Times of validity of the values in frames, computed block by block.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Timer:
         return np.where(has_own | is_known, validity_ns, device_ns)
 
     def _is_repeated(self, device_ns: Int64Array, following: Block | None) -> BoolArray:
-        """Frames of a block that were received together with the one before or behind, shape (n,)."""
+        """Tell which frames were received together with a neighbour, shape (n,)."""
         behind_ns = np.zeros(0, dtype=np.int64) if following is None else following.received.values[:1]
         around_ns = np.concatenate((self._device_ns, device_ns, behind_ns))
         is_same = np.concatenate(([False], around_ns[1:] == around_ns[:-1], [False]))
@@ -85,7 +85,7 @@ class Timer:
         return np.asarray(block.received.values + self._clocks.offsets.at(block.record_index))
 
     def _read(self, block: Block, sender: int, number: int, which: Int64Array) -> Int64Array:
-        """Times of frames by the clock of their sender, -1 where there is none."""
+        """Read times of frames by the clock of their sender, -1 where there is none."""
         reader = self._readers.setdefault((sender, number), TimeReader(number))
         return self._clocks.senders[sender].by_its_clock(*reader.read(block, which))
 
@@ -110,7 +110,7 @@ class Timer:
     def _around(
         self, sender: int, own: Mapping[int, NDArray[np.int64]], behind: Mapping[int, NDArray[np.int64]]
     ) -> NDArray[np.int64]:
-        """References of a sender in the block, with the last before it and the first behind it."""
+        """Return references of a sender in the block, and the nearest on either side of it."""
         nothing = np.zeros((3, 0), dtype=np.int64)
         parts = self._before.get(sender, nothing), own.get(sender, nothing), behind.get(sender, nothing)[:, :1]
         return np.concatenate(parts, axis=1)
@@ -124,7 +124,7 @@ class Timer:
         utc_ns: Int64Array,
         is_known: BoolArray,
     ) -> None:
-        """UTC of the frames of a sender whose own times can be true."""
+        """Set the UTC of the frames of a sender whose own times can be true."""
         clock = self._clocks.senders[sender]
         if not around.shape[1]:
             return
@@ -162,7 +162,7 @@ class Timer:
         return np.concatenate((self._last.get(sender, nothing), known[:, rows[is_known[rows]]], behind), axis=1)
 
     def _known(self, system: int, rows: Int64Array, known: NDArray[np.int64], is_known: BoolArray) -> NDArray[np.int64]:
-        """The same of all senders of a system."""
+        """Return frames of all senders of a system with known time, and the last before."""
         last = [one for sender, one in self._last.items() if sender >> 8 == system]
         before = max(last, key=lambda one: int(one[0, -1]), default=np.zeros((3, 0), dtype=np.int64))
         return np.concatenate((before, known[:, rows[is_known[rows]]]), axis=1)
@@ -184,7 +184,7 @@ class Timer:
 
 
 def _near(short_ns: Int64Array, clock_ns: Int64Array) -> Int64Array:
-    """Times of which 32 bits in microseconds were sent, next to others."""
+    """Complete times of which only 32 bits in microseconds were sent, close to others."""
     wrap_ns = (1 << 32) * NS_PER_US
     return np.asarray(clock_ns + (short_ns - clock_ns + wrap_ns // 2) % wrap_ns - wrap_ns // 2)
 

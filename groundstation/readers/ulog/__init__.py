@@ -39,7 +39,10 @@ def sniff(source: Source) -> Claim | None:
 
 
 def _refuse_encrypted(source: Source) -> None:
-    """Say how to decrypt what PX4 encrypted; before 1.16 data are told by their name."""
+    """Refuse a log that PX4 encrypted and say how to decrypt it.
+
+    Before PX4 1.16 encrypted data are recognised by the file's name.
+    """
     if source.head.startswith(_KEY):
         found, next_step = "the key of an encrypted PX4 ULog, no log", "decrypt the .ulgc beside it"
         raise UnclaimedLogError(source.name, found, "", f"{next_step} with PX4's Tools/decrypt_ulog.py")
@@ -83,7 +86,7 @@ def read(source: Source) -> Iterator[Item]:
 
 
 def _headless(source: Source) -> Iterator[Item]:
-    """Items of a log whose first bytes are damaged; when logging began is not known."""
+    """Yield the items of a log whose first bytes are damaged; its start is not known."""
     from groundstation.readers.ulog.reader import items
 
     yield from items(source, NAME, 0)

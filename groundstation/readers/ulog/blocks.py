@@ -67,7 +67,7 @@ class Block:
     topics: list[Topic]
 
     def groups(self) -> Iterator[tuple[Topic, Int64Array]]:
-        """Each topic that occurs, and which messages (numbered from 0) are of it, increasing."""
+        """Yield each topic that occurs, and the numbers (from 0) of its messages, increasing."""
         order = np.argsort(self.topic.astype(np.int16), kind="stable")  # 16 bits: sorted by radix
         numbers = self.topic[order]
         starts = np.flatnonzero(np.diff(numbers, prepend=-(1 << 20)))
@@ -85,7 +85,7 @@ class Block:
         return windows[self.at[which] + (scan.HEADER + 2)].view(layout.dtype)
 
     def controls(self) -> Iterator[tuple[int, str, bytes]]:
-        """Messages that are not data: number, type and body."""
+        """Yield number, type and body of the messages that are not data."""
         for number in np.flatnonzero(self.topic < 0).tolist():
             yield number, chr(-int(self.topic[number])), self.body(number)
 
@@ -97,7 +97,7 @@ class Block:
 
 
 class Definitions:
-    """Formats and subscriptions in force, and what was wrong with them.
+    """Formats and subscriptions in force, and the damage found in them.
 
     Attributes
     ----------
@@ -222,7 +222,7 @@ class Walk:
         return [*(offset for offset in dict.fromkeys(offsets) if start < offset < size), size]
 
     def _section(self, stream: BinaryIO, start: int, end: int) -> Iterator[Block]:
-        """Messages of the bytes from ``start`` to ``end``."""
+        """Yield blocks of the messages in the bytes from ``start`` to ``end``."""
         state = scan.new_state()
         room = min(BLOCK_BYTES + 2 * scan.LOOKAHEAD, end - start)
         buffer = np.zeros(room + SLACK, dtype=np.uint8)
@@ -273,7 +273,7 @@ class Walk:
                 self._index += count
 
     def _note_skipped(self, data: NDArray[np.uint8], start: int, behind: int) -> None:
-        """Count bytes of no message; the header of a further log is none of them."""
+        """Count bytes of no message; the header of a further log does not count."""
         bytes_, end = data.tobytes(), start + len(data)
         at = bytes_.find(MAGIC)
         if at < 0:
@@ -288,7 +288,7 @@ class Walk:
                 self._skipped.add(first, last, behind)
 
     def _read(self, stream: BinaryIO, place: int, into: NDArray[np.uint8]) -> int:
-        """Fill ``into`` with bytes of the file from ``place`` on; returns how many there were."""
+        """Fill ``into`` with bytes from ``place`` on and return their number."""
         try:
             stream.seek(place)
             count: int = stream.readinto(into.data)  # type: ignore[attr-defined]

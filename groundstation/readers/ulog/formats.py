@@ -69,7 +69,7 @@ class Layout:
 
     @cached_property
     def row_bytes(self) -> int:
-        """Bytes of a row of gathered data: a multiple of eight keeps aligned what the log aligned."""
+        """Bytes of a row of gathered data, a multiple of eight so that numbers stay aligned."""
         return (self.least_bytes + 7) // 8 * 8
 
     @cached_property
@@ -130,7 +130,7 @@ def parse_format(text: str) -> Format:
 
 
 class Flattener:
-    """Makes layouts of formats, within a bound on the work that one log may cause.
+    """Builder of layouts from formats, within a bound on the work of one log.
 
     Examples
     --------
@@ -189,7 +189,7 @@ def _is_padding(column: LayoutColumn) -> bool:
 
 
 def _unique(columns: list[LayoutColumn]) -> Iterator[LayoutColumn]:
-    """Columns with a number behind names that occur again."""
+    """Yield columns with a number behind names that occur again."""
     taken: set[str] = set()
     for column in columns:
         name, copy = column.name, 1

@@ -1,4 +1,4 @@
-"""Messages other than data: what their bytes say."""
+"""Messages other than data, parsed from their bytes."""
 
 import struct
 from dataclasses import dataclass
@@ -67,7 +67,7 @@ class LoggedText:
 
 
 def flag_bits(head: bytes) -> FlagBits | None:
-    """Flags of a log, None when its first message is another one."""
+    """Return the flags of a log, None when its first message is another one."""
     at = FILE_HEADER_BYTES
     if len(head) < at + 3 + FLAG_BITS_BYTES or head[at + 2 : at + 3] != b"B":
         return None

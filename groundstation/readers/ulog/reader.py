@@ -55,7 +55,7 @@ class _Losses:
             self.refused[topic, what] = self.refused.get((topic, what), 0) + count
 
     def damages(self) -> Iterator[Damage]:
-        """One for each topic."""
+        """Yield one damage for each topic."""
         for name, count in self.unreadable.items():
             yield Damage("dropped_channel", "the whole log", count, f"messages of {name} without a usable definition")
         for topic, count in self.beyond.items():
@@ -67,7 +67,7 @@ class _Losses:
 
 
 def items(source: Source, reader_name: str, start_us: int) -> Iterator[Item]:
-    """Items of a log; ``start_us`` is when its header says that logging began."""
+    """Yield the items of a log; ``start_us`` is when its header says that logging began."""
     walk = Walk(source)
     kept = deque(walk) if walk.may_be_kept else None
     found = overview(walk if kept is None else kept, walk.definitions)
@@ -108,7 +108,7 @@ def items(source: Source, reader_name: str, start_us: int) -> Iterator[Item]:
 
 
 def _let_go(blocks: deque[Block]) -> Iterator[Block]:
-    """Blocks, each free once it is done with."""
+    """Yield blocks; each is freed once it is done."""
     while blocks:
         yield blocks.popleft()
 
@@ -178,7 +178,7 @@ class _CanonicalTopics:
         self._mode = "gnss_aided" if found.fixed else "attitude"
 
     def take(self, topic: Topic, index: Int64Array, time: Column, rows: NDArray[Any]) -> None:
-        """Convert what a block has of a PX4 topic."""
+        """Convert the data that a block has of a PX4 topic."""
         values = Rows(rows)
         of_topic: dict[str, dict[str, Column]] = {}
         for assignment in self._found.assignments.get((topic.name, topic.instance), ()):
@@ -230,7 +230,7 @@ class _CanonicalTopics:
             self._parts.setdefault("event", []).append(part)
 
     def batches(self) -> Iterator[RecordBatch]:
-        """Batches of what was taken since the last call."""
+        """Yield batches of what was taken since the last call."""
         parts, self._parts = self._parts, {}
         for topic, several in parts.items():
             batch = merged(topic, several)

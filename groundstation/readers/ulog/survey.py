@@ -81,7 +81,7 @@ def _note_odd_flags(block: Block, topic: Topic, odd: set[tuple[int, str]]) -> No
 
 
 def _has_fix(block: Block, topic: Topic) -> bool:
-    """Check for a receiver with a fix in a block."""
+    """Tell whether a block has a receiver with a fix."""
     if topic.name not in _RECEIVERS or topic.layout is None or "fix_type" not in topic.layout.names:
         return False
     rows = block.rows(topic.layout, np.flatnonzero(block.topic == topic.number))

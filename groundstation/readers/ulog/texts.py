@@ -42,7 +42,7 @@ class _Rows:
     width: int = 0
 
     def add(self, row: _Row) -> bool:
-        """Take in a row; whether it is time for a batch."""
+        """Take in a row and tell whether it is time for a batch."""
         self.rows.append(row)
         self.width = max(self.width, row.width)
         return len(self.rows) == ROWS_A_BATCH or len(self.rows) * self.width > CHARACTERS_A_BATCH
@@ -50,7 +50,7 @@ class _Rows:
 
 @dataclass
 class TextTopics:
-    """Makes rows of the text topics block by block; counts drop-outs and what cannot be read.
+    """Maker of the rows of text topics; counts drop-outs and unreadable messages.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def _parameter(fact: Keyed, kind: str, time_us: int) -> tuple[str, int, dict[str
 
 
 def _value_text(fact: Keyed) -> str:
-    """A value as text: bytes that are no text in hexadecimal."""
+    """Return a value as text: bytes that are no text in hexadecimal."""
     return fact.value.hex() if isinstance(fact.value, bytes) else str(fact.value)
 
 
