@@ -1,6 +1,4 @@
-"""Reader for tables of any layout, described by a TOML profile.
-
-The profile is one of those shipped, or the user's.
+"""Tables of any layout, described by a TOML profile: a shipped one, or the user's.
 
 ``record_index`` is the line number in the file (from 1). Columns that the profile does not name are kept under the
 profile's raw topic.

@@ -1,4 +1,4 @@
-"""Reader for flat CSV: a time column, columns ``<topic>.<field>``, metadata after ``#``.
+"""Flat CSV of any recorder: a time column, columns ``<topic>.<field>``, ``#`` metadata.
 
 Every recorder can export it.
 

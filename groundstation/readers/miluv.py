@@ -1,6 +1,6 @@
-"""Reader for MILUV ultra-wideband ranges (range_data.csv) of several quadrotors.
+"""MILUV ultra-wideband ranges (range_data.csv): one log of several quadrotors, with poses.
 
-One log holds all of them, with their poses by motion capture.
+The poses are by motion capture.
 
 A range from tag 10 to tag or anchor 31 is a row of ``link.10-31``; the pose of ifo001 is ``truth.ifo001``. World axes
 of the data have z up and bodies forward-left-up; here both are turned by 180 deg about x. Columns that no rule names

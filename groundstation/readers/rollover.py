@@ -99,7 +99,8 @@ def rollovers(
     --------
     >>> found = rollovers(iso_to_utc_ns("2004-09-20T10:00:00Z")[0], leap_s=18)
     >>> found.count, found.remarks[0].text
-    (1, 'the date told, 2004-09-20, is 1024 weeks behind (the GPS week rolled over): 18 leap seconds are stated, and that day had 13; read as 2024-05-06')
+    (1, 'the date told, 2004-09-20, is 1024 weeks behind (the GPS week rolled over): 18 leap seconds are stated, and \
+that day had 13; read as 2024-05-06')
     """
     for count, why in _shown(told_ns, leap_s, earliest, others):
         true_ns = told_ns + count * ROLLOVER_NS

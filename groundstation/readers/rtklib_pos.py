@@ -1,4 +1,4 @@
-"""Reader for RTKLIB solutions (.pos): position and velocity with covariances.
+"""RTKLIB solutions (.pos): position and velocity of a receiver with their covariances.
 
 Every column is kept.
 

@@ -1,4 +1,4 @@
-"""Reader for SBET, the smoothed best estimate of trajectory of an INS with GNSS.
+"""SBET, the smoothed best estimate of trajectory of an INS with GNSS.
 
 The file has records of 17 doubles and no header. Times are seconds of the GPS week. The file does not say which week: a
 date in its name does (``sbet_20250708.out``), else the flight has no date. The accuracies stand in ``smrmsg_X.out``

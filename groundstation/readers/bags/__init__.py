@@ -1,6 +1,6 @@
-"""Reader for robots' logs: MCAP of other programs, ROS 1 bags, ROS 2 bags.
+"""Robots' logs: MCAP of other programs, ROS 1 bags (.bag), ROS 2 bags (sqlite3, MCAP).
 
-ROS 1 bags end with .bag; ROS 2 bags are sqlite3 or MCAP, split ones are read by their folder.
+A ROS 2 bag that was split is read by its folder.
 """
 
 from collections.abc import Iterator

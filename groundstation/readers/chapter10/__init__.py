@@ -1,7 +1,4 @@
-"""Reader for IRIG 106 Chapter 10 and 11 recordings.
-
-Every bus word is kept; an ICD names the navigation words.
-"""
+"""IRIG 106 Chapter 10 and 11 recordings: every bus word kept, navigation named by an ICD."""
 
 import re
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,4 @@
-"""Reader for ArduPilot DataFlash logs (.BIN).
-
-Every message is kept; navigation is mapped to the canonical topics.
-"""
+"""ArduPilot DataFlash logs (.BIN): every message kept, navigation in canonical topics."""
 
 import re
 from collections.abc import Iterator

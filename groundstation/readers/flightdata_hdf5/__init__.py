@@ -1,6 +1,6 @@
-"""Reader for airliner flight data in HDF5 (FlightDataAnalyzer).
+"""Airliner flight data in HDF5 (FlightDataAnalyzer): every parameter, canonical ones too.
 
-It reads every parameter, and the canonical ones in their units.
+The canonical parameters are in their units.
 """
 
 from collections.abc import Iterator

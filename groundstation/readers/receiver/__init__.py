@@ -1,7 +1,4 @@
-"""Reader for satellite receivers: UBX, NMEA 0183 and NovAtel OEM in one stream.
-
-RTCM 3 frames between them are counted.
-"""
+"""Satellite receivers: UBX, NMEA 0183 and NovAtel OEM in one stream, RTCM 3 is counted."""
 
 import re
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Reader for MAVLink telemetry as ground stations record it (.tlog).
+"""MAVLink telemetry as ground stations record it (.tlog).
 
 Each frame stands behind its time of receipt.
 """

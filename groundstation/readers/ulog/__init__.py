@@ -1,7 +1,6 @@
-"""Reader for PX4 ULog.
+"""PX4 ULog: every topic under its own definition, canonical ones in their units.
 
-Every topic is read under its own definition; the canonical topics get their units. What was lost on the way is reported
-as damage.
+Loss on the way is reported as damage.
 """
 
 import re
