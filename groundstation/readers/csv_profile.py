@@ -39,8 +39,9 @@ def _shipped() -> tuple[Profile, ...]:
 def sniff(source: Source) -> Claim | None:
     """Claim a file whose first line and header row are those of a shipped profile.
 
-    Where the first line is damaged a header row with enough of the profile's columns will do. Of the profiles of a
-    family the one has the file whose header row stands first, or has the long names of that row below it.
+    Where the first line is damaged, a header row with enough of the profile's columns will do. Among the profiles of a
+    family, the file goes to the one whose header row stands first, or to the one that has the long names of that row
+    below it.
     """
     found = _best(source)
     return None if found is None else Claim(NAME, found[1].profile.name, found[0])

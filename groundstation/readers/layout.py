@@ -1,7 +1,4 @@
-"""Layout of a delimited table: the field of each column, and the form of the time.
-
-The fields are canonical ones.
-"""
+"""Layout of a delimited table: canonical field of each column, and form of the time."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -172,7 +169,8 @@ def wind_from_direction(from_deg: FloatArray, speed_mps: FloatArray) -> tuple[Fl
 def pressure_altitude(indicated_m: FloatArray, setting_inhg: FloatArray) -> tuple[FloatArray, ...]:
     """Return altitude above 1013.25 hPa from one indicated with another altimeter setting.
 
-    To the indicated altitude is added that of the setting in the standard atmosphere; 1013.25 hPa are 29.92126 inHg.
+    The altitude of the setting in the standard atmosphere is added to the indicated altitude; 1013.25 hPa are 29.92126
+    inHg.
 
     Examples
     --------

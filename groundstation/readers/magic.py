@@ -33,7 +33,8 @@ def recognise(source: Source) -> str | None:
 def companion(source: Source) -> str | None:
     """Name a file that belongs to a log and is no log itself; None for any other.
 
-    RTKLIB writes beside a log it records when which of its bytes came: ``TIMETAG RTKLIB`` and its version, 60 bytes.
+    RTKLIB writes a file beside the log it records that tells when its bytes came: ``TIMETAG RTKLIB`` and its version,
+    60 bytes.
     """
     if not source.head.startswith(b"TIMETAG RTKLIB"):
         return None

@@ -1,6 +1,6 @@
 """Roles that map messages of a log to canonical fields, each with its rules, best first.
 
-The one engine of the readers whose logs name their messages: a reader states its roles and tells what its log offers.
+All readers whose logs name their messages share it: a reader states its roles and what its log offers.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

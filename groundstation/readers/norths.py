@@ -1,8 +1,8 @@
 """North of a logged track and sign of a logged variation, found from the data.
 
 Recorders of one family differ: a Garmin G1000 logs a magnetic track and a variation that is positive east, a G3X a true
-track and a variation that is positive west, a G5 the one or the other by its software. Where velocities, or positions,
-stand beside the track they show it; what is left is told by the Earth's field of the day.
+track and a variation that is positive west, a G5 either, depending on its software. Velocities or positions beside the
+track show which it is; the Earth's field of the day shows the rest.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

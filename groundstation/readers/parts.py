@@ -105,7 +105,7 @@ def bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
 def one_row_each(batch: RecordBatch) -> RecordBatch:
     """Merge records that are valid at the same time into one row.
 
-    Those of an instant at which two have the same field stay as they are.
+    Where two records of an instant have the same field, they stay as they are.
     """
     stamps = batch.validity_time_ns
     if stamps is None:

@@ -33,8 +33,8 @@ def without_place(latitude: Column, longitude: Column) -> BoolArray:
 def zeroed(kind: str, fields: Mapping[str, Column], is_zero: BoolArray) -> dict[str, BoolArray]:
     """Return masks, by field, of values to drop where rows have no position, shape (n,).
 
-    The height and the sigmas go with the place. A receiver that has no place has no velocity either: what it tells of
-    motion goes where all of it is zero.
+    The height and the sigmas go with the place. A receiver that has no place has no velocity either: its motion is
+    dropped where all of it is zero.
 
     Parameters
     ----------

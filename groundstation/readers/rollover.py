@@ -33,7 +33,8 @@ _DAY_NS = 86_400 * NS_PER_S
 class Earliest:
     """Year before which something in the log did not exist, such as ``PX4 v1.11``.
 
-    ``moves`` is False of what stays in use for decades, as a format: it shows that a date is wrong, not by how much.
+    ``moves`` is False for what stays in use for decades, such as a format: it shows that a date is wrong, not by how
+    much.
     """
 
     year: int

@@ -131,8 +131,8 @@ class _Level:
 def told_at_zero(told_ns: Int64Array, device_ns: Int64Array) -> ToldZero:
     """Return the time by another clock when the recorder's was at zero.
 
-    Of readings that repeat a time only the first counts, for the others are older than they say: a clock may tell whole
-    seconds. When the log's first time was told first is not known where times repeat.
+    Where readings repeat a time only the first counts, for the others are older than they say: a clock may state whole
+    seconds. Where times repeat, it is not known when the log's first time was stated first.
 
     Parameters
     ----------
@@ -154,9 +154,9 @@ def told_at_zero(told_ns: Int64Array, device_ns: Int64Array) -> ToldZero:
 def zero_of_readings(zeros_ns: Int64Array) -> ToldZero:
     """Return the zero by readings of another clock; if that was set, the last level counts.
 
-    A receiver tells UTC some seconds late until it has heard of the leap seconds, and a date of the past until it knows
-    the week. So the latest date counts, and of levels on that date the last; of a receiver that started again in the
-    log, the level before it fell back.
+    A receiver states UTC some seconds late until it has heard of the leap seconds, and a date of the past until it
+    knows the week. So the latest date counts, and among the levels on that date the last one. If the receiver started
+    again in the log and fell back, it is the level before.
 
     Parameters
     ----------

@@ -146,8 +146,9 @@ class Origin:
 class PoseWriter(DerivedWriter):
     """Writer of attitude and position of an INS topic as ``foxglove.PoseInFrame``, for 3-D.
 
-    Body axes are forward-left-up, the frame is east-north-up at the first position of the file. Ten poses a second at
-    most; where a row of attitude has no position of its own it has the last one. Single precision: they are to be seen.
+    Body axes are forward-left-up, the frame is east-north-up at the first position of the file. There are at most ten
+    poses a second. A row of attitude without a position of its own has the last one. Single precision is enough to look
+    at.
     """
 
     def __init__(self, channel_id: int, source: str, emit: Callable[[Chunk], None], has_utc: bool, origin: Origin):

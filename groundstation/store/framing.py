@@ -266,7 +266,8 @@ def _evenly_spaced(buffer: ByteArray) -> Messages | None:
 class Summary:
     """The summary section: definitions and indexes; ``is_intact`` when its checksum was right.
 
-    ``is_in_place`` when it stands where the footer says: else bytes before it were lost or added, and its places lie.
+    ``is_in_place`` when it stands where the footer says: else bytes before it were lost or added, and the places it
+    states are wrong.
     """
 
     start: int = 0

@@ -57,8 +57,6 @@ class Part:
     """Part of a store file: the records from ``start_ns`` on and before ``end_ns``.
 
     Only topics for which ``wants`` is true belong to it.
-
-    Of the topics for which ``wants`` is true.
     """
 
     start_ns: int
@@ -77,10 +75,9 @@ class Part:
 def read(path: str | os.PathLike[str], part: Part | None = None) -> Iterator[Item]:
     """Yield the items of a store file: one LogHeader, then batches and damage in file order.
 
-    Batches have ``time_ns`` and, where it differs, ``validity_time_ns``; their columns are those that the topic had,
-    in the source's names and types. The header's ``utc_of_zero_ns`` is 0 when times are UTC, None for NOTIME.
-    One chunk is held at a time. Of a ``part`` only the chunks that the index places in it are read; without an index
-    all are.
+    Batches have ``time_ns`` and, where it differs, ``validity_time_ns``; their columns are those that the topic had, in
+    the source's names and types. The header's ``utc_of_zero_ns`` is 0 when times are UTC, None for NOTIME. One chunk is
+    held at a time. For a ``part`` only the chunks that the index places in it are read; without an index all are.
 
     Raises
     ------

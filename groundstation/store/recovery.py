@@ -370,8 +370,8 @@ def is_own_schema(schema: Schema) -> bool:
 def search_definitions(file: BinaryIO, size: int, checksums: Mapping[str, int]) -> Summary:
     """Search schemas and channels wherever they stand in the file.
 
-    Of each id the one counts that agrees with its checksum; without checksums one that can be used, and of those the
-    one that is there most often, or the first.
+    For each id the definition counts that agrees with its checksum. Without checksums it is one that can be used, and
+    of those the one that is found most often, or the first.
     """
     times: Counter[tuple[str, int]] = Counter()
     known: dict[tuple[str, int], tuple[Schema | Channel, bytes]] = {}

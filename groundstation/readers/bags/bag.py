@@ -149,10 +149,7 @@ class Bag:
         self._kept = kept
 
     def _read(self) -> Iterator[Item]:
-        """Yield messages and damage, then what the metadata counts beyond the files' content.
-
-        The metadata is that of the bag.
-        """
+        """Yield messages and damage, then what the bag's metadata counts beyond them."""
         account = _account_of(self.source.path).messages if self._is_folder else {}
         told: Counter[str] = Counter()
         count, most = 0, most_messages(self.size)

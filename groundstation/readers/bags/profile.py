@@ -41,7 +41,7 @@ ATTITUDE = "attitude"  # of a quaternion x, y, z, w: flu in enu, or frd in ned
 class VectorRule:
     """Rule for a vector of the message: its topic, quantity, frame and factor.
 
-    The factor is to the unit of the fields.
+    ``factor`` converts to the unit of the fields.
     """
 
     name: str

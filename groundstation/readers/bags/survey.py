@@ -87,7 +87,7 @@ class Survey:
     def is_set(self) -> bool:
         """Tell whether a clock was set: the log time of a topic falls or leaps from 1970.
 
-        It falls by a second or more, though it was corrected.
+        The fall is a second or more; the log time is the corrected one.
         """
         return any(was_set(one.jumps, self.offsets) for seen in self.seen.values() for one in seen.stamped)
 

@@ -273,7 +273,7 @@ class Namer:
     def _is_new(self, holder: Message1553, data: NDArray[np.uint16]) -> BoolArray:
         """Tell which messages have another time tag than the one before.
 
-        All messages without a tag do.
+        Messages without a tag are all new.
         """
         tag = next((one for one in holder.elements if one.name == TIME_TAG), None)
         if tag is None:

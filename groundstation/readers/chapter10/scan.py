@@ -1,8 +1,8 @@
 """Compiled loops over the bytes of a recording: packets, and the messages in them.
 
 A header counts when its sync pattern and its checksum are right: 32 bits that noise does not meet. Its packet counts
-where its data checksum is right, or it has none and another header (or the end of the file) follows; else no other
-header may begin inside it: what lost bytes must not pass for whole.
+where its data checksum is right, or where it has none and another header (or the end of the file) follows. Else no
+other header may begin inside it: a packet that lost bytes must not pass for whole.
 """
 
 from typing import Any

@@ -126,9 +126,8 @@ class Start:
 def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) -> Start:
     """Return the UTC of the counter's zero: the median over the readings of one channel.
 
-    It is the channel that has most readings. Of a time source that was set in the recording, the readings count that it
-    told in the end. A date that is behind that of TMATS by whole rollovers of the GPS week is of a source that missed
-    them.
+    It is the channel that has most readings. If the time source was set in the recording, its last readings count. A
+    date that is behind that of TMATS by whole rollovers of the GPS week is of a source that missed them.
 
     Examples
     --------

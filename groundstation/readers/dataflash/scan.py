@@ -127,7 +127,7 @@ def _is_false(data: Any, at: int, length: int, lengths: Any, time_kind: Any, las
     """Tell whether a record is false, with a damaged id: another record begins inside it.
 
     Where magic (or the end of the file) follows it, only a record that ends there too and has a near time counts: a
-    payload that looks like that by chance is not to be met.
+    payload is most unlikely to look like that by chance.
     """
     end = at + length
     ends_well = end + 2 > len(data) or (data[end] == 0xA3 and data[end + 1] == 0x95)

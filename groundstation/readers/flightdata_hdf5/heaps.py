@@ -1,6 +1,6 @@
 """Heaps of text without an end; the HDF5 library reads them for ever.
 
-Seen with its version 1.14.
+This was seen with version 1.14 of the library.
 """
 
 import struct

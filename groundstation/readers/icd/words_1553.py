@@ -1,6 +1,6 @@
 """Conversion of MIL-STD-1553 data words to values and back, in every schema of DTS files.
 
-Whole arrays at once.
+Whole arrays are converted at once.
 
 Of several words the first is the most significant. Sources: MIL-STD-1750A, 4.1.5 (floating point); IS-GPS-059 (GPS
 floating point and CAPS); IEEE 754; scaling by the value of the most significant bit as in the DTS files.

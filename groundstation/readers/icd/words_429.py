@@ -36,8 +36,8 @@ def has_odd_parity(words: Words429) -> NDArray[np.bool_]:
 def decode_429(words: Words429, element: Element429) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Values of an element in the ICD's unit, and whether each may be used.
 
-    Not usable are words of even parity, those whose sign/status matrix says anything but normal operation (of BCD also
-    minus), and digits above nine. Label and SDI are for :meth:`Word429.takes`.
+    Words of even parity are not usable, nor those whose sign/status matrix says anything but normal operation (for BCD
+    also minus), nor those with digits above nine. Label and SDI are for :meth:`Word429.takes`.
 
     Parameters
     ----------

@@ -228,7 +228,7 @@ def _add_solution(epochs: Epochs, columns: Columns, tally: Tally) -> None:
 def _kind(epochs: Epochs) -> Column:
     """Return the kind of solution of each epoch.
 
-    It follows from the quality of GGA, else from the mode of RMC or GNS.
+    It follows from the quality of GGA, else from the mode of GNS or RMC.
     """
     kind = Column(np.full(len(epochs), _NONE), np.zeros(len(epochs), dtype=bool))
     for formatter in ("RMC", "GNS"):

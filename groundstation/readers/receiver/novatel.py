@@ -178,7 +178,7 @@ def gnss_batch(block: Block, leader: str, tally: Tally) -> RecordBatch | None:
 def ins_batch(block: Block, source: str, tally: Tally) -> RecordBatch | None:
     """Return position, velocity and attitude of the receiver's inertial filter.
 
-    Or the heading of its two antennas.
+    For a HEADING message it is the heading of the receiver's two antennas.
     """
     messages, fields = block.get(source), block.fields(source)
     if not isinstance(messages, Timed) or fields is None:

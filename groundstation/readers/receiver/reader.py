@@ -1,6 +1,6 @@
-"""Second pass over a stream: batches of every message, raw and canonical, then damage.
+"""Second pass over a stream: batches of messages and sentences, remarks and damage.
 
-Remarks come before the damage; NMEA sentences are messages too.
+Batches are raw, and canonical where a rule serves them.
 """
 
 import re

@@ -133,8 +133,9 @@ NO_ANCHORS = Anchors(_NOTHING, _NOTHING, _NOTHING)
 def on_one_date(anchors: Anchors, *, is_gps_time: bool) -> tuple[Anchors, tuple[tuple[int, int], ...]]:
     """Put anchors on one date; return also (number, days before) of each other date.
 
-    Times that jump by whole days and go on are of a receiver that did not know its week or date yet, or was late with a
-    new one. It tells one of the past, so the latest counts that is told a few times, or last.
+    Times that jump by whole days and go on are those of a receiver that did not know its week or date yet, or was late
+    with a new one. Such a receiver states a date of the past, so the latest date counts that is stated a few times, or
+    last.
 
     Examples
     --------
@@ -174,8 +175,8 @@ def moved_on(anchors: Anchors, rollovers: int, *, is_gps_time: bool) -> Anchors:
 def late_stretches(anchors: Anchors) -> tuple[LateStretch, ...]:
     """Find stretches of sentences before the leap seconds were learnt: UTC falls back.
 
-    It falls by whole seconds, and times go on steadily before and after. What is late by no more than the time between
-    two is not seen.
+    UTC falls by whole seconds, and times go on steadily before and after. A lateness of no more than the time between
+    two sentences is not seen.
     """
     is_new = np.append(True, np.diff(anchors.utc_ns) != 0) if len(anchors) else np.zeros(0, dtype=bool)
     places, utc_ns = anchors.places[is_new], anchors.utc_ns[is_new]
