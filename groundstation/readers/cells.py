@@ -23,7 +23,7 @@ from groundstation.base.timescales import iso_to_utc_ns
 
 MAX_TIME_NS = 2**62  # UTC until 2116; sums and differences of two such times fit 64 bits
 _NUMBER = r"^[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?|(?i:nan|inf|infinity))$"
-_DECIMAL_DIGITS = 19  # before the point: what 64 bits can hold
+_DECIMAL_DIGITS = 19  # digits before the point: what 64 bits can hold
 _DECIMAL = rf"^[+-]?\d{{1,{_DECIMAL_DIGITS}}}(?:\.\d*)?$"
 _EXPONENT = re.compile(r"[+-]?(?:\d{1,30}\.?\d{0,30}|\.\d{1,30})[eE][+-]?\d{1,2}")
 _INTEGER = r"^[+-]?\d{1,18}$"

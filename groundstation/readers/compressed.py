@@ -65,7 +65,7 @@ def head_of(stream: BinaryIO, compression: str, size: int) -> bytes:
             if len(head) >= size:
                 break
     except _Broken:
-        pass  # what came before it is the head; the damage is told when all is read
+        pass  # the head is what came before; the damage is reported when all is read
     return bytes(head[:size])
 
 

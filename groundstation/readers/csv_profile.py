@@ -25,8 +25,8 @@ from groundstation.readers.start import unusable_references, utc_of_zero
 NAME = "csv-profile"
 DISTINCTIVE_COLUMNS = 4
 _HEAD_LINES = 1000
-DAMAGED_HEAD_LINES = 20  # in which a header row is looked for when the first line is not the profile's
-MOST_LINES = 10_000  # in which it is looked for elsewhere
+DAMAGED_HEAD_LINES = 20  # lines searched for a header row when the first line is not the profile's
+MOST_LINES = 10_000  # lines searched for it otherwise
 _OF_NUMBERS = frozenset(b"%c" % sign for sign in b"0123456789+-.,;")
 FEWEST_ROWS = 3  # above the header row that are those of another log
 

@@ -151,7 +151,7 @@ def uses_decimal_comma(rows: Sequence[str], delimiter: str) -> bool:
         return False
     cells = [cell for row in rows for cell in split_cells(row, delimiter)]
     if any(_DECIMAL_POINT.fullmatch(cell) for cell in cells):
-        return False  # then a comma parts thousands, or stands in a text
+        return False  # with decimal points a comma separates thousands, or stands in a text
     return any(_DECIMAL_COMMA.fullmatch(cell) for cell in cells)
 
 

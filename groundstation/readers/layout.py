@@ -147,7 +147,7 @@ def velocity_from_track(track_deg: FloatArray, speed_mps: FloatArray) -> tuple[F
     >>> [round(float(part[0]), 9) for part in velocity_from_track(np.array([90.0]), np.array([50.0]))]
     [0.0, 50.0]
     """
-    with np.errstate(invalid="ignore", over="ignore"):  # of an infinite direction or speed: NaN
+    with np.errstate(invalid="ignore", over="ignore"):  # an infinite direction or speed gives NaN
         track_rad = np.deg2rad(track_deg)
         return speed_mps * np.cos(track_rad), speed_mps * np.sin(track_rad)
 
@@ -231,7 +231,7 @@ def apply(derivation: Derivation, known: Mapping[Key, Column]) -> dict[Key, Colu
     masks += [known[key].values != 0.0 for key in derivation.not_zero]
     present = np.logical_and.reduce(masks)
     factors = derivation.factors or (1.0,) * len(inputs)
-    with np.errstate(over="ignore", invalid="ignore"):  # of absurd numbers: becomes infinite or NaN
+    with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers become infinite or NaN
         values = [np.where(present, one.values * factor, np.nan) for one, factor in zip(inputs, factors, strict=True)]
         results = METHODS[derivation.method].function(*values)
     found = {

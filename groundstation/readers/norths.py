@@ -27,10 +27,10 @@ OF_MOTION = (
 LEAST_VARIATION_DEG = 1.0  # below it neither north nor sign makes a difference that could be seen
 _MOVING_MPS, _MOVED_M = 5.0, 30.0
 _FEWEST, _ENOUGH = 20, 200  # samples
-_SHARE = 0.4  # of the variation: the ways to read a track differ by all of it
-_WINDOWS, _WINDOW_BYTES = (0.5, 0.75, 0.25, 0.0), 128 << 10  # of the rows, in which motion is looked for
+_SHARE = 0.4  # largest misfit, as a share of the variation: the ways to read a track differ by all of it
+_WINDOWS, _WINDOW_BYTES = (0.5, 0.75, 0.25, 0.0), 128 << 10  # places among the rows where motion is looked for
 _APART = 2  # rows to either side, between which a position has moved
-_PLACES = 5  # at which the Earth's field is asked for
+_PLACES = 5  # places where the Earth's field is computed
 _FIELD_MISFIT_DEG, _FIELD_MARGIN_DEG = 2.5, 1.0  # tables of recorders are years old
 
 

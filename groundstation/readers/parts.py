@@ -61,7 +61,7 @@ def merged(topic: str, parts: Sequence[Part]) -> RecordBatch:
     places[order] = np.arange(len(order))
     places_of = np.split(places, np.cumsum([len(part.index) for part in parts])[:-1])
     columns: dict[str, Column] = {}
-    masks: dict[tuple[tuple[int, int], ...], BoolArray | None] = {}  # of parts with the same masks there is one
+    masks: dict[tuple[tuple[int, int], ...], BoolArray | None] = {}  # parts with the same masks share one
     for name in dict.fromkeys(name for part in parts for name in part.columns):
         known = {number: part.columns[name] for number, part in enumerate(parts) if name in part.columns}
         pieces = [(places_of[number], column) for number, column in known.items()]
@@ -81,7 +81,7 @@ def merged(topic: str, parts: Sequence[Part]) -> RecordBatch:
 def _values(pieces: Sequence[tuple[Int64Array, Column]], rows: int) -> NDArray[Any]:
     """Return the values of several pieces at given places."""
     kind = np.result_type(*(piece.values.dtype for _at, piece in pieces))
-    first = pieces[0][1].values[:1]  # one text throughout is one run to write
+    first = pieces[0][1].values[:1]  # a text that never changes is written as one run
     values = np.full(rows, np.nan if kind.kind == "f" else first[0] if len(first) else 0, dtype=kind)
     for at, piece in pieces:
         values[at] = piece.values

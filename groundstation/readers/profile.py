@@ -26,7 +26,7 @@ SHIPPED = Path(__file__).parent / "profiles"
 TIME_UNITS: Mapping[str, tuple[int, int]] = MappingProxyType(
     {"ns": (0, 1), "us": (3, 1), "ms": (6, 1), "s": (9, 1), "min": (9, 60), "h": (9, 3600)}
 )
-DIRECTIONS = ("track_deg", "true_heading_deg")  # of which a profile may say from which north they count
+DIRECTIONS = ("track_deg", "true_heading_deg")  # directions of which a profile may state the north
 _DATE_DIRECTIVES = frozenset("YymdbBj")
 
 

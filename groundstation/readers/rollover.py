@@ -25,7 +25,7 @@ from groundstation.base.units import NS_PER_S
 
 CODE = "week_rollover"
 _MOST = 3  # rollovers: 59 years
-_YEARS_IN_USE = 12  # of a firmware or a receiver, after it came
+_YEARS_IN_USE = 12  # years that a firmware or a receiver stays in use after its release
 _DAY_NS = 86_400 * NS_PER_S
 
 

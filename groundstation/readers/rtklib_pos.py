@@ -40,7 +40,7 @@ NAME = "rtklib-pos"
 RAW = "raw.pos"
 _PARTING = re.compile(rb"[ \t]+(?:[,;][ \t]*)?|[,;][ \t]*")
 _TOUCHING = re.compile(rb"(?<=[0-9.])(?=[-+][0-9.])")
-_OF_NO_ROW = re.compile(rb"(?m)^\t?%[^\n]*|^\t|\t?\r?$")  # of lines whose cells are parted by tabs
+_OF_NO_ROW = re.compile(rb"(?m)^\t?%[^\n]*|^\t|\t?\r?$")  # parts to drop of lines whose cells are separated by tabs
 _PLUS, _MINUS, _POINT, _DIGITS_FROM, _DIGITS_TO = b"+-.09"
 _FIXES = np.array(["none", "rtk_fixed", "rtk_float", "dgnss", "dgnss", "3d", "ppp", "dead_reckoning"])
 _JST_NS = 9 * 3_600 * NS_PER_S

@@ -44,7 +44,7 @@ _LOOKED_AT, _JUDGED = 200, 4_096  # records
 _DATE = re.compile(r"(?<!\d)(20\d\d)[-_.]?([01]\d)[-_.]?([0-3]\d)(?!\d)")
 _PLACE = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m")
 _MODE = "gnss_aided"
-_MOST_APART_S = 5.0  # of two accuracies between which one is interpolated
+_MOST_APART_S = 5.0  # largest gap between two accuracies that is interpolated
 _NS_PER_MS = 1_000_000
 _SPECIFIC_FORCE = (0.8 * MPS2_PER_G, 1.2 * MPS2_PER_G)
 
@@ -168,7 +168,7 @@ class _Walk:
         """Yield the records of the data at hand; return how many bytes are done."""
         at, origin, records = 0, 1, np.zeros(0, RECORD)
         while len(data) - at >= RECORD.itemsize:
-            if (at - origin) % RECORD.itemsize or at >= origin + records.nbytes:  # others than those judged already
+            if (at - origin) % RECORD.itemsize or at >= origin + records.nbytes:  # places not judged already
                 count = min((len(data) - at) // RECORD.itemsize, _JUDGED)
                 origin, records = at, np.frombuffer(data, RECORD, count, at)
                 damaged = np.append(np.flatnonzero(~are_sound(records)), len(records))
@@ -181,7 +181,7 @@ class _Walk:
             if len(data) - at < RECORD.itemsize or first + count == len(records):
                 continue
             found = next_start(data, at + 1)
-            if found is None:  # what is left may begin a record that the next block ends
+            if found is None:  # the rest may begin a record that the next block ends
                 tail = len(data) - (IN_A_ROW + 1) * RECORD.itemsize
                 found = tail if at < tail else len(data)
             self._skipped.add(base + at, base + found, self._count)

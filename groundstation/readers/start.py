@@ -12,7 +12,7 @@ from groundstation.base.records import Int64Array, Remark
 from groundstation.base.timescales import iso_to_utc_ns, leap_seconds_late, whole_weeks
 from groundstation.base.units import NS_PER_S
 
-_FIRST_UTC_NS = iso_to_utc_ns("1678-01-01T00:00:00Z")[0]  # what 64 bits of nanoseconds hold
+_FIRST_UTC_NS = iso_to_utc_ns("1678-01-01T00:00:00Z")[0]  # range that 64 bits of nanoseconds hold
 _LAST_UTC_NS = iso_to_utc_ns("2262-01-01T00:00:00Z")[0]
 _REFERENCES = {
     "reference.parking_heading_deg": (-360.0, 720.0, "a heading in degrees"),
@@ -67,10 +67,10 @@ def utc_of_zero(metadata: Mapping[str, str]) -> tuple[int | None, list[Remark]]:
     return utc_ns, [] if named_zone else [Remark("assumed_utc", f"start_utc {text} names no zone: read as UTC")]
 
 
-_JUMP_NS = NS_PER_S // 2  # between readings of one level: messages of a receiver come late by less
+_JUMP_NS = NS_PER_S // 2  # jump between two levels; messages of a receiver come late by less
 _SAME_NS = 7 * NS_PER_S // 10  # middles of one level
 _FEWEST, _MOST_PIECES = 3, 1_000  # readings of a level; pieces between jumps, of which more are no levels but noise
-_FEW_READINGS, _FEW = 10, 0.1  # of a level that nothing explains, and as a share of all: fewer are late messages
+_FEW_READINGS, _FEW = 10, 0.1  # readings of an unexplained level, and their share: fewer are late messages
 _HALF_DAY_NS = 43_200 * NS_PER_S
 
 

@@ -20,16 +20,16 @@ import numpy as np
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
 
-LARGEST_NS = 1 << 62  # of a time: differences of differences fit 64 bits
+LARGEST_NS = 1 << 62  # largest time: differences of differences fit 64 bits
 STEP_S = 1.0  # a smaller step cannot be told from a reading that arrived late
-DRIFT_PPM = 200.0  # of two clocks; crystals are within 100
+DRIFT_PPM = 200.0  # drift between two clocks; crystals are within 100
 MOST_SKEW_PPM = 1_000.0  # a clock that runs worse counts no seconds: a simulation, or one that was stopped
 JUMP_AHEAD_S = 60.0  # a clock that goes ahead by less and stays: older readings were dropped on the way
-FEWEST_READINGS = 4  # of a stretch; fewer are astray
-MOST_ROUNDS = 5  # of leaving out readings astray
-CAUGHT_UP_SHARE = 0.1  # of a step, by which readings behind it may come earlier
+FEWEST_READINGS = 4  # readings of a stretch; fewer are astray
+MOST_ROUNDS = 5  # rounds of leaving out readings astray
+CAUGHT_UP_SHARE = 0.1  # share of a step by which readings after it may come earlier
 MOST_KEPT, RUN = 100_000, 64  # readings that are kept beside the lowest of each run
-MOST_STEPS = 64  # of a log; a clock with more is none
+MOST_STEPS = 64  # steps in a log; a clock with more is no clock
 Stepped: TypeAlias = Literal["", "receipt", "clock"]
 
 

@@ -25,7 +25,7 @@ from groundstation.readers.source import Claim, Source
 
 NAME = "utias"
 MARK = b"# UTIAS Multi-Robot"
-_CAMERA = "raw.camera"  # before its rows are parted by what was seen
+_CAMERA = "raw.camera"  # topic of the rows before they are split by the barcode seen
 _ROBOT = re.compile(r"robot(\d+)_", re.IGNORECASE)
 _DEG = float(np.rad2deg(1.0))
 _RULES: dict[str, tuple[Rule, ...]] = {
@@ -44,7 +44,7 @@ _RULES: dict[str, tuple[Rule, ...]] = {
         Rule(3, _CAMERA, "relative_bearing_deg", "double", -_DEG),
     ),
 }
-_TABLES = {"Barcode Data": 2, "Landmark Groundtruth": 5}  # of a set, with their columns; no logs
+_TABLES = {"Barcode Data": 2, "Landmark Groundtruth": 5}  # tables of a data set and their columns; they are no logs
 MOST_BARCODE = 999
 
 

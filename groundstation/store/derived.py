@@ -28,7 +28,7 @@ from groundstation.store.wire import Slot, encode_text
 # Source: GPS Standard Positioning Service Performance Standard, 5th edition, 2020, table 3.4-1.
 RANGE_SIGMA_M = 7.0 / 1.96
 POSE_FRAME = "local_enu"
-POSE_STEP_NS = NS_PER_S // 10  # one pose in each such step: enough for an eye, and little of the file
+POSE_STEP_NS = NS_PER_S // 10  # one pose per step: enough to look at, and little of the file
 MOST_METRES = 1e8  # a position further from the origin is none
 LOG_TOPIC = "log"
 LEVELS: dict[Severity, int] = {"info": 2, "warn": 3, "fail": 4}  # foxglove.Log.Level
@@ -155,7 +155,7 @@ class PoseWriter(DerivedWriter):
         message = PoseInFrame_pb2.PoseInFrame.DESCRIPTOR
         super().__init__(channel_id, f"pose.{source}", source, emit, message, has_utc)
         self._origin, self._step = origin, -1
-        self._last: dict[str, float] = {}  # of each coordinate, the last value known
+        self._last: dict[str, float] = {}  # last known value of each coordinate
 
     def write(self, batch: RecordBatch) -> None:
         """Take in the first row with an attitude of each step in time."""
@@ -168,7 +168,7 @@ class PoseWriter(DerivedWriter):
             steps = batch.time_ns[rows] // POSE_STEP_NS
             rows = rows[np.diff(steps, prepend=self._step) != 0]
             self._step = int(steps[-1])
-        place = self._places(batch, rows)  # of no rows too: it remembers the last one
+        place = self._places(batch, rows)  # called for no rows too, as it remembers the last one
         if batch.time_ns is None or not len(rows):
             return
         turn = quaternion_enu_from_flu_xyzw(*(column.values[rows] for column in attitude if column is not None))

@@ -111,7 +111,7 @@ class ForeignMcap:
         self._known = Summary()
         self._count = self._unknown = 0
         self._met: dict[int, Sequences] = {}
-        self._room = max(FREE_BYTES, MOST_EXPANDED * size)  # what chunks may still expand to
+        self._room = max(FREE_BYTES, MOST_EXPANDED * size)  # bytes that chunks may still expand to
 
     def __iter__(self) -> Iterator[Found]:
         summary = read_summary(self._file, self._size)
@@ -313,5 +313,5 @@ def _beginning(compression: str, data: bytes, size: int) -> ByteArray:
         else:
             raw += data
     except (zstandard.ZstdError, RuntimeError, ValueError, EOFError):
-        pass  # what came before is kept
+        pass  # the data before the damage are kept
     return np.frombuffer(bytes(raw[:limit]), np.uint8)

@@ -36,10 +36,10 @@ from groundstation.base.records import Int64Array
 from groundstation.store.marks import MAGIC, RECORD_PREFIX
 from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, Messages
 
-MAX_CHUNK_BYTES = 64 << 20  # of a decompressed chunk; the writer's have about one megabyte
-MAX_RECORD_BYTES = 64 << 20  # of any record that is read whole
+MAX_CHUNK_BYTES = 64 << 20  # largest chunk, decompressed; the writer's have about one megabyte
+MAX_RECORD_BYTES = 64 << 20  # largest record that is read whole
 FOOTER_BYTES = RECORD_PREFIX + 20
-SHIFTED_BYTES = 8 << 20  # of the end of a file, in which a summary is looked for: that of a million chunks is longer
+SHIFTED_BYTES = 8 << 20  # part of the end searched for a summary; only one of a million chunks is longer
 _PREFIX = struct.Struct("<BQ")
 _DATA_END = _PREFIX.pack(Opcode.DATA_END, 4)
 _CHUNK_HEAD = struct.Struct("<BQQQQII")  # opcode, length, start, end, uncompressed size, crc, length of compression

@@ -7,7 +7,7 @@ from typing import BinaryIO
 
 from groundstation.store.marks import HEADER_OPCODE, MAGIC, METADATA_NAME, PACKAGE, RECORD_PREFIX, SEARCH_BYTES
 
-HEAD_BYTES = 4096  # of a sound file are enough to recognise it
+HEAD_BYTES = 4096  # enough to recognise a sound file
 _LIBRARY = "groundstation "
 _BEGINNING = re.compile(re.escape(MAGIC) + rb"\x01[\0-\xff]{8}\0{4}[\0-\xff]{4}" + _LIBRARY.encode())
 

@@ -49,8 +49,8 @@ _ENCODING = struct.pack("<I", 8) + b"protobuf"  # stands behind the name of eith
 _NAME_BYTES = 4096  # names of topics and types are shorter
 _MOST_DEFINITIONS = 1 << 17  # twice as many as there are channel ids
 _READ_AGAIN = 16  # bytes that may be read for each byte of a file: what is read may turn out to be none, time and again
-_CALL_BYTES = 64  # what a call costs, as bytes
-_INDEX_BYTES = RECORD_PREFIX + 6  # of a MessageIndex without its entries
+_CALL_BYTES = 64  # cost of a call, in bytes
+_INDEX_BYTES = RECORD_PREFIX + 6  # size of a MessageIndex without its entries
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ def _try_chunk(file: BinaryIO, at: int, size: int, head: ChunkHead) -> tuple[Fou
         content = memoryview(data)[head.data_at :]
         messages = _opened(content, head.compression, head.uncompressed_size, head.crc)
     except ChunkError as error:
-        if not _is_plausible(file, end, size):  # then its length is not to be trusted
+        if not _is_plausible(file, end, size):  # the stated length cannot be trusted then
             end = find_chunk(file, at + 1, size)
             return Lost(at, end, str(error)), end
         known = read_message_index(_index_record(file, end))

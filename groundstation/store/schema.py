@@ -31,7 +31,7 @@ MESSAGE_OF_KIND: Mapping[str, str] = {
 } | {"truth": "Ins"}
 DEVICE_TIME, RECORD_INDEX = "device_time_ns", "record_index"
 FIRST_OWN_NUMBER = 3
-MAX_FIELDS = 10_000  # of a message that is read: working arrays grow with it
+MAX_FIELDS = 10_000  # fields of a message that is read: working arrays grow with them
 TEXT = np.dtype("U1")  # stands for text of any width
 
 _Type = FieldDescriptorProto.Type

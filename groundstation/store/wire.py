@@ -21,7 +21,7 @@ from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, Messag
 from groundstation.store.schema import WireField, varint
 from groundstation.store.walk import locate_fields
 
-MAX_TEXT_BYTES = 64 << 20  # of the matrix in which texts of one piece are laid side by side
+MAX_TEXT_BYTES = 64 << 20  # matrix in which the texts of one piece are laid side by side
 ROWS_ALIKE, MAX_PARTIAL = 512, 60  # rows with the same fields that are worth a matrix; fields that some rows lack
 
 Rows = slice | NDArray[np.intp]

@@ -48,7 +48,7 @@ from groundstation.store.marks import MAGIC, METADATA_NAME, PACKAGE
 LIBRARY = f"groundstation {__version__}"
 # Higher levels save 4 to 7 % of recorded flights and read random mantissas a quarter slower: docs/decisions/005.
 ZSTD_LEVEL = -1
-MEMORY_BYTES = 32 << 20  # of finished chunks that are kept in memory; when there are more, all go to the spool
+MEMORY_BYTES = 32 << 20  # finished chunks kept in memory; when there are more, all go to the spool
 MOST_ON_THEIR_WAY = 4  # chunks that wait for the thread which compresses and writes them
 PART = ".part"  # end of the name of a file that is being written
 MAX_CHANNELS = 65_535  # MCAP's channel ids have 16 bits
@@ -191,7 +191,7 @@ class StoreWriter:
 
     def _channels_of(self, topic: str) -> Iterator[ChannelWriter]:
         if topic not in self._channels:
-            if len(self._channels) + 3 > MAX_CHANNELS:  # its own, one made from it, and the log
+            if len(self._channels) + 3 > MAX_CHANNELS:  # room for its channel, one derived from it, and the log
                 raise GroundstationError(str(self.path), "more topics than an MCAP file has channels")
             new_id = len(self._channels) + 1
             self._channels[topic] = TopicWriter(new_id, topic, self._name_for(topic), self._hand_over)
@@ -298,7 +298,7 @@ class StoreWriter:
             (channel_id,) = chunk.index.message_index_offsets
             indexes.append(self._copy_chunk(file, chunk))
             count[channel_id] += 1
-            if count[channel_id].bit_count() == 1:  # behind chunks 1, 2, 4, 8 ...: should those at both ends be lost
+            if count[channel_id].bit_count() == 1:  # after chunks 1, 2, 4, 8 ..., in case those at both ends are lost
                 file.write(again[channel_id])
         places.append(MetadataIndex(offset=file.tell(), length=len(copy), name=COPY_NAME))
         file.write(copy + to_bytes(DataEnd(0)))
@@ -358,7 +358,7 @@ def clear_parts(path: Path) -> None:
 
 
 def _is_alive(process: int) -> bool:
-    if os.name != "posix":  # there the signal 0 is another one
+    if os.name != "posix":  # signal 0 means something else there
         return True
     try:
         os.kill(process, 0)

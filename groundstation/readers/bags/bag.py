@@ -26,7 +26,7 @@ from groundstation.readers.source import Source
 
 METADATA = "metadata.yaml"
 MARK = b"rosbag2_bagfile_information:"
-KEPT_BYTES, MESSAGE_BYTES = 64 << 20, 64  # of messages kept for the second pass; beside its own, of each
+KEPT_BYTES, MESSAGE_BYTES = 64 << 20, 64  # messages kept for the second pass; what each adds to its own
 MOST_METADATA_BYTES = 16 << 20
 _ENDINGS = ("", ".zstd")  # rosbag2 names a file it compressed later without the ending
 Item: TypeAlias = Block | Damage

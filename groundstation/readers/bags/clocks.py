@@ -19,15 +19,15 @@ from groundstation.readers.bags.sources import Line
 from groundstation.readers.clock_offsets import Jump, Offsets, offsets_by
 from groundstation.readers.two_clocks import FEWEST_READINGS, Readings, Stretch, Track, stretches_of
 
-LARGEST_LAG_S = 2.0  # between header stamp and log time: what is further apart is another clock
-MOST_QUEUED_S = 60.0  # that a message waits for the recorder
-USUAL_SHARE = 0.99  # of the stamps of a topic that must be within it, while neither clock steps
-BELIEVED_SHARE = 0.5  # of the messages of a topic while its stamps go with the log time: the others have log time
+LARGEST_LAG_S = 2.0  # between header stamp and log time: a larger lag means another clock
+MOST_QUEUED_S = 60.0  # longest time that a message waits for the recorder
+USUAL_SHARE = 0.99  # share of a topic's stamps that must be within that lag, while neither clock steps
+BELIEVED_SHARE = 0.5  # share of a topic's messages whose stamps go with the log time: the others have log time
 FIRST_NS = iso_to_utc_ns("1980-01-08T00:00:00Z")[0]  # a clock before it was not set
 MOST_SAMPLES = 4_096
 MOST_JUMPS = 1_000
-_LEAP_S = 5.0  # of the log time of a topic from one message to the next: another clock may have been set there
-_SLIP_NS = 60 * NS_PER_S  # from the last message before a slip to the first behind it, at most
+_LEAP_S = 5.0  # leap of a topic's log time between two messages: another clock may have been set there
+_SLIP_NS = 60 * NS_PER_S  # longest slip, from the last message before it to the first one after it
 _LARGEST_LAG_NS = int(LARGEST_LAG_S * NS_PER_S)
 
 

@@ -28,7 +28,7 @@ from groundstation.readers.bags.work import BYTES_PER_STEP, STEPS_PER_VALUE, Wor
 
 DEEPEST = 32  # objects within objects
 BYTES = "bytes"  # column of messages that cannot be read: how long they are
-MOST_SHAPES = 64  # of a connection that are kept: messages of ever new lengths are walked one by one
+MOST_SHAPES = 64  # shapes kept for a connection: messages of ever new lengths are walked one by one
 
 
 @dataclass(frozen=True, eq=False)

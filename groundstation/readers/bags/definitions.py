@@ -14,7 +14,7 @@ import numpy as np
 
 from groundstation.readers.bags.known_types import KNOWN_TYPES
 
-MOST_FIELDS = 4_000  # of one definition with all its parts: a longer text is no definition
+MOST_FIELDS = 4_000  # fields of one definition with all its parts: a longer text is no definition
 _SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
 _PART = re.compile(r"\s*MSG:\s*(\S+)\s*\n")
 _CONSTANT = re.compile(r"[\w/<=]+\s+\w+\s*=")

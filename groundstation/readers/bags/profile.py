@@ -34,7 +34,7 @@ _VECTORS: Mapping[str, tuple[tuple[str, str, str], str, tuple[str, str]]] = Mapp
     }
 )
 LATEST_NS = 2.0**62
-ATTITUDE = "attitude"  # of a quaternion x, y, z, w: flu in enu, or frd in ned
+ATTITUDE = "attitude"  # from a quaternion x, y, z, w: flu in enu, or frd in ned
 
 
 @dataclass(frozen=True)

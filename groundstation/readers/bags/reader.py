@@ -31,8 +31,8 @@ from groundstation.readers.parts import Part, bounded, merged, occupied, one_row
 from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
 
-GATHERED_BYTES = 8 << 20  # of messages that are decoded together
-MESSAGE_BYTES = 64  # that a message takes beside its own
+GATHERED_BYTES = 8 << 20  # size of messages that are decoded together
+MESSAGE_BYTES = 64  # memory that a message takes beside its own bytes
 LATEST_NS = 1 << 62
 MAX_NAME_CHARACTERS = 200
 PUBLISHED, PUBLISHER = "publish_time_ns", "publisher"

@@ -40,7 +40,7 @@ from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 
 MAX_CHUNK_BYTES = 256 << 20  # decompressed; recorders close a chunk at 768 kB
-FREE_BYTES = 32 << 20  # that chunks may expand to, whatever the size of the file
+FREE_BYTES = 32 << 20  # size that chunks may expand to, whatever the size of the file
 MOST_SEARCHED = 20_000  # times that a record is searched for in the contents of chunks
 _TIME = struct.Struct("<II")
 
@@ -144,7 +144,7 @@ class Ros1Bag:
         """Read consecutive messages; definitions among them are taken in."""
         found: dict[int, _Gathered] = {}
         at = lost = 0
-        most = most_messages(self._source.size) + 1  # that many are told to be too many
+        most = most_messages(self._source.size) + 1  # one more than is allowed: reported as too many
         while at < len(content) and self._count <= most:
             end = self._known_message(content, at, found)
             if end:

@@ -13,16 +13,16 @@ from typing import BinaryIO, NamedTuple
 
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
-MAX_HEADER_BYTES, MOST_FIELDS = 4096, 32  # of a header, and of the description of a connection
+MAX_HEADER_BYTES, MOST_FIELDS = 4096, 32  # largest header, and fields in it; also of the description of a connection
 SEARCH_BYTES = 1 << 20
 BEYOND_BYTES = 4096  # room for a header that begins within a record and ends behind it
-BACK_BYTES, MOST_BEGINNINGS = 512, 8  # before an operation: how far its header begins, and places that are tried
-MOST_TRIES = 5_000  # of a file: what looks like an operation stands in damaged bytes once in many gigabytes
+BACK_BYTES, MOST_BEGINNINGS = 512, 8  # how far before an operation its header may begin, and places that are tried
+MOST_TRIES = 5_000  # for one file: damaged bytes look like an operation once in many gigabytes
 LOOKED_AT, MOST_TRIED = 1 << 16, 200  # bytes of a file without the first ones of a bag, and headers in them
-INDEX_BYTES = 64 << 20  # of an index at most
+INDEX_BYTES = 64 << 20  # largest index
 # Every record's header has the field "op" of one byte: 4 bytes of length, "op=", the number.
 OP = re.compile(rb"\x04\0\0\0op=[\x02-\x07]")
-OP_OUTSIDE = re.compile(rb"\x04\0\0\0op=[\x04-\x06]")  # of records that stand in no chunk
+OP_OUTSIDE = re.compile(rb"\x04\0\0\0op=[\x04-\x06]")  # operations of records outside chunks
 # A header begins with its length and that of its first field, then a name; both lengths are below a megabyte.
 _BEGINNING = re.compile(rb"(?=[\0-\xff]{2}[\0-\x0f]\0[\0-\xff]{2}[\0-\x0f]\0[a-z_])")
 
@@ -156,7 +156,7 @@ class Records:
         if head.end > self.size:
             if head.op == CHUNK and self._next(head.data_at, self.size, OP_OUTSIDE) == self.size:
                 return Record(at, self.size, head, is_cut=True)
-            end = self._next(at + 1, self.size)  # its length is not to be trusted, or the end is cut
+            end = self._next(at + 1, self.size)  # the stated length cannot be trusted, or the end is cut
             return Record(at, end, is_cut=end == self.size)
         inside = self._inside(head)
         return Record(at, inside) if inside else Record(at, head.end, head)

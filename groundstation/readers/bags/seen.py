@@ -16,8 +16,8 @@ from groundstation.readers.bags.messages import Block, Connection
 from groundstation.readers.bags.profile import MessageRule
 
 SAMPLE = 4_000  # messages of a connection that are looked at
-LOOKED_AT = 200  # of those whose values stand at places that are found once
-LATER = 4  # of each block behind them, where a stamp does not stand at one place in all messages
+LOOKED_AT = 200  # messages looked at if their values stand at places that are found once
+LATER = 4  # messages of each later block, where a stamp does not stand at one place in all messages
 STAMPS = ("header.stamp_ns", "timestamp_ns")
 
 
@@ -107,7 +107,7 @@ class Seen:
         rows = np.arange(min(len(block), SAMPLE - self._looked_at), dtype=np.int64)
         if decoder.has_places and not self.columns:
             rows = rows[:LOOKED_AT]
-        elif decoder.stands_at_one_place(self._stamp_name()):  # then it is read without a look at the rest
+        elif decoder.stands_at_one_place(self._stamp_name()):  # the stamp is read without decoding the rest
             rows = rows[:0]
         elif not len(rows):
             rows = np.unique(np.linspace(0, len(block) - 1, LATER).astype(np.int64))

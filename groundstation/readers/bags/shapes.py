@@ -20,10 +20,10 @@ from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags.definitions import PRIMITIVES, TEXT, TIMES, WIDE_TEXT, Definition
 from groundstation.readers.bags.messages import ByteArray
 
-MOST_NUMBERS, MOST_PARTS = 64, 16  # of an array that become columns: of a longer one the length is kept
+MOST_NUMBERS, MOST_PARTS = 64, 16  # elements of an array that become columns: of a longer one only the length is kept
 MOST_COLUMNS = 2_000
-MOST_STEPS = 100_000  # of a walk through one message
-COUNT = ".count"  # behind the name of an array of which the length alone is kept
+MOST_STEPS = 100_000  # steps of a walk through one message
+COUNT = ".count"  # added to the name of an array of which only the length is kept
 
 
 class ShapeError(Exception):

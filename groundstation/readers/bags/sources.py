@@ -15,7 +15,7 @@ import numpy as np
 from groundstation.base.records import Int64Array
 from groundstation.readers.bags.messages import Connection
 
-OVERLAP_SHARE, OVERLAP_MESSAGES = 0.05, 3  # of either of two connections within the time of the other: they interlace
+OVERLAP_SHARE, OVERLAP_MESSAGES = 0.05, 3  # connections interlace with this share of one, and messages of both
 Key: TypeAlias = tuple[str, str, str, bytes]
 
 

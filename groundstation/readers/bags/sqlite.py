@@ -33,13 +33,13 @@ ROWS, BLOCK_BYTES = 2_000, 32 << 20  # taken at once, at most
 STEPS, LOOKS = (
     1_000,
     4_000,
-)  # of sqlite's machine between two looks, and looks at most; as many again as the file has kB
+)  # machine steps of sqlite between two looks, and looks at most; plus two for each kB of the file
 MOST_TOPICS = 10_000
-MOST_FAILURES = 200  # of reading, each at another place of the table
+MOST_FAILURES = 200  # failures of reading, each at another place of the table
 MAX_MESSAGE_BYTES = 64 << 20
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _COPY_BYTES = 1 << 20
-_FAILURES = (sqlite3.Error, OverflowError, UnicodeDecodeError, MemoryError)  # of lengths that are none, too
+_FAILURES = (sqlite3.Error, OverflowError, UnicodeDecodeError, MemoryError)  # impossible lengths raise some of them
 _READABLE = frozenset({TOPICS, MESSAGES, DEFINITIONS, METADATA, "sqlite_master", "sqlite_schema"})
 
 
@@ -105,7 +105,7 @@ class Ros2Sqlite:
         """Yield the messages that the bag's own account counts and that were not met."""
         gone = {name: count - self._met.get(name, 0) for name, count in database.metadata.messages.items()}
         gone = {name: count for name, count in gone.items() if count > 0 and name in topics}
-        if sum(gone.values()) > self._odd + self._unknown:  # else it is those
+        if sum(gone.values()) > self._odd + self._unknown:  # otherwise the missing ones are those
             for name, count in gone.items():
                 yield Missing(name, count, counted_by("metadata in the database"))
 

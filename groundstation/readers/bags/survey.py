@@ -25,9 +25,9 @@ from groundstation.readers.bags.work import Work
 from groundstation.readers.clock_offsets import Offsets
 from groundstation.readers.mapping import Columns, mapped
 
-SHARED_SHARE = 0.8  # of the stamps of the slower of two topics that the faster has too: one unit's solution
+SHARED_SHARE = 0.8  # share of the slower topic's stamps that the faster one must have too, to be one unit
 ATTITUDE = ("roll_deg", "pitch_deg", "true_heading_deg")
-_ORDER = ("imu", "odometry", "pose", "fix", "twist")  # of a unit's messages: who gives a field first
+_ORDER = ("imu", "odometry", "pose", "fix", "twist")  # order in which the messages of a unit give a field
 _TURNED = "east-north-up turned to north-east-down, forward-left-up to forward-right-down"
 
 
@@ -48,7 +48,7 @@ class Feed:
         if not columns.keys() >= set(self.needs):
             return {}
         try:
-            with np.errstate(over="ignore", invalid="ignore"):  # of absurd numbers: becomes infinite or NaN
+            with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers become infinite or NaN
                 found = self.columns(Values(columns))
         except KeyError:  # a type of a common name whose definition lacks a field: its messages stay raw
             return {}

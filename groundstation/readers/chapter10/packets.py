@@ -20,7 +20,7 @@ from groundstation.readers.source import Source
 
 BLOCK_BYTES = 4 << 20
 MAX_SPANS = 4_096
-NS_PER_COUNT = 100  # of the relative time counter, which runs at 10 MHz
+NS_PER_COUNT = 100  # the relative time counter runs at 10 MHz
 _SLACK = 64  # bytes behind the data, so that it may be seen as numbers of four bytes
 _SMALLEST_PACKET = scan.HEADER_BYTES
 

@@ -12,13 +12,13 @@ import numpy as np
 from groundstation.base.compile import in_place, scanner
 
 HEADER_BYTES, SECONDARY_BYTES, SYNC = 24, 12, 0xEB25
-MOST_BYTES, MOST_COMPUTER_BYTES = 524_288, 134_217_728  # of a packet, by the standard
+MOST_BYTES, MOST_COMPUTER_BYTES = 524_288, 134_217_728  # largest packet, by the standard
 LAST_COMPUTER_TYPE = 7
 
 # Columns of a packet: where it begins and ends, its data begin and end (behind the channel-specific word), its header.
 AT, END, BODY, BODY_END, CHANNEL, TYPE, FLAGS, SEQUENCE, RTC, STATE, COLUMNS = range(11)
 WHOLE, WRONG_CHECKSUM, TORN, CUT = range(4)
-BETWEEN_TERMINALS = 0x0800  # of a 1553 message's block status
+BETWEEN_TERMINALS = 0x0800  # flag of a 1553 message's block status
 IEEE_1588 = 1  # format of a secondary header's time
 HAS_SECONDARY, STAMPS_ARE_SECONDARY, RTC_UNSYNCED, OVERFLOW = 0x80, 0x40, 0x20, 0x10
 

@@ -14,7 +14,7 @@ from groundstation.readers.chapter10 import kinds, scan
 from groundstation.readers.chapter10.tmats import Tmats
 from groundstation.readers.skipped import bytes_place
 
-RESTART_TICKS = 10 * 10_000_000  # of the relative time counter, which runs at 10 MHz: a step back of no recording
+RESTART_TICKS = 10 * 10_000_000  # step back of a new recording; the counter runs at 10 MHz
 WRAP_TICKS = 1 << 47  # a longer one is a wrap: numbers go on
 
 
@@ -45,7 +45,7 @@ class Tally:
     """Counts of a whole recording."""
 
     packets: int = 0
-    by_channel: dict[tuple[int, int], int] = field(default_factory=dict)  # of channel and type
+    by_channel: dict[tuple[int, int], int] = field(default_factory=dict)  # by channel and type
     checked: int = 0
     secondary: int = 0
     filler_bytes: int = 0

@@ -20,7 +20,7 @@ from groundstation.readers.start import zero_of_readings
 
 NS_PER_DAY = 86_400 * NS_PER_S
 _GPS_NATIVE, _NONE = 5, 15
-_RESTART_NS = -NS_PER_S  # of the counter: recordings joined end to end
+_RESTART_NS = -NS_PER_S  # step of the counter where recordings are joined end to end
 _SPREAD_NS = 500_000_000  # readings that differ by more are of a clock that was set
 _TMATS_DAYS = 40.0
 _LABEL_260 = 0x0D  # octal 260 as it stands in a word, its first bit last

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import date
 
-YEARS = range(1970, 2200)  # of recordings; others are damage
-MOST_CHARACTERS = 4 << 20  # of attributes; real ones have some 100 thousand
+YEARS = range(1970, 2200)  # years of recordings; others are damage
+MOST_CHARACTERS = 4 << 20  # characters of all attributes; real ones have some 100 thousand
 _VALUE_CHARACTERS = 200
 _ATTRIBUTE = re.compile(r"([A-Za-z]{1,4}(?:-\d+)?\\[^:;\r\n]{1,60}):([^;]*);")
 _YEAR_FIRST, _YEAR_LAST = (

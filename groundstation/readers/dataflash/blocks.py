@@ -27,10 +27,10 @@ from groundstation.readers.source import Source
 BLOCK_BYTES = 4 << 20
 REFUSED_SHOWN = 20  # definitions left out that are told one by one
 MAX_SPANS = 4_096
-BYTES_KEPT, RECORDS_KEPT = 96 << 20, 1 << 22  # of a log whose places are kept for a second pass, 5 bytes a record
+BYTES_KEPT, RECORDS_KEPT = 96 << 20, 1 << 22  # log whose places are kept for a second pass, 5 bytes a record
 MOST_LOGS, MOST_DEFINITIONS = 256, 10_000  # joined in a file, and different ones in it: more is no log but an attack
 _LOG_BEGINS = bytes((FMT_ID, FMT_BYTES)) + b"FMT"  # every log begins with the definition of definitions
-FILLERS = (b"\0", b"\xff")  # what a recorder fills the rest of a page with
+FILLERS = (b"\0", b"\xff")  # bytes with which a recorder fills the rest of a page
 
 
 @dataclass(frozen=True, eq=False)

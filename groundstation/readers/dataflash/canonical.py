@@ -38,7 +38,7 @@ class Mapper:
     def __init__(self, found: Overview, choices: Choices) -> None:
         self._found, self._choices = found, choices
         self._parts: dict[str, list[Part]] = {}
-        self.fields: dict[str, dict[str, None]] = {}  # what was yielded, for the remarks
+        self.fields: dict[str, dict[str, None]] = {}  # fields that were yielded, for the remarks
         self._refused: dict[tuple[str, str], int] = {}
         self._nowhere: Counter[str] = Counter()
         self._unknown = UnknownUnits()
@@ -203,7 +203,7 @@ class Mapper:
         placed = has_2d
         if {"latitude_deg", "longitude_deg"} <= position.keys():
             placed = self._placed(topic, position, has_2d)
-        if not has_status:  # then a record with a position has a fix
+        if not has_status:  # without a status, a record with a position has a fix
             has_2d = has_3d = placed
         placed_3d = frozen(placed & has_3d)
         columns = {

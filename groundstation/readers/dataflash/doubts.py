@@ -98,7 +98,7 @@ def _fault(payload: bytes, definition: Definition) -> str:
     if not _NAME.fullmatch(plain["Name"]) or not _LABELS.fullmatch(plain["Columns"] or b"a"):
         return "a name with characters that no name has"
     fields, labels = len(plain["Format"]), plain["Columns"].split(b",") if plain["Columns"] else []
-    is_full = len(plain["Columns"]) >= FMT_DTYPE["Columns"].itemsize - 1  # then the last names may be left out
+    is_full = len(plain["Columns"]) >= FMT_DTYPE["Columns"].itemsize - 1  # the last names may be left out then
     is_short = any(wanted.encode() not in labels for wanted in WANTED.get(definition.name, ()))
     if len(labels) != fields and (is_short or not is_full):
         return f"{len(labels)} names for {fields} fields"

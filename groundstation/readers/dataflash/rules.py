@@ -149,7 +149,7 @@ WIND = (Rule("VWN", "wind_north_mps", "m/s"), Rule("VWE", "wind_east_mps", "m/s"
 HEIGHT = (Rule("Dist", "height_m", "m", integer_multiplier=0.01),)
 
 FIX_2D, FIX_3D = 2, 3  # states of a receiver
-MOST_SENSORS = 16  # of one type; another instance is damage
+MOST_SENSORS = 16  # sensors of one type; a higher instance is damage
 # Sensors of one kind in the order in which their topics are numbered; the first group that has records is taken.
 SENSOR_TYPES: Mapping[str, tuple[tuple[str, ...], ...]] = MappingProxyType(
     {

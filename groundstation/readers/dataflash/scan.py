@@ -17,7 +17,7 @@ from groundstation.base.compile import in_place, scanner
 
 LOOKAHEAD = 1_024  # bytes that must follow the record that is judged: itself and two more, at most 255 each
 NEAR_US = 10_000_000  # a record whose time is within 10 s of the last good one is believed
-MAGIC_BYTES = 0x95A3  # as a little-endian number
+MAGIC_BYTES = 0x95A3  # both bytes as a little-endian number
 NO_TIME, TIME_US_8, TIME_US_4, TIME_MS = 0, 1, 2, 3
 
 # Places in the state array.
@@ -196,7 +196,7 @@ def scan(
     size = len(data)
     limit = size if is_last else size - LOOKAHEAD
     at, count, skip, last_us = state[POSITION], state[COUNT], state[SKIP_START], state[LAST_US]
-    after = state[MAGIC]  # of the magic, the first behind the header that is judged
+    after = state[MAGIC]  # first magic behind the header that is judged
     timed = NOWHERE  # the last good record with a time, which is looked at when somebody asks for it
     stopped = False
     while at < limit and count < len(offsets) and state[SPANS] < len(spans):

@@ -16,7 +16,7 @@ from groundstation.base.signals import Field, field_of
 from groundstation.base.units import CONVERSIONS
 from groundstation.readers.flightdata_hdf5.container import Container, Parameter
 
-_UNITS: Mapping[str, str] = {"kts": "kt", "deg/sec": "dps"}  # as these files write them -> as base.units does
+_UNITS: Mapping[str, str] = {"kts": "kt", "deg/sec": "dps"}  # units as these files write them -> as base.units does
 Way = Literal["plain", "circle", "step"]
 
 
@@ -69,7 +69,7 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
     ),
     "discrete": (Rule("Gear On Ground", "weight_on_wheels", "", way="step"),),
 }
-TRACK = "Track True"  # with Groundspeed: the velocities of ins
+TRACK = "Track True"  # gives the velocities of ins, with Groundspeed
 _SAID: Mapping[str, str] = {
     "Heading True Continuous": "counts on past north: brought into [0, 360)",
     "Heading Continuous": "counts on past north: brought into [0, 360)",

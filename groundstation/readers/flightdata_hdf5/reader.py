@@ -94,7 +94,7 @@ def _raw_topics(container: Container) -> dict[str, Parameter]:
     return topics
 
 
-Span = tuple[int, int]  # of time: nanoseconds since the start, the second one exclusive
+Span = tuple[int, int]  # of time: nanoseconds since the start, end exclusive
 
 
 def _slices(parameters: Sequence[Parameter]) -> list[Span]:

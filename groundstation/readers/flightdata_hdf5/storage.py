@@ -16,7 +16,7 @@ FILTERS = frozenset((DEFLATE, SHUFFLE, FLETCHER32, LZF))
 CHECKSUM_BYTES = 4
 MOST_PIECE_BYTES = 1 << 26
 NEVER_WRITTEN = "never written"
-_LITERAL, _LONG = 32, 7  # of LZF: first control byte of a copy, length that has one more byte
+_LITERAL, _LONG = 32, 7  # LZF: first control byte of a copy, length that has one more byte
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from groundstation.readers.icd.words_429 import decode_429, status_of
 from groundstation.readers.icd.words_1553 import Data1553, decode_1553
 
 TRANSMIT = 0x400
-NEEDED_LABELS = 2  # of those below, with values that may be used, before a bus is taken for that equipment's
+NEEDED_LABELS = 2  # labels below, with usable values, that a bus needs to count as that equipment's
 _TELLING = {
     "arinc429_inertial": (0o314, 0o320, 0o324, 0o325),
     "arinc429_gnss": (0o110, 0o111, 0o120, 0o121, 0o370),

@@ -19,7 +19,7 @@ Words429 = NDArray[np.uint32]
 # Sign/status matrix, bits 31 and 30, of a value that may be used; all others say: failure, no computed data, test.
 USABLE: Mapping[Status, tuple[int, ...]] = {"bnr": (3,), "bcd": (0, 3), "discrete": (0,), "none": (0, 1, 2, 3)}
 NO_COMPUTED_DATA = 1
-MINUS = 3  # of BCD: minus, south, west, left, from, below
+MINUS = 3  # sign/status of BCD: minus, south, west, left, from, below
 SIGN_AT = 29
 
 

@@ -9,7 +9,7 @@ from groundstation.readers.receiver.checksums import binary_frame_at, is_novatel
 from groundstation.readers.source import Claim, Source
 
 NAME = "receiver"
-_NAME = rb"(?<![ -~].)(?=[A-Z][A-Z0-9]{2,29},)"  # behind a $ or ! with no text before it
+_NAME = rb"(?<![ -~].)(?=[A-Z][A-Z0-9]{2,29},)"  # after a $ or ! with no text before it
 _ASCII = rb"(?=[A-Z][A-Z0-9_]*A,)"  # NovAtel's messages as text
 # Every branch begins with one byte: then re skips what begins none, seven times as fast.
 _START = re.compile(

@@ -68,7 +68,7 @@ def dated(told: Told) -> Dated:
     if not len(anchors):
         return Dated(anchors, tuple(remarks))
     last_ns = int(anchors.utc_ns[-1])
-    is_old = last_ns < _NEWEST_NS  # else nothing that a stream tells of itself can contradict its date
+    is_old = last_ns < _NEWEST_NS  # nothing that a stream states can contradict a newer date
     leap_s, earliest = (_leap_seconds(told, last_ns), _earliest(told)) if is_old else (None, None)
     found = rollovers(last_ns, leap_s=leap_s, earliest=earliest, others=_others(other))
     remarks += found.remarks

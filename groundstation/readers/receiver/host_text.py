@@ -18,7 +18,7 @@ from groundstation.readers.receiver.checksums import is_sentence
 
 LOOKED_AT, GLANCED_AT, TEXT_BYTES = 1 << 16, 1 << 14, 1 << 10
 FEWEST = 3  # sentences in text, before a log is believed to be of that kind
-_MOST_LINES, _MOST_STARTS = 2_000, 4  # that are looked at
+_MOST_LINES, _MOST_STARTS = 2_000, 4  # lines that are looked at, and sentence starts in each
 _SHARE_OF_SENTENCES = 0.5
 _SHARE_OF_SHAPE = 0.05
 _SHARE_WITH_TIME = 0.9

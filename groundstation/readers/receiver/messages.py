@@ -22,7 +22,7 @@ from groundstation.base.records import (
 from groundstation.readers.receiver.layouts import Layout
 from groundstation.readers.receiver.stream import Frames
 
-PIECE_BYTES = MAX_TEXT_CHARACTERS // 2  # of a payload that is kept as hexadecimal digits
+PIECE_BYTES = MAX_TEXT_CHARACTERS // 2  # bytes of a payload in one row, as hexadecimal digits
 PIECES_AT_ONCE = 4_096
 Columns = dict[str, Column]
 _DIGITS = np.frombuffer(b"0123456789abcdef", dtype=np.uint8)
@@ -89,7 +89,7 @@ class Messages:
     def is_short(self) -> bool:
         """Tell whether payloads are shorter than the layout, and of no known older version."""
         if self.layout is None or self.size >= self.layout.size:
-            return False  # also of a text that its layout does not fit: is_sound tells that
+            return False  # also for a text that does not fit its layout, which is_sound tells
         return not self.is_sound or self.size >= self.layout.needed
 
     def misfits(self) -> BoolArray:
@@ -104,7 +104,7 @@ class Messages:
             return np.asarray(behind != 0)
         width = self.layout.group.dtype.itemsize
         told = np.zeros(len(self), dtype=np.int64) if self.layout.count == "*" else self._told()
-        as_they_fit = (told == 0) & (behind % width == 0)  # as older versions that tell no count
+        as_they_fit = (told == 0) & (behind % width == 0)  # older versions state no count
         return np.asarray((behind != width * told) & (behind != width * told + self.layout.tail) & ~as_they_fit)
 
     def _told(self) -> Int64Array:

@@ -27,7 +27,7 @@ _NONE, _AUTONOMOUS, _DIFFERENTIAL, _FIXED, _FLOAT, _PPP, _ESTIMATED, _MANUAL, _S
 _BY_GNSS = np.isin(np.arange(len(_FIXES)), (_AUTONOMOUS, _DIFFERENTIAL, _FIXED, _FLOAT, _PPP, _FLAT))
 _PLAIN = np.isin(np.arange(len(_FIXES)), (_AUTONOMOUS, _DIFFERENTIAL))
 _BY_HAND = np.isin(np.arange(len(_FIXES)), (_MANUAL, _SIMULATED))
-_OF_QUALITY = np.full(12, _OTHER)  # of GGA, 0 to 10; others are not known
+_OF_QUALITY = np.full(12, _OTHER)  # by the quality of GGA, 0 to 10; others are unknown
 _OF_QUALITY[:6] = _NONE, _AUTONOMOUS, _DIFFERENTIAL, _AUTONOMOUS, _FIXED, _FLOAT
 _OF_QUALITY[6:11] = _ESTIMATED, _MANUAL, _SIMULATED, _DIFFERENTIAL, _PPP
 # Letters of a mode by rank: GNS has one for each system, and the highest counts; 0 no letter, 2 one that is not known.

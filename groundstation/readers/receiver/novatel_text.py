@@ -20,10 +20,8 @@ from groundstation.readers.receiver import scan
 from groundstation.readers.receiver.novatel_messages import LAYOUTS
 from groundstation.readers.receiver.stream import Frames
 
-HEADER = struct.Struct(
-    "<3sBHBBHHBBHI8s"
-)  # of the binary form: header, number, kind ... time status, week, milliseconds
-KEPT = "-text"  # behind the name of a log of which the text is kept
+HEADER = struct.Struct("<3sBHBBHHBBHI8s")  # binary header: header, number, kind ... time status, week, milliseconds
+KEPT = "-text"  # added to the name of a log whose text is kept
 _TIME_STATUS = {"UNKNOWN": 20, "APPROXIMATE": 60, "COARSEADJUSTING": 80, "COARSE": 100, "COARSESTEERING": 120}
 _TIME_STATUS |= {"FREEWHEELING": 130, "FINEADJUSTING": 140, "FINE": 160, "FINEBACKUPSTEERING": 170}
 _TIME_STATUS |= {"FINESTEERING": 180, "SATTIME": 200}

@@ -17,7 +17,7 @@ from groundstation.base.compile import in_place, inlined
 UBX, NMEA, RTCM, NOVATEL, NOVATEL_SHORT, BARE_NMEA, NOVATEL_TEXT = 1, 2, 3, 4, 5, 6, 7
 UBX_EXTRA, RTCM_EXTRA, CRC_BYTES = 8, 6, 4
 NOVATEL_SHORT_HEADER = 12
-TEXT_CRC_BYTES = 9  # of a NovAtel log as text: an asterisk and eight digits
+TEXT_CRC_BYTES = 9  # checksum of a NovAtel log as text: an asterisk and eight digits
 SHORTEST_TEXT = 28  # bytes of such a log, which are those of the binary header
 LONGEST = 66_000  # bytes of the longest frame that any protocol can write
 LONGEST_SENTENCE, LONGEST_ADDRESS = 1_024, 31
@@ -173,7 +173,7 @@ def _novatel_text(data: Any, at: int, table: Any) -> int:
         if byte < 32 or byte > 126 or (k == at + 1 and not 65 <= byte <= 90):
             return NO_FRAME
         if byte in (HASH, PERCENT) and k + 1 < end and 65 <= data[k + 1] <= 90:
-            return NO_FRAME  # else starts without an end would all be followed to the end
+            return NO_FRAME  # otherwise every start without an end would be followed to the end
         has_body |= byte == SEMICOLON
         crc = (crc >> 8) ^ table[(crc ^ byte) & 255]
     return PENDING if end == len(data) else NO_FRAME

@@ -22,16 +22,16 @@ from groundstation.readers.receiver.stream import Frames
 
 COMMA, STAR, POINT, MINUS, PLUS, MAKERS = 44, 42, 46, 45, 43, 80  # P begins a maker's own address
 CHECKSUM_BYTES = 3
-MOST_DIGITS = 18  # of a number: more do not fit 64 bits
+MOST_DIGITS = 18  # digits of a number: more do not fit 64 bits
 MOST_BEHIND = 13  # digits behind the point of an angle
-ADDRESS_BYTES = 30  # of the longest address, PQTMCFGORIENTATIONERROR among them, and of the word behind it
+ADDRESS_BYTES = 30  # longest address, such as PQTMCFGORIENTATIONERROR, and longest word behind it
 NAMELESS = "sentence"  # in place of an address that is none: such sentences are kept as text
-_EXACT_BYTES = 7  # of an address: they are its key; the bytes of a longer one are hashed
+_EXACT_BYTES = 7  # addresses of so many bytes are their own key; longer ones are hashed
 _PRIME, _LONG = (1 << 55) - 55, 1 << 57  # hashes are below the first, so that the next byte fits 64 bits
 
-_UPPER_CASE = 0xDF  # of a letter: the bit of lower case taken out
+_UPPER_CASE = 0xDF  # mask that turns a letter into upper case
 _HEMISPHERES = {"lat": "NS", "lon": "EW"}
-_FIELDS_OF_OLD_VTG = 5  # with a mode
+_FIELDS_OF_OLD_VTG = 5  # fields of such a sentence with a mode
 _SATELLITE_FIELDS, _BEFORE_SATELLITES, _NO_FIELD = 4, 3, -1
 
 

@@ -165,7 +165,7 @@ class Stream:
             texts[:count] = 0
             is_whole = state[scan.POSITION] >= limit
             kept = self._held_back(found) if is_whole and not is_last else count
-            if kept < count:  # those that wait are found again
+            if kept < count:  # the frames held back are found again
                 first = int(found.offsets[kept]) - (0 if around is None else int(around[kept, 0]))
                 state[scan.POSITION], state[scan.SKIP_START] = first, scan.NOWHERE
                 spans = spans[spans[:, 1] <= first]

@@ -11,7 +11,7 @@ from groundstation.base.records import HEADING_IS_TRACK, Damage, Int64Array, Ite
 from groundstation.readers.receiver.messages import Messages
 from groundstation.readers.receiver.sentences import Sentences
 
-MOST_SEPARATION_M = 120.0  # of geoid and ellipsoid; on Earth they are within 107 m
+MOST_SEPARATION_M = 120.0  # separation of geoid and ellipsoid; on Earth it is within 107 m
 MOST_ROLL_DEG, MOST_PITCH_DEG, MOST_HEADING_DEG = 180.0, 90.0, 360.0
 MOVING_MPS = 1.0
 ZERO_POSITION, IMPOSSIBLE_ATTITUDE, ASTRAY, NOT_MEASURED = "no_position", "impossible", "odd_height", "not_measured"

@@ -40,7 +40,7 @@ _LEAPS = {
 _LEAPS |= {f"NAV2-{name[4:]}": told for name, told in _LEAPS.items() if name.startswith("NAV-")}
 _CLASSES = {"NAV": 0x01, "NAV2": 0x29, "HNR": 0x28}
 _ITOW_AT_4 = (0x14, 0x13, 0x3C, 0x3B)  # HPPOSLLH, HPPOSECEF, RELPOSNED, SVIN have a version in front
-_HNR_INS = 0x02  # of the class HNR; its time stands elsewhere
+_HNR_INS = 0x02  # message of the class HNR whose time stands elsewhere
 
 
 def messages_of(frames: Frames) -> Iterator[Messages]:

@@ -22,16 +22,16 @@ from groundstation.readers.two_clocks import FEWEST_READINGS, Line, Readings, St
 
 Key: TypeAlias = tuple[int, int, bool]  # sender, number of message, and whether its times count from 1970
 NS_PER_MS, NS_PER_US = 1_000_000, 1_000
-SINCE_1970_US = 10**15  # a time_usec of more counts from 1970, of less from when the sender was switched on
+SINCE_1970_US = 10**15  # a larger time_usec counts from 1970, a smaller one from when the sender was switched on
 _LAST_US = 4_102_444_800 * 10**6  # 2100
-RECEIPT_STEP_S = 10.0  # of the ground station's clock ahead: a link may go on being late by less
-LEAST_PACE = 0.1  # of a clock against the time of receipt
+RECEIPT_STEP_S = 10.0  # least step of the ground station's clock ahead: a link may stay late by less
+LEAST_PACE = 0.1  # least pace of a clock against the time of receipt
 SHARE_STEPS = 512
-MOST_SHARE = 0.5  # of the frames of a message whose times go with its sender's clock
-OFF_S = 5.0  # between the times of a message and its sender's clock
+MOST_SHARE = 0.5  # least share of a message's frames whose times go with its sender's clock
+OFF_S = 5.0  # largest difference between the times of a message and its sender's clock
 ROLLOVER_S, DAY_S = 1_024 * 604_800, 86_400
 MOST_JUMPS = 1_000
-_WRAP_MS, _EDGE_MS = 1 << 32, 3_600_000  # of time_boot_ms, in 49.7 days
+_WRAP_MS, _EDGE_MS = 1 << 32, 3_600_000  # time_boot_ms starts again after 49.7 days; distance that counts as near to it
 _UTC_READINGS = 20
 # Messages whose times are read for the clock of their sender, the best first; any others where it sends none of them.
 _STEADY = (
@@ -347,7 +347,7 @@ class ClockSurvey:
         clock = SenderClock(number, frozenset(), epochs, of_1970, unix_ns)
         late = {other: clock.lateness(track, other[2]) for other, track in own.items()}
         trusted = [other for other in late if _go_together(late[key], late[other])]
-        unread = time_fields().keys() - {other[1] for other in own}  # of these each frame is judged by itself
+        unread = time_fields().keys() - {other[1] for other in own}  # each frame of these is judged by itself
         return replace(clock, trusted=frozenset({other[1] for other in trusted} | unread))
 
 
@@ -379,7 +379,7 @@ def _go_together(reference: Lateness, other: Lateness) -> bool:
     if len(other.late_ns) == 0:
         return False
     off_ns = other.late_ns - np.interp(other.record_index, reference.record_index, reference.late_ns)
-    evenly = np.linspace(other.number[0], other.number[-1], SHARE_STEPS)  # those that are kept are not
+    evenly = np.linspace(other.number[0], other.number[-1], SHARE_STEPS)  # the readings kept are not evenly spread
     return bool(np.mean(np.abs(np.interp(evenly, other.number, off_ns)) <= OFF_S * NS_PER_S) >= MOST_SHARE)
 
 

@@ -25,7 +25,7 @@ from groundstation.readers.tlog.frames import Block
 from groundstation.readers.tlog.timer import Timer
 
 BLOCK_BYTES = 4 << 20
-KEPT_BYTES = 32 << 20  # of a log whose frames are kept for the second pass
+KEPT_BYTES = 32 << 20  # size of a log whose frames are kept for the second pass
 AUTOPILOT = 1  # component
 
 
@@ -204,7 +204,7 @@ def _take(
     """Add the values of a message to canonical topics; ``nowhere`` counts missing positions."""
     if not assignments:
         return
-    with np.errstate(invalid="ignore"):  # of a NaN that signals
+    with np.errstate(invalid="ignore"):  # a signalling NaN would warn
         numbers = {
             name: one.values.astype(np.float64) for name, one in part.columns.items() if one.values.dtype.kind != "U"
         }

@@ -14,7 +14,7 @@ from groundstation.readers.tlog.clock import NS_PER_US, Clocks, TimeReader, time
 from groundstation.readers.tlog.frames import Block
 
 MOST_LATE_S = 600.0
-ASTRAY_S = 2.0  # of the time of a message from those of its sender's clock around it
+ASTRAY_S = 2.0  # largest difference of a message's time from its sender's clock around it
 
 
 class Timer:
@@ -32,7 +32,7 @@ class Timer:
         self._readers: dict[tuple[int, int], TimeReader] = {}
         self._before: dict[int, NDArray[np.int64]] = {}  # the last reference of each sender: record, receipt, its clock
         self._last: dict[int, NDArray[np.int64]] = {}  # the last frame whose time is known: record, receipt, UTC
-        self._references: dict[int, NDArray[np.int64]] = {}  # of the block that follows
+        self._references: dict[int, NDArray[np.int64]] = {}  # references of the block that follows
         self._device_ns: Int64Array = np.zeros(0, dtype=np.int64)  # when the last frame before the block was received
 
     def validity_ns(self, block: Block, following: Block | None) -> Int64Array | None:

@@ -19,7 +19,7 @@ from groundstation.readers.ulog.formats import Flattener, Format, Layout, parse_
 from groundstation.readers.ulog.messages import FILE_HEADER_BYTES, FLAGS_BYTES, MAGIC, FlagBits, flag_bits, text_of
 
 BLOCK_BYTES = 8 << 20
-KEPT_BYTES = 32 << 20  # of a log whose blocks may all be kept, for a second pass
+KEPT_BYTES = 32 << 20  # size of a log whose blocks may all be kept for the second pass
 MAX_TOPICS = 30_000  # numbers of topics have 16 bits
 DEFINITIONS_SHOWN = 20  # bad definitions told one by one; the others are told together
 SLACK = 7  # bytes behind the data, so that a row may be rounded up to a multiple of eight

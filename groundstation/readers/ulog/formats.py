@@ -15,9 +15,9 @@ DTYPES: Mapping[str, str] = {
     "int64_t": "<i8", "uint64_t": "<u8", "float": "<f4", "double": "<f8", "bool": "u1", "char": "i1",
 }  # fmt: skip
 MAX_DATA_BYTES = 0xFFFF - 2
-MAX_COLUMNS = 9_000  # of one topic; the store reads no more
+MAX_COLUMNS = 9_000  # columns of one topic; the store reads no more
 MAX_DEPTH = 20
-MAX_STEPS = 2_000_000  # of flattening all formats of a log
+MAX_STEPS = 2_000_000  # steps of flattening all formats of a log
 TIMESTAMP = "timestamp"
 _FIELD = re.compile(r"([A-Za-z0-9_\-/]+)(?:\[(\d{1,6})\])? +(\S{1,200})")
 

@@ -26,7 +26,7 @@ LOOKAHEAD = 6 * MAX_MESSAGE  # bytes that must follow the message that is judged
 LOOKED_AT = 256  # characters of a text or a name: bounds the work that a file made of letters causes
 LONGEST_WEAK = 4_096  # bytes of a message with little to check: one that is longer has a damaged size
 LONGEST_STEP = 512  # bytes of one on the way to a strong message
-NOT_SUBSCRIBED = -1  # of a message id, as its largest size
+NOT_SUBSCRIBED = -1  # largest size of a message id without subscription
 
 DATA, SYNC = 0x44, 0x53
 NONE, WEAK, STRONG = 0, 1, 2
@@ -364,7 +364,7 @@ def scan(
         if count == len(out_at) or state[SPANS] == len(spans):
             reason = FULL
             break
-        if at + 5 <= end and data[at + 2] == 0x44 and state[SKIP_START] == NOWHERE:  # what nearly all messages are
+        if at + 5 <= end and data[at + 2] == 0x44 and state[SKIP_START] == NOWHERE:  # nearly all messages are data
             size = _u16(data, at)
             message_id = _u16(data, at + 3)
             low, high, stop = least[message_id], most[message_id], at + 3 + size
@@ -392,7 +392,7 @@ def scan(
             spans[state[SPANS], 0], spans[state[SPANS], 1], spans[state[SPANS], 2] = state[SKIP_START], at, count
             state[SPANS] += 1
             state[SKIP_START] = NOWHERE
-            continue  # there is room for the message only if the outputs are looked at again
+            continue  # the outputs must be checked for room again
         kind = data[at + 2]
         out_at[count] = at
         out_topic[count] = topic[_u16(data, at + 3)] if kind == 0x44 else -np.int32(kind)

@@ -18,13 +18,13 @@ UTC_SOURCES = ("vehicle_gps_position", "sensor_gps", "vehicle_global_position")
 FIX_3D = 3
 _NS_PER_US = 1_000
 _EPOCH_US = GPS_EPOCH_NS // _NS_PER_US
-_EARLIEST_US = iso_to_utc_ns("1980-01-08T00:00:00Z")[0] // _NS_PER_US  # before it a clock was not set
+_EARLIEST_US = iso_to_utc_ns("1980-01-08T00:00:00Z")[0] // _NS_PER_US  # an earlier clock was not set
 _OWN_EARLIEST_US = 1_234_567_890_000_000  # 2009: PX4 takes its own clock for one that was not set before it
 _LATEST_US = iso_to_utc_ns("2100-01-01T00:00:00Z")[0] // _NS_PER_US
 _BOOT_TIME, _OFFSET = "boot_time_utc_us", "time_ref_utc"
 _LOG_NAME = re.compile(r"/(\d{4})-(\d\d)-(\d\d)/(\d\d)_(\d\d)_(\d\d)\w*\.ulg")
 _MOST_OFFSET_S = 86_400
-_FEW = 0.1  # of the readings of another receiver: too few to be taken before it
+_FEW = 0.1  # share of another receiver's readings that is too few to be preferred to it
 _FEWEST = 3  # readings of a date that cannot be true, as a receiver tells that missed a rollover
 _APART_NS = 2 * NS_PER_S
 # Minor version of PX4 1.x -> the year its development began. Source: releases of PX4-Autopilot on GitHub.
