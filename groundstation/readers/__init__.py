@@ -1,1 +1,4 @@
-"""Readers: one module per log format, found by content; each yields records and nothing reads a file whole."""
+"""Readers: one module per log format, found by content; each yields records.
+
+Nothing reads a file whole.
+"""

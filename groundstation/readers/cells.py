@@ -1,4 +1,6 @@
-"""Text cells to typed columns, whole columns at a time; a cell that cannot be read is marked, never guessed.
+"""Text cells to typed columns, whole columns at a time.
+
+A cell that cannot be read is marked, never guessed.
 
 Each function takes a pyarrow string array (null = empty cell) and gives values, where they are present, and where a
 cell stood that could not be read.
@@ -21,7 +23,7 @@ from groundstation.base.timescales import iso_to_utc_ns
 
 MAX_TIME_NS = 2**62  # UTC until 2116; sums and differences of two such times fit 64 bits
 _NUMBER = r"^[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?|(?i:nan|inf|infinity))$"
-_DECIMAL_DIGITS = 19  # before the point: what 64 bits can hold
+_DECIMAL_DIGITS = 19  # digits before the point: what 64 bits can hold
 _DECIMAL = rf"^[+-]?\d{{1,{_DECIMAL_DIGITS}}}(?:\.\d*)?$"
 _EXPONENT = re.compile(r"[+-]?(?:\d{1,30}\.?\d{0,30}|\.\d{1,30})[eE][+-]?\d{1,2}")
 _INTEGER = r"^[+-]?\d{1,18}$"
@@ -31,7 +33,10 @@ _NOT_TEXT = r"[\x00-\x08\x0a-\x1e\x7f\x{FFFD}]"
 
 @dataclass(frozen=True)
 class Cells:
-    """A column as read: values with presence, where a cell could not be read, and where a text was cut, shape (n,)."""
+    """Column as read: its values, the unreadable cells, and the texts that were cut.
+
+    Each has shape (n,).
+    """
 
     column: Column
     unreadable: BoolArray
@@ -39,13 +44,13 @@ class Cells:
 
 
 def trimmed(text: Any) -> Any:
-    """Cells without padding; cells of nothing but padding become empty (null)."""
+    """Trim cells; a cell of nothing but padding becomes empty (null)."""
     stripped = pc.utf8_trim_whitespace(text)
     return pc.if_else(pc.equal(stripped, arrow.EMPTY_TEXT), arrow.NO_TEXT, stripped)
 
 
 def _cast(text: Any, target: Any, pattern: str) -> tuple[Any, BoolArray]:
-    """Cast a column; where that fails, cast what matches ``pattern`` and say which cells did not."""
+    """Cast a column; where that fails, cast what matches ``pattern`` and mark the rest."""
     options = pc.CastOptions(target_type=target, allow_decimal_truncate=True)
     none = np.zeros(len(text), dtype=bool)
     try:
@@ -61,7 +66,7 @@ def _column(array: Any, filler: float | int) -> Column:
 
 
 def numbers(text: Any) -> Cells:
-    """Decimal numbers as float64; ``nan`` in a cell is a NaN that the device wrote.
+    """Convert decimal numbers to float64; ``nan`` in a cell is a NaN that the device wrote.
 
     Examples
     --------
@@ -76,12 +81,12 @@ def numbers(text: Any) -> Cells:
 
 
 def ready_numbers(array: Any) -> Cells:
-    """A float64 column that the CSV parser itself has converted."""
+    """Wrap a float64 column that the CSV parser itself has converted."""
     return Cells(_column(array, float("nan")), np.zeros(len(array), dtype=bool))
 
 
 def are_numbers(text: Any) -> bool:
-    """Whether every cell that is not empty is a number."""
+    """Tell whether every cell that is not empty is a number."""
     if pc.all(pc.match_substring_regex(text, _NUMBER), min_count=0).as_py():
         return True
     if not pc.any(pc.starts_with(text, "+-")).as_py():
@@ -90,12 +95,12 @@ def are_numbers(text: Any) -> bool:
 
 
 def _one_sign(text: Any) -> Any:
-    """Numbers such as ``+-2.5`` as ``-2.5``."""
+    """Convert numbers such as ``+-2.5`` to ``-2.5``."""
     return pc.replace_substring_regex(text, _TWO_SIGNS, "-")
 
 
 def flags(text: Any) -> Cells:
-    """``0``, ``1``, ``true``, ``false`` (any case) as bool.
+    """Convert ``0``, ``1``, ``true``, ``false`` (any case) to bool.
 
     Examples
     --------
@@ -111,7 +116,9 @@ def flags(text: Any) -> Cells:
 
 
 def words(text: Any, restore: Callable[[str], str] = str) -> Cells:
-    """Text as fixed-width unicode; cells with control characters or broken encoding are unreadable.
+    """Convert cells to fixed-width unicode.
+
+    Cells with control characters or broken encoding are unreadable.
 
     Examples
     --------
@@ -132,7 +139,9 @@ def words(text: Any, restore: Callable[[str], str] = str) -> Cells:
 
 
 def decimal_ns(text: Any, digits: int = 9, multiple: int = 1) -> Cells:
-    """Decimal numbers of a unit of time as integer nanoseconds, exact; what is below a nanosecond is cut.
+    """Convert decimal numbers of a unit of time to integer nanoseconds, exactly.
+
+    Digits below a nanosecond are cut off.
 
     Parameters
     ----------
@@ -163,7 +172,10 @@ def decimal_ns(text: Any, digits: int = 9, multiple: int = 1) -> Cells:
 
 
 def _exact(text: str, digits: int) -> int | None:
-    """A number with an exponent times ``10**digits``, cut to a whole one; None when it is none, or beyond 64 bits."""
+    """Return a number with an exponent times ``10**digits``, cut to a whole number.
+
+    None when the text is no such number, or the result is beyond 64 bits.
+    """
     if not _EXPONENT.fullmatch(text):
         return None
     whole = int(Decimal(text).scaleb(digits))
@@ -171,14 +183,17 @@ def _exact(text: str, digits: int) -> int | None:
 
 
 def integers_ns(text: Any) -> Cells:
-    """Whole numbers of nanoseconds."""
+    """Convert whole numbers of nanoseconds."""
     array, unreadable = _cast(text, pa.int64(), _INTEGER)
     filled = arrow.is_valid(text)
     return _times(arrow.values(array, 0), filled, filled & ~unreadable)
 
 
 def _times(values: Int64Array, filled: BoolArray, readable: BoolArray) -> Cells:
-    """Times of cells that are filled and readable; one beyond the range of :data:`MAX_TIME_NS` is not."""
+    """Return the times of cells that are filled and readable.
+
+    A time beyond the range of :data:`MAX_TIME_NS` counts as unreadable.
+    """
     present = readable & (values > -MAX_TIME_NS) & (values < MAX_TIME_NS)  # of the least integer abs() is negative
     return Cells(Column(np.where(present, values, 0), present), filled & ~present)
 

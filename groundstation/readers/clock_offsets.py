@@ -1,4 +1,7 @@
-"""How the clock by which records were received was set, by clocks whose readings are in them: offsets by record."""
+"""Steps of the clock that stamped the records on receipt, as offsets by record.
+
+They are found by clocks whose readings are in the records.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,7 +15,7 @@ from groundstation.readers.two_clocks import Stretch, Track
 
 
 class Jump(NamedTuple):
-    """Two records in turn between which the receiver's clock falls, or leaps.
+    """Two consecutive records between which the receiver's clock falls, or leaps.
 
     ``number`` is the place of the second among those of its source; then records and times of both.
     """
@@ -26,9 +29,9 @@ class Jump(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Offsets:
-    """What is added to times of receipt: ``added_ns[k]`` from the record ``starts[k]`` on. Without any, nothing.
+    """Offsets added to times of receipt: ``added_ns[k]`` from record ``starts[k]`` on.
 
-    ``by`` are the numbers of the clocks that tell it.
+    Without steps, 0 is added. ``by`` has the numbers of the clocks that the offsets were found by.
     """
 
     starts: Int64Array = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
@@ -36,36 +39,39 @@ class Offsets:
     by: tuple[int, ...] = ()
 
     def at(self, record_index: Int64Array) -> Int64Array:
-        """What is added to the times of records."""
+        """Return the offset that is added to the times of some records."""
         if len(self.starts) == 1:
             return np.full(len(record_index), self.added_ns[0])
         place = np.searchsorted(self.starts, record_index, side="right") - 1
         return np.asarray(self.added_ns[np.maximum(place, 0)])
 
     def plus(self, added_ns: int) -> "Offsets":
-        """The same with as much more everywhere."""
+        """Return the offsets with ``added_ns`` added everywhere."""
         return Offsets(self.starts, self.added_ns + added_ns, self.by)
 
     def moved(self, track: Track) -> Track:
-        """Readings by the corrected time of receipt."""
+        """Return readings with the corrected time of receipt."""
         return Track(track.record_index, track.receipt_ns + self.at(track.record_index), track.clock_ns, track.number)
 
     @property
     def stated(self) -> tuple[tuple[int, int], ...]:
-        """As the header of a log states them."""
+        """Offsets in the form in which the header of a log states them.
+
+        Pairs of first record and nanoseconds; empty where nothing is added.
+        """
         if not self.added_ns.any():
             return ()
         return tuple(zip(self.starts.tolist(), self.added_ns.tolist(), strict=True))
 
     def steps(self) -> Iterable[tuple[int, int]]:
-        """Records before which the clock was set, and by how much, nanoseconds."""
+        """Yield the records before which the clock was set, and by how much, nanoseconds."""
         for at, by in enumerate(np.diff(self.added_ns).tolist(), start=1):
             if by:
                 yield int(self.starts[at]), -by
 
 
 class _Step(NamedTuple):
-    """The receiver's clock was set between two records, by so much, as ``readings`` of a clock tell."""
+    """Step of the receiver's clock between two records, as ``readings`` of a clock show it."""
 
     after: int
     first: int
@@ -75,7 +81,9 @@ class _Step(NamedTuple):
 
 
 def offsets_by(clocks: Mapping[int, Sequence[Stretch]], jumps: Sequence[Jump] = ()) -> Offsets:
-    """Offsets by which times of receipt go on smoothly with the readings of some clocks; none before the first step.
+    """Return offsets that make times of receipt follow the readings of some clocks smoothly.
+
+    The offset is zero before the first step.
 
     Parameters
     ----------
@@ -104,7 +112,10 @@ def _steps(clocks: Mapping[int, Sequence[Stretch]]) -> list[_Step]:
 
 
 def _united(steps: list[_Step], jumps: Sequence[Jump]) -> list[_Step]:
-    """Steps that several clocks show as one, at the first record that is known to be behind it."""
+    """Merge steps that several clocks show into one.
+
+    It is placed at the first record that is known to be behind it.
+    """
     united: list[_Step] = []
     for step in sorted(steps, key=lambda step: (step.first, step.after)):
         if united and step.after < united[-1].first:
@@ -117,7 +128,7 @@ def _united(steps: list[_Step], jumps: Sequence[Jump]) -> list[_Step]:
 
 
 def _behind(step: _Step, jumps: Sequence[Jump]) -> Iterable[int]:
-    """Records behind the step, by jumps of about its size between the readings that show it."""
+    """Yield records after the step, by jumps of about its size between its readings."""
     for jump in jumps:
         if step.after < jump.record < step.first and abs(jump.time_ns - jump.before_ns) > abs(step.size_ns) // 2:
             yield jump.record

@@ -1,4 +1,6 @@
-"""Compressed logs: gzip and zstd, told by their content, decompressed once into an unnamed temporary file.
+"""Compressed logs: gzip and zstd, told by their content.
+
+They are decompressed once into an unnamed temporary file.
 
 Sizes that the file declares are not believed: what comes out is counted, and stops at a bound. What a cut or damaged
 file still gives is kept.
@@ -33,7 +35,10 @@ _Pieces = Iterator[bytes]
 
 @dataclass(frozen=True)
 class Expanded:
-    """What came out of a compressed file: a temporary file, its size, and the damage met (None when it was whole)."""
+    """Content of a compressed file: a temporary file, its size, and the damage met.
+
+    ``damage`` is None when the file was whole.
+    """
 
     file: BinaryIO
     size: int
@@ -41,7 +46,7 @@ class Expanded:
 
 
 def compression_of(start: bytes) -> str:
-    """``gzip``, ``zstd`` or nothing, by the first bytes of a file.
+    """Return ``gzip``, ``zstd`` or an empty text, by the first bytes of a file.
 
     Examples
     --------
@@ -60,7 +65,7 @@ def head_of(stream: BinaryIO, compression: str, size: int) -> bytes:
             if len(head) >= size:
                 break
     except _Broken:
-        pass  # what came before it is the head; the damage is told when all is read
+        pass  # the head is what came before; the damage is reported when all is read
     return bytes(head[:size])
 
 
@@ -94,7 +99,10 @@ def expand(stream: BinaryIO, compression: str, compressed_size: int, name: str) 
 
 
 def _unnamed_file() -> BinaryIO:
-    """An empty temporary file that is closed with its last user, without Python's warning of one left open."""
+    """Return an empty temporary file that is closed with its last user.
+
+    Python does not warn that it was left open.
+    """
     with tempfile.TemporaryFile() as made:
         descriptor = os.dup(made.fileno())
     file = os.fdopen(descriptor, "w+b", closefd=False)
@@ -121,13 +129,13 @@ class Window(io.RawIOBase):
         return self._at
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Move to a position; returns it."""
+        """Move to a position and return it."""
         base = {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._size}[whence]
         self._at = max(0, base + offset)
         return self._at
 
     def readinto(self, buffer: Any) -> int:
-        """Fill ``buffer`` from the position on; returns how many bytes there were."""
+        """Fill ``buffer`` from the position on and return the number of bytes."""
         self._file.seek(self._at)
         count: int = self._file.readinto(buffer)  # type: ignore[attr-defined]
         self._at += count
@@ -143,7 +151,7 @@ class _Broken(Exception):  # noqa: N818 -- a signal inside this module
 
 
 class _FrameCount:
-    """Counts members or frames; a file of hardly anything but their headers is no log."""
+    """Count of members or frames; a file of little but their headers is no log."""
 
     def __init__(self) -> None:
         self._count = self._bytes = 0
@@ -156,7 +164,9 @@ class _FrameCount:
 
 
 def _gzip_pieces(stream: BinaryIO) -> _Pieces:
-    """Decompressed pieces of all members of a gzip file; zero bytes after the last one are padding.
+    """Yield decompressed pieces of all members of a gzip file.
+
+    Zero bytes after the last member are padding.
 
     The frame of a member is read here: zlib's own reader withholds what it has when the checksum behind is wrong.
     """
@@ -195,7 +205,7 @@ def _gzip_pieces(stream: BinaryIO) -> _Pieces:
 
 
 def _last_pieces(member: Any, data: bytes) -> _Pieces:
-    """What a member still gives, byte by byte, before the place where it breaks."""
+    """Yield what a broken member still gives before the place where it breaks, byte by byte."""
     for at in range(len(data)):
         try:
             piece = member.decompress(data[at : at + 1])
@@ -206,7 +216,7 @@ def _last_pieces(member: Any, data: bytes) -> _Pieces:
 
 
 def _behind_gzip_header(data: bytes, at: int) -> int:
-    """Where the header of the member that begins at ``at`` ends (RFC 1952)."""
+    """Return the end of the header of the gzip member that begins at ``at`` (RFC 1952)."""
     if not data.startswith(GZIP_MAGIC, at):
         raise _Broken("corrupt", "it makes no sense from here on")
     flags, at = (data[at + 3] if len(data) > at + 3 else 0), at + 10

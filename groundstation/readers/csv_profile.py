@@ -1,4 +1,4 @@
-"""Tables of any layout, described by a profile (TOML): one of the shipped ones, or the user's.
+"""Tables of any layout, described by a TOML profile: a shipped one, or the user's.
 
 ``record_index`` is the line number in the file (from 1). Columns that the profile does not name are kept under the
 profile's raw topic.
@@ -25,8 +25,8 @@ from groundstation.readers.start import unusable_references, utc_of_zero
 NAME = "csv-profile"
 DISTINCTIVE_COLUMNS = 4
 _HEAD_LINES = 1000
-DAMAGED_HEAD_LINES = 20  # in which a header row is looked for when the first line is not the profile's
-MOST_LINES = 10_000  # in which it is looked for elsewhere
+DAMAGED_HEAD_LINES = 20  # lines searched for a header row when the first line is not the profile's
+MOST_LINES = 10_000  # lines searched for it otherwise
 _OF_NUMBERS = frozenset(b"%c" % sign for sign in b"0123456789+-.,;")
 FEWEST_ROWS = 3  # above the header row that are those of another log
 
@@ -39,15 +39,16 @@ def _shipped() -> tuple[Profile, ...]:
 def sniff(source: Source) -> Claim | None:
     """Claim a file whose first line and header row are those of a shipped profile.
 
-    Where the first line is damaged a header row with enough of the profile's columns will do. Of the profiles of a
-    family the one has the file whose header row stands first, or has the long names of that row below it.
+    Where the first line is damaged, a header row with enough of the profile's columns will do. Among the profiles of a
+    family, the file goes to the one whose header row stands first, or to the one that has the long names of that row
+    below it.
     """
     found = _best(source)
     return None if found is None else Claim(NAME, found[1].profile.name, found[0])
 
 
 def _best(source: Source) -> tuple[float, Fit] | None:
-    """The shipped profile that fits a file, and how sure that is."""
+    """Return the shipped profile that fits a file, and how sure that is."""
     first = source.head[:4096].removeprefix(b"\xef\xbb\xbf").decode("utf-8", errors="replace").lstrip()
     profiles = [profile for profile in _shipped() if profile.first_lines]
     is_one = any(first.startswith(profile.first_lines) for profile in profiles)
@@ -74,17 +75,20 @@ def _best(source: Source) -> tuple[float, Fit] | None:
 
 
 def _begins_with_rows(source: Source) -> bool:
-    """Tell whether a file begins with numbers, be the first row cut."""
+    """Tell whether a file begins with numbers, even if the first row is cut."""
     return any(line.strip()[:1] in _OF_NUMBERS for line in source.head[:4096].split(b"\n", 2)[:2])
 
 
 def _stands_below(source: Source, profile: Profile) -> bool:
-    """Tell whether the profile's first line stands below the rows of another log, of which the beginning is lost."""
+    """Tell whether the profile's first line stands below the rows of another log.
+
+    The beginning of that other log is lost.
+    """
     return any(b"\n" + line.encode() in source.head for line in profile.first_lines)
 
 
 def claim_by(source: Source, profile: Path) -> Claim:
-    """Claim of a file by the user's profile.
+    """Claim a file by the user's profile.
 
     Raises
     ------
@@ -99,7 +103,10 @@ def claim_by(source: Source, profile: Path) -> Claim:
 
 
 def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
-    """Yield the header, batches, remarks and damages of a table, by ``profile`` or the shipped one that fits."""
+    """Yield the header, batches, remarks and damage of a table.
+
+    It is read by ``profile``, or by the shipped profile that fits.
+    """
     from groundstation.readers.table_reader import TableReader, truncated_header
 
     if profile is not None:
@@ -126,7 +133,10 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
 
 
 def _rows_of_another(fit: Fit) -> Dialect | None:
-    """Form of the rows above the header, where they are those of another log with the same columns."""
+    """Return the dialect of the rows above the header, if they belong to another log.
+
+    That log has the same columns.
+    """
     if not fit.profile.first_lines or len(fit.rows_above) < FEWEST_ROWS:
         return None
     below = [line for line in fit.above if line.number > fit.rows_above[-1].number]
@@ -159,7 +169,7 @@ def _fitted(source: Source, profile: Profile) -> Fit:
 
 
 def _above(fit: Fit) -> Iterator[Damage]:
-    """Rows that stand above the header: nothing names their columns."""
+    """Yield damage for rows above the header: nothing names their columns."""
     if fit.rows_above:
         first, last = fit.rows_above[0].number, fit.rows_above[-1].number
         place = f"row {first}" if first == last else f"rows {first} to {last}"
@@ -230,6 +240,9 @@ def _utc_of_zero(fit: Fit, metadata: Mapping[str, str]) -> tuple[int | None, lis
 
 
 def _slips(fit: Fit) -> dict[tuple[str, str], tuple[str, str]]:
-    """Columns that are almost ones of the profile, by raw topic and name: their name, and what was perhaps meant."""
+    """Find columns whose names are almost those of the profile.
+
+    Returns, by raw topic and name, the name found and the name that was probably meant.
+    """
     known = (*(rule.name for rule in fit.profile.columns), *(name for name in fit.profile.time.columns))
     return {(fit.profile.raw_topic, name): (name, meant) for name, meant in slips(fit.names, known).items()}

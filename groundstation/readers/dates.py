@@ -1,4 +1,4 @@
-"""Local date, time of day and offset from UTC, in columns of text, to UTC nanoseconds."""
+"""Conversion of local date, time and UTC offset in columns of text to UTC nanoseconds."""
 
 from datetime import datetime
 from typing import Any
@@ -47,7 +47,7 @@ def _offset_ns(text: str, formats: tuple[str, ...]) -> int | None:
 
 
 def _each_distinct(text: Any, parse: Any, formats: tuple[str, ...]) -> tuple[Int64Array, BoolArray, BoolArray]:
-    """Parse every distinct text once: values, where known, where a cell could not be read."""
+    """Parse every distinct text once; return values, presence, and unreadable cells."""
     coded = pc.dictionary_encode(text, null_encoding="encode")
     parsed = [None if word is None else parse(word, formats) for word in coded.dictionary.to_pylist()]
     values = np.array([0 if value is None else value for value in parsed] or [0], dtype=np.int64)

@@ -1,4 +1,4 @@
-"""How a delimited text file is written: encoding, delimiter, where its rows begin."""
+"""Dialect of a delimited text file: its encoding, its delimiter, where its rows begin."""
 
 import re
 from collections.abc import Sequence
@@ -16,7 +16,10 @@ _DECIMAL_POINT = re.compile(r"[+-]?\d+\.\d+")
 
 @dataclass(frozen=True)
 class Line:
-    """One line of the head: its number (from 1), the byte where the next one starts, its text without line end."""
+    """Line of the head: its number, where the next one starts, its text without line end.
+
+    Numbers count from 1; ``next_byte`` is the byte where the next line starts.
+    """
 
     number: int
     next_byte: int
@@ -26,7 +29,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Dialect:
-    """What the row scanner must know.
+    """Facts that the row scanner needs about a delimited file.
 
     Parameters
     ----------
@@ -53,7 +56,9 @@ class Dialect:
 
 
 def detect_encoding(head: bytes, name: str) -> str:
-    """Encoding of a text: UTF-8, or cp1251 where the bytes are no UTF-8 and look like Cyrillic words.
+    """Return the encoding of a text: UTF-8 or cp1251.
+
+    It is cp1251 where the bytes are no UTF-8 and look like Cyrillic words.
 
     A stray high byte in an otherwise plain file is damage of that cell, not another encoding.
 
@@ -74,7 +79,10 @@ def detect_encoding(head: bytes, name: str) -> str:
 
 
 def head_lines(source: Source, encoding: str, limit: int = 1000) -> list[Line]:
-    """The first lines of a file (at most ``limit``); a last one that the head cuts off is left out."""
+    """Return the first lines of a file, at most ``limit``.
+
+    A last line that the head cuts off is left out.
+    """
     head = source.head
     position = len(_UTF8_BOM) if head.startswith(_UTF8_BOM) else 0
     separator = b"\n" if b"\n" in head or b"\r" not in head else b"\r"
@@ -103,7 +111,7 @@ def detect_delimiter(header: str) -> str:
 
 
 def split_cells(line: str, delimiter: str) -> list[str]:
-    """Cells of one line, trimmed, quotes removed; broken quoting falls back to a plain split.
+    """Split a line into trimmed cells without quotes; a plain split if quoting is broken.
 
     Examples
     --------
@@ -123,12 +131,14 @@ def split_cells(line: str, delimiter: str) -> list[str]:
 
 
 def normal_form(line: str, delimiter: str) -> str:
-    """A line with its cells trimmed: equal for header lines that differ in padding alone."""
+    """Return a line with its cells trimmed, so that padding makes no difference."""
     return delimiter.join(split_cells(line, delimiter))
 
 
 def uses_decimal_comma(rows: Sequence[str], delimiter: str) -> bool:
-    """Whether numbers in the first rows are written with a decimal comma (never with ``,`` as delimiter).
+    """Tell whether numbers in the first rows have a decimal comma.
+
+    Never with ``,`` as delimiter.
 
     Examples
     --------
@@ -141,12 +151,14 @@ def uses_decimal_comma(rows: Sequence[str], delimiter: str) -> bool:
         return False
     cells = [cell for row in rows for cell in split_cells(row, delimiter)]
     if any(_DECIMAL_POINT.fullmatch(cell) for cell in cells):
-        return False  # then a comma parts thousands, or stands in a text
+        return False  # with decimal points a comma separates thousands, or stands in a text
     return any(_DECIMAL_COMMA.fullmatch(cell) for cell in cells)
 
 
 def trailing_cells(rows: Sequence[str], delimiter: str, names: int) -> int:
-    """1 where most rows end with a delimiter that the header row does not have, else 0; of a tie the first row decides.
+    """Return 1 where most rows end with a delimiter that the header row lacks, else 0.
+
+    The first row decides a tie.
 
     Examples
     --------

@@ -1,4 +1,6 @@
-"""The flat CSV that every recorder can export: one time column, columns ``<topic>.<field>``, metadata in ``#`` lines.
+"""Flat CSV of any recorder: a time column, columns ``<topic>.<field>``, ``#`` metadata.
+
+Every recorder can export it.
 
 ``record_index`` is the line number in the file (from 1), so that findings name the line an editor shows. Columns
 without a canonical field go to ``raw.<topic>`` (``raw.csv`` when their name has no dot), as numbers where every cell of
@@ -53,7 +55,10 @@ FEWEST_ROWS = 3  # below a header row that does not stand on top
 
 @dataclass(frozen=True)
 class _Top:
-    """What stands above the rows; ``strange_lines`` of it are neither metadata nor the header row."""
+    """Part of the file above the rows.
+
+    ``strange_lines`` of it are neither metadata nor the header row.
+    """
 
     encoding: str
     metadata: Mapping[str, str]
@@ -70,17 +75,17 @@ class _Top:
 
     @property
     def is_flat(self) -> bool:
-        """Tell whether there is a time column, and one of ``<topic>.<field>``."""
+        """Tell whether there is a time column, and a column ``<topic>.<field>``."""
         return _are_flat(self.names)
 
     @property
     def time_kind(self) -> str:
-        """Time of a row, as it is written."""
+        """Form in which the time of a row is written."""
         return next(kind for name, kind in TIME_COLUMNS.items() if name in self.names)
 
     @cached_property
     def dialect(self) -> Dialect:
-        """Form of the rows below."""
+        """Dialect of the rows below."""
         return Dialect(
             self.encoding,
             self.delimiter,
@@ -99,7 +104,11 @@ class _Top:
 
 
 def _read_top(source: Source) -> _Top | None:
-    """The first line below the metadata; where it is damaged, the first header row that has its rows below it."""
+    """Read the metadata and the header row.
+
+    The header row is the first line below the metadata; where that is damaged, the first header row that has its rows
+    below it.
+    """
     encoding = detect_encoding(source.head, source.name)
     metadata: dict[str, str] = {}
     lines = head_lines(source, encoding)
@@ -121,7 +130,7 @@ def _read_top(source: Source) -> _Top | None:
 
 
 def _top(encoding: str, metadata: Mapping[str, str], lines: Sequence[Line], at: int, strange_lines: int) -> _Top:
-    """What stands above the rows when line ``at`` is the header row."""
+    """Return the part above the rows when line ``at`` is the header row."""
     header = lines[at]
     delimiter = detect_delimiter(header.text)
     names = tuple(split_cells(header.text, delimiter))
@@ -146,7 +155,7 @@ def sniff(source: Source) -> Claim | None:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, batches, remarks and damages of a flat CSV.
+    """Yield the header, batches, remarks and damage of a flat CSV.
 
     Raises
     ------
@@ -209,7 +218,10 @@ def _sections(
 
 
 def _shift_ns(zero_ns: int | None, utc_ns: int | None, found: _Top, last: _Top, shift_ns: int | None) -> int | None:
-    """From the times below a header to those of the log; None where nothing tells it."""
+    """Return the shift from the times below a header to those of the log.
+
+    None where nothing tells it.
+    """
     is_continued = (found.time_kind == "iso") == (last.time_kind == "iso")
     if utc_ns is not None and zero_ns is not None:
         return utc_ns - zero_ns
@@ -217,7 +229,10 @@ def _shift_ns(zero_ns: int | None, utc_ns: int | None, found: _Top, last: _Top, 
 
 
 def _is_header(line: str) -> bool:
-    """Tell whether a line in the middle of the file names a time column, and one of ``<topic>.<field>``."""
+    """Tell whether a line in the middle of the file is a header row.
+
+    It names a time column, and a column ``<topic>.<field>``.
+    """
     return _are_flat(split_cells(line, detect_delimiter(line)))
 
 
@@ -245,7 +260,10 @@ def _entries(lines: Sequence[Line]) -> Iterator[tuple[str, str]]:
 def _utc_of_zero(
     source: Source, dialect: Dialect, layout: Layout, metadata: Mapping[str, str], names: tuple[str, ...]
 ) -> tuple[int | None, list[Remark]]:
-    """UTC of device time zero: by the kind of the time column, the metadata, or a ``time_utc`` beside it."""
+    """Return the UTC of device time zero, and remarks.
+
+    It follows from the kind of the time column, the metadata, or a column ``time_utc``.
+    """
     if layout.time.kind == "iso":
         return 0, []
     utc_ns, remarks = utc_of_zero(metadata)
@@ -255,7 +273,10 @@ def _utc_of_zero(
 
 
 def _utc_from_rows(source: Source, dialect: Dialect, layout: Layout, column: int) -> tuple[int | None, list[Remark]]:
-    """UTC of device time zero by the first rows that have both a recorder time and a ``time_utc``."""
+    """Return the UTC of device time zero, and remarks, by the column ``time_utc``.
+
+    The first rows that have both a recorder time and a ``time_utc`` tell it.
+    """
     from groundstation.readers.table_reader import first_times
 
     device, _none = first_times(source, dialect, layout)
@@ -315,7 +336,7 @@ def _derivations(rules: tuple[Rule, ...]) -> tuple[Derivation, ...]:
 
 
 def _mistakes(top: _Top) -> list[Remark]:
-    """Columns that name no canonical field: they are kept as raw, and the user is told."""
+    """Return a remark on columns that name no canonical field: they are kept as raw."""
     unknown = [name for name in _unknown(top) if "." in name and not name.startswith(RAW_PREFIX)]
     if not unknown:
         return []
@@ -328,7 +349,10 @@ def _unknown(top: _Top) -> list[str]:
 
 
 def _slips(top: _Top) -> Mapping[tuple[str, str], tuple[str, str]]:
-    """Columns that are almost canonical ones, by topic and field: their name, and what was perhaps meant."""
+    """Find columns whose names are almost canonical.
+
+    Returns, by topic and field, the name found and the name that was probably meant.
+    """
     topics = dict.fromkeys((*(name.rpartition(".")[0] for name in top.canonical), *TOPICS))
     known = [f"{topic}.{one.name}" for topic in topics for one in TOPICS.get(kind_of(topic), ())]
     found = slips(top.names, known)
@@ -336,7 +360,7 @@ def _slips(top: _Top) -> Mapping[tuple[str, str], tuple[str, str]]:
 
 
 def _with_near(name: str) -> str:
-    """A column with the canonical one that was perhaps meant.
+    """Name a column, with the canonical one that was probably meant.
 
     Examples
     --------

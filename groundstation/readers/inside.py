@@ -1,4 +1,4 @@
-"""Header and comment lines inside a table: what a log that was appended to another says of itself."""
+"""Header and comment lines inside a table, as an appended log has at its start."""
 
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
@@ -14,7 +14,9 @@ NOTHING: Mapping[int, Mapping[str, str]] = MappingProxyType({})
 def new_logs(
     lines: Mapping[int, str], told: Mapping[int, Mapping[str, str]] = NOTHING, zero_ns: int | None = None
 ) -> Iterator[NewLog]:
-    """Logs that begin at lines of a header or comments; lines right behind one another are of one log.
+    """Yield the logs that begin at header or comment lines inside a table.
+
+    Lines that follow one another directly belong to one log.
 
     Parameters
     ----------
@@ -41,13 +43,15 @@ def new_logs(
 
 
 def _new_log(first: int, facts: Mapping[str, str], zero_ns: int | None) -> NewLog:
-    """A log with the UTC of its time zero, where it states one."""
+    """Return a log with the UTC of its time zero, where it states one."""
     own_ns = utc_of_zero(facts)[0]
     return NewLog(first, facts, own_ns if own_ns is None or zero_ns is None else zero_ns)
 
 
 def with_own_zeros(time: Column, numbers: Int64Array, lines: Mapping[int, str], zero_ns: int | None) -> Column:
-    """Times of rows by the zero of the file's header, where a line above them states another one.
+    """Refer times of rows to the time zero of the file's header.
+
+    It shifts the rows below a line that states another time zero.
 
     Parameters
     ----------
@@ -69,7 +73,7 @@ def with_own_zeros(time: Column, numbers: Int64Array, lines: Mapping[int, str], 
 
 
 def _zero_ns(text: str) -> int | None:
-    """UTC of time zero that a line states."""
+    """Return the UTC of time zero that a line states."""
     return utc_of_zero(_entry(text))[0]
 
 

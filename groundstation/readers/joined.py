@@ -1,4 +1,4 @@
-"""Consecutive files of one recording, seen as one file; and a few bytes, seen as one."""
+"""Consecutive files of one recording, seen as one file; bytes in memory, seen as a file."""
 
 import io
 from bisect import bisect_right
@@ -17,7 +17,9 @@ _LOOKED_AT = 1 << 16  # bytes at the end of a file and at the beginning of the n
 
 @dataclass(frozen=True)
 class JoinedSource(Source):
-    """Files that were written one after the other, as one: their bytes stand behind one another.
+    """Files that were written one after the other, seen as one file.
+
+    Their bytes follow one another.
 
     Containers of messages are read file by file, from ``files``.
 
@@ -33,17 +35,17 @@ class JoinedSource(Source):
 
     @cached_property
     def size(self) -> int:
-        """Bytes of all of them, decompressed."""
+        """Bytes of all files, decompressed."""
         return self._ends[-1]
 
     @property
     def compression(self) -> str:
-        """Nothing: the files are decompressed one by one."""
+        """Empty text: the files are decompressed one by one."""
         return ""
 
     @cached_property
     def head(self) -> bytes:
-        """The first bytes, of as many files as it takes."""
+        """First bytes, of as many files as it takes."""
         head = b""
         for piece in self._pieces:
             head += piece if isinstance(piece, bytes) else piece.head
@@ -53,11 +55,11 @@ class JoinedSource(Source):
 
     @cached_property
     def is_empty(self) -> bool:
-        """Whether none has any bytes."""
+        """Tell whether all files are empty."""
         return all(file.is_empty for file in self.files)
 
     def open(self) -> BinaryIO:
-        """Open for reading bytes; errors as of a single file."""
+        """Open for reading bytes; errors are those of a single file."""
         return io.BufferedReader(_Chain(self._pieces, self._ends))
 
     def damages(self) -> tuple[Damage, ...]:
@@ -66,7 +68,7 @@ class JoinedSource(Source):
 
     @cached_property
     def _pieces(self) -> "tuple[Source | bytes, ...]":
-        """The files, and a line feed between two where rows of a table would run into one another."""
+        """Files, and a line feed between two where rows of a table would run together."""
         pieces: list[Source | bytes] = [self.files[0]]
         for before, file in zip(self.files, self.files[1:], strict=False):
             pieces += [*([b"\n"] if _runs_together(before, file) else []), file]
@@ -79,28 +81,28 @@ class JoinedSource(Source):
 
 @dataclass(frozen=True)
 class BytesSource(Source):
-    """Bytes at hand, under the name of a file."""
+    """Bytes in memory, under the name of a file."""
 
     content: bytes = b""
 
     @property
     def size(self) -> int:
-        """How many they are."""
+        """Number of bytes."""
         return len(self.content)
 
     @property
     def compression(self) -> str:
-        """Nothing."""
+        """Empty text: nothing is compressed."""
         return ""
 
     @property
     def head(self) -> bytes:
-        """The first of them."""
+        """First bytes."""
         return self.content[:HEAD_BYTES]
 
     @property
     def is_empty(self) -> bool:
-        """Whether there are none."""
+        """Tell whether there are no bytes."""
         return not self.content
 
     def open(self) -> BinaryIO:
@@ -109,7 +111,7 @@ class BytesSource(Source):
 
 
 class _Chain(io.RawIOBase):
-    """A read-only view of files behind one another, each opened when it is first read."""
+    """Read-only view of consecutive files, each opened when it is first read."""
 
     def __init__(self, pieces: "Sequence[Source | bytes]", ends: Sequence[int]) -> None:
         self._pieces, self._ends, self._at = pieces, ends, 0
@@ -128,13 +130,16 @@ class _Chain(io.RawIOBase):
         return self._at
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Move to a position; returns it."""
+        """Move to a position and return it."""
         base = {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._ends[-1]}[whence]
         self._at = max(0, base + offset)
         return self._at
 
     def readinto(self, buffer: Any) -> int:
-        """Fill ``buffer`` from the position on, at most to the end of the file there; returns how many bytes."""
+        """Fill ``buffer`` from the position on and return the number of bytes.
+
+        It stops at the end of the file that the position is in.
+        """
         number = bisect_right(self._ends, self._at)
         if number == len(self._ends):
             return 0
@@ -149,7 +154,7 @@ class _Chain(io.RawIOBase):
         return count
 
     def close(self) -> None:
-        """Close it, and the file that is open."""
+        """Close the view, and the file that is open."""
         self._close()
         super().close()
 
@@ -160,7 +165,7 @@ class _Chain(io.RawIOBase):
 
 
 def _runs_together(before: Source, behind: Source) -> bool:
-    """Whether a row ends a file without a line end, and a whole line begins the next."""
+    """Tell whether a file ends in a row without line end, before a file that begins a line."""
     with before.open() as stream:
         stream.seek(max(0, before.size - _LOOKED_AT))
         lines = stream.read().splitlines(keepends=True)
@@ -176,6 +181,9 @@ def _runs_together(before: Source, behind: Source) -> bool:
 
 
 def _cells(line: bytes, like: bytes) -> int:
-    """Cells of a row, parted as those of another one: by the delimiter that it has most of, else by blanks."""
+    """Return the number of cells of a row, split like the row ``like``.
+
+    The delimiter is the one that ``like`` has most of, else blanks.
+    """
     mark = max((delimiter.encode() for delimiter in DELIMITERS), key=like.count)
     return line.count(mark) + 1 if mark in like else len(line.split())

@@ -1,4 +1,4 @@
-"""What the columns of a delimited table mean: which canonical field each one feeds, and how the time is written."""
+"""Layout of a delimited table: canonical field of each column, and form of the time."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -21,7 +21,9 @@ FloatArray: TypeAlias = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Rule:
-    """Where one column of the file goes: canonical value = number in the cell x ``factor`` + ``offset``.
+    """Rule for one column of a file: its topic, its field, and how its cells are converted.
+
+    Canonical value = number in the cell x ``factor`` + ``offset``.
 
     Parameters
     ----------
@@ -54,13 +56,13 @@ class Rule:
 
     @property
     def target(self) -> str:
-        """``topic.field``, for messages."""
+        """Text ``topic.field``, for messages."""
         return f"{self.topic}.{self.field}"
 
 
 @dataclass(frozen=True)
 class TimeRule:
-    """Time of a row, as it is written.
+    """Rule for the time of a row: the form in which it is written.
 
     Parameters
     ----------
@@ -86,7 +88,10 @@ class TimeRule:
 
 @dataclass(frozen=True)
 class Method:
-    """A way to derive fields from others: names and units of its inputs, what it gives, what to tell the user."""
+    """Method that derives fields from others.
+
+    It states the names and units of its inputs, what it gives, and the text for the user.
+    """
 
     inputs: tuple[str, ...]
     units: tuple[str, ...]
@@ -97,7 +102,9 @@ class Method:
 
 @dataclass(frozen=True)
 class Derivation:
-    """Fields of a topic that the reader computes row by row from other fields times ``factors`` (1 where empty).
+    """Fields of a topic that the reader computes row by row from other fields.
+
+    Each input is multiplied by its entry of ``factors`` (1 where empty).
 
     A zero of an input that is named in ``not_zero`` is no value.
     """
@@ -112,7 +119,7 @@ class Derivation:
 
 @dataclass(frozen=True)
 class Layout:
-    """The meaning of a table: time, columns, derived fields."""
+    """Layout of a table: time, columns, derived fields."""
 
     time: TimeRule
     rules: tuple[Rule, ...]
@@ -122,7 +129,7 @@ class Layout:
 
 
 def true_from_magnetic(magnetic_deg: FloatArray, variation_deg: FloatArray) -> tuple[FloatArray, ...]:
-    """True direction, degrees in [0, 360): magnetic + declination, east positive.
+    """Return true direction, degrees in [0, 360): magnetic + declination, east positive.
 
     Examples
     --------
@@ -133,20 +140,22 @@ def true_from_magnetic(magnetic_deg: FloatArray, variation_deg: FloatArray) -> t
 
 
 def velocity_from_track(track_deg: FloatArray, speed_mps: FloatArray) -> tuple[FloatArray, ...]:
-    """Velocities north and east from true track and ground speed.
+    """Return velocities north and east from true track and ground speed.
 
     Examples
     --------
     >>> [round(float(part[0]), 9) for part in velocity_from_track(np.array([90.0]), np.array([50.0]))]
     [0.0, 50.0]
     """
-    with np.errstate(invalid="ignore", over="ignore"):  # of an infinite direction or speed: NaN
+    with np.errstate(invalid="ignore", over="ignore"):  # an infinite direction or speed gives NaN
         track_rad = np.deg2rad(track_deg)
         return speed_mps * np.cos(track_rad), speed_mps * np.sin(track_rad)
 
 
 def wind_from_direction(from_deg: FloatArray, speed_mps: FloatArray) -> tuple[FloatArray, ...]:
-    """Velocity of the air north and east from the true direction the wind blows from, and its speed.
+    """Return the wind velocity north and east of a wind direction and speed.
+
+    The direction is true, and the one the wind blows from.
 
     Examples
     --------
@@ -158,9 +167,10 @@ def wind_from_direction(from_deg: FloatArray, speed_mps: FloatArray) -> tuple[Fl
 
 
 def pressure_altitude(indicated_m: FloatArray, setting_inhg: FloatArray) -> tuple[FloatArray, ...]:
-    """Altitude above 1013.25 hPa from the altitude indicated with another altimeter setting.
+    """Return altitude above 1013.25 hPa from one indicated with another altimeter setting.
 
-    To the indicated altitude is added that of the setting in the standard atmosphere; 1013.25 hPa are 29.92126 inHg.
+    The altitude of the setting in the standard atmosphere is added to the indicated altitude; 1013.25 hPa are 29.92126
+    inHg.
 
     Examples
     --------
@@ -206,12 +216,12 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 def rule_for(
     column: int, topic: str, known: Field, factor: float = 1.0, offset: float = 0.0, raw: Key | None = None
 ) -> Rule:
-    """Rule that feeds a canonical field from a column."""
+    """Return the rule that feeds a canonical field from a column."""
     return Rule(column, topic, known.name, known.kind, factor, offset, known.is_heading, raw)
 
 
 def apply(derivation: Derivation, known: Mapping[Key, Column]) -> dict[Key, Column]:
-    """Columns that a derivation gives and the file has not: present where all its inputs are.
+    """Return the columns that a derivation adds: present where all its inputs are.
 
     A column of the file is not filled from others where it is empty: a Garmin G5 without a fix writes no velocity
     beside a speed of 150 kt.
@@ -221,7 +231,7 @@ def apply(derivation: Derivation, known: Mapping[Key, Column]) -> dict[Key, Colu
     masks += [known[key].values != 0.0 for key in derivation.not_zero]
     present = np.logical_and.reduce(masks)
     factors = derivation.factors or (1.0,) * len(inputs)
-    with np.errstate(over="ignore", invalid="ignore"):  # of absurd numbers: becomes infinite or NaN
+    with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers become infinite or NaN
         values = [np.where(present, one.values * factor, np.nan) for one, factor in zip(inputs, factors, strict=True)]
         results = METHODS[derivation.method].function(*values)
     found = {

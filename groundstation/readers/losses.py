@@ -1,4 +1,4 @@
-"""Counts what a reader could not read, and where: one line of report for many alike losses."""
+"""Count of what a reader could not read, and where; many alike losses give one line."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class _Tally:
 
 
 class Losses:
-    """Collects losses by (kind, what, topic) with the first and the last line they occurred in."""
+    """Losses by (kind, what, topic), with the first and the last line of each."""
 
     def __init__(self) -> None:
         self._tallies: dict[tuple[str, str, str, str, bool], _Tally] = {}
@@ -32,7 +32,10 @@ class Losses:
         topic: str = "",
         loses_data: bool = True,
     ) -> None:
-        """Count one loss for each of ``lines`` (line numbers, increasing); ``where`` names the column, if one."""
+        """Count one loss for each of ``lines`` (line numbers, increasing).
+
+        ``where`` names the column, if there is one.
+        """
         if not len(lines):
             return
         first, last = int(lines[0]), int(lines[-1])
@@ -41,7 +44,7 @@ class Losses:
         tally.first, tally.last = min(tally.first, first), max(tally.last, last)
 
     def damages(self) -> Iterator[Damage]:
-        """One :class:`Damage` for each kind of loss, in the order they were first met."""
+        """Yield one :class:`Damage` for each kind of loss, in the order they were first met."""
         for (kind, what, where, topic, loses_data), tally in self._tallies.items():
             lines = f"row {tally.first}" if tally.first == tally.last else f"rows {tally.first} to {tally.last}"
             yield Damage(kind, f"{where}, {lines}" if where else lines, tally.count, what, topic, loses_data)

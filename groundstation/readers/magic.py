@@ -26,14 +26,15 @@ _AT_START: tuple[tuple[bytes, str], ...] = (
 
 
 def recognise(source: Source) -> str | None:
-    """Name of the format that a file's first bytes show, None when they show none."""
+    """Return the format that a file's first bytes show, None when they show none."""
     return next((name for magic, name in _AT_START if source.head.startswith(magic)), None)
 
 
 def companion(source: Source) -> str | None:
-    """Name a file that belongs to a log and is none itself; None for any other.
+    """Name a file that belongs to a log and is no log itself; None for any other.
 
-    RTKLIB writes beside a log it records when which of its bytes came: ``TIMETAG RTKLIB`` and its version, 60 bytes.
+    RTKLIB writes a file beside the log it records that tells when its bytes came: ``TIMETAG RTKLIB`` and its version,
+    60 bytes.
     """
     if not source.head.startswith(b"TIMETAG RTKLIB"):
         return None
@@ -42,7 +43,10 @@ def companion(source: Source) -> str | None:
 
 
 def is_mostly_text(source: Source) -> bool:
-    """Whether most of the head is lines without a control character, whatever its first bytes are; by samples."""
+    """Tell whether most of the head is lines without control characters.
+
+    The first bytes do not matter; samples of the head are looked at.
+    """
     step = max(_SAMPLE_BYTES, len(source.head) // _SAMPLES)
     sample = b"".join(source.head[at : at + _SAMPLE_BYTES] + b"\n" for at in range(0, len(source.head), step))
     text = sum(len(line) + 1 for line in sample.split(b"\n") if not _CONTROL.search(line))
@@ -50,7 +54,7 @@ def is_mostly_text(source: Source) -> bool:
 
 
 def is_binary(source: Source) -> bool:
-    """Whether the head is no text: NUL bytes, or many control characters."""
+    """Tell whether the head is no text: it has NUL bytes, or many control characters."""
     sample = source.head[:4096]
     control = sum(byte < 32 and byte not in (9, 10, 12, 13) for byte in sample)
     return b"\0" in sample or control * 20 > len(sample)

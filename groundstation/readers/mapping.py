@@ -1,6 +1,6 @@
-"""Which messages of a log give which canonical fields: roles, each with its rules, best first.
+"""Roles that map messages of a log to canonical fields, each with its rules, best first.
 
-The one engine of the readers whose logs name their messages: a reader states its roles and tells what its log offers.
+All readers whose logs name their messages share it: a reader states its roles and what its log offers.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -27,7 +27,7 @@ class Numbers(Protocol):
 
 @dataclass(frozen=True)
 class Rule:
-    """How the messages of one source give fields of a canonical topic.
+    """Rule that turns the messages of one source into fields of a canonical topic.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Rule:
     derived: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def told(self, topic: str) -> Iterator[Remark]:
-        """What a user must know, fields of which the same is to be said in one line."""
+        """Yield remarks on derived fields, one for all fields with the same text."""
         for text in dict.fromkeys(self.derived.values()):
             fields = tuple(name for name, one in self.derived.items() if one == text)
             yield Remark("derived", f"{topic}: {', '.join(fields)} from {text}", topic, fields)
@@ -55,7 +55,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class Role:
-    """Something that a canonical topic tells, and the rules for it, best first.
+    """Part of a canonical topic, and the rules for it, best first.
 
     ``has_instances``: each instance of the source is a topic of its own (``gnss.1``, ``gnss.2``).
     """
@@ -67,14 +67,17 @@ class Role:
 
 @dataclass(frozen=True)
 class Offer:
-    """Messages that a log has: their name, which of several sources of that name, and their columns."""
+    """Messages that a log has: their name, number of the source, and columns.
+
+    ``instance`` tells apart several sources of one name.
+    """
 
     source: str
     instance: int
     columns: frozenset[str]
 
     def serves(self, rule: Rule) -> bool:
-        """Whether a rule applies."""
+        """Tell whether a rule applies to these messages."""
         return self.source == rule.source and self.columns.issuperset(rule.needs)
 
 
@@ -88,7 +91,10 @@ class Assignment:
 
 
 def assigned(roles: Iterable[Role], offers: Sequence[Offer]) -> Iterator[Assignment]:
-    """For each role the first rule that messages of the log serve, and all messages that do; or the first of them."""
+    """Yield, for each role, the first rule that the log serves and the messages that serve it.
+
+    A role without instances takes only the first of these messages.
+    """
     for role in roles:
         for rule in role.rules:
             instances = {offer.instance: offer for offer in offers if offer.serves(rule)}
@@ -101,7 +107,7 @@ def assigned(roles: Iterable[Role], offers: Sequence[Offer]) -> Iterator[Assignm
 
 
 def mapped(sources: Mapping[str, Sequence[str]]) -> Iterator[Remark]:
-    """What serves as what: names of the log by canonical topic, in one line."""
+    """Yield one remark that lists, by canonical topic, the names in the log that serve it."""
     if sources:
         yield Remark(
             "mapped", "; ".join(f"{topic} from {', '.join(names)}" for topic, names in sorted(sources.items()))
@@ -109,7 +115,7 @@ def mapped(sources: Mapping[str, Sequence[str]]) -> Iterator[Remark]:
 
 
 def scaled(fields: Mapping[str, tuple[str, float]]) -> Callable[[Numbers], Columns]:
-    """Columns of plain factors: canonical field -> (column, factor)."""
+    """Return columns of plain factors: canonical field -> (column, factor)."""
 
     def columns(numbers: Numbers) -> Columns:
         return {field: Column(numbers[name] * factor) for field, (name, factor) in fields.items() if name in numbers}
@@ -118,16 +124,19 @@ def scaled(fields: Mapping[str, tuple[str, float]]) -> Callable[[Numbers], Colum
 
 
 def holds(numbers: Numbers, name: str) -> BoolArray | None:
-    """Where a flag is set, shape (n,); None in messages that have no such flag."""
+    """Return where a flag is set, shape (n,); None in messages that lack the flag."""
     return numbers[name] != 0.0 if name in numbers else None
 
 
 def pressure_altitude(pressure_pa: FloatArray) -> Columns:
-    """Pressure as altitude in the standard atmosphere; absent where it is no pressure of the air."""
+    """Convert pressure to altitude in the standard atmosphere.
+
+    Absent where the pressure cannot be that of the air.
+    """
     altitude, is_refused = pressure_altitude_m(pressure_pa)
     return {"pressure_altitude_m": Column(altitude, ~is_refused)}
 
 
 def direction(values_deg: FloatArray, present: BoolArray | None = None) -> Column:
-    """A direction in [0, 360)."""
+    """Return a direction in [0, 360)."""
     return Column(np.asarray(wrap_360(values_deg)), present)

@@ -1,10 +1,12 @@
-"""MILUV ultra-wideband ranges (range_data.csv): one log of several quadrotors, with their poses by motion capture.
+"""MILUV ultra-wideband ranges (range_data.csv): one log of several quadrotors, with poses.
+
+The poses are by motion capture.
 
 A range from tag 10 to tag or anchor 31 is a row of ``link.10-31``; the pose of ifo001 is ``truth.ifo001``. World axes
 of the data have z up and bodies forward-left-up; here both are turned by 180 deg about x. Columns that no rule names
-are kept under ``raw.miluv``: ``gt_range`` and ``bias`` among them, which are wrong in some versions of the file (the
-true range is that of the poses). Whose tags the numbers are stands in other files of the set (tags.yaml,
-anchors.yaml): :func:`arms`.
+are kept under ``raw.miluv``, among them ``gt_range`` and ``bias``, which are wrong in some versions of the file (the
+true range is that of the poses). Other files of the set (tags.yaml, anchors.yaml) tell which vehicle carries which tag:
+:func:`arms` reads them.
 
 Source: Shalaby, Ahmed, Dahdah, Cossette, Le Ny and Forbes, MILUV: a multi-UAV indoor localization dataset with UWB and
 vision, 2025 (arXiv 2504.14376).
@@ -36,7 +38,7 @@ _GROUP = re.compile(r"""^["']?(\w+)["']?\s*:\s*$""")
 
 
 def _header(source: Source) -> tuple[Line, list[str]] | None:
-    """The header row, where it is that of this format."""
+    """Return the header row, if it is that of this format."""
     lines = head_lines(source, "utf-8", 1)
     names = split_cells(lines[0].text, ",") if lines else []
     wanted = {RANGE, *ENDS, TIME}
@@ -49,7 +51,7 @@ def sniff(source: Source) -> Claim | None:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, batches, remarks and damages."""
+    """Yield the header, batches, remarks and damage."""
     from groundstation.readers.table_reader import TableReader, truncated_header
 
     found = _header(source)
@@ -83,7 +85,7 @@ def read(source: Source) -> Iterator[Item]:
 
 
 def _parted(batch: RecordBatch, vehicles: list[str], losses: Losses) -> Iterator[RecordBatch]:
-    """A batch of rows as links, poses and what is left."""
+    """Split a batch of rows into links, poses and the rest."""
     columns = dict(batch.columns)
     distance, ends = columns.pop(RANGE), [columns.pop(name) for name in ENDS]
     ids = [np.where(end.mask, end.values, -1.0) for end in ends]
@@ -132,7 +134,10 @@ def _pose(place: Column | None, turn: Column | None, n: int) -> tuple[dict[str, 
 
 
 def _vectors(column: Column | None, size: int, n: int) -> FloatArray:
-    """Cells such as ``[1.0 2.0 3.0]`` as rows, shape (n, size); NaN where one is anything else."""
+    """Parse cells such as ``[1.0 2.0 3.0]`` into rows, shape (n, size).
+
+    NaN where a cell is anything else.
+    """
     out = np.full((n, size), np.nan)
     if column is None:
         return out
@@ -147,7 +152,9 @@ def _vectors(column: Column | None, size: int, n: int) -> FloatArray:
 
 
 def arms(source: Source) -> dict[str, dict[int, tuple[float, float, float]]]:
-    """Tags (or anchors) by vehicle (or constellation): places in its axes, forward-right-down (north-east-down).
+    """Read the positions of tags by vehicle, or of anchors by constellation.
+
+    Tags are in the vehicle's axes forward-right-down, anchors in north-east-down.
 
     Raises
     ------

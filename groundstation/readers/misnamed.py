@@ -1,4 +1,4 @@
-"""Columns of a table under names that are almost known ones: kept as raw, and told as lost."""
+"""Columns of a table whose names are almost known ones: kept as raw, and reported as lost."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -11,7 +11,7 @@ Key = tuple[str, str]
 
 
 def misnamed(items: Iterator[Item], wanted: Mapping[Key, tuple[str, str]], row: int) -> Iterator[Item]:
-    """The items, then what of them stands under names that are almost known ones.
+    """Yield the items, then damage for columns whose names are almost known ones.
 
     Parameters
     ----------

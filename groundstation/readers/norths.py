@@ -1,8 +1,8 @@
-"""North of a logged track and sign of a logged variation, told by the data.
+"""North of a logged track and sign of a logged variation, found from the data.
 
 Recorders of one family differ: a Garmin G1000 logs a magnetic track and a variation that is positive east, a G3X a true
-track and a variation that is positive west, a G5 the one or the other by its software. Where velocities, or positions,
-stand beside the track they show it; what is left is told by the Earth's field of the day.
+track and a variation that is positive west, a G5 either, depending on its software. Velocities or positions beside the
+track show which it is; the Earth's field of the day shows the rest.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,10 +27,10 @@ OF_MOTION = (
 LEAST_VARIATION_DEG = 1.0  # below it neither north nor sign makes a difference that could be seen
 _MOVING_MPS, _MOVED_M = 5.0, 30.0
 _FEWEST, _ENOUGH = 20, 200  # samples
-_SHARE = 0.4  # of the variation: the ways to read a track differ by all of it
-_WINDOWS, _WINDOW_BYTES = (0.5, 0.75, 0.25, 0.0), 128 << 10  # of the rows, in which motion is looked for
+_SHARE = 0.4  # largest misfit, as a share of the variation: the ways to read a track differ by all of it
+_WINDOWS, _WINDOW_BYTES = (0.5, 0.75, 0.25, 0.0), 128 << 10  # places among the rows where motion is looked for
 _APART = 2  # rows to either side, between which a position has moved
-_PLACES = 5  # at which the Earth's field is asked for
+_PLACES = 5  # places where the Earth's field is computed
 _FIELD_MISFIT_DEG, _FIELD_MARGIN_DEG = 2.5, 1.0  # tables of recorders are years old
 
 
@@ -47,7 +47,7 @@ class Samples:
 
     @property
     def has_variation(self) -> bool:
-        """Tell whether the variation is more than next to nothing in most rows."""
+        """Tell whether the variation differs from zero in most rows."""
         known = np.abs(self.variation_deg[np.isfinite(self.variation_deg)])
         return bool(len(known) and np.median(known) >= LEAST_VARIATION_DEG)
 
@@ -75,7 +75,9 @@ class Norths:
 
 
 def samples_of(source: Source, dialect: Dialect, layout: Layout) -> Samples:
-    """Rows from the middle of a file, from elsewhere where nothing moves; all of a small file.
+    """Read rows from the middle of a file, or from elsewhere where nothing moves there.
+
+    All rows of a small file are read.
 
     ``layout`` has fields of :data:`OF_MOTION` and ``variation_deg`` under the topic :data:`LOOKED_AT`.
     """
@@ -101,7 +103,7 @@ def samples_of(source: Source, dialect: Dialect, layout: Layout) -> Samples:
 
 
 def day_of(source: Source, dialect: Dialect, layout: Layout) -> int | None:
-    """Time of one row, device nanoseconds; None where no row looked at has one."""
+    """Return the time of one row, device nanoseconds; None where no row has one."""
     from groundstation.readers.table_reader import first_times
 
     for window in _windows(source, dialect):
@@ -126,7 +128,7 @@ def _windows(source: Source, dialect: Dialect) -> Iterator[Dialect]:
 
 
 def _is_enough(parts: Sequence[Mapping[str, FloatArray]]) -> bool:
-    """Tell whether enough rows move, or the variation is next to nothing."""
+    """Tell whether enough rows move, or the variation is close to zero."""
     variation = np.concatenate([part["variation_deg"] for part in parts] or [np.zeros(0)])
     speed = np.concatenate([part.get("ground_speed_mps", np.zeros(0)) for part in parts] or [np.zeros(0)])
     known = np.abs(variation[np.isfinite(variation)])
@@ -135,7 +137,7 @@ def _is_enough(parts: Sequence[Mapping[str, FloatArray]]) -> bool:
 
 
 def by_motion(samples: Samples) -> Norths:
-    """North of the track, and the sign of the variation of a magnetic one, by the motion.
+    """Find the north of the track by the motion, and the sign of its variation if magnetic.
 
     Examples
     --------
@@ -165,7 +167,7 @@ def by_motion(samples: Samples) -> Norths:
 
 
 def _moved_m(samples: Samples) -> FloatArray:
-    """Way north and east of the positions around each row, metres, shape (2, n)."""
+    """Return the way north and east around each row, metres, shape (2, n)."""
     moved = np.full((2, len(samples.track_deg)), np.nan)
     known = np.flatnonzero(has_position(samples.latitude_deg, samples.longitude_deg))
     if len(known) > 2 * _APART:
@@ -178,7 +180,7 @@ def _moved_m(samples: Samples) -> FloatArray:
 
 
 def by_the_field(samples: Samples, utc_ns: int) -> Norths:
-    """Sign of the variation by the declination of the Earth's field at some of the positions."""
+    """Find the sign of the variation by the Earth's field at some of the positions."""
     with np.errstate(invalid="ignore"):
         usable = has_position(samples.latitude_deg, samples.longitude_deg)
         usable &= np.abs(samples.variation_deg) >= LEAST_VARIATION_DEG

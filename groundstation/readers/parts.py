@@ -1,4 +1,4 @@
-"""What several sources give to one topic, as one batch in the order of the log."""
+"""Merge of what several sources give to one topic, in the order of the log."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,10 @@ from groundstation.base.records import (
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Columns of one topic that one source gave, with place, device time and, where it is another, time of validity."""
+    """Columns of one topic from one source, with their places in the log and device time.
+
+    ``validity_ns`` is the time of validity, where it differs from the device time.
+    """
 
     index: Int64Array
     time: Column
@@ -28,7 +31,7 @@ class Part:
 
 
 def occupied(part: Part) -> Part | None:
-    """The rows that have any value; None when there are none."""
+    """Return the rows that have any value; None when there are none."""
     columns = part.columns.values()
     if not part.columns or any(column.present is None for column in columns):
         return part if part.columns else None
@@ -45,7 +48,10 @@ def occupied(part: Part) -> Part | None:
 
 
 def merged(topic: str, parts: Sequence[Part]) -> RecordBatch:
-    """One batch of parts from different messages, in the order of the log; each row has the fields of its source."""
+    """Merge parts from different messages into one batch, in the order of the log.
+
+    Each row has the fields of its source.
+    """
     if len(parts) == 1:
         one = parts[0]
         return RecordBatch(topic, one.index, one.time, one.columns, validity_time_ns=one.validity_ns)
@@ -55,7 +61,7 @@ def merged(topic: str, parts: Sequence[Part]) -> RecordBatch:
     places[order] = np.arange(len(order))
     places_of = np.split(places, np.cumsum([len(part.index) for part in parts])[:-1])
     columns: dict[str, Column] = {}
-    masks: dict[tuple[tuple[int, int], ...], BoolArray | None] = {}  # of parts with the same masks there is one
+    masks: dict[tuple[tuple[int, int], ...], BoolArray | None] = {}  # parts with the same masks share one
     for name in dict.fromkeys(name for part in parts for name in part.columns):
         known = {number: part.columns[name] for number, part in enumerate(parts) if name in part.columns}
         pieces = [(places_of[number], column) for number, column in known.items()]
@@ -73,9 +79,9 @@ def merged(topic: str, parts: Sequence[Part]) -> RecordBatch:
 
 
 def _values(pieces: Sequence[tuple[Int64Array, Column]], rows: int) -> NDArray[Any]:
-    """Values of several pieces that stand at given places."""
+    """Return the values of several pieces at given places."""
     kind = np.result_type(*(piece.values.dtype for _at, piece in pieces))
-    first = pieces[0][1].values[:1]  # one text throughout is one run to write
+    first = pieces[0][1].values[:1]  # a text that never changes is written as one run
     values = np.full(rows, np.nan if kind.kind == "f" else first[0] if len(first) else 0, dtype=kind)
     for at, piece in pieces:
         values[at] = piece.values
@@ -83,7 +89,7 @@ def _values(pieces: Sequence[tuple[Int64Array, Column]], rows: int) -> NDArray[A
 
 
 def _present(pieces: Sequence[tuple[Int64Array, Column]], rows: int) -> BoolArray | None:
-    """Where there is a value; None when everywhere."""
+    """Return where there is a value; None when there is one everywhere."""
     present = np.zeros(rows, dtype=bool)
     for at, piece in pieces:
         present[at] = True if piece.present is None else piece.present
@@ -91,15 +97,15 @@ def _present(pieces: Sequence[tuple[Int64Array, Column]], rows: int) -> BoolArra
 
 
 def bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
-    """The batch in pieces of at most ``MAX_BATCH_ROWS`` rows."""
+    """Yield the batch in pieces of at most ``MAX_BATCH_ROWS`` rows."""
     for start in range(0, len(batch), MAX_BATCH_ROWS):
         yield batch if len(batch) <= MAX_BATCH_ROWS else batch.take(slice(start, start + MAX_BATCH_ROWS))
 
 
 def one_row_each(batch: RecordBatch) -> RecordBatch:
-    """Records that are valid at the same time as one row: what a unit says of one instant.
+    """Merge records that are valid at the same time into one row.
 
-    Those of an instant at which two have the same field stay as they are.
+    Where two records of an instant have the same field, they stay as they are.
     """
     stamps = batch.validity_time_ns
     if stamps is None:

@@ -17,7 +17,7 @@ _MOTION = ("velocity_north_mps", "velocity_east_mps", "velocity_down_mps", "grou
 
 
 def without_place(latitude: Column, longitude: Column) -> BoolArray:
-    """Rows with a latitude and a longitude that are both zero, shape (n,).
+    """Tell which rows have a latitude and a longitude that are both zero, shape (n,).
 
     Examples
     --------
@@ -31,10 +31,10 @@ def without_place(latitude: Column, longitude: Column) -> BoolArray:
 
 
 def zeroed(kind: str, fields: Mapping[str, Column], is_zero: BoolArray) -> dict[str, BoolArray]:
-    """Masks of the values that fall away where rows have no place, by field, shape (n,) each.
+    """Return masks, by field, of values to drop where rows have no position, shape (n,).
 
-    The height and the sigmas go with the place. A receiver that has no place has no velocity either: what it tells of
-    motion goes where all of it is zero.
+    The height and the sigmas go with the place. A receiver that has no place has no velocity either: its motion is
+    dropped where all of it is zero.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def zeroed(kind: str, fields: Mapping[str, Column], is_zero: BoolArray) -> dict[
 
 
 def placed(topic: str, columns: Mapping[str, Column]) -> tuple[dict[str, Column], Int64Array]:
-    """Columns of a topic without what falls away at latitude and longitude 0, and the rows that stand there.
+    """Drop the values of fixes at latitude and longitude 0, and return the rows of these.
 
     A fix without a place has no integrity. Columns of which nothing is left are left out.
 
@@ -77,5 +77,5 @@ def placed(topic: str, columns: Mapping[str, Column]) -> tuple[dict[str, Column]
 
 
 def nowhere(topic: str, count: int, place: str = "the whole log") -> Damage:
-    """Count rows of a topic without a place; nothing is lost, the raw values keep it."""
+    """Return a damage that counts rows without a position; the raw values keep it."""
     return Damage("no_position", place, count, NO_POSITION, topic, loses_data=False)

@@ -1,4 +1,6 @@
-"""Profiles: TOML files that say what the columns of a table mean. A slip in one is an error that names its key.
+"""Profiles: TOML files that map the columns of a table to canonical fields.
+
+A mistake in one raises an error that names its key.
 
 The value of a field is ``(number in the cell x scale x sign + offset)`` in ``unit``, brought to the field's unit.
 docs/profiles.md describes every key.
@@ -24,7 +26,7 @@ SHIPPED = Path(__file__).parent / "profiles"
 TIME_UNITS: Mapping[str, tuple[int, int]] = MappingProxyType(
     {"ns": (0, 1), "us": (3, 1), "ms": (6, 1), "s": (9, 1), "min": (9, 60), "h": (9, 3600)}
 )
-DIRECTIONS = ("track_deg", "true_heading_deg")  # of which a profile may say from which north they count
+DIRECTIONS = ("track_deg", "true_heading_deg")  # directions of which a profile may state the north
 _DATE_DIRECTIVES = frozenset("YymdbBj")
 
 
@@ -57,7 +59,10 @@ class InputRule:
 
 @dataclass(frozen=True)
 class DerivedRule:
-    """Fields of a topic computed from others by a method of :data:`groundstation.readers.layout.METHODS`."""
+    """Fields of a topic that a method computes from other fields.
+
+    The methods are :data:`groundstation.readers.layout.METHODS`.
+    """
 
     method: str
     topic: str
@@ -67,7 +72,9 @@ class DerivedRule:
 
 @dataclass(frozen=True)
 class TimeColumns:
-    """Time of a row: kind as in :class:`groundstation.readers.layout.TimeRule`, its columns, its unit.
+    """Time of a row: its kind, its columns, its unit.
+
+    The kinds are those of :class:`groundstation.readers.layout.TimeRule`.
 
     ``is_utc``: date and time of kind ``local`` are UTC.
     """
@@ -81,7 +88,7 @@ class TimeColumns:
 
 @dataclass(frozen=True)
 class Variation:
-    """The column of the magnetic variation, and the factor that makes it degrees, east positive."""
+    """Column of the magnetic variation, and the factor to degrees, east positive."""
 
     column: str
     factor: float
@@ -130,7 +137,7 @@ def load(path: Path) -> Profile:
 
 
 def read_table(path: Path) -> dict[str, Any]:
-    """The TOML of a profile, not checked yet.
+    """Read the TOML of a profile without checks.
 
     Raises
     ------
@@ -142,7 +149,7 @@ def read_table(path: Path) -> dict[str, Any]:
 
 
 class Checker:
-    """Checks the values of a profile; every complaint names the file and the key."""
+    """Checker of the values of a profile; every error names the file and the key."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -208,7 +215,7 @@ class Checker:
 
 
 class _Checker(Checker):
-    """Turns the TOML tables into the rules of a table's columns."""
+    """Parser of the TOML tables into rules for a table's columns."""
 
     def profile(self, table: dict[str, Any]) -> Profile:
         allowed = (

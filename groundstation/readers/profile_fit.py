@@ -1,4 +1,4 @@
-"""A profile laid over a header of a table: its columns, and the lines that belong to it."""
+"""Match of a profile to a header of a table: its columns and the lines around it."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ _FORMAT = re.compile(r"(?=.*(yy|hh))[ymdhs:./ -]+", re.IGNORECASE)  # the unit o
 
 @dataclass(frozen=True)
 class Fit:
-    """A profile over a header row.
+    """Match of a profile to a header row.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ class Fit:
 
     @property
     def last(self) -> Line:
-        """The last line above the rows."""
+        """Last line above the rows."""
         return self.behind[-1] if self.behind else self.header
 
     def dialect_to(self, end_byte: int | None, stands_again: bool = True) -> Dialect:
-        """Form, beginning and end of the rows; ``stands_again``: the header may stand among them."""
+        """Return the dialect of the rows; ``stands_again``: the header may repeat in them."""
         lines = (*self.above, *((self.header,) if stands_again else ()), *self.behind)
         return Dialect(
             self.encoding,
@@ -75,7 +75,7 @@ class Fit:
 
     @cached_property
     def position(self) -> Mapping[str, int]:
-        """Columns by name; also by the name without a unit if the header tells units."""
+        """Columns by name; also by the name without a unit if the header states units."""
         found = {name: at for at, name in reversed(list(enumerate(self.names))) if name}
         if self.profile.header_tells:
             found = {bare(name): at for at, name in reversed(list(enumerate(self.names))) if bare(name)} | found
@@ -95,7 +95,7 @@ class Fit:
 
     @property
     def told_count(self) -> int:
-        """Number of columns whose name tells more in parentheses."""
+        """Number of columns whose name has more in parentheses."""
         return sum(bare(name) != name for name in self.names)
 
     def told(self, at: int) -> Told:
@@ -105,7 +105,11 @@ class Fit:
 
     @property
     def units(self) -> dict[str, str]:
-        """Units by column: a comment above the header, or a row below it that is left out, that has as many cells."""
+        """Units by column.
+
+        They stand in a comment above the header, or in a row below it that is left out; either has as many cells as the
+        header.
+        """
         comments = [line.text for line in self.above if line.text.startswith("#")]
         below = [line.text for line in self.behind[: self.profile.rows_after_header]]
         for cells in map(self._cells, (*comments, *below)):
@@ -114,34 +118,34 @@ class Fit:
         return {}
 
     def label(self, at: int) -> str:
-        """Name of a column under the raw topic."""
+        """Return the name of a column under the raw topic."""
         name = self.names[at]
         return name if self.names.index(name) == at else f"{name}_{at + 1}"
 
     def names_as(self, other: "Fit") -> bool:
-        """Tell whether another header names and tells the same."""
+        """Tell whether another header has the same names and the same units."""
         return (self.names, self.delimiter, self._around) == (other.names, other.delimiter, other._around)
 
     def is_repeated(self, place: Place) -> bool:
-        """Tell whether the very lines stand again."""
+        """Tell whether another header has exactly the same lines."""
         above = place.above[len(place.above) - len(self.above) :] if self.above else ()
         return place.line.text == self.header.text and [one.text for one in above] == [one.text for one in self.above]
 
     def is_row(self, line: str) -> bool:
-        """Tell a row: it has a cell for each column, and a time, or no time and some number."""
+        """Tell whether a line is a row: a cell for each column, and a time or some number."""
         times, others = self._times(line)
         if any(times):
             return bool(_TIMES[self.profile.time.kind].fullmatch(times[-1]))
         return any(_TIMES["seconds"].fullmatch(cell) for cell in others)
 
     def is_of_names(self, line: str) -> bool:
-        """Tell a row of names or units: a word for each column of time, and no number."""
+        """Tell whether a line has names or units: words for the columns of time, no number."""
         times, others = self._times(line.lstrip("#"))
         is_time = bool(times) and bool(_TIMES[self.profile.time.kind].fullmatch(times[-1]))
         return bool(times) and all(times) and not is_time and not any(map(_TIMES["seconds"].fullmatch, others))
 
     def _times(self, line: str) -> tuple[list[str], list[str]]:
-        """Cells of a line that tell the time, and the others; none if there are too few or many."""
+        """Return the time cells of a line, and the others; none if their number is wrong."""
         cells = split_cells(line, self.delimiter)
         if len(cells) not in (len(self.names), len(self.names) + 1) or line.startswith("#"):
             return [], []
@@ -149,13 +153,13 @@ class Fit:
         return [cells[one] for one in at], [cell for one, cell in enumerate(cells) if one not in at]
 
     def _cells(self, line: str) -> list[str]:
-        """Cells of a line beside the header, none where their number is not that of the columns."""
+        """Return the cells of a line near the header; none if their number is wrong."""
         cells = [cell.strip() for cell in split_cells(line.lstrip("# "), self.delimiter)]
         return cells if len(cells) == len(self.names) else []
 
 
 def delimiter_of(line: str, profile: Profile) -> str:
-    """Delimiter of a line that is a header row of a profile, else nothing."""
+    """Return the delimiter of a line that is a header row of a profile, else nothing."""
     wanted = {*profile.required, *profile.time.columns[:2]}
     if not all(name in line for name in wanted):
         return ""
@@ -167,7 +171,7 @@ def delimiter_of(line: str, profile: Profile) -> str:
 
 
 def fit_at(profile: Profile, encoding: str, delimiter: str, lines: Sequence[Line], at: int) -> Fit:
-    """A profile over the header row ``at`` of the lines on top of a file."""
+    """Match a profile to the header row ``at`` of the lines at the top of a file."""
     fit = _with_names(profile, encoding, delimiter, lines, at)
     return replace(
         fit,
@@ -177,7 +181,10 @@ def fit_at(profile: Profile, encoding: str, delimiter: str, lines: Sequence[Line
 
 
 def fit_below(source: Source, before: Fit, place: Place) -> tuple[Fit, int]:
-    """A profile over a header in the middle of a file, and the byte that ends the one before."""
+    """Match a profile to a header inside a file.
+
+    Returns also the byte that ends the rows above.
+    """
     lines = [place.line, *lines_below(source, place.line, before.encoding)]
     fit = _with_names(before.profile, before.encoding, delimiter_of(place.line.text, before.profile), lines, 0)
     count = 0
@@ -188,7 +195,7 @@ def fit_below(source: Source, before: Fit, place: Place) -> tuple[Fit, int]:
 
 
 def _with_names(profile: Profile, encoding: str, delimiter: str, lines: Sequence[Line], at: int) -> Fit:
-    """Names and the lines below them; what stands above is left open."""
+    """Return a match with names and the lines below them, without the lines above."""
     names = _names(lines[at].text, delimiter, profile)
     first = at + 1 + profile.rows_after_header
     fit = Fit(profile, encoding, delimiter, names, lines[at], tuple(lines[at + 1 : first]))

@@ -1,4 +1,4 @@
-"""A profile over the header of a table: the column of each field, as the header tells."""
+"""Layout of a table by a profile: the column of each field, as the header states it."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ _HEIGHTS = {"altitude_ellipsoid_m": "ellipsoid", "altitude_msl_m": "msl"}
 
 @dataclass
 class _Fed:
-    """Rules and derivations that are settled, and what a user must know of them."""
+    """Rules and derivations that are settled, and the remarks on them."""
 
     rules: dict[Key, Rule]
     derivations: list[Derivation]
@@ -34,7 +34,7 @@ class _Fed:
 def layout_of(
     fit: Fit, source: Source, utc_of_zero_ns: int | None, end_byte: int | None
 ) -> tuple[Layout, list[Remark]]:
-    """Layout of the rows below a header, up to ``end_byte``, and what a user must know of it."""
+    """Return the layout of the rows below a header, up to ``end_byte``, and remarks."""
     profile = fit.profile
     time = _time(fit)
     fed = _Fed({}, [], [])
@@ -68,7 +68,7 @@ def _time(fit: Fit) -> TimeRule:
 
 
 def _adapted(rule: ColumnRule, said: Told, remarks: list[Remark]) -> ColumnRule | None:
-    """A rule with the unit and height that the file tells; None if its dimension is another."""
+    """Adapt a rule to the unit and height that the file states; None if of another kind."""
     known = rule.field
     if said.unit is not None and known.unit and said.unit[0] != known.unit:
         if known.unit == "deg" and said.unit[0] == "m":  # (M): magnetic
@@ -88,7 +88,7 @@ def _adapted(rule: ColumnRule, said: Told, remarks: list[Remark]) -> ColumnRule 
 
 
 def _feed(fit: Fit, rule: ColumnRule, at: int, norths: Norths, fed: _Fed) -> None:
-    """Add the rule of a column; of a magnetic direction its values and a derivation."""
+    """Add the rule of a column; for a magnetic direction also a derivation."""
     raw = (fit.profile.raw_topic, fit.label(at))
     north, by = rule.north, ""
     if rule.north and (said := fit.told(at).north):
@@ -124,7 +124,7 @@ def _feed(fit: Fit, rule: ColumnRule, at: int, norths: Norths, fed: _Fed) -> Non
 
 
 def _raw_key(fit: Fit, name: str) -> Key:
-    """Place of a column that no rule names."""
+    """Return raw topic and name of a column that no rule names."""
     return fit.profile.raw_topic, fit.label(fit.position[name])
 
 
@@ -162,7 +162,7 @@ def _raw(fit: Fit, rules: Iterable[Rule], derivations: Sequence[Derivation], tim
 
 
 def _norths(fit: Fit, source: Source, time: TimeRule, utc_of_zero_ns: int | None, end_byte: int | None) -> Norths:
-    """Ask the data which norths directions count from."""
+    """Find from the data which norths directions count from."""
     profile, variation = fit.profile, fit.profile.variation
     directions = {rule.field.name for rule in profile.columns if rule.north and rule.name in fit.position}
     if variation is None or variation.column not in fit.position or not directions:

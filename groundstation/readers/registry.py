@@ -1,4 +1,4 @@
-"""Finds the reader of a file by its content.
+"""Registry of the readers: find the one for a file by its content.
 
 Built-in readers are listed here; third parties add theirs through entry points of the group
 ``groundstation.readers``: a module or object with ``NAME``, ``sniff(source)`` and ``read(source)``. A plug-in that
@@ -49,7 +49,7 @@ _BUILT_IN: tuple[Reader, ...] = (
 
 @dataclass(frozen=True)
 class Format:
-    """A format that can be read: reader's name, one line on it, and where the reader comes from."""
+    """Readable format: the reader's name, one line on it, and the reader's origin."""
 
     name: str
     summary: str
@@ -94,7 +94,7 @@ def _readers() -> dict[str, Reader]:
 
 
 def plug_in_failures() -> tuple[str, ...]:
-    """One line for each third-party reader that could not be loaded."""
+    """List one line for each third-party reader that could not be loaded."""
     return _plug_ins()[1]
 
 
@@ -152,7 +152,10 @@ def read(path: str | Path | Source, profile: Path | None = None, icds: "Sequence
 
 
 def _in_silence(items: Iterator[Item]) -> Iterator[Item]:
-    """Items of a reader without the warnings of numpy: a log may hold any number, and the ledger flags what is odd."""
+    """Yield the items of a reader without numpy's warnings.
+
+    A log may hold any number; the ledger flags odd ones.
+    """
     while True:
         with np.errstate(all="ignore"):
             item = next(items, None)
@@ -162,12 +165,12 @@ def _in_silence(items: Iterator[Item]) -> Iterator[Item]:
 
 
 def _of_the_source(source: Source) -> Iterator[Item]:
-    """Damage of the compressed file; known only when all was read."""
+    """Yield the damage of the compressed file, which is known when all was read."""
     yield from source.damages()
 
 
 def _guarded(reader: Reader, claim: Claim, source: Source) -> Iterator[Item]:
-    """Items of a stranger's reader; whatever it raises becomes one line."""
+    """Yield the items of a third-party reader; whatever it raises becomes one line."""
     try:
         yield from reader.read(source)
     except GroundstationError:
@@ -191,7 +194,9 @@ def _claim(source: Source, profile: Path | None) -> tuple[Claim, tuple[str, ...]
 
 @np.errstate(all="ignore")
 def unclaimed(path: Path) -> UnclaimedLogError | None:
-    """Why no reader claims a file, found by its first bytes alone, or None where those do not show it.
+    """Return the reason why no reader claims a file, judged by its first bytes alone.
+
+    None where the first bytes do not show it.
 
     Nothing is decompressed, and no plug-in is asked: where there is one, only :func:`identify` tells.
     """
@@ -210,7 +215,7 @@ def unclaimed(path: Path) -> UnclaimedLogError | None:
 
 
 def _claims(source: Source) -> tuple[list[Claim], list[GroundstationError], list[str]]:
-    """Who claims a file, who refuses it, and troubles with plug-ins."""
+    """Return the claims on a file, the refusals, and troubles with plug-ins."""
     claims: list[Claim] = []
     refusals: list[GroundstationError] = []
     troubles = list(plug_in_failures())
@@ -231,14 +236,19 @@ def _claims(source: Source) -> tuple[list[Claim], list[GroundstationError], list
 
 
 def _are_sure(claims: list[Claim], source: Source) -> bool:
-    """Whether nobody need look for rows: a table is claimed, or a format by its first bytes and no text follows."""
+    """Tell whether the claims make a search for rows needless.
+
+    They do when a table is claimed, or a format by its first bytes and no text follows.
+    """
     if any(claim.reader == csv_profile.NAME for claim in claims):
         return True
     return any(claim.confidence == 1.0 for claim in claims) and not magic.is_mostly_text(source)
 
 
 def _best(claims: list[Claim], source: Source) -> Claim:
-    """The claim that the content supports, where the beginning of another log stands in the file or before it.
+    """Choose the claim that the content supports.
+
+    Several claims arise where the beginning of another log stands in the file or before it.
 
     In what is mostly text the built-in readers of binary logs come last, in all else those of tables. A reader of
     binary logs that finds no record gives way.
@@ -253,7 +263,7 @@ def _best(claims: list[Claim], source: Source) -> Claim:
 
 
 def _has_records(claim: Claim, source: Source) -> bool:
-    """Whether a built-in reader finds any record."""
+    """Tell whether a built-in reader finds any record."""
     try:
         return any(isinstance(item, RecordBatch) for item in _readers()[claim.reader].read(source))
     except GroundstationError:
@@ -261,7 +271,7 @@ def _has_records(claim: Claim, source: Source) -> bool:
 
 
 def _own(claim: Any, name: str) -> Claim | None:
-    """A reader's answer, as its own claim."""
+    """Return a reader's answer as our own claim."""
     if claim is None:
         return None
     return Claim(name, str(claim.detail), float(claim.confidence))

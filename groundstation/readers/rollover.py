@@ -25,15 +25,16 @@ from groundstation.base.units import NS_PER_S
 
 CODE = "week_rollover"
 _MOST = 3  # rollovers: 59 years
-_YEARS_IN_USE = 12  # of a firmware or a receiver, after it came
+_YEARS_IN_USE = 12  # years that a firmware or a receiver stays in use after its release
 _DAY_NS = 86_400 * NS_PER_S
 
 
 @dataclass(frozen=True)
 class Earliest:
-    """Year before which something in the log did not exist: ``PX4 v1.11``.
+    """Year before which something in the log did not exist, such as ``PX4 v1.11``.
 
-    ``moves`` is False of what stays in use for decades, as a format: it shows that a date is wrong, not by how much.
+    ``moves`` is False for what stays in use for decades, such as a format: it shows that a date is wrong, not by how
+    much.
     """
 
     year: int
@@ -43,7 +44,7 @@ class Earliest:
 
 @dataclass(frozen=True)
 class OtherDate:
-    """UTC of the same moment by another clock of the log, good to ``within_days``."""
+    """UTC of the same moment by another clock of the log, within ``within_days``."""
 
     name: str
     utc_ns: int
@@ -52,13 +53,13 @@ class OtherDate:
 
 @dataclass(frozen=True)
 class Rollovers:
-    """Number of rollovers that a date is behind, and remarks on it."""
+    """Number of rollovers that a date lags, and remarks on it."""
 
     count: int = 0
     remarks: tuple[Remark, ...] = ()
 
     def shift_ns(self, told_ns: int, *, is_gps_time: bool) -> int:
-        """Nanoseconds to add to a UTC that was told, or made of GPS time on the day told.
+        """Return the nanoseconds to add to stated UTC, or to UTC made of GPS time that day.
 
         Examples
         --------
@@ -78,7 +79,7 @@ def rollovers(
     earliest: Earliest | None = None,
     others: tuple[OtherDate, ...] = (),
 ) -> Rollovers:
-    """Count the rollovers that a date is behind the true one, as far as the log shows.
+    """Count the rollovers that a date lags the true one, as far as the log shows.
 
     Parameters
     ----------
@@ -121,7 +122,7 @@ that day had 13; read as 2024-05-06')
 def _shown(
     told_ns: int, leap_s: int | None, earliest: Earliest | None, others: tuple[OtherDate, ...]
 ) -> Iterator[tuple[int, str]]:
-    """Rollovers that each piece of evidence shows, the surest first."""
+    """Yield the rollovers that each piece of evidence shows, the surest first."""
     later = [(count, told_ns + count * ROLLOVER_NS) for count in range(1, _MOST + 1)]
     if leap_s is not None and leap_s > leap_seconds_at(told_ns):
         count = next((count for count, utc_ns in later if leap_seconds_at(utc_ns) >= leap_s), 0)

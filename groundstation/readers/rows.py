@@ -1,4 +1,6 @@
-"""Cuts a delimited file into blocks of sound rows; what is damaged is counted and left out.
+"""Cut a delimited file into blocks of sound rows.
+
+Damaged rows are counted and left out.
 
 The scanner looks at bytes alone (vectorised): a row is sound when it has the number of cells that the header has. So
 one flipped bit costs a row or a cell, never the rest of a block, and the CSV parser needs no quoting rules.
@@ -30,19 +32,19 @@ _QUOTED_DELIMITER = "\x1f"  # takes the place of a delimiter inside quotes until
 
 @dataclass(frozen=True)
 class Block:
-    """Sound rows as UTF-8 text, each ended by a line feed, and the line number (from 1) of each."""
+    """Sound rows as UTF-8 text, each ended by a line feed, and their line numbers (from 1)."""
 
     text: bytes
     line_numbers: Int64Array
 
 
 def restore_delimiters(text: str, delimiter: str) -> str:
-    """Give a text cell the delimiters back that stood inside quotes."""
+    """Restore the delimiters that stood inside quotes in a text cell."""
     return text.replace(_QUOTED_DELIMITER, delimiter)
 
 
 class RowScanner:
-    """Iterates over the blocks of sound rows of a source; counts losses into ``losses``."""
+    """Iterator over the blocks of sound rows of a source; counts losses into ``losses``."""
 
     def __init__(self, source: Source, dialect: Dialect, losses: Losses) -> None:
         self._source, self._dialect, self._losses = source, dialect, losses
@@ -71,7 +73,10 @@ class RowScanner:
         return data
 
     def _pieces(self, stream: BinaryIO) -> Iterator[tuple[bytes, bool]]:
-        """Pieces of whole lines; the last line of a file that ends without a line feed comes alone, marked as cut."""
+        """Yield pieces of whole lines.
+
+        The last line of a file that ends without a line feed comes alone, marked as cut.
+        """
         rest = b""
         while data := self._read(stream):
             if self._newline != b"\n":
@@ -102,7 +107,7 @@ class RowScanner:
         return b""
 
     def _clean(self, piece: bytes) -> bytes:
-        """UTF-8 text with LF line ends; bytes that cannot stand in a text are replaced by a mark."""
+        """Return UTF-8 text with LF line ends; a mark replaces bytes that are no text."""
         if not piece.isascii():
             encoding = self._dialect.encoding
             piece = piece.decode(encoding, errors="replace").encode("utf-8")
@@ -163,7 +168,9 @@ class RowScanner:
 
 
 def without_quotes(text: bytes, delimiter: str) -> bytes:
-    """Take the quotes off cells; delimiters inside quotes become a mark (see :func:`restore_delimiters`).
+    """Remove the quotes around cells.
+
+    Delimiters inside quotes become a mark (see :func:`restore_delimiters`).
 
     Where every quote opens or closes a whole cell the quotes are simply cut out; else the lines that have quotes
     are taken one by one. A quote that does not match anything stays: it makes its own cell unreadable, no other.

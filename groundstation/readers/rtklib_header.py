@@ -53,13 +53,13 @@ class Form:
     metadata: Mapping[str, str]
 
     def reads_as(self, other: "Form") -> bool:
-        """Tell whether rows mean the same by another header."""
+        """Tell whether rows mean the same under another header."""
         return self == replace(other, metadata=self.metadata)
 
 
 @dataclass(frozen=True)
 class Governed:
-    """A form, and line and byte of its first row; ``end_byte`` begins the next header."""
+    """Form with line and byte of its first row; ``end_byte`` begins the next header."""
 
     form: Form
     first_line: int
@@ -68,7 +68,7 @@ class Governed:
 
 
 def form_of(source: Source) -> Governed | None:
-    """The header on top of a file; None where it is none of a solution."""
+    """Return the header at the top of a file; None where it is not RTKLIB's."""
     if not source.head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"%"):
         return None
     top: list[Line] = []
@@ -81,7 +81,7 @@ def form_of(source: Source) -> Governed | None:
 
 
 def forms_of(source: Source, first: Governed) -> tuple[list[Governed], Damage | None]:
-    """Headers of a file that change how rows are read, and what is left out behind too many."""
+    """Find the headers that change how rows are read; damage where there are too many."""
     governed = [first]
     last = Line(first.first_line - 1, first.first_byte, "", True)
     for block, start in _blocks(source, last):
@@ -96,7 +96,7 @@ def forms_of(source: Source, first: Governed) -> tuple[list[Governed], Damage | 
 
 
 def _blocks(source: Source, last: Line) -> Iterator[tuple[list[Line], int]]:
-    """Lines behind the first header that begin with a percent sign, neighbours together."""
+    """Yield runs of lines after the first header that begin with a percent sign."""
     block: list[Line] = []
     begin = 0
     for line, start in lines_with(source, last, "utf-8", _PERCENT):
@@ -112,7 +112,7 @@ def _blocks(source: Source, last: Line) -> Iterator[tuple[list[Line], int]]:
 
 
 def _form(source: Source, block: Sequence[Line], before: Form | None) -> Form | None:
-    """Form told by a block of lines; None where it changes nothing.
+    """Return the form that a block of lines states; None where it changes nothing.
 
     A line of names begins anew: what the lines around it do not say is not known. Without one, or where the same line
     of names stands alone, what they say is added to what was known.
@@ -144,7 +144,7 @@ def _cell_names(words: Sequence[str]) -> tuple[str, ...]:
 
 
 def _first_row(source: Source, start: int) -> bytes:
-    """The beginning of the first row, its date or week."""
+    """Return the beginning of the first row, its date or week."""
     if start < len(source.head) - 64:
         return source.head[start : start + 64].lstrip(b" \t\r\n")[:12]
     with source.open() as stream:
@@ -153,7 +153,7 @@ def _first_row(source: Source, start: int) -> bytes:
 
 
 def _reference(text: str) -> Place | None:
-    """Place of the base station: degrees, d m s, or ECEF; its numbers may touch.
+    """Return the place of the base station: degrees, d m s, or ECEF; numbers may touch.
 
     Examples
     --------

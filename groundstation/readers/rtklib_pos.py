@@ -1,4 +1,6 @@
-"""RTKLIB solutions (.pos): position and velocity of a receiver with their covariances, every column kept.
+"""RTKLIB solutions (.pos): position and velocity of a receiver with their covariances.
+
+Every column is kept.
 
 The line of names says which form it is: latitude and longitude (degrees, or degrees, minutes and seconds), ECEF, or a
 baseline east, north, up from the base station; in GPS time, UTC or Japan's, as date and time or as week and second. A
@@ -38,7 +40,7 @@ NAME = "rtklib-pos"
 RAW = "raw.pos"
 _PARTING = re.compile(rb"[ \t]+(?:[,;][ \t]*)?|[,;][ \t]*")
 _TOUCHING = re.compile(rb"(?<=[0-9.])(?=[-+][0-9.])")
-_OF_NO_ROW = re.compile(rb"(?m)^\t?%[^\n]*|^\t|\t?\r?$")  # of lines whose cells are parted by tabs
+_OF_NO_ROW = re.compile(rb"(?m)^\t?%[^\n]*|^\t|\t?\r?$")  # parts to drop of lines whose cells are separated by tabs
 _PLUS, _MINUS, _POINT, _DIGITS_FROM, _DIGITS_TO = b"+-.09"
 _FIXES = np.array(["none", "rtk_fixed", "rtk_float", "dgnss", "dgnss", "3d", "ppp", "dead_reckoning"])
 _JST_NS = 9 * 3_600 * NS_PER_S
@@ -52,7 +54,7 @@ def sniff(source: Source) -> Claim | None:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, rows as ``raw.pos`` and as ``gnss``, then remarks and damages."""
+    """Yield the header, rows as ``raw.pos`` and as ``gnss``, remarks and damage."""
     first = form_of(source)
     if first is None:
         raise UnreadableLogError(source.name, "no line of names", "%  GPST latitude(deg) ... of RTKLIB")
@@ -68,7 +70,7 @@ def read(source: Source) -> Iterator[Item]:
 
 
 def _rows(source: Source, governed: Sequence[Governed], losses: Losses) -> Iterator[Item]:
-    """Rows below headers that name the same columns."""
+    """Yield the rows below headers that name the same columns."""
     from groundstation.readers.table_reader import TableReader
 
     form, first = governed[0].form, governed[0]
@@ -98,7 +100,10 @@ def _rows(source: Source, governed: Sequence[Governed], losses: Losses) -> Itera
 
 
 class _Tabs(io.RawIOBase):
-    """The rows of a file with one tab between cells; lines stay lines. At most ``left`` bytes of it are read."""
+    """Rows of a file with one tab between cells; lines stay lines.
+
+    At most ``left`` bytes of the file are read.
+    """
 
     def __init__(self, stream: BinaryIO, left: int | None) -> None:
         self._stream, self._left, self._rest, self._ready = stream, left, b"", b""
@@ -110,7 +115,7 @@ class _Tabs(io.RawIOBase):
         return True
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """The rows are read once, from the first on."""
+        """Return 0 without moving: the rows are read once, from the first on."""
         return 0
 
     def close(self) -> None:
@@ -134,7 +139,7 @@ class _Tabs(io.RawIOBase):
 
 
 def _parted(rows: bytes) -> bytes:
-    """Rows with a tab between numbers that touch: where a digit stands right before a sign.
+    """Insert a tab between numbers that touch: where a sign follows a digit.
 
     Examples
     --------
@@ -151,7 +156,10 @@ def _parted(rows: bytes) -> bytes:
 
 @dataclass(frozen=True)
 class _Tabbed(Source):
-    """Another source, rows parted by tabs, from ``first_byte`` to ``end_byte`` (None: end)."""
+    """Another source with tabs between cells, from ``first_byte`` to ``end_byte``.
+
+    ``end_byte`` None is the end of the file.
+    """
 
     whole: Source
     first_byte: int
@@ -159,11 +167,11 @@ class _Tabbed(Source):
 
     @property
     def head(self) -> bytes:
-        """That of the whole file."""
+        """Head of the whole file."""
         return self.whole.head
 
     def open(self) -> BinaryIO:
-        """The rows, from the first on."""
+        """Open the rows, from the first on."""
         stream = self.whole.open()
         stream.seek(self.first_byte)
         return io.BufferedReader(_Tabs(stream, None if self.end_byte is None else self.end_byte - self.first_byte))
@@ -187,7 +195,7 @@ def _in_utc(batch: RecordBatch, form: Form) -> RecordBatch:
 
 
 def _gnss(batch: RecordBatch, form: Form, losses: Losses) -> RecordBatch | None:
-    """The canonical row of each solution."""
+    """Return the canonical row of each solution."""
     columns = _Cells(batch)
     found = _placed(_position(columns, form), batch, losses)
     if "Q" in columns:
@@ -215,7 +223,7 @@ class _Cells(dict[str, Column]):
         super().__init__(batch.columns)
 
     def vector(self, *names: str) -> tuple[FloatArray, Any] | None:
-        """Three columns as (n, 3), and where all are present; None where the form lacks one."""
+        """Return three columns as (n, 3), and where all are present; None if one is missing."""
         if not all(name in self for name in names):
             return None
         parts = [self[name] for name in names]
@@ -249,7 +257,7 @@ def _of_minutes(columns: _Cells, name: str) -> Column:
 
 
 def _of_vectors(columns: _Cells, form: Form) -> dict[str, Column]:
-    """Positions in ECEF, or east, north, up of a base station whose place the file tells."""
+    """Return positions in ECEF, or east, north, up of a base station with a known place."""
     ecef, baseline = (
         columns.vector("x-ecef", "y-ecef", "z-ecef"),
         columns.vector("e-baseline", "n-baseline", "u-baseline"),

@@ -1,8 +1,9 @@
-"""SBET, the smoothed best estimate of trajectory of an INS with GNSS: records of 17 doubles without a header.
+"""SBET, the smoothed best estimate of trajectory of an INS with GNSS.
 
-Times are seconds of the GPS week; which week, the file does not say: a date in its name does (``sbet_20250708.out``),
-else the flight has no date. Beside ``sbet_X.out`` stands ``smrmsg_X.out`` with the accuracies, which are read along.
-Heading and velocity are those of a platform that a wander angle turns from north: which way, the positions tell.
+The file has records of 17 doubles and no header. Times are seconds of the GPS week. The file does not say which week: a
+date in its name does (``sbet_20250708.out``), else the flight has no date. The accuracies stand in ``smrmsg_X.out``
+beside ``sbet_X.out``, and are read along. Heading and velocity are those of a platform that a wander angle turns from
+north; the positions tell which way.
 
 Source: Applanix, POSPac MMS file formats (SBET, SMRMSG).
 """
@@ -43,22 +44,25 @@ _LOOKED_AT, _JUDGED = 200, 4_096  # records
 _DATE = re.compile(r"(?<!\d)(20\d\d)[-_.]?([01]\d)[-_.]?([0-3]\d)(?!\d)")
 _PLACE = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m")
 _MODE = "gnss_aided"
-_MOST_APART_S = 5.0  # of two accuracies between which one is interpolated
+_MOST_APART_S = 5.0  # largest gap between two accuracies that is interpolated
 _NS_PER_MS = 1_000_000
 _SPECIFIC_FORCE = (0.8 * MPS2_PER_G, 1.2 * MPS2_PER_G)
 
 
 @dataclass(frozen=True)
 class _Sense:
-    """What the file does not say and its data tell: ``wander_sign`` turns heading and velocity back, ``force_sign``
-    makes the accelerations a specific force (0: they are without gravity)."""
+    """Signs that the file does not state, found in its data.
+
+    ``wander_sign`` turns heading and velocity back, ``force_sign`` makes the accelerations a specific force (0: they
+    are without gravity).
+    """
 
     wander_sign: int
     force_sign: int
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim a file whose records are places on Earth in order, as near as the speeds say.
+    """Claim a file whose records are consecutive places on Earth, as near as speeds say.
 
     Some hundred records are looked at on top, and of a longer file in its middle or at its end.
     """
@@ -73,7 +77,10 @@ def sniff(source: Source) -> Claim | None:
 
 
 def _records_at(source: Source, first: int) -> NDArray[Any]:
-    """Some records from one on; behind damage that has moved them, from where they begin again."""
+    """Read some records from number ``first`` on.
+
+    Where damage has shifted them, they are read from the place where they begin again.
+    """
     with source.open() as stream:
         stream.seek(first * RECORD.itemsize)
         data = stream.read(2 * _LOOKED_AT * RECORD.itemsize)
@@ -84,7 +91,10 @@ def _records_at(source: Source, first: int) -> NDArray[Any]:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, then ``ins`` and ``raw.sbet``, remarks, and a last record that was cut."""
+    """Yield the header, ``ins`` and ``raw.sbet``, remarks, and damage.
+
+    A last record that was cut is damage.
+    """
     head = np.frombuffer(source.head, RECORD, len(source.head) // RECORD.itemsize)
     if not len(head):
         raise UnreadableLogError(source.name, "less than one record", f"{RECORD.itemsize} bytes", "the file was cut")
@@ -113,21 +123,24 @@ class _Placeless:
     last: int = 0
 
     def add(self, first: int, is_placed: NDArray[np.bool_]) -> None:
-        """Count those of some records."""
+        """Count the records without a place among some."""
         none = np.flatnonzero(~is_placed)
         if len(none):
             self.first = self.first if self.count else first + int(none[0])
             self.count, self.last = self.count + len(none), first + int(none[-1])
 
     def damages(self) -> Iterator[Damage]:
-        """One that tells of them, where there are any."""
+        """Yield one damage for all records without a place, if there are any."""
         if self.count:
             place = f"record {self.first}" if self.count == 1 else f"records {self.first} to {self.last}"
             yield Damage("no_position", place, self.count, NO_POSITION, "ins", loses_data=False)
 
 
 class _Walk:
-    """Iterates over the sound records of a file; behind a damaged one the next is looked for at every byte."""
+    """Iterator over the sound records of a file.
+
+    After a damaged record the next one is searched for at every byte.
+    """
 
     def __init__(self, source: Source) -> None:
         self._source, self._skipped = source, SkippedBytes("record")
@@ -145,17 +158,17 @@ class _Walk:
             self._finish(base, base + len(data))
 
     def damages(self) -> Iterator[Damage]:
-        """What belongs to no record, and a last record that was cut."""
+        """Yield the bytes that belong to no record, and a last record that was cut."""
         yield from self._skipped.damages()
         if self._cut is not None:
             what = "bytes of a record that was cut"
             yield Damage("truncated", bytes_place(*self._cut), self._cut[1] - self._cut[0], what)
 
     def _of(self, data: bytes, base: int) -> Generator[NDArray[Any], None, int]:
-        """Records of the data at hand; returns how many bytes are done with."""
+        """Yield the records of the data at hand; return how many bytes are done."""
         at, origin, records = 0, 1, np.zeros(0, RECORD)
         while len(data) - at >= RECORD.itemsize:
-            if (at - origin) % RECORD.itemsize or at >= origin + records.nbytes:  # others than those judged already
+            if (at - origin) % RECORD.itemsize or at >= origin + records.nbytes:  # places not judged already
                 count = min((len(data) - at) // RECORD.itemsize, _JUDGED)
                 origin, records = at, np.frombuffer(data, RECORD, count, at)
                 damaged = np.append(np.flatnonzero(~are_sound(records)), len(records))
@@ -168,7 +181,7 @@ class _Walk:
             if len(data) - at < RECORD.itemsize or first + count == len(records):
                 continue
             found = next_start(data, at + 1)
-            if found is None:  # what is left may begin a record that the next block ends
+            if found is None:  # the rest may begin a record that the next block ends
                 tail = len(data) - (IN_A_ROW + 1) * RECORD.itemsize
                 found = tail if at < tail else len(data)
             self._skipped.add(base + at, base + found, self._count)
@@ -184,7 +197,10 @@ class _Walk:
 
 
 def _week_of(name: str, first_s: float) -> int | None:
-    """GPS week by the date in the name of the file: that of the day, or the one in which the first second lies."""
+    """Return the GPS week by the date in the name of the file.
+
+    It is the week of that day, or the one in which the first second lies.
+    """
     match = _DATE.search(name)
     if match is None:
         return None
@@ -206,7 +222,10 @@ def _time(week: int | None, week_s: FloatArray) -> Column:
 
 
 def _sense_of(records: NDArray[Any]) -> _Sense:
-    """Compare the velocities with the way between the first records, and the accelerations with gravity."""
+    """Find the signs by comparing velocities and accelerations with the first positions.
+
+    Velocities are compared with the way between the first records, accelerations with gravity.
+    """
     with np.errstate(all="ignore"):
         meridian, normal = curvature_radii_m(np.rad2deg(records["latitude"]))
         step_s = np.diff(records["time"])
@@ -226,7 +245,10 @@ def _sense_of(records: NDArray[Any]) -> _Sense:
 
 
 def _turned(records: NDArray[Any], wander_sign: int) -> tuple[FloatArray, FloatArray]:
-    """Velocities north and east, the platform's x axis standing at ``wander_sign`` times the wander angle."""
+    """Return the velocities north and east.
+
+    The platform's x axis stands at ``wander_sign`` times the wander angle.
+    """
     azimuth = wander_sign * records["wander_angle"]
     x, y = records["x_velocity"], records["y_velocity"]
     return x * np.cos(azimuth) - y * np.sin(azimuth), x * np.sin(azimuth) + y * np.cos(azimuth)
@@ -269,13 +291,16 @@ def _batches(
 
 
 def accuracies_beside(path: Path) -> Path | None:
-    """Where the accuracies of an SBET would stand; None where the name of the file tells of none."""
+    """Return the path where the accuracies of an SBET would stand.
+
+    None where the file's name does not begin with ``sbet``.
+    """
     name, is_sbet = re.subn(r"(?i)^sbet", "smrmsg", path.name)
     return path.with_name(name) if is_sbet else None
 
 
 def _accuracies(path: Path) -> NDArray[Any]:
-    """Records of the file of accuracies beside an SBET; none where there is no such file."""
+    """Read the accuracies beside an SBET; none where there is no such file."""
     beside = accuracies_beside(path)
     if beside is None:
         return np.zeros(0, ACCURACY)
@@ -292,7 +317,7 @@ def _accuracies(path: Path) -> NDArray[Any]:
 
 
 def _sigmas(week_s: FloatArray, accuracies: NDArray[Any]) -> dict[str, Column]:
-    """Accuracies at the times of the records, interpolated between two that are near."""
+    """Interpolate accuracies to the times of the records, between two that are near."""
     if len(accuracies) < 2:
         return {}
     times = unrolled_s(accuracies["time"])

@@ -1,4 +1,4 @@
-"""Records of an SBET: their layout, which bytes are one, where the next one begins.
+"""Records of an SBET: their layout, which bytes are records, where the next one begins.
 
 Source: Applanix, POSPac MMS file formats (SBET, SMRMSG).
 """
@@ -93,7 +93,7 @@ def next_start(data: bytes, at: int) -> int | None:
 
 
 def unrolled_s(week_s: FloatArray) -> FloatArray:
-    """Seconds of the week that count on past its end; what is no number stays."""
+    """Count seconds of the week on past its end; a NaN stays."""
     finite = np.isfinite(week_s) & (np.abs(week_s) < 1e9)
     ms = unrolled((np.where(finite, week_s, 0.0) * 1e3).astype(np.int64), S_PER_WEEK * 1000)
     turns = np.round((ms / 1e3 - np.where(finite, week_s, 0.0)) / S_PER_WEEK)
@@ -115,7 +115,10 @@ def are_sound(records: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 def _are_zeros_of_a_record(records: NDArray[Any]) -> NDArray[np.bool_]:
-    """Tell which records with next to no latitude are some: it is 0, and beside a place of 0, 0 stands something."""
+    """Tell which records with a latitude of 0 are real records.
+
+    Their latitude is exactly 0, and the longitude or another value is not.
+    """
     is_one = np.logical_or.reduce([records[name] != 0.0 for name in ("altitude", "x_velocity", "platform_heading")])
     is_one &= records["time"] > 0.0
     return np.asarray((records["latitude"] == 0.0) & ((records["longitude"] != 0.0) | is_one))

@@ -45,7 +45,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Place:
-    """A header line, and the lines above it up to the header before, each with its first byte."""
+    """Header line, and the lines between it and the header before, with their first bytes."""
 
     line: Line
     first_byte: int
@@ -78,7 +78,7 @@ def header_places(
 
 
 def mark_of(name: str) -> re.Pattern[bytes]:
-    """A mark of header lines: a name in them, or a letter at their beginning if it is short."""
+    """Return a mark of header lines: a name in them, or a first letter if it is short."""
     return _WORD if len(name) <= _SHORT else re.compile(re.escape(name.encode()))
 
 
@@ -133,12 +133,12 @@ def _separator(source: Source) -> bytes:
 
 
 def ended(section: Section, end_byte: int) -> Section:
-    """A section whose rows end where the next header, or what belongs to it, begins."""
+    """Return a section whose rows end at ``end_byte``, where the next header begins."""
     return replace(section, dialect=replace(section.dialect, end_byte=end_byte))
 
 
 def left_out(source: Source, line: int, first_byte: int) -> Damage:
-    """Damage that tells of the lines from a header on that is one too many."""
+    """Return damage for the lines from a header on that is one too many."""
     with source.open() as stream:
         count = _count(stream, first_byte, source.size, _separator(source))
     what = f"lines behind the first {MOST} headers, each unlike the one before: left out"
@@ -146,12 +146,15 @@ def left_out(source: Source, line: int, first_byte: int) -> Damage:
 
 
 def without_headers(section: Section) -> Section:
-    """A section in which no header line stands again: nothing to look for."""
+    """Return a section in which no repeated header line is looked for."""
     return replace(section, dialect=replace(section.dialect, header_lines=frozenset()))
 
 
 def told(place: Place, is_same: bool, shift_ns: int | None = 0) -> Remark:
-    """A remark on a header of other columns, or of another time, that governs the rows below."""
+    """Return a remark on a header inside the file: it has other columns, or another time.
+
+    The header governs the rows below it.
+    """
     what = "is that of a log with another zero of time" if is_same else "names other columns"
     text = f"the header in row {place.line.number} {what}: it governs the rows below it"
     if shift_ns is None:

@@ -1,4 +1,7 @@
-"""Bytes of a binary log that belong to no record: the first stretches one by one, the others together."""
+"""Bytes of a binary log that belong to no record.
+
+The first stretches are reported one by one, the others together.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -10,7 +13,7 @@ STRETCHES_SHOWN = 20
 
 
 class _Stretch(NamedTuple):
-    """First byte, the first after it, and the index of the first record behind it."""
+    """First byte, end byte (exclusive), and index of the first record behind it."""
 
     start: int
     end: int
@@ -19,7 +22,7 @@ class _Stretch(NamedTuple):
 
 @dataclass
 class SkippedBytes:
-    """Stretches in the order of the file.
+    """Skipped stretches of bytes in the order of the file.
 
     Parameters
     ----------
@@ -41,7 +44,7 @@ class SkippedBytes:
     _other_ends: tuple[_Stretch, ...] = ()
 
     def __bool__(self) -> bool:
-        """Whether there is any."""
+        """Tell whether any bytes were skipped."""
         return bool(self._shown)
 
     def add(self, start: int, end: int, index: int) -> None:
@@ -54,7 +57,7 @@ class SkippedBytes:
         self._other_ends = (*self._other_ends[:1], stretch)
 
     def damages(self) -> Iterator[Damage]:
-        """What was skipped, in the order of the file."""
+        """Yield the skipped bytes as damage, in the order of the file."""
         what = f"bytes that belong to no {self.record}"
         for start, end, behind in self._shown:
             place = bytes_place(start, end)
@@ -69,5 +72,5 @@ class SkippedBytes:
 
 
 def bytes_place(start: int, end: int) -> str:
-    """Where bytes stand, ``end`` being the first after them."""
+    """Return the text that says where bytes stand; ``end`` is the first after them."""
     return f"byte {start}" if end - start == 1 else f"bytes {start} to {end - 1}"

@@ -1,4 +1,7 @@
-"""A log file as readers see it before one of them claims it; gzip and zstd files are seen decompressed."""
+"""Log file as readers see it before one of them claims it.
+
+Files in gzip and zstd are seen decompressed.
+"""
 
 import io
 from collections.abc import Iterator
@@ -17,7 +20,7 @@ HEAD_BYTES = 1 << 20  # a header row of 10 000 columns takes about 300 kB
 
 @dataclass(frozen=True)
 class Source:
-    """A file, its size and its first bytes. Nothing is read before it is asked for.
+    """File, its size and its first bytes; nothing is read before it is asked for.
 
     Parameters
     ----------
@@ -38,7 +41,7 @@ class Source:
 
     @property
     def compression(self) -> str:
-        """``gzip``, ``zstd`` or nothing, told by the content (something must come out of it)."""
+        """Compression, ``gzip``, ``zstd`` or empty, by the content (it must decompress)."""
         return self._beginning[0]
 
     @property
@@ -76,7 +79,7 @@ class Source:
 
     @cached_property
     def is_empty(self) -> bool:
-        """Whether the file has no bytes."""
+        """Tell whether the file has no bytes."""
         return self._file_size == 0
 
     @cached_property
@@ -130,12 +133,12 @@ class Claim:
 
 @runtime_checkable
 class Reader(Protocol):
-    """What a reader module (or a third party's object) offers."""
+    """Interface of a reader: a module of ours, or an object of a plug-in."""
 
     NAME: str
 
     def sniff(self, source: Source) -> Claim | None:
-        """Say whether this reader can read the source; looks at ``source.head`` only."""
+        """Claim the source if this reader can read it; looks at ``source.head`` only."""
 
     def read(self, source: Source) -> Iterator[Item]:
-        """Yield the header, then batches, remarks and damages."""
+        """Yield the header, batches, remarks and damage."""

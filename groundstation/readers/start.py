@@ -1,4 +1,4 @@
-"""UTC of a recorder's time zero, from the metadata of a log or a clock that it carries."""
+"""UTC of a recorder's time zero, from the metadata of a log or a clock in it."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -12,7 +12,7 @@ from groundstation.base.records import Int64Array, Remark
 from groundstation.base.timescales import iso_to_utc_ns, leap_seconds_late, whole_weeks
 from groundstation.base.units import NS_PER_S
 
-_FIRST_UTC_NS = iso_to_utc_ns("1678-01-01T00:00:00Z")[0]  # what 64 bits of nanoseconds hold
+_FIRST_UTC_NS = iso_to_utc_ns("1678-01-01T00:00:00Z")[0]  # range that 64 bits of nanoseconds hold
 _LAST_UTC_NS = iso_to_utc_ns("2262-01-01T00:00:00Z")[0]
 _REFERENCES = {
     "reference.parking_heading_deg": (-360.0, 720.0, "a heading in degrees"),
@@ -46,7 +46,9 @@ def _number(text: str) -> float:
 
 
 def utc_of_zero(metadata: Mapping[str, str]) -> tuple[int | None, list[Remark]]:
-    """UTC nanoseconds of device time zero by ``start_utc``, None without it, and what was assumed.
+    """Return the UTC nanoseconds of device time zero by ``start_utc``, and remarks.
+
+    None without ``start_utc``. The remarks tell what was assumed.
 
     Examples
     --------
@@ -65,16 +67,16 @@ def utc_of_zero(metadata: Mapping[str, str]) -> tuple[int | None, list[Remark]]:
     return utc_ns, [] if named_zone else [Remark("assumed_utc", f"start_utc {text} names no zone: read as UTC")]
 
 
-_JUMP_NS = NS_PER_S // 2  # between readings of one level: messages of a receiver come late by less
+_JUMP_NS = NS_PER_S // 2  # jump between two levels; messages of a receiver come late by less
 _SAME_NS = 7 * NS_PER_S // 10  # middles of one level
 _FEWEST, _MOST_PIECES = 3, 1_000  # readings of a level; pieces between jumps, of which more are no levels but noise
-_FEW_READINGS, _FEW = 10, 0.1  # of a level that nothing explains, and as a share of all: fewer are late messages
+_FEW_READINGS, _FEW = 10, 0.1  # readings of an unexplained level, and their share: fewer are late messages
 _HALF_DAY_NS = 43_200 * NS_PER_S
 
 
 @dataclass(frozen=True, eq=False)
 class ToldZero:
-    """UTC of the recorder's zero by the readings of another clock.
+    """UTC of the recorder's time zero by the readings of another clock.
 
     Parameters
     ----------
@@ -92,11 +94,11 @@ class ToldZero:
 
     @property
     def spread_s(self) -> float:
-        """Nine tenths of the readings are within it."""
+        """Spread in seconds that contains nine tenths of the readings."""
         return float(np.quantile(np.abs(self.zeros_ns - self.ns), 0.9)) / NS_PER_S
 
     def remarks(self, clock: str) -> Iterator[Remark]:
-        """A line on each level that does not count; ``clock`` names what told them."""
+        """Yield a remark on each level that does not count; ``clock`` names its source."""
         for count, away_ns in self.passed_over:
             weeks, late_s = whole_weeks(away_ns), leap_seconds_late(away_ns)
             begins = f"{clock}: {count} reading{'s' if count > 1 else ''}"
@@ -127,10 +129,10 @@ class _Level:
 
 
 def told_at_zero(told_ns: Int64Array, device_ns: Int64Array) -> ToldZero:
-    """Time by another clock when the recorder's was at zero.
+    """Return the time by another clock when the recorder's was at zero.
 
-    Of readings that repeat a time only the first counts, for the others are older than they say: a clock may tell whole
-    seconds. When the log's first time was told first is not known where times repeat.
+    Where readings repeat a time only the first counts, for the others are older than they say: a clock may state whole
+    seconds. Where times repeat, it is not known when the log's first time was stated first.
 
     Parameters
     ----------
@@ -150,11 +152,11 @@ def told_at_zero(told_ns: Int64Array, device_ns: Int64Array) -> ToldZero:
 
 
 def zero_of_readings(zeros_ns: Int64Array) -> ToldZero:
-    """Zero by readings of another clock; where that was set, the last level counts.
+    """Return the zero by readings of another clock; if that was set, the last level counts.
 
-    A receiver tells UTC some seconds late until it has heard of the leap seconds, and a date of the past until it knows
-    the week. So the latest date counts, and of levels on that date the last; of a receiver that started again in the
-    log, the level before it fell back.
+    A receiver states UTC some seconds late until it has heard of the leap seconds, and a date of the past until it
+    knows the week. So the latest date counts, and among the levels on that date the last one. If the receiver started
+    again in the log and fell back, it is the level before.
 
     Parameters
     ----------
@@ -186,7 +188,7 @@ def _middle(values: Int64Array) -> int:
 
 
 def _levels(zeros_ns: Int64Array) -> list[_Level]:
-    """Levels of readings in their order; none where all agree, or hardly any two do."""
+    """Group readings into levels; none where all agree, or hardly any two do."""
     jumps = np.flatnonzero(np.abs(np.diff(zeros_ns)) > _JUMP_NS) + 1
     if not 0 < len(jumps) < _MOST_PIECES:
         return []
@@ -206,7 +208,10 @@ def _levels(zeros_ns: Int64Array) -> list[_Level]:
 
 
 def _without_excursions(levels: list[_Level]) -> list[_Level]:
-    """Levels but for late messages: unexplained ones that are short, or after which all is as before."""
+    """Drop levels that late messages cause.
+
+    These are unexplained levels that are short, or after which all is as before.
+    """
     kept: list[_Level] = []
     for at, one in enumerate(levels):
         neighbours = levels[max(at - 1, 0) : at] + levels[at + 1 : at + 2]
@@ -221,7 +226,7 @@ def _without_excursions(levels: list[_Level]) -> list[_Level]:
 
 
 def _goes_on(zeros_ns: Int64Array, level: _Level, first: int, middle_ns: int) -> bool:
-    """Check for a piece of the level before it: after an outlier, or as clocks drift."""
+    """Tell whether readings continue a level: after an outlier, or as clocks drift."""
     _first, stop = level.pieces[-1]
     return (
         abs(middle_ns - level.middle_ns) < _SAME_NS

@@ -1,4 +1,4 @@
-"""Reads a delimited table by its dialect and layout: blocks of rows in, batches of typed columns out."""
+"""Read a delimited table by its dialect and layout, as batches of typed columns."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -41,7 +41,7 @@ MAX_BATCH_BYTES = 32 << 20  # a text field is as wide as its longest value: a ba
 
 
 class TableReader:
-    """Iterator of items over one delimited file, section by section.
+    """Reader of one delimited file, section by section.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class TableReader:
         self._sections = self._settled(sections)
 
     def items(self, header: LogHeader) -> Iterator[Item]:
-        """The header, batches in the order of the file, then remarks and damages."""
+        """Yield the header, batches in the order of the file, remarks and damage."""
         yield header
         lines: dict[int, str] = {}
         facts: dict[int, Mapping[str, str]] = {}
@@ -96,7 +96,7 @@ class TableReader:
         return Column(np.zeros(0, dtype=np.int64))
 
     def _settled(self, sections: Sequence[Section]) -> tuple[Section, ...]:
-        """Sections with ``raw`` settled: float64 where every cell of the file is a number, else text.
+        """Settle columns of kind ``raw``: float64 where every cell is a number, else text.
 
         A column's type must not change between batches, so it takes a pass of its own; only raw columns are parsed. A
         field that is a number by the rule of one section is one in all.
@@ -116,7 +116,7 @@ class TableReader:
         return tuple(settled)
 
     def _texts(self, section: Section, columns: set[int]) -> set[int]:
-        """Those of some columns of a section that have a cell which is no number."""
+        """Return those of some columns of a section that have a cell which is no number."""
         self._dialect = section.dialect
         texts: set[int] = set()
         for block in RowScanner(self._source, section.dialect, Losses()) if columns else ():
@@ -130,7 +130,10 @@ class TableReader:
         return texts
 
     def _parse(self, block: Block, types: Mapping[int, Any], decimal_point: str = ".") -> dict[int, Any]:
-        """Columns of a block as arrow arrays, empty cells null; pa.ArrowInvalid where a type does not fit."""
+        """Return columns of a block as arrow arrays, empty cells null.
+
+        Raises pa.ArrowInvalid where a type does not fit.
+        """
         names = [str(column) for column in range(self._dialect.cells)]
         table = pa_csv.read_csv(
             pa.BufferReader(block.text),
@@ -153,7 +156,10 @@ class TableReader:
         return self._time(arrays, block.line_numbers), self._fields(arrays, block.line_numbers)
 
     def _arrays(self, block: Block, with_time: bool = True) -> dict[int, Any]:
-        """Cells of the columns that have rules, and of the time, as numbers where they can be, else as text."""
+        """Return the cells of the columns that have rules, and of the time.
+
+        As numbers where they can be, else as text.
+        """
         layout = self._layout
         types = {rule.column: pa.float64() if rule.kind == "double" else pa.string() for rule in layout.rules}
         types |= dict.fromkeys(layout.time.columns if with_time else (), pa.string())
@@ -173,7 +179,7 @@ class TableReader:
         return columns
 
     def _places(self) -> Iterator[tuple[str, dict[str, Rule]]]:
-        """Topics whose rows tell a place, and their rules by field; truth is left alone."""
+        """Yield topics whose rows state a position, with rules by field; truth is left out."""
         topics: dict[str, dict[str, Rule]] = {}
         for rule in self._layout.rules:
             topics.setdefault(rule.topic, {})[rule.field] = rule
@@ -184,7 +190,7 @@ class TableReader:
     def _placed(
         self, topic: str, by_field: Mapping[str, Rule], columns: Mapping[Key, Column], lines: Int64Array
     ) -> dict[Key, Column]:
-        """Columns of a topic without values that have no place, and the raw numbers beside them."""
+        """Drop values without a position; keep their raw numbers in raw columns."""
         latitude, longitude = (columns[topic, f"{name}_deg"] for name in ("latitude", "longitude"))
         is_zero = without_place(latitude, longitude)
         self._losses.add("no_position", NO_POSITION, lines[is_zero], topic=topic, loses_data=False)
@@ -243,7 +249,10 @@ class TableReader:
         return cells.numbers(_with_point(array) if self._layout.decimal_comma else array), what
 
     def _on_the_circle(self, rule: Rule, column: Column) -> Column:
-        """Bring headings into [0, 360). Beyond a turn to either side it is no heading: left for the ledger to flag."""
+        """Bring headings into [0, 360).
+
+        A value more than a turn outside is no heading: it is left for the ledger to flag.
+        """
         values = column.values
         astray = ((values < 0.0) | (values >= 360.0)) & (values >= -360.0) & (values <= 720.0) & column.mask
         if not astray.any():
@@ -296,7 +305,7 @@ def _zero_of(header: LogHeader, section: Section) -> int | None:
 
 
 def _shifted(time: Column, shift_ns: int | None) -> Column:
-    """Times by the clock of the log's header; none where nothing tells the shift."""
+    """Return times by the clock of the log's header; none where the shift is unknown."""
     if shift_ns is None:
         return Column(time.values, np.zeros(len(time), dtype=bool))
     return Column(time.values + shift_ns, time.present) if shift_ns else time
@@ -311,7 +320,10 @@ def _occupied(fields: Mapping[str, Column]) -> BoolArray | None:
 
 
 def first_times(source: Source, dialect: Dialect, layout: Layout) -> tuple[Column, int]:
-    """Times of the first block of rows (none when there are no rows), and how many name no zone."""
+    """Return the times of the first block of rows, and how many name no time zone.
+
+    There are no times when there are no rows.
+    """
     reader = TableReader(source, [Section(dialect, replace(layout, rules=(), derivations=()))])
     return reader.first_times(), reader.zoneless
 

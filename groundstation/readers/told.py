@@ -1,4 +1,4 @@
-"""Unit, north and height of a column, as far as its header tells them.
+"""Unit, north and height of a column, as far as its header states them.
 
 ``GPS Ground Track (deg true)``, ``GPS Altitude (WGS84 ft)``; or in a row of its own, ``degrees``, ``ft msl``.
 """
@@ -47,7 +47,7 @@ _SEA = re.compile(r"\ba?msl\b|\bgeoid\b|\begm(?:96|08|2008)?\b", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Told:
-    """Facts told of one column; empty where nothing is.
+    """Facts that a header states of one column; empty where it states none.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Told:
 
 
 def bare(name: str) -> str:
-    """The name of a column without what stands in parentheses.
+    """Return the name of a column without parentheses and their content.
 
     Examples
     --------
@@ -99,7 +99,7 @@ def _unit(text: str) -> tuple[str, float] | None:
 
 
 def _word(texts: Iterable[str], words: Mapping[str, re.Pattern[str]]) -> str:
-    """The meaning of which a text has the words, and those of no other."""
+    """Return the meaning whose words a text has, if it has those of no other."""
     for text in texts:
         found = [meaning for meaning, pattern in words.items() if pattern.search(text.strip())]
         if len(found) == 1:

@@ -1,4 +1,6 @@
-"""A clock against the times at which its readings were received: what arrived late, and which of the two was set.
+"""Comparison of a clock with the times at which its readings were received.
+
+It tells which readings arrived late, and which of the two clocks was set.
 
 Receipt less clock is never below the offset between the two: a reading that waited in a buffer or on a link arrives
 late, none early. The lower envelope of the differences is that offset; where the envelope steps and stays, one of the
@@ -18,22 +20,24 @@ import numpy as np
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
 
-LARGEST_NS = 1 << 62  # of a time: differences of differences fit 64 bits
+LARGEST_NS = 1 << 62  # largest time: differences of differences fit 64 bits
 STEP_S = 1.0  # a smaller step cannot be told from a reading that arrived late
-DRIFT_PPM = 200.0  # of two clocks; crystals are within 100
+DRIFT_PPM = 200.0  # drift between two clocks; crystals are within 100
 MOST_SKEW_PPM = 1_000.0  # a clock that runs worse counts no seconds: a simulation, or one that was stopped
 JUMP_AHEAD_S = 60.0  # a clock that goes ahead by less and stays: older readings were dropped on the way
-FEWEST_READINGS = 4  # of a stretch; fewer are astray
-MOST_ROUNDS = 5  # of leaving out readings astray
-CAUGHT_UP_SHARE = 0.1  # of a step, by which readings behind it may come earlier
+FEWEST_READINGS = 4  # readings of a stretch; fewer are astray
+MOST_ROUNDS = 5  # rounds of leaving out readings astray
+CAUGHT_UP_SHARE = 0.1  # share of a step by which readings after it may come earlier
 MOST_KEPT, RUN = 100_000, 64  # readings that are kept beside the lowest of each run
-MOST_STEPS = 64  # of a log; a clock with more is none
+MOST_STEPS = 64  # steps in a log; a clock with more is no clock
 Stepped: TypeAlias = Literal["", "receipt", "clock"]
 
 
 @dataclass
 class Readings:
-    """Readings of a clock, thinned: those around each jump, and of each run the one that arrived least late.
+    """Readings of a clock, thinned.
+
+    Those around each jump are kept, and of each run the one that arrived least late.
 
     Attributes
     ----------
@@ -47,7 +51,10 @@ class Readings:
     _last: Int64Array = field(default_factory=lambda: np.zeros((4, 0), dtype=np.int64))
 
     def take(self, record_index: Int64Array, receipt_ns: Int64Array, clock_ns: Int64Array) -> None:
-        """Add readings in the order of the log, shape (n,) each; a time that is negative or above 62 bits is none."""
+        """Add readings in the order of the log, shape (n,) each.
+
+        Readings with a time that is negative or above 62 bits are left out.
+        """
         is_time = (receipt_ns >= 0) & (receipt_ns < LARGEST_NS) & (clock_ns >= 0) & (clock_ns < LARGEST_NS)
         if not is_time.all():
             record_index, receipt_ns, clock_ns = record_index[is_time], receipt_ns[is_time], clock_ns[is_time]
@@ -72,14 +79,17 @@ class Readings:
         self._last = rows[:, -1:]
 
     def all(self) -> "Track":
-        """Those that were kept."""
+        """Return the readings that were kept."""
         rows = np.concatenate(self._parts, axis=1) if self._parts else np.zeros((4, 0), dtype=np.int64)
         return Track(*rows)
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Readings in the order of the log, shape (n,) each: record, receipt, clock, and the place among all readings."""
+    """Readings in the order of the log: record, receipt, clock, place among all readings.
+
+    Each has shape (n,).
+    """
 
     record_index: Int64Array
     receipt_ns: Int64Array
@@ -100,7 +110,7 @@ class Track:
 
     @property
     def readings(self) -> int:
-        """How many readings there are from the first to the last."""
+        """Number of readings from the first to the last."""
         return int(self.number[-1] - self.number[0]) + 1 if len(self) else 0
 
 
@@ -128,7 +138,9 @@ class Stretch:
 
 
 def stretches_of(track: Track, *, receipt_step_s: float = STEP_S) -> list[Stretch]:
-    """Stretches between steps; readings astray are left out. One of all where the steps are no steps of a clock.
+    """Part readings into stretches between steps; readings astray are left out.
+
+    All are one stretch where the steps are no steps of a clock.
 
     Parameters
     ----------
@@ -156,7 +168,7 @@ def stretches_of(track: Track, *, receipt_step_s: float = STEP_S) -> list[Stretc
 
 
 def _slips(track: Track) -> BoolArray:
-    """Single readings that are far from those before and behind, which are near each other."""
+    """Tell which single readings are far from two neighbours that are near each other."""
     late_ns, step_ns = track.late_ns, STEP_S * NS_PER_S
     found = np.zeros(len(track), dtype=bool)
     changes = np.abs(np.diff(late_ns)) > step_ns
@@ -195,7 +207,9 @@ def _stretches(track: Track, receipt_step_s: float) -> list[Stretch]:
 def _step_in(
     track: Track, late_ns: Int64Array, start: int, end: int, tolerance_ns: float, ahead_ns: float
 ) -> tuple[int, Stepped]:
-    """The largest step of the lower envelope within some readings: its place, and which clock stepped.
+    """Return the largest step of the lower envelope in some readings: its place and clock.
+
+    The clock is the one that stepped.
 
     The readings step there too. Those that come late after a pause catch up, those of a clock that was set do not.
     """
@@ -224,27 +238,33 @@ def _step_in(
 
 
 def _oddness(change_ns: int) -> float:
-    """How odd a change of a clock from one reading to the next is: one that falls is odder than any that rises."""
+    """Return how odd a change of a clock from one reading to the next is.
+
+    A change that falls is odder than any that rises.
+    """
     return change_ns if change_ns >= -STEP_S * NS_PER_S else -change_ns * 1e6
 
 
 @dataclass(frozen=True)
 class Line:
-    """Receipt less clock of readings that were not late: ``offset_ns`` at ``zero_ns`` of the clock, and its drift."""
+    """Receipt less clock of readings that were not late, as a straight line.
+
+    ``offset_ns`` at ``zero_ns`` of the clock, and its drift.
+    """
 
     zero_ns: int
     offset_ns: int
     drift: float = 0.0
 
     def at(self, clock_ns: Int64Array) -> Int64Array:
-        """What is to be added to times of the clock."""
+        """Return the offset to add to times of the clock, ns."""
         if not self.drift:
             return np.full(len(clock_ns), self.offset_ns, dtype=np.int64)
         return np.asarray(self.offset_ns + np.rint((clock_ns - self.zero_ns) * self.drift).astype(np.int64))
 
 
 def lower_line(track: Track) -> Line:
-    """The line below all differences of receipt and clock that is nearest to them.
+    """Fit the line below all differences of receipt and clock that is nearest to them.
 
     It goes through the edge of their lower hull above which the middle of the clock's times lies. A clock that runs off
     by more than :data:`MOST_SKEW_PPM` counts no seconds: then the least difference holds throughout.
@@ -273,7 +293,10 @@ def lower_line(track: Track) -> Line:
 
 
 def _lower_hull(x: Int64Array, y: Int64Array) -> list[int]:
-    """Places of the corners of the lower hull of points in order of ``x``; of equal ``x`` the lowest."""
+    """Return the places of the corners of the lower hull of points in order of ``x``.
+
+    Of points with equal ``x`` the lowest counts.
+    """
     keep = _lowest(x, y)
     corners: list[int] = []
     for at in keep:
@@ -284,7 +307,7 @@ def _lower_hull(x: Int64Array, y: Int64Array) -> list[int]:
 
 
 def _lowest(x: Int64Array, y: Int64Array) -> Sequence[int]:
-    """The lowest point of each of at most some thousand stretches of ``x``."""
+    """Return the lowest point of each of at most some thousand stretches of ``x``."""
     width = max(int(x[-1] - x[0]) // 4_096, 1)
     cell = (x - x[0]) // width
     order = np.lexsort((y, cell))
@@ -295,6 +318,6 @@ def _lowest(x: Int64Array, y: Int64Array) -> Sequence[int]:
 
 
 def _is_above(x: Int64Array, y: Int64Array, one: int, middle: int, other: int) -> bool:
-    """Whether the point in the middle is not below the line between two."""
+    """Tell whether the middle point is on or above the line between the two others."""
     left = int(y[middle] - y[one]) * int(x[other] - x[one])
     return left >= int(y[other] - y[one]) * int(x[middle] - x[one])

@@ -25,7 +25,7 @@ from groundstation.readers.source import Claim, Source
 
 NAME = "utias"
 MARK = b"# UTIAS Multi-Robot"
-_CAMERA = "raw.camera"  # before its rows are parted by what was seen
+_CAMERA = "raw.camera"  # topic of the rows before they are split by the barcode seen
 _ROBOT = re.compile(r"robot(\d+)_", re.IGNORECASE)
 _DEG = float(np.rad2deg(1.0))
 _RULES: dict[str, tuple[Rule, ...]] = {
@@ -44,7 +44,7 @@ _RULES: dict[str, tuple[Rule, ...]] = {
         Rule(3, _CAMERA, "relative_bearing_deg", "double", -_DEG),
     ),
 }
-_TABLES = {"Barcode Data": 2, "Landmark Groundtruth": 5}  # of a set, with their columns; no logs
+_TABLES = {"Barcode Data": 2, "Landmark Groundtruth": 5}  # tables of a data set and their columns; they are no logs
 MOST_BARCODE = 999
 
 
@@ -57,7 +57,10 @@ class Landmark(NamedTuple):
 
 
 def _kind(source: Source) -> str:
-    """What a file of the set holds, by the lines on its top; empty for any other file."""
+    """Return what a file of the data set holds, by the lines at its top.
+
+    Empty for any other file.
+    """
     if not source.head.removeprefix(b"\xef\xbb\xbf").startswith(MARK):
         return ""
     top = source.head[:2000].decode("utf-8", errors="replace")
@@ -73,7 +76,7 @@ def sniff(source: Source) -> Claim | None:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, batches, remarks and damages of a file of a robot."""
+    """Yield the header, batches, remarks and damage of a file of a robot."""
     from groundstation.readers.table_reader import TableReader
 
     kind = _kind(source)
@@ -98,7 +101,10 @@ def read(source: Source) -> Iterator[Item]:
 
 
 def _by_barcode(items: Iterator[Item]) -> Iterator[Item]:
-    """Rows of the camera by the barcode they tell of; those without one are counted and left out."""
+    """Split the rows of the camera by barcode.
+
+    Rows without a barcode are counted and left out.
+    """
     losses = Losses()
     for item in items:
         if not isinstance(item, RecordBatch):
@@ -120,7 +126,7 @@ def _by_barcode(items: Iterator[Item]) -> Iterator[Item]:
 
 
 def barcodes(source: Source) -> tuple[dict[int, int], tuple[Damage, ...]]:
-    """Subject by barcode, and the rows that are none.
+    """Return the subject of each barcode, and damage for unreadable rows.
 
     Raises
     ------
@@ -132,7 +138,7 @@ def barcodes(source: Source) -> tuple[dict[int, int], tuple[Damage, ...]]:
 
 
 def landmarks(source: Source) -> tuple[tuple[Landmark, ...], tuple[Damage, ...]]:
-    """Landmarks of a set, and the rows that are none. Raises as :func:`barcodes` does."""
+    """Return the landmarks of a set, and damage for unreadable rows."""
     rows, damages = _table(source, "Landmark Groundtruth")
     return tuple(Landmark(int(row[0]), row[1], -row[2]) for row in rows), damages
 

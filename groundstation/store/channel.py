@@ -1,4 +1,4 @@
-"""One topic on its way into the file: batches become message records, gathered until they fill a chunk."""
+"""Writer of one topic: batches become message records, gathered until they fill a chunk."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,7 +28,10 @@ DERIVED_KEY = "derived_from"  # in the metadata of a channel made from another o
 
 @dataclass(frozen=True)
 class Chunk:
-    """Message records of one channel, ready to be compressed: bytes, times and places of its messages, in pieces."""
+    """Message records of one channel, ready to be compressed.
+
+    Bytes, times and places of the messages, in pieces.
+    """
 
     channel_id: int
     topic: str
@@ -38,7 +41,9 @@ class Chunk:
 
 
 class Pace:
-    """Time in which a topic gets a chunk however few bytes it has: the longer the more such chunks a file has.
+    """Time after which a topic gets a chunk, however few bytes it has.
+
+    It grows with the number of such chunks in the file.
 
     A flight has some hundred of them; a log of a row a day would have as many as rows.
     """
@@ -52,12 +57,12 @@ class Pace:
 
     @property
     def span_ns(self) -> int:
-        """Time between two boundaries: four times as long after each ``MOST_SMALL`` small chunks."""
+        """Time between two boundaries, four times as long after each ``MOST_SMALL`` small chunks."""
         return CHUNK_SPAN_NS << 2 * min(self._small // MOST_SMALL, 12)
 
 
 class ChannelWriter:
-    """Turn batches of one topic into chunks.
+    """Writer of the batches of one topic as chunks.
 
     Parameters
     ----------
@@ -81,11 +86,14 @@ class ChannelWriter:
         self._last_ns = 0
 
     def slots(self, batch: RecordBatch) -> list[Slot]:
-        """Values of a batch as they are written, in order of their field numbers."""
+        """Return the values of a batch as they are written, in order of field numbers."""
         raise NotImplementedError
 
     def definition(self, metadata: Mapping[str, str] = MappingProxyType({})) -> tuple[Schema, Channel]:
-        """Schema and channel records, for all that was written; ``metadata`` of the file may tell units."""
+        """Return the schema and channel records for everything written.
+
+        The ``metadata`` of the file may state units.
+        """
         raise NotImplementedError
 
     def write(self, batch: RecordBatch) -> None:
@@ -115,7 +123,10 @@ class ChannelWriter:
             self.flush()
 
     def _append(self, time_ns: Int64Array, starts: Int64Array, buffer: ByteArray) -> None:
-        """Gather records; ``starts`` count from wherever, the first record is the first of the buffer."""
+        """Gather records.
+
+        ``starts`` may count from any place: the first record is the first of the buffer.
+        """
         self._buffers.append(buffer)
         self._times.append(time_ns)
         self._starts.append(starts + (self._bytes - starts[0]))
@@ -146,7 +157,10 @@ class ChannelWriter:
 
 
 class TopicWriter(ChannelWriter):
-    """Channel of a topic: the compiled type of a canonical one, else a type made of its columns."""
+    """Writer of the channel of a topic.
+
+    A canonical topic has its compiled message type, any other a type made of its columns.
+    """
 
     def __init__(self, channel_id: int, topic: str, name: str, emit: Callable[[Chunk], None]) -> None:
         super().__init__(channel_id, topic, emit)
@@ -154,7 +168,7 @@ class TopicWriter(ChannelWriter):
         self._device_time, self._record_index = self._type.common_fields
 
     def slots(self, batch: RecordBatch) -> list[Slot]:
-        """Common fields, then the batch's columns in order of their numbers."""
+        """Return common fields, then the batch's columns in order of their numbers."""
         device_time = batch.device_time_ns
         fields = {name: self._type.field_for(name, column.values.dtype) for name, column in batch.columns.items()}
         common = [
@@ -173,7 +187,7 @@ class TopicWriter(ChannelWriter):
         return slot_of(field, values, column.present)
 
     def _converted(self, field: WireField, values: NDArray[Any], present: BoolArray | None) -> NDArray[Any]:
-        """Values in the dtype that the channel has from its first batch, where nothing is lost by it."""
+        """Convert values to the dtype of the channel's first batch, where nothing is lost by it."""
         numbers = "biuf"
         if values.dtype.kind in numbers and field.dtype.kind in numbers:
             with np.errstate(invalid="ignore"):
@@ -194,19 +208,19 @@ class TopicWriter(ChannelWriter):
 
 
 def channel_record(channel_id: int, topic: str, metadata: Mapping[str, str]) -> Channel:
-    """Record of a channel whose schema has its number."""
+    """Return the record of a channel whose schema has the same number."""
     return Channel(
         id=channel_id, topic=topic, message_encoding="protobuf", metadata=dict(metadata), schema_id=channel_id
     )
 
 
 def _width(dtype: np.dtype[Any]) -> int:
-    """About as many bytes as a value takes in a message."""
+    """Return about as many bytes as a value takes in a message."""
     return dtype.itemsize // 4 if dtype.kind == "U" else dtype.itemsize
 
 
 def _pieces(time_ns: Int64Array, row_bytes: int, span_ns: int = CHUNK_SPAN_NS) -> Iterator[slice]:
-    """Rows in pieces of no more than a chunk's bytes that cross no boundary at which a chunk ends.
+    """Cut rows into pieces of at most a chunk's bytes that cross no chunk boundary.
 
     ``span_ns`` lies between two boundaries for so few rows that they make a small chunk.
     """
@@ -224,7 +238,7 @@ def _pieces(time_ns: Int64Array, row_bytes: int, span_ns: int = CHUNK_SPAN_NS) -
 
 
 def _together(pieces: Iterable[slice], most_rows: int) -> Iterator[list[slice]]:
-    """Pieces that follow each other in groups of no more than so many rows: a group is encoded at once."""
+    """Group consecutive pieces into at most so many rows; a group is encoded at once."""
     group: list[slice] = []
     for piece in pieces:
         if group and piece.stop - group[0].start > most_rows:

@@ -1,4 +1,4 @@
-"""Channels made of others for programs that do not know ours: positions for a map, poses for 3-D, lines for a log.
+"""Channels derived for other programs: map positions, 3-D poses, lines of a log.
 
 Messages of Foxglove's schemas, which Foxglove and Rerun's own loader draw by themselves. Reading skips them.
 
@@ -28,7 +28,7 @@ from groundstation.store.wire import Slot, encode_text
 # Source: GPS Standard Positioning Service Performance Standard, 5th edition, 2020, table 3.4-1.
 RANGE_SIGMA_M = 7.0 / 1.96
 POSE_FRAME = "local_enu"
-POSE_STEP_NS = NS_PER_S // 10  # one pose in each such step: enough for an eye, and little of the file
+POSE_STEP_NS = NS_PER_S // 10  # one pose per step: enough to look at, and little of the file
 MOST_METRES = 1e8  # a position further from the origin is none
 LOG_TOPIC = "log"
 LEVELS: dict[Severity, int] = {"info": 2, "warn": 3, "fail": 4}  # foxglove.Log.Level
@@ -51,11 +51,11 @@ class DerivedWriter(ChannelWriter):
         self._metadata: dict[str, str] = {}
 
     def timestamp(self, prefix: bytes, time_ns: Int64Array | None) -> list[Slot]:
-        """The timestamp behind its tag, on an absolute clock."""
+        """Return the timestamp behind its tag, on an absolute clock."""
         return [Slot(prefix + b"\x0c", _timestamps(time_ns))] if self._has_utc and time_ns is not None else []
 
     def definition(self, metadata: Mapping[str, str] = MappingProxyType({})) -> tuple[Schema, Channel]:
-        """Foxglove's schema; the channel's metadata says that reading skips it."""
+        """Return Foxglove's schema; the channel's metadata says that reading skips it."""
         files = FileDescriptorSet()
         for descriptor in _with_imports(self._message.file, {}).values():
             descriptor.CopyToProto(files.file.add())
@@ -65,7 +65,9 @@ class DerivedWriter(ChannelWriter):
 
 
 class LocationFixWriter(DerivedWriter):
-    """Positions of a GNSS topic as ``foxglove.LocationFix``, which gives them a map in any viewer.
+    """Writer of the positions of a GNSS topic as ``foxglove.LocationFix``.
+
+    Any viewer can show them on a map.
 
     The covariance is that of the receiver's own sigmas, else of the dilutions of precision and the range error that
     the GPS performance standard states; without either it is absent. The frame is named after the topic.
@@ -109,7 +111,10 @@ class LocationFixWriter(DerivedWriter):
 
 
 def position_variances_m2(batch: RecordBatch) -> FloatArray:
-    """Variances of positions east, north and up, shape (n, 3); NaN where the batch does not tell."""
+    """Return the variances of positions east, north and up, shape (n, 3), in m2.
+
+    NaN where the batch does not tell.
+    """
     across, up = _values(batch, "horizontal_sigma_m") / np.sqrt(2.0), _values(batch, "vertical_sigma_m")
     hdop, pdop = _values(batch, "hdop"), _values(batch, "pdop")
     with np.errstate(invalid="ignore", over="ignore"):
@@ -121,13 +126,13 @@ def position_variances_m2(batch: RecordBatch) -> FloatArray:
 
 
 class Origin:
-    """Where the local frame of a file's poses begins: its first position, whichever topic it is of."""
+    """Origin of the local frame of a file's poses: the first position, of whichever topic."""
 
     def __init__(self) -> None:
         self.place: tuple[float, float, float] | None = None
 
     def enu_m(self, geodetic: FloatArray) -> FloatArray:
-        """East, north and up of latitudes, longitudes (deg) and heights (m), shape (n, 3)."""
+        """Return east, north and up of latitudes, longitudes (deg) and heights (m), (n, 3)."""
         known = np.flatnonzero(np.isfinite(geodetic[:, :2]).all(axis=1))
         if self.place is None and len(known):
             latitude, longitude, height = geodetic[known[0]].tolist()
@@ -139,17 +144,18 @@ class Origin:
 
 
 class PoseWriter(DerivedWriter):
-    """Attitude and position of an INS topic as ``foxglove.PoseInFrame``, which gives it a place in 3-D.
+    """Writer of attitude and position of an INS topic as ``foxglove.PoseInFrame``, for 3-D.
 
-    Body axes are forward-left-up, the frame is east-north-up at the first position of the file. Ten poses a second at
-    most; where a row of attitude has no position of its own it has the last one. Single precision: they are to be seen.
+    Body axes are forward-left-up, the frame is east-north-up at the first position of the file. There are at most ten
+    poses a second. A row of attitude without a position of its own has the last one. Single precision is enough to look
+    at.
     """
 
     def __init__(self, channel_id: int, source: str, emit: Callable[[Chunk], None], has_utc: bool, origin: Origin):
         message = PoseInFrame_pb2.PoseInFrame.DESCRIPTOR
         super().__init__(channel_id, f"pose.{source}", source, emit, message, has_utc)
         self._origin, self._step = origin, -1
-        self._last: dict[str, float] = {}  # of each coordinate, the last value known
+        self._last: dict[str, float] = {}  # last known value of each coordinate
 
     def write(self, batch: RecordBatch) -> None:
         """Take in the first row with an attitude of each step in time."""
@@ -162,7 +168,7 @@ class PoseWriter(DerivedWriter):
             steps = batch.time_ns[rows] // POSE_STEP_NS
             rows = rows[np.diff(steps, prepend=self._step) != 0]
             self._step = int(steps[-1])
-        place = self._places(batch, rows)  # of no rows too: it remembers the last one
+        place = self._places(batch, rows)  # called for no rows too, as it remembers the last one
         if batch.time_ns is None or not len(rows):
             return
         turn = quaternion_enu_from_flu_xyzw(*(column.values[rows] for column in attitude if column is not None))
@@ -180,7 +186,10 @@ class PoseWriter(DerivedWriter):
         return [*self.timestamp(b"\x0a", batch.time_ns), frame, *values]
 
     def _places(self, batch: RecordBatch, rows: Int64Array) -> FloatArray:
-        """East, north and up of rows, shape (n, 3): geodetic, else of the log's own local frame; 0 where not known."""
+        """Return east, north and up of rows, shape (n, 3).
+
+        From geodetic positions, else from the log's own local frame; 0 where not known.
+        """
         height = "altitude_ellipsoid_m" if "altitude_ellipsoid_m" in batch.columns else "altitude_msl_m"
         geodetic = [self._held(batch, name, rows) for name in ("latitude_deg", "longitude_deg", height)]
         local = [self._held(batch, f"position_{axis}_m", rows) for axis in ("east", "north", "down")]
@@ -191,7 +200,10 @@ class PoseWriter(DerivedWriter):
         return np.where(np.abs(place) < MOST_METRES, place, 0.0)
 
     def _held(self, batch: RecordBatch, name: str, rows: Int64Array) -> FloatArray:
-        """Values of a column at rows, shape (n,), held where a row has none, from earlier batches too."""
+        """Return values of a column at rows, shape (n,), held where a row has none.
+
+        The value held may come from an earlier batch.
+        """
         before, column = self._last.get(name, np.nan), batch.columns.get(name)
         known = np.zeros(0, np.int64) if column is None else np.flatnonzero(column.mask & np.isfinite(column.values))
         if column is None or not len(known):
@@ -202,7 +214,10 @@ class PoseWriter(DerivedWriter):
 
 
 class LogWriter(DerivedWriter):
-    """Findings and events as ``foxglove.Log``: gathered until the file is finished, for findings come last."""
+    """Writer of findings and events as ``foxglove.Log``.
+
+    They are gathered until the file is finished, for findings come last.
+    """
 
     def __init__(self, emit: Callable[[Chunk], None], has_utc: bool) -> None:
         super().__init__(0, LOG_TOPIC, "event", emit, Log_pb2.Log.DESCRIPTOR, has_utc)
@@ -218,7 +233,10 @@ class LogWriter(DerivedWriter):
             self._entries.append((time_ns, LEVELS["info"], name, batch.topic))
 
     def finish(self, channel_id: int, findings: Iterable[Finding], first_ns: int, last_ns: int) -> None:
-        """Write all lines in order of time; a finding without a time in the file stands at its beginning."""
+        """Write all lines in order of time.
+
+        A finding without a time in the file is written at its beginning.
+        """
         self.id = channel_id
         for one in findings:
             time_ns = place_time_ns(one.place, first_ns, has_utc=self._has_utc)
@@ -252,7 +270,7 @@ class LogWriter(DerivedWriter):
 
 
 def _values(batch: RecordBatch, name: str) -> FloatArray:
-    """A column as float64, shape (n,), NaN where absent."""
+    """Return a column as float64, shape (n,), NaN where absent."""
     column = batch.columns.get(name)
     if column is None:
         return np.full(len(batch), np.nan)
@@ -260,13 +278,13 @@ def _values(batch: RecordBatch, name: str) -> FloatArray:
 
 
 def _constant(tag: bytes, text: str, count: int) -> Slot:
-    """The same text in every message."""
+    """Return a slot with the same text in every message."""
     encoded = text.encode()
     return Slot(tag + bytes([len(encoded)]) + encoded, np.empty(count, "V0"))
 
 
 def _with_imports(file: FileDescriptor, found: dict[str, FileDescriptor]) -> dict[str, FileDescriptor]:
-    """A file's descriptor and all that it imports, imported ones first."""
+    """Return a file's descriptor and all that it imports, imported ones first."""
     for imported in file.dependencies:
         _with_imports(imported, found)
     found[file.name] = file
@@ -274,7 +292,10 @@ def _with_imports(file: FileDescriptor, found: dict[str, FileDescriptor]) -> dic
 
 
 def _timestamps(time_ns: Int64Array) -> NDArray[np.void]:
-    """google.protobuf.Timestamp of each time: varints padded to five bytes, so that all are equally long."""
+    """Encode each time as google.protobuf.Timestamp.
+
+    Varints are padded to five bytes, so that all are equally long.
+    """
     seconds, nanos = np.divmod(time_ns, NS_PER_S)
     out = np.empty((len(time_ns), 12), np.uint8)
     for at, tag, value in ((0, 0x08, seconds), (6, 0x10, nanos)):

@@ -1,7 +1,8 @@
-"""Messages of an MCAP of any program: of every chunk that is intact, of messages outside chunks, as far as they go.
+"""Reader for the messages of an MCAP of any program.
 
-A cut file gives what stands before the cut, the beginning of its last chunk among it. Where no record can be recognised
-the next chunk is searched for; a chunk whose checksum is wrong is lost.
+It reads the messages of every intact chunk, and those outside chunks, as far as they go. A cut file gives what stands
+before the cut, and the beginning of its last chunk. Where no record can be recognised the next chunk is searched for; a
+chunk whose checksum is wrong is lost.
 """
 
 import re
@@ -42,7 +43,10 @@ _KNOWN_OPCODES = frozenset(range(Opcode.HEADER, Opcode.DATA_END + 1))
 
 @dataclass(frozen=True, eq=False)
 class ForeignMessages:
-    """Messages of one channel that stand together. ``first`` (n,) are their places among those of the file."""
+    """Messages of one channel that stand together.
+
+    ``places`` (n,) are their places among the messages of the file.
+    """
 
     channel: Channel
     schema: Schema | None
@@ -52,7 +56,10 @@ class ForeignMessages:
 
 @dataclass(frozen=True)
 class ForeignLost:
-    """What could not be used in the bytes ``start`` to ``end``: ``count`` of ``what``, before message ``before``."""
+    """Loss of ``count`` of ``what`` in the bytes ``start`` to ``end`` of the file.
+
+    ``before`` is the number of the message that the loss comes before.
+    """
 
     start: int
     end: int
@@ -71,7 +78,7 @@ class UnknownChannel:
 
 @dataclass(frozen=True)
 class Missing:
-    """Messages of a topic that are not in the file, by what the file itself tells."""
+    """Messages of a topic that the file counts and that are not in it."""
 
     topic: str
     count: int
@@ -82,7 +89,7 @@ Found: TypeAlias = ForeignMessages | ForeignLost | UnknownChannel | Missing
 
 
 def read_header(head: bytes) -> Header | None:
-    """The header in the first bytes of an MCAP."""
+    """Read the header in the first bytes of an MCAP."""
     start = len(MAGIC) + RECORD_PREFIX
     length = int.from_bytes(head[len(MAGIC) + 1 : start], "little")
     is_header = head.startswith(MAGIC + bytes([Opcode.HEADER])) and start + length <= len(head)
@@ -91,7 +98,7 @@ def read_header(head: bytes) -> Header | None:
 
 
 class ForeignMcap:
-    """Iterates over what a file holds, in its order.
+    """Iterator over the content of a file, in its order.
 
     Parameters
     ----------
@@ -104,7 +111,7 @@ class ForeignMcap:
         self._known = Summary()
         self._count = self._unknown = 0
         self._met: dict[int, Sequences] = {}
-        self._room = max(FREE_BYTES, MOST_EXPANDED * size)  # what chunks may still expand to
+        self._room = max(FREE_BYTES, MOST_EXPANDED * size)  # bytes that chunks may still expand to
 
     def __iter__(self) -> Iterator[Found]:
         summary = read_summary(self._file, self._size)
@@ -149,7 +156,10 @@ class ForeignMcap:
         yield from self._missing()
 
     def _missing(self) -> Iterator[Missing]:
-        """What the statistics count and was not met; where they tell of nothing, what the numbers of messages tell."""
+        """Yield the messages that the statistics count and that were not met.
+
+        Where the statistics show none, the sequence numbers of the messages do.
+        """
         counts = self._known.message_counts
         gone = {number: counts.get(number, 0) - self._met[number].count for number in self._met}
         gone |= {number: count for number, count in counts.items() if number not in self._met}
@@ -166,7 +176,7 @@ class ForeignMcap:
         return self._file.read(length)
 
     def find_chunk(self, start: int) -> int:
-        """Place of the next chunk from ``start`` on, the size of the file when there is none."""
+        """Return the place of the next chunk from ``start`` on, or the size of the file."""
         at = start
         while at < self._size:
             block = self._read(at, SEARCH_BYTES + PEEK_BYTES)
@@ -197,7 +207,10 @@ class ForeignMcap:
         yield from self._records(raw, at, end)
 
     def _stretches(self, raw: ByteArray, at: int, end: int) -> Iterator[Found]:
-        """Records that stand one after the other, searched for behind what is none; of a chunk without a checksum."""
+        """Yield consecutive records of a chunk without a checksum.
+
+        After bytes that are no record, the next one is searched for.
+        """
         data, start = raw.tobytes(), 0
         while start < len(data):
             whole = _whole_records(data, start)
@@ -208,7 +221,7 @@ class ForeignMcap:
             yield ForeignLost(at, end, "bytes of a chunk's content that are no record", start - whole, self._count)
 
     def _records(self, raw: ByteArray, at: int, end: int) -> Iterator[Found]:
-        """Messages among records that stand one after the other, definitions taken in."""
+        """Yield the messages among consecutive records; definitions are taken in."""
         found = find_messages(raw)
         if found is None:
             yield from self._stretches(raw, at, end)
@@ -246,13 +259,19 @@ class ForeignMcap:
                             self._known.add(parsed, b"")
 
     def _is_sure_of(self, found: Schema | Channel) -> bool:
-        """Whether an intact summary defines the same id: it has a checksum, which the definition here may lack."""
+        """Tell whether an intact summary defines the same id.
+
+        The summary has a checksum, which the definition here may lack.
+        """
         known = self._known.schemas if isinstance(found, Schema) else self._known.channels
         return self._known.is_intact and found.id in known
 
 
 def _whole_records(data: bytes, start: int = 0) -> int:
-    """Where the whole records end that stand one after the other from a place on; nothing is copied."""
+    """Return the end of the whole records that follow one another from a place on.
+
+    Nothing is copied.
+    """
     at = start
     while at + RECORD_PREFIX <= len(data):
         end = at + RECORD_PREFIX + int.from_bytes(data[at + 1 : at + RECORD_PREFIX], "little")
@@ -263,7 +282,10 @@ def _whole_records(data: bytes, start: int = 0) -> int:
 
 
 def _next_message(data: bytes, start: int) -> int:
-    """Place of the next message behind damage: two whole messages must stand there, or one that ends the data."""
+    """Return the place of the next message after damage.
+
+    Two whole messages must stand there, or one that ends the data.
+    """
     for match in _MESSAGE.finditer(data, start):
         at = match.start()
         for _number in range(2):
@@ -276,7 +298,7 @@ def _next_message(data: bytes, start: int) -> int:
 
 
 def _beginning(compression: str, data: bytes, size: int) -> ByteArray:
-    """What the beginning of a chunk's data gives."""
+    """Decompress the beginning of a chunk's data, as far as it goes."""
     limit = min(size, MAX_CHUNK_BYTES)
     raw = bytearray()
     try:
@@ -291,5 +313,5 @@ def _beginning(compression: str, data: bytes, size: int) -> ByteArray:
         else:
             raw += data
     except (zstandard.ZstdError, RuntimeError, ValueError, EOFError):
-        pass  # what came before is kept
+        pass  # the data before the damage are kept
     return np.frombuffer(bytes(raw[:limit]), np.uint8)

@@ -1,4 +1,7 @@
-"""Protobuf messages of other programs as nested dictionaries, by the descriptors that their file carries."""
+"""Protobuf messages of other programs as nested dictionaries.
+
+They are decoded by the descriptors that their file carries.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,7 +17,9 @@ _TIMES = {"google.protobuf.Timestamp", "google.protobuf.Duration"}
 
 
 def message_reader(name: str, descriptor_set: bytes) -> Callable[[bytes], dict[str, Any]] | None:
-    """A function from the bytes of a message to its fields; None when the definition cannot be used.
+    """Return a function from the bytes of a message to its fields.
+
+    None when the definition cannot be used.
 
     Fields without presence have their default where a message leaves them out; bytes are told by their length. The
     function raises ValueError for what is no such message.

@@ -1,4 +1,6 @@
-"""MCAP at the level of records: chunks, their messages, the summary. Nothing here trusts a length that a file states.
+"""MCAP at the level of records: chunks, their messages, the summary.
+
+Nothing here trusts a length that a file states.
 
 Source: MCAP format specification, https://mcap.dev/spec.
 """
@@ -34,10 +36,10 @@ from groundstation.base.records import Int64Array
 from groundstation.store.marks import MAGIC, RECORD_PREFIX
 from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, Messages
 
-MAX_CHUNK_BYTES = 64 << 20  # of a decompressed chunk; the writer's have about one megabyte
-MAX_RECORD_BYTES = 64 << 20  # of any record that is read whole
+MAX_CHUNK_BYTES = 64 << 20  # largest chunk, decompressed; the writer's have about one megabyte
+MAX_RECORD_BYTES = 64 << 20  # largest record that is read whole
 FOOTER_BYTES = RECORD_PREFIX + 20
-SHIFTED_BYTES = 8 << 20  # of the end of a file, in which a summary is looked for: that of a million chunks is longer
+SHIFTED_BYTES = 8 << 20  # part of the end searched for a summary; only one of a million chunks is longer
 _PREFIX = struct.Struct("<BQ")
 _DATA_END = _PREFIX.pack(Opcode.DATA_END, 4)
 _CHUNK_HEAD = struct.Struct("<BQQQQII")  # opcode, length, start, end, uncompressed size, crc, length of compression
@@ -60,11 +62,11 @@ Buffer: TypeAlias = bytes | memoryview
 
 
 class ChunkError(Exception):
-    """A chunk that cannot be used; the text says why."""
+    """Error of a chunk that cannot be used; the text says why."""
 
 
 def to_bytes(*records: McapRecord) -> bytes:
-    """MCAP records as bytes, one after the other."""
+    """Return MCAP records as bytes, one after the other."""
     builder = RecordBuilder()
     for record in records:
         record.write(builder)
@@ -72,7 +74,7 @@ def to_bytes(*records: McapRecord) -> bytes:
 
 
 def parse_record(opcode: int, payload: bytes) -> McapRecord | None:
-    """The record in a payload; None when the payload is not exactly one record of that kind."""
+    """Parse a payload; None when it is not exactly one record of that kind."""
     kind = _READABLE.get(opcode)
     if kind is None:
         return None
@@ -85,7 +87,10 @@ def parse_record(opcode: int, payload: bytes) -> McapRecord | None:
 
 
 def parse_records(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Records that stand one after the other: opcode and whole bytes; ends where a length leads outside."""
+    """Yield opcode and whole bytes of consecutive records.
+
+    It ends where a length leads outside the data.
+    """
     at = 0
     while at + RECORD_PREFIX <= len(data):
         opcode, length = _PREFIX.unpack_from(data, at)
@@ -97,7 +102,10 @@ def parse_records(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def message_index(channel_id: int, log_time: Int64Array, starts: Int64Array) -> bytes:
-    """MessageIndex record of a chunk: time and place of each message (mcap.records would take a list of pairs)."""
+    """Return the MessageIndex record of a chunk: time and place of each message.
+
+    The one in mcap.records would take a list of pairs.
+    """
     entries = np.empty(len(log_time), INDEX_ENTRY)
     entries["time"] = log_time
     entries["offset"] = starts
@@ -105,7 +113,9 @@ def message_index(channel_id: int, log_time: Int64Array, starts: Int64Array) -> 
 
 
 def read_message_index(data: bytes) -> tuple[int, int, int, int] | None:
-    """Channel, number of messages, first and last time of a MessageIndex record at the start of ``data``, if it is one.
+    """Read a MessageIndex record at the start of ``data``.
+
+    Returns its channel, number of messages, first and last time; None where there is no such record.
 
     ``data`` needs the whole record: entries must be in order of time and of place to be believed.
     """
@@ -124,7 +134,7 @@ def read_message_index(data: bytes) -> tuple[int, int, int, int] | None:
 
 @dataclass(frozen=True)
 class ChunkHead:
-    """What stands before a chunk's compressed data.
+    """Fields that stand before a chunk's compressed data.
 
     ``length`` is that of the whole record, ``data_at`` the place of the data in it.
     """
@@ -139,14 +149,17 @@ class ChunkHead:
 
 
 def chunk_head(start_time: int, end_time: int, uncompressed_size: int, crc: int, data_length: int) -> bytes:
-    """What stands before a chunk's zstd data (mcap.records would copy the data twice)."""
+    """Return the bytes that stand before a chunk's zstd data.
+
+    mcap.records would copy the data twice.
+    """
     tail = b"zstd" + struct.pack("<Q", data_length)
     length = _CHUNK_HEAD.size + len(tail) + data_length - RECORD_PREFIX
     return _CHUNK_HEAD.pack(Opcode.CHUNK, length, start_time, end_time, uncompressed_size, crc, 4) + tail
 
 
 def read_chunk_head(data: bytes, *, need_lengths: bool = True) -> ChunkHead | None:
-    """Head of the chunk record at the start of ``data``; None when it contradicts itself.
+    """Read the head of the chunk at the start of ``data``; None when it is inconsistent.
 
     Without ``need_lengths`` only the places are used: for a chunk whose extent an index tells.
     """
@@ -166,7 +179,7 @@ def read_chunk_head(data: bytes, *, need_lengths: bool = True) -> ChunkHead | No
 
 
 def decompress(compression: str, data: Buffer, size: int, crc: int | None) -> ByteArray:
-    """Records of a chunk, checksum checked.
+    """Decompress the records of a chunk and check its checksum.
 
     Parameters
     ----------
@@ -201,7 +214,10 @@ def decompress(compression: str, data: Buffer, size: int, crc: int | None) -> By
 
 
 def _zstd(data: Buffer, size: int) -> bytes:
-    """One zstd frame; its own claim of a size is compared first, since the library allocates by it."""
+    """Decompress one zstd frame.
+
+    The size that the frame claims is compared first, since the library allocates by it.
+    """
     claimed = zstandard.get_frame_parameters(data).content_size
     if claimed not in (size, zstandard.CONTENTSIZE_UNKNOWN):
         raise ChunkError("has another size than it claims")
@@ -211,7 +227,7 @@ def _zstd(data: Buffer, size: int) -> bytes:
 
 
 def split_messages(buffer: ByteArray) -> list[Messages] | None:
-    """Messages of a chunk by channel; None when the chunk is not a row of whole records."""
+    """Split a chunk into messages by channel; None when it is not made of whole records."""
     if not len(buffer):
         return []
     even = _evenly_spaced(buffer)
@@ -230,7 +246,7 @@ def split_messages(buffer: ByteArray) -> list[Messages] | None:
 
 
 def _evenly_spaced(buffer: ByteArray) -> Messages | None:
-    """The messages of a chunk in which all have one length and one channel."""
+    """Return the messages of a chunk in which all have one length and one channel."""
     if len(buffer) < HEAD.itemsize or buffer[0] != MESSAGE_OPCODE:
         return None
     head = np.frombuffer(buffer, HEAD, 1)[0]
@@ -250,7 +266,8 @@ def _evenly_spaced(buffer: ByteArray) -> Messages | None:
 class Summary:
     """The summary section: definitions and indexes; ``is_intact`` when its checksum was right.
 
-    ``is_in_place`` when it stands where the footer says: else bytes before it were lost or added, and its places lie.
+    ``is_in_place`` when it stands where the footer says: else bytes before it were lost or added, and the places it
+    states are wrong.
     """
 
     start: int = 0
@@ -265,7 +282,10 @@ class Summary:
 
     @property
     def message_counts(self) -> dict[int, int]:
-        """Messages by channel, as statistics that agree with themselves tell; empty where there are none."""
+        """Number of messages by channel, by statistics that agree with themselves.
+
+        Empty where there are none.
+        """
         found = self.statistics
         if not self.is_intact or found is None or sum(found.channel_message_counts.values()) != found.message_count:
             return {}
@@ -288,7 +308,7 @@ class Summary:
 
 
 def _footer(file: BinaryIO, size: int) -> tuple[bytes, Footer] | None:
-    """The last bytes of a file and the footer in them; None when there is none at its end."""
+    """Return the last bytes of a file and the footer in them; None without a footer."""
     tail = FOOTER_BYTES + len(MAGIC)
     if size < len(MAGIC) + tail:
         return None
@@ -302,17 +322,23 @@ def _footer(file: BinaryIO, size: int) -> tuple[bytes, Footer] | None:
 
 
 def ends_whole(file: BinaryIO, size: int) -> bool:
-    """Whether a file has a footer at its end: whatever happened inside, it was not cut."""
+    """Tell whether a file has a footer at its end: if so, it was not cut.
+
+    There may be damage inside all the same.
+    """
     return _footer(file, size) is not None
 
 
 def _summary_crc(data: bytes, end: bytes) -> int:
-    """Checksum of a summary and of the footer behind it."""
+    """Return the checksum of a summary and of the footer behind it."""
     return zlib.crc32(end[: FOOTER_BYTES - 4], zlib.crc32(data))
 
 
 def _shifted_summary(file: BinaryIO, end: bytes, footer: Footer, stop: int) -> bytes:
-    """The summary between the end of data and the footer, where its checksum is right; else nothing."""
+    """Return the summary between the end of data and the footer, if its checksum is right.
+
+    Else nothing.
+    """
     file.seek(max(0, stop - SHIFTED_BYTES))
     tail = file.read(min(stop, SHIFTED_BYTES))
     at = tail.rfind(_DATA_END)
@@ -321,10 +347,10 @@ def _shifted_summary(file: BinaryIO, end: bytes, footer: Footer, stop: int) -> b
 
 
 def read_summary(file: BinaryIO, size: int) -> Summary | None:
-    """Summary of a file of ``size`` bytes; None when it has no footer at its end or no summary.
+    """Read the summary of a file of ``size`` bytes.
 
-    One that does not stand where the footer says is looked for behind the end of data. One with a wrong checksum is
-    read as far as it goes, ``is_intact`` False.
+    None when it has no footer at its end, or no summary. A summary that does not stand where the footer says is looked
+    for behind the end of data. A summary with a wrong checksum is read as far as it goes, ``is_intact`` False.
     """
     found = _footer(file, size)
     if found is None:

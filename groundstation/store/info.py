@@ -1,4 +1,4 @@
-"""What a store file is of: its source, how it was read, its clock and its integrity ledger."""
+"""Facts of a store file: its source, how it was read, its clock, its integrity ledger."""
 
 import json
 import zlib
@@ -28,7 +28,7 @@ class _WithFindings:
 
 
 def _plain(value: Any) -> Any:
-    """Numpy scalars and mappings as plain Python, for JSON."""
+    """Convert numpy scalars and mappings to plain Python, for JSON."""
     if isinstance(value, Mapping):
         return {str(key): entry for key, entry in value.items()}
     if hasattr(value, "item"):
@@ -112,7 +112,9 @@ class StoreInfo:
             object.__setattr__(self, entry.name, value)
 
     def to_strings(self, definitions_crc32: Mapping[str, int]) -> dict[str, str]:
-        """The record's strings for an MCAP Metadata record: plain text as it is, all else as JSON, keys sorted.
+        """Return the facts as strings for an MCAP Metadata record.
+
+        Plain text as it is, all else as JSON; keys are sorted.
 
         Parameters
         ----------
@@ -134,18 +136,21 @@ class StoreInfo:
 
 
 def checksum(strings: Mapping[str, str]) -> str:
-    """CRC-32 of a metadata record's strings but itself, eight hexadecimal digits: MCAP has none for these records."""
+    """Return the CRC-32 of a metadata record's strings, as eight hexadecimal digits.
+
+    The checksum itself is left out. MCAP has no checksum for these records.
+    """
     kept = {key: value for key, value in strings.items() if key != _CHECKSUM}
     return f"{zlib.crc32(_json(kept).encode()):08x}"
 
 
 def is_intact(strings: Mapping[str, str]) -> bool:
-    """Whether a metadata record's strings are as they were written."""
+    """Tell whether a metadata record's strings are as they were written."""
     return strings.get(_CHECKSUM) == checksum(strings)
 
 
 def from_strings(strings: Mapping[str, str]) -> StoreInfo:
-    """The facts in a metadata record; entries that cannot be read are left at their defaults."""
+    """Read the facts in a metadata record; unreadable entries keep their defaults."""
     values: dict[str, Any] = {}
     defaults = StoreInfo()
     for entry in fields(StoreInfo):
@@ -185,7 +190,10 @@ def _fits(value: Any, default: Any) -> bool:
 
 
 def definition_checksums(strings: Mapping[str, str]) -> dict[str, int]:
-    """Checksums of schema and channel records (``"schema 1"``, ``"channel 1"``); empty when not known."""
+    """Return the checksums of schema and channel records (``"schema 1"``, ``"channel 1"``).
+
+    Empty when not known.
+    """
     try:
         found = json.loads(strings.get(_DEFINITIONS, "{}"))
     except (ValueError, RecursionError):

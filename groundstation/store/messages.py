@@ -1,4 +1,4 @@
-"""Message records as they lie in a chunk: their head, where each starts, which of them are alike."""
+"""Message records as they lie in a chunk: their head, their starts, which are alike."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -49,17 +49,17 @@ class Messages:
         return len(self.starts)
 
     def matrix(self) -> ByteArray:
-        """The records as rows of bytes, shape (n, stride), for a stride that is not 0."""
+        """Return the records as rows of bytes, shape (n, stride), for a stride that is not 0."""
         first = int(self.starts[0])
         return self.buffer[first : first + len(self) * self.stride].reshape(len(self), self.stride)
 
     def take(self, rows: Any) -> "Messages":
-        """The messages that ``rows`` (slice or positions) selects."""
+        """Return the messages that ``rows`` (slice or positions) selects."""
         stride = self.stride if isinstance(rows, slice) and rows.step in (None, 1) else 0
         return Messages(self.buffer, self.channel_id, self.starts[rows], self.sizes[rows], stride)
 
     def head(self, name: str) -> Int64Array:
-        """An entry of every record's head (``"log_time"``) as int64, shape (n,)."""
+        """Return an entry of every record's head (``"log_time"``) as int64, shape (n,)."""
         dtype, offset = HEAD.fields[name][:2]  # type: ignore[index]
         if self.stride:
             return self.column(dtype, offset).astype(np.int64)
@@ -76,13 +76,18 @@ class Messages:
         return int(np.frombuffer(self.buffer, HEAD, 1, int(self.starts[0]))[0]["sequence"])
 
     def column(self, dtype: np.dtype[Any], offset: int) -> NDArray[Any]:
-        """Values that stand ``offset`` bytes into every record of an even stride, shape (n,), a strided view."""
+        """Return the values ``offset`` bytes into every record, shape (n,), as a strided view.
+
+        The records must have an even stride.
+        """
         values: NDArray[Any] = self.matrix()[:, offset : offset + dtype.itemsize].view(dtype)[:, 0]
         return values
 
 
 def at_any_byte(buffer: ByteArray, dtype: np.dtype[Any]) -> NDArray[Any]:
-    """View of a buffer in which entry ``k`` is the value that starts at byte ``k``; entries overlap.
+    """Return a view of a buffer whose entry ``k`` is the value that starts at byte ``k``.
+
+    Entries overlap.
 
     Indexing it with many places moves whole values, five to ten times faster than a matrix of byte indices.
     """

@@ -1,4 +1,4 @@
-"""Read a store file: facts, then batches chunk by chunk, and an account of what is damaged."""
+"""Read a store file: facts, then batches chunk by chunk, then the damage."""
 
 import os
 import zlib
@@ -38,7 +38,9 @@ PLACES_BYTES = 64 << 20  # bound of the working arrays for one piece of a chunk
 
 
 def read_info(path: str | os.PathLike[str]) -> StoreInfo:
-    """Facts about a store file, blank where it lost them; without a name that of the file.
+    """Read the facts about a store file, blank where they are lost.
+
+    A lost source name is that of the file.
 
     Raises
     ------
@@ -52,14 +54,17 @@ def read_info(path: str | os.PathLike[str]) -> StoreInfo:
 
 @dataclass(frozen=True)
 class Part:
-    """Part of a store file: records from ``start_ns`` on and before ``end_ns``, of the topics that ``wants`` says."""
+    """Part of a store file: the records from ``start_ns`` on and before ``end_ns``.
+
+    Only topics for which ``wants`` is true belong to it.
+    """
 
     start_ns: int
     end_ns: int
     wants: Callable[[str], bool] = lambda _topic: True
 
     def cut(self, batch: RecordBatch) -> RecordBatch:
-        """The rows of a batch that belong to the part; none of a topic that is not wanted."""
+        """Return the rows of a batch that belong to the part; none of an unwanted topic."""
         assert batch.time_ns is not None
         if not self.wants(batch.topic):
             return batch.take(slice(0, 0))
@@ -68,12 +73,11 @@ class Part:
 
 
 def read(path: str | os.PathLike[str], part: Part | None = None) -> Iterator[Item]:
-    """Items of a store file: one LogHeader, then batches and damages in the order of the file.
+    """Yield the items of a store file: one LogHeader, then batches and damage in file order.
 
-    Batches have ``time_ns`` and, where it differs, ``validity_time_ns``; their columns are those that the topic had,
-    in the source's names and types. The header's ``utc_of_zero_ns`` is 0 when times are UTC, None for NOTIME.
-    One chunk is held at a time. Of a ``part`` only the chunks that the index places in it are read; without an index
-    all are.
+    Batches have ``time_ns`` and, where it differs, ``validity_time_ns``; their columns are those that the topic had, in
+    the source's names and types. The header's ``utc_of_zero_ns`` is 0 when times are UTC, None for NOTIME. One chunk is
+    held at a time. For a ``part`` only the chunks that the index places in it are read; without an index all are.
 
     Raises
     ------
@@ -113,21 +117,27 @@ def read(path: str | os.PathLike[str], part: Part | None = None) -> Iterator[Ite
 
 
 class _Missing:
-    """What the ledger in the file counts and what of it is there: a chunk may be gone with all that told of it."""
+    """Comparison of the rows that the file's ledger counts with those that are there.
+
+    A chunk may be gone with all that told of it.
+    """
 
     def __init__(self, info: StoreInfo) -> None:
         self._left = Counter({topic: entry.rows for topic, entry in info.ledger.topics.items()})
         self._is_told = False
 
     def take(self, item: RecordBatch | Damage) -> None:
-        """Count what is there, and what is told to be lost already."""
+        """Count rows that are there, and note loss that was reported already."""
         if isinstance(item, RecordBatch):
             self._left[item.topic] -= len(item)
         elif item.loses_data:
             self._is_told = True
 
     def damages(self) -> Iterator[Damage]:
-        """What is missing by the ledger, where no loss is told that may be the same."""
+        """Yield the rows that are missing by the ledger.
+
+        Nothing where a loss was reported that may be the same.
+        """
         for topic, count in self._left.items():
             if count > 0 and not self._is_told:
                 what = "messages that the ledger in the file counts and that are not in it"
@@ -136,7 +146,7 @@ class _Missing:
 
 @contextmanager
 def _opened(path: str | os.PathLike[str]) -> Iterator[tuple[BinaryIO, int]]:
-    """The file and its size, when it is one of the store; errors of reading in one line."""
+    """Open a store file and give its size; errors of reading come in one line."""
     try:
         with Path(path).open("rb") as file:
             if not is_groundstation_mcap(path):
@@ -148,7 +158,10 @@ def _opened(path: str | os.PathLike[str]) -> Iterator[tuple[BinaryIO, int]]:
 
 @dataclass(frozen=True)
 class _Definition:
-    """How to decode a channel: its topic and the fields its columns come from; ``fields`` None: do not."""
+    """Decoding of a channel: its topic and the fields that its columns come from.
+
+    With ``fields`` None the channel is not decoded.
+    """
 
     topic: str
     fields: tuple[WireField, ...] | None
@@ -158,7 +171,7 @@ class _Definition:
 def _definitions(
     file: BinaryIO, size: int, summary: Summary | None, checksums: dict[str, int]
 ) -> dict[int, _Definition]:
-    """Definitions by channel id: from an intact summary, else any that are found in the file.
+    """Return definitions by channel id: from an intact summary, else any in the file.
 
     Where the metadata has their checksums, only definitions that agree with them count.
     """
@@ -188,7 +201,7 @@ def _definition(channel: Channel, schema: Schema | None) -> _Definition:
 
 
 def _narrowed(summary: Summary, part: Part, definitions: dict[int, _Definition]) -> Summary:
-    """The summary with the indexes of those chunks alone that may hold records of a part."""
+    """Return the summary with only the chunks that may hold records of a part."""
     unwanted = {number for number, one in definitions.items() if one.is_derived or not part.wants(one.topic)}
     chunks = [
         index
@@ -208,7 +221,7 @@ def _cut(items: Iterator[RecordBatch | Damage], part: Part) -> Iterator[RecordBa
 
 
 class _Reading:
-    """Chunks to items, by the definitions of one file."""
+    """Conversion of chunks to items, by the definitions of one file."""
 
     def __init__(self, definitions: dict[int, _Definition], has_utc: bool) -> None:
         self._definitions = definitions
@@ -217,7 +230,7 @@ class _Reading:
         self._seen: set[tuple[int, int]] = set()  # channel and sequence number of the first message of each chunk
 
     def batches(self, chunk: Intact) -> Iterator[RecordBatch | Damage]:
-        """Batches of a chunk's messages."""
+        """Yield the batches of a chunk's messages."""
         for messages in chunk.messages:
             definition = self._definitions.get(messages.channel_id)
             if definition is not None and definition.is_derived:
@@ -243,7 +256,10 @@ class _Reading:
                 yield Damage("corrupt", place, unreadable, "messages that are not of their schema", definition.topic)
 
     def _is_next(self, messages: Messages) -> bool:
-        """Whether a chunk is in order of time and follows those before; a damaged disk may repeat or move one."""
+        """Tell whether a chunk is in order of time and follows those before.
+
+        A damaged disk may repeat or move a chunk.
+        """
         time_ns = messages.log_time
         if (time_ns[1:] < time_ns[:-1]).any() or int(time_ns[0]) < self._last_ns.get(messages.channel_id, 0):
             return False
@@ -257,7 +273,7 @@ class _Reading:
         return (messages.channel_id, messages.first_sequence) in self._seen
 
     def damage(self, lost: Lost) -> Damage:
-        """What a stretch of lost bytes means."""
+        """Return a stretch of lost bytes as damage."""
         known = [self._definitions[number] for number in lost.channels if number in self._definitions]
         topic = ", ".join(definition.topic for definition in known)
         loses = not known or not all(definition.is_derived for definition in known)
@@ -281,7 +297,7 @@ class _Reading:
 
 
 def _parts(messages: Messages, field_count: int) -> Iterator[Messages]:
-    """Messages in parts that a batch may have and whose working arrays stay bounded."""
+    """Split messages into parts small enough for a batch and its working arrays."""
     most = max(1, min(MAX_BATCH_ROWS, PLACES_BYTES // (16 * field_count)))
     if len(messages) <= most:
         yield messages
@@ -291,7 +307,10 @@ def _parts(messages: Messages, field_count: int) -> Iterator[Messages]:
 
 
 def _batch(messages: Messages, decoded: Decoded, definition: _Definition) -> RecordBatch:
-    """Batch of decoded messages; those without a record index are not the store's and left out."""
+    """Return the batch of decoded messages.
+
+    Messages without a record index are not the store's, and are left out.
+    """
     assert definition.fields is not None
     if decoded.rows is not None:
         messages = messages.take(decoded.rows)

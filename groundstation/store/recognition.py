@@ -1,4 +1,4 @@
-"""Whether a file is of the store: by its first bytes, or by what is left of it where those are damaged."""
+"""Recognition of a store file by its first bytes, or by the rest where those are damaged."""
 
 import os
 import re
@@ -7,13 +7,13 @@ from typing import BinaryIO
 
 from groundstation.store.marks import HEADER_OPCODE, MAGIC, METADATA_NAME, PACKAGE, RECORD_PREFIX, SEARCH_BYTES
 
-HEAD_BYTES = 4096  # of a sound file are enough to recognise it
+HEAD_BYTES = 4096  # enough to recognise a sound file
 _LIBRARY = "groundstation "
 _BEGINNING = re.compile(re.escape(MAGIC) + rb"\x01[\0-\xff]{8}\0{4}[\0-\xff]{4}" + _LIBRARY.encode())
 
 
 def is_groundstation_mcap(source: str | os.PathLike[str] | bytes) -> bool:
-    """Whether a file, or the first 4096 bytes of one, was written by the store.
+    """Tell whether a file, or the first 4096 bytes of one, was written by the store.
 
     Three marks tell: MCAP's magic number, the library in the header, the name of the metadata record. Two are enough,
     so that no single flipped bit disowns a file. Of a file with fewer, unless its header names another program, the
@@ -33,9 +33,10 @@ def is_groundstation_mcap(source: str | os.PathLike[str] | bytes) -> bool:
 
 
 def is_mostly_mcap(path: str | os.PathLike[str]) -> bool:
-    """Whether a file that :func:`is_groundstation_mcap` is one to its end, or much of it is chunks.
+    """Tell whether a file is an MCAP of the store to its end, or in large part chunks.
 
-    At least half, a quarter where it begins as one. Else another log may stand in it, of which a part was overwritten.
+    The chunks must be at least half of its bytes, or a quarter where :func:`is_groundstation_mcap` accepts its
+    beginning. Else another log may stand in it, of which a part was overwritten.
     """
     from groundstation.store.recovery import chunk_bytes
 
@@ -64,7 +65,10 @@ def _head(source: str | os.PathLike[str] | bytes) -> bytes:
 
 
 def _is_of_another_program(head: bytes) -> bool:
-    """Whether there is a whole header with a library that is not ours with some characters damaged."""
+    """Tell whether there is a whole header that names another program's library.
+
+    A name that is ours but for some damaged characters is not another.
+    """
     start = len(MAGIC) + RECORD_PREFIX
     length = int.from_bytes(head[len(MAGIC) + 1 : start], "little")
     if not head.startswith(MAGIC + bytes([HEADER_OPCODE])) or length > HEAD_BYTES:
@@ -81,9 +85,9 @@ def _is_of_another_program(head: bytes) -> bool:
 
 
 def _has_definition(file: BinaryIO, size: int) -> bool:
-    """Whether a message type of the store stands in the first or the last 1 MiB.
+    """Tell whether a message type of the store stands in the first or the last 1 MiB.
 
-    Not when the file is an archive or an image that holds an MCAP: a whole beginning further in, or a summary that
+    False when the file is an archive or an image that holds an MCAP: a whole beginning further in, or a summary that
     does not end with the file.
     """
     is_ended = _ends_with_magic(file, size)
@@ -94,7 +98,7 @@ def _has_definition(file: BinaryIO, size: int) -> bool:
 
 
 def _defines(file: BinaryIO, start: int) -> bool:
-    """Whether a message type of the store begins in the 1 MiB from ``start`` on."""
+    """Tell whether a message type of the store begins in the 1 MiB from ``start`` on."""
     file.seek(start)
     if PACKAGE.encode() + b"." not in file.read(SEARCH_BYTES):
         return False

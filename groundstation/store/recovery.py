@@ -49,13 +49,13 @@ _ENCODING = struct.pack("<I", 8) + b"protobuf"  # stands behind the name of eith
 _NAME_BYTES = 4096  # names of topics and types are shorter
 _MOST_DEFINITIONS = 1 << 17  # twice as many as there are channel ids
 _READ_AGAIN = 16  # bytes that may be read for each byte of a file: what is read may turn out to be none, time and again
-_CALL_BYTES = 64  # what a call costs, as bytes
-_INDEX_BYTES = RECORD_PREFIX + 6  # of a MessageIndex without its entries
+_CALL_BYTES = 64  # cost of a call, in bytes
+_INDEX_BYTES = RECORD_PREFIX + 6  # size of a MessageIndex without its entries
 
 
 @dataclass(frozen=True)
 class Intact:
-    """A chunk with the right checksum: its messages by channel."""
+    """Chunk with the right checksum: its messages by channel."""
 
     start: int
     messages: list[Messages]
@@ -63,7 +63,7 @@ class Intact:
 
 @dataclass(frozen=True)
 class Lost:
-    """Bytes ``start`` to ``end`` of the file that could not be used, and what is known of them.
+    """Unusable bytes ``start`` to ``end`` of the file, and what is known of them.
 
     ``channels`` are the ids, ``count`` the messages and ``span`` their first and last log time, where known;
     ``is_cut`` when the file ends there without its summary.
@@ -82,11 +82,11 @@ Found: TypeAlias = Intact | Lost
 
 
 class _TooMuchReadError(Exception):
-    """More was read than a file that is damaged by accident asks for."""
+    """Error of reading more than a file that is damaged by accident asks for."""
 
 
 class _Bounded:
-    """A file of which no more than so many bytes are read."""
+    """File of which at most so many bytes are read."""
 
     def __init__(self, file: BinaryIO, most: int) -> None:
         self._file, self._left = file, most
@@ -103,7 +103,10 @@ class _Bounded:
 
 
 def bounded(file: BinaryIO, size: int) -> BinaryIO:
-    """The file, for work on ``size`` bytes of it: reading more than is due to them raises an error."""
+    """Return the file with a bound on reading, for work on ``size`` bytes of it.
+
+    Reading more than is due to them raises an error.
+    """
     return cast(BinaryIO, _Bounded(file, _READ_AGAIN * size + MAX_RECORD_BYTES))
 
 
@@ -113,7 +116,7 @@ def _read(file: BinaryIO, at: int, length: int) -> bytes:
 
 
 def _opened(data: memoryview, compression: str, size: int, crc: int) -> list[Messages]:
-    """Messages of a chunk's compressed data; ChunkError when it is not intact."""
+    """Return the messages of a chunk's compressed data; ChunkError when it is not intact."""
     messages = split_messages(decompress(compression, data, size, crc))
     if messages is None:
         raise ChunkError("its records do not fit together")
@@ -121,7 +124,10 @@ def _opened(data: memoryview, compression: str, size: int, crc: int) -> list[Mes
 
 
 def index_fits(file: BinaryIO, summary: Summary) -> bool:
-    """Whether chunks stand where the indexes say; one may be damaged, two show that bytes were lost or added."""
+    """Tell whether chunks stand where the indexes say.
+
+    One misplaced chunk may be damaged; two show that bytes were lost or added.
+    """
     astray = 0
     for index in summary.chunks:
         head = read_chunk_head(_read(file, index.chunk_start_offset, PEEK_BYTES))
@@ -132,7 +138,7 @@ def index_fits(file: BinaryIO, summary: Summary) -> bool:
 
 
 def chunks_by_index(file: BinaryIO, summary: Summary) -> Iterator[Found]:
-    """Chunks of a file with an intact summary, in the order of the file."""
+    """Yield the chunks of a file with an intact summary, in the order of the file."""
     free_from = len(MAGIC)
     for index in sorted(summary.chunks, key=lambda index: index.chunk_start_offset):
         start, length = index.chunk_start_offset, index.chunk_length
@@ -162,7 +168,7 @@ def _lost(index: ChunkIndex, count: int | None, reason: str) -> Lost:
 
 
 def chunks_by_walk(file: BinaryIO, size: int) -> Iterator[Found]:
-    """Chunks of a file without a usable summary, in the order of the file.
+    """Yield the chunks of a file without a usable summary, in the order of the file.
 
     The last item is a :class:`Lost` of ``is_cut`` when the file ends before its data does, without bytes where a whole
     record stands before the cut.
@@ -201,14 +207,14 @@ def _walked(file: BinaryIO, at: int, size: int, has_end: bool) -> Iterator[Found
 
 
 def _try_chunk(file: BinaryIO, at: int, size: int, head: ChunkHead) -> tuple[Found, int]:
-    """The chunk at ``at`` and the place to go on from."""
+    """Return the chunk at ``at`` and the place to go on from."""
     data = _read(file, at, head.length)
     end = at + head.length
     try:
         content = memoryview(data)[head.data_at :]
         messages = _opened(content, head.compression, head.uncompressed_size, head.crc)
     except ChunkError as error:
-        if not _is_plausible(file, end, size):  # then its length is not to be trusted
+        if not _is_plausible(file, end, size):  # the stated length cannot be trusted then
             end = find_chunk(file, at + 1, size)
             return Lost(at, end, str(error)), end
         known = read_message_index(_index_record(file, end))
@@ -228,13 +234,16 @@ def _index_record(file: BinaryIO, at: int) -> bytes:
 
 
 def _chunk_at(peek: bytes, at: int, size: int) -> ChunkHead | None:
-    """Head of a chunk that lies wholly inside the file."""
+    """Return the head of a chunk that lies wholly inside the file."""
     head = read_chunk_head(peek)
     return head if head is not None and head.length <= min(size - at, MAX_CHUNK_BYTES) else None
 
 
 def _record_end(file: BinaryIO, at: int, size: int, peek: bytes) -> int | None:
-    """Where the record at ``at`` ends; None when there is no whole record other than a chunk."""
+    """Return the end of the record at ``at``.
+
+    None when there is no whole record other than a chunk.
+    """
     if len(peek) < RECORD_PREFIX:
         return None
     length = int.from_bytes(peek[1:RECORD_PREFIX], "little")
@@ -247,7 +256,7 @@ def _record_end(file: BinaryIO, at: int, size: int, peek: bytes) -> int | None:
 
 
 def _is_plausible(file: BinaryIO, at: int, size: int) -> bool:
-    """Whether a record starts at ``at``, or the file ends there."""
+    """Tell whether a record starts at ``at``, or the file ends there."""
     if at == size:
         return True
     peek = _read(file, at, PEEK_BYTES)
@@ -255,7 +264,7 @@ def _is_plausible(file: BinaryIO, at: int, size: int) -> bool:
 
 
 def find_chunk(file: BinaryIO, start: int, size: int) -> int:
-    """Place of the next chunk from ``start`` on, ``size`` when there is none."""
+    """Return the place of the next chunk from ``start`` on, ``size`` when there is none."""
     at = start + SIGNATURE_AT
     while (hit := find_bytes(file, SIGNATURE, at)) is not None:
         peek = _read(file, hit - SIGNATURE_AT, PEEK_BYTES)
@@ -267,7 +276,10 @@ def find_chunk(file: BinaryIO, start: int, size: int) -> int:
 
 
 def find_bytes(file: BinaryIO, needle: bytes, start: int) -> int | None:
-    """Place of the first ``needle`` from ``start`` on; the file is searched in blocks, small ones first."""
+    """Return the place of the first ``needle`` from ``start`` on.
+
+    The file is searched in blocks, small ones first.
+    """
     at, size = start, PEEK_BYTES
     while True:
         block = _read(file, at, size)
@@ -281,7 +293,10 @@ def find_bytes(file: BinaryIO, needle: bytes, start: int) -> int | None:
 
 
 def find_facts(file: BinaryIO) -> tuple[dict[str, str], bool]:
-    """Strings of the file's metadata record or of its copy, and whether they are as they were written."""
+    """Return the strings of the file's metadata record, or of its copy.
+
+    Also whether they are as they were written.
+    """
     fallback: dict[str, str] = {}
     for name in (METADATA_NAME, COPY_NAME):
         needle = struct.pack("<I", len(name)) + name.encode()
@@ -296,7 +311,10 @@ def find_facts(file: BinaryIO) -> tuple[dict[str, str], bool]:
 
 
 def _facts_at(file: BinaryIO, place: int, name_bytes: int) -> dict[str, str]:
-    """Strings of a Metadata record whose name stands at ``place``; by the length of its map, not of the record."""
+    """Return the strings of a Metadata record whose name stands at ``place``.
+
+    The length of its map is used, not that of the record.
+    """
     (length,) = struct.unpack("<I", _read(file, place + name_bytes, 4).ljust(4, b"\0"))
     if length > MAX_RECORD_BYTES:
         return {}
@@ -305,7 +323,7 @@ def _facts_at(file: BinaryIO, place: int, name_bytes: int) -> dict[str, str]:
 
 
 def chunk_bytes(file: BinaryIO, size: int) -> int:
-    """Bytes of a file that stand in chunks, by their heads alone."""
+    """Count the bytes of a file that stand in chunks, by their heads alone."""
     total, at = 0, find_chunk(file, 0, size)
     while (head := _chunk_at(_read(file, at, PEEK_BYTES), at, size)) is not None:
         total += head.length
@@ -314,7 +332,10 @@ def chunk_bytes(file: BinaryIO, size: int) -> int:
 
 
 def definitions_in(file: BinaryIO, start: int, end: int) -> Iterator[tuple[Schema | Channel, bytes]]:
-    """Schemas and channels that begin in a part of a file, told by their form: each record and its bytes."""
+    """Yield the schemas and channels that begin in a part of a file, and their bytes.
+
+    They are recognised by their form.
+    """
     with suppress(_TooMuchReadError):
         yield from _definitions_in(bounded(file, end - start), start, end)
 
@@ -339,7 +360,7 @@ def _definitions_in(file: BinaryIO, start: int, end: int) -> Iterator[tuple[Sche
 
 
 def is_own_schema(schema: Schema) -> bool:
-    """Whether a schema is a message type of the store."""
+    """Tell whether a schema is a message type of the store."""
     try:
         return schema.name.startswith(f"{PACKAGE}.") and bool(message_type(schema.data, schema.name))
     except GroundstationError:
@@ -347,10 +368,10 @@ def is_own_schema(schema: Schema) -> bool:
 
 
 def search_definitions(file: BinaryIO, size: int, checksums: Mapping[str, int]) -> Summary:
-    """Schemas and channels wherever they stand in the file.
+    """Search schemas and channels wherever they stand in the file.
 
-    Of each id the one counts that agrees with its checksum; without checksums one that can be used, and of those the
-    one that is there most often, or the first.
+    For each id the definition counts that agrees with its checksum. Without checksums it is one that can be used, and
+    of those the one that is found most often, or the first.
     """
     times: Counter[tuple[str, int]] = Counter()
     known: dict[tuple[str, int], tuple[Schema | Channel, bytes]] = {}
@@ -371,7 +392,7 @@ def search_definitions(file: BinaryIO, size: int, checksums: Mapping[str, int]) 
 
 
 def _is_usable(record: Schema | Channel) -> bool:
-    """Whether messages could be read by a definition."""
+    """Tell whether messages could be read by a definition."""
     if isinstance(record, Channel):
         return DERIVED_KEY in record.metadata or own_columns(record.metadata.get(COLUMNS_KEY, "")) is not None
     return is_own_schema(record)

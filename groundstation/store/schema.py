@@ -1,4 +1,6 @@
-"""Message types of the store's channels: compiled ones for canonical topics, made at run time for all others.
+"""Message types of the store's channels.
+
+Those of canonical topics are compiled, all others are made at run time.
 
 Fields 1 and 2 of every message are ``device_time_ns`` and ``record_index``; the topic's own fields follow from 3 on.
 A message type describes its fields to numpy (:class:`WireField`) and itself to other programs (a descriptor set).
@@ -29,7 +31,7 @@ MESSAGE_OF_KIND: Mapping[str, str] = {
 } | {"truth": "Ins"}
 DEVICE_TIME, RECORD_INDEX = "device_time_ns", "record_index"
 FIRST_OWN_NUMBER = 3
-MAX_FIELDS = 10_000  # of a message that is read: working arrays grow with it
+MAX_FIELDS = 10_000  # fields of a message that is read: working arrays grow with them
 TEXT = np.dtype("U1")  # stands for text of any width
 
 _Type = FieldDescriptorProto.Type
@@ -58,7 +60,7 @@ _TYPE_OF_DTYPE: Mapping[str, int] = {
 
 
 def varint(value: int) -> bytes:
-    """Protobuf's variable-length integer.
+    """Encode an integer as protobuf's variable-length integer.
 
     Examples
     --------
@@ -137,13 +139,16 @@ def _compiled_files() -> Mapping[str, FileDescriptorProto]:
 
 @cache
 def canonical_type(kind: str) -> MessageType:
-    """Message type of a canonical topic kind (``"ins"``), with every field of schemas/<kind>.proto."""
+    """Return the message type of a canonical topic kind (``"ins"``).
+
+    It has every field of schemas/<kind>.proto.
+    """
     file = _compiled_files()[MESSAGE_OF_KIND[kind]]
     return message_type(FileDescriptorSet(file=[file]).SerializeToString(), f"{PACKAGE}.{file.message_type[0].name}")
 
 
 def message_type(descriptor_set: bytes, name: str, columns: str = "") -> MessageType:
-    """Message type from what a file says of a channel.
+    """Return the message type from what a file says of a channel.
 
     Parameters
     ----------
@@ -195,7 +200,7 @@ def _dtype_key(dtype: np.dtype[Any]) -> str:
 
 
 def columns_text(fields: Iterable[WireField]) -> str:
-    """Names and dtypes of columns as one line of JSON, for the channel's metadata.
+    """Return names and dtypes of columns as one line of JSON, for the channel's metadata.
 
     Only this tells a reader that field ``Alt_ft`` was column ``Alt (ft)`` of int16, and which fields the log had.
     """
@@ -204,7 +209,7 @@ def columns_text(fields: Iterable[WireField]) -> str:
 
 
 def own_columns(text: str) -> tuple[str, ...] | None:
-    """Names of the fields that :func:`columns_text` noted; None when the text is not usable."""
+    """Parse the field names that :func:`columns_text` noted; None when not usable."""
     try:
         return tuple(str(entry[0]) for entry in json.loads(text))
     except (ValueError, TypeError, LookupError, RecursionError):
@@ -212,7 +217,7 @@ def own_columns(text: str) -> tuple[str, ...] | None:
 
 
 class GrowingType:
-    """Message type of one topic's channel, growing with the columns that its batches bring.
+    """Message type of one topic's channel, which grows with the columns of its batches.
 
     Canonical topics take their fields from the compiled schemas; every other topic gets a type made from its columns,
     numbered in order of their first appearance.
@@ -234,7 +239,7 @@ class GrowingType:
         self._taken = {_name_key(DEVICE_TIME), _name_key(RECORD_INDEX)}
 
     def field_for(self, column: str, dtype: np.dtype[Any]) -> WireField:
-        """Field that carries a column, a new one at its first appearance.
+        """Return the field that carries a column, a new one at its first appearance.
 
         Raises
         ------
@@ -273,7 +278,10 @@ class GrowingType:
         return tuple(sorted(self._fields.values(), key=lambda field: field.number))
 
     def message_type(self, units: Mapping[str, str] = MappingProxyType({})) -> MessageType:
-        """The type as it stands now; ``units`` of columns, as the source tells them, describe fields made for them."""
+        """Return the type as it stands now.
+
+        ``units`` of columns, as the source tells them, describe fields made for them.
+        """
         if self._canonical is not None:
             return self._canonical
         fields = (*self.common_fields, *self.own_fields)
@@ -281,7 +289,7 @@ class GrowingType:
 
 
 def identifier(text: str) -> str:
-    """Protobuf field name for a column's name.
+    """Return the protobuf field name for a column's name.
 
     Examples
     --------
@@ -293,12 +301,17 @@ def identifier(text: str) -> str:
 
 
 def _name_key(name: str) -> str:
-    """What must differ between fields of a message: protobuf's JSON names drop underscores and change case."""
+    """Return the form of a name that must differ between fields of a message.
+
+    Protobuf's JSON names drop underscores and change case.
+    """
     return name.replace("_", "").lower()
 
 
 def _describe(name: str, fields: Sequence[WireField], units: Mapping[str, str]) -> bytes:
-    """Serialised descriptor set of a message made at run time, every field with explicit presence.
+    """Return the serialised descriptor set of a message type made at run time.
+
+    Every field has explicit presence.
 
     A field's unit is its comment, as if it stood before it in a .proto file.
     """

@@ -1,4 +1,4 @@
-"""Sequence numbers of the messages of one channel: whether a chunk is missing between others."""
+"""Sequence numbers of the messages of one channel; they show whether a chunk is missing."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ _WRAP = 1 << 32
 
 @dataclass
 class Sequences:
-    """Follows the numbers block by block.
+    """Check of the sequence numbers of one channel, block by block.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class Sequences:
     _is_counting: bool = True
 
     def take(self, numbers: Int64Array) -> None:
-        """Go on with the messages of a block, shape (n,), at least one."""
+        """Take in the messages of a block, shape (n,), at least one."""
         inside = np.diff(numbers) % _WRAP
         self._is_counting &= bool((inside == 1).all())
         self.steps += len(inside)
@@ -45,5 +45,5 @@ class Sequences:
 
     @property
     def missing(self) -> int:
-        """Numbers left out between blocks, where all else counts."""
+        """Sequence numbers missing between blocks, where all others are consecutive."""
         return self._missing if self._is_counting and self.steps >= FEWEST_STEPS else 0

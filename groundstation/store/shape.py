@@ -1,4 +1,6 @@
-"""What of a store file's facts has the shape that later rooms rely on; an entry that has not is left out.
+"""Check of the shape of a store file's facts; an entry of another shape is left out.
+
+Later rooms rely on the shape.
 
 The facts are JSON in a file that may be damaged or written by anyone. Keys that are not named here pass unchanged.
 """
@@ -21,12 +23,12 @@ def _is_a(value: Any, kind: str) -> bool:
 
 
 def _agrees(entry: Any, shape: Mapping[str, str]) -> bool:
-    """Whether what an entry has of a shape is right; all of it may be absent."""
+    """Tell whether the keys that an entry has agree with a shape; all may be absent."""
     return isinstance(entry, dict) and all(_is_a(entry[key], kind) for key, kind in shape.items() if key in entry)
 
 
 def sound_damages(entries: Any) -> list[Any]:
-    """Entries that may be damages.
+    """Return the entries that may be damage.
 
     Examples
     --------
@@ -37,7 +39,7 @@ def sound_damages(entries: Any) -> list[Any]:
 
 
 def sound_remarks(entries: Any) -> list[Any]:
-    """Entries that may be remarks."""
+    """Return the entries that may be remarks."""
     return [entry for entry in _listed(entries) if _agrees(entry, _REMARK)]
 
 

@@ -1,8 +1,7 @@
-"""Message by message where messages differ in length or fields: the store's only loops over rows.
+"""Loops over messages that differ in length or fields: the store's only loops over rows.
 
-Compiled when there is much to walk; the first short chunks of a process are walked by the interpreter, as loading numba
-takes half a second.
-Everything a loop reads may be hostile: each index is checked against the end before use.
+They are compiled when there is much to walk. The interpreter walks the first short chunks of a process, as loading
+numba takes half a second. Everything a loop reads may be hostile: each index is checked against the end before use.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,7 +21,9 @@ HEAD_BYTES = HEAD.itemsize
 
 
 def record_starts(buffer: Any, starts: Int64Array, sizes: Int64Array) -> int:
-    """Find the message records of a chunk; returns how many, or -1 when the records do not fill the chunk exactly.
+    """Find the message records of a chunk and return their number.
+
+    -1 when the records do not fill the chunk exactly.
 
     Records that are no messages (schemas and channels may stand in chunks) are passed over. ``starts`` and ``sizes``,
     each long enough for a chunk full of the shortest messages, receive place and size.
@@ -125,13 +126,16 @@ def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Walker:
-    """Choose who walks: the interpreter for the first ``interpreted_bytes``, compiled code from then on."""
+    """Choice of who walks: the interpreter at first, then compiled code.
+
+    The interpreter walks the first ``interpreted_bytes``.
+    """
 
     def __init__(self, interpreted_bytes: int) -> None:
         self.left = interpreted_bytes
 
     def choose(self, function: Callable[..., Any], buffer: ByteArray) -> tuple[Callable[..., Any], Any]:
-        """The function, and the buffer in the form that is fastest for it."""
+        """Return the function, and the buffer in the form that is fastest for it."""
         if len(buffer) > self.left:
             self.left = 0
             return _compiled(function), buffer
@@ -143,7 +147,10 @@ walker = Walker(INTERPRETED_BYTES)
 
 
 def find_messages(buffer: ByteArray) -> tuple[Int64Array, Int64Array] | None:
-    """Places and sizes of a chunk's message records; None when the chunk is not a row of whole records."""
+    """Return the places and sizes of a chunk's message records.
+
+    None when the chunk is not a row of whole records.
+    """
     room = len(buffer) // HEAD_BYTES + 1
     starts, sizes = np.empty(room, np.int64), np.empty(room, np.int64)
     function, data = walker.choose(record_starts, buffer)
@@ -152,7 +159,10 @@ def find_messages(buffer: ByteArray) -> tuple[Int64Array, Int64Array] | None:
 
 
 def locate_fields(messages: Messages, fields: Sequence[WireField]) -> tuple[Int64Array, Int64Array, BoolArray]:
-    """Places of values (-1: absent), bytes of texts, each (n, fields), and which messages are protobuf, (n,)."""
+    """Return places of values, bytes of texts, and which messages are protobuf.
+
+    Places (-1: absent) and bytes are (n, fields), the last is (n,).
+    """
     shape = len(messages), len(fields)
     places, lengths = np.full(shape, -1, np.int64), np.zeros(shape, np.int64)
     good = np.ones(len(messages), dtype=bool)

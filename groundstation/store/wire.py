@@ -1,4 +1,4 @@
-"""Columns <-> MCAP message records with protobuf payloads, a whole chunk at a time.
+"""Conversion of columns to MCAP messages with protobuf payloads and back, by chunks.
 
 A message record is a fixed head (opcode, length, channel, sequence, log and publish time) and a payload of
 ``tag value tag value ...``. As numbers have fixed width, rows with the same fields present differ in nothing but the
@@ -21,7 +21,7 @@ from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, Messag
 from groundstation.store.schema import WireField, varint
 from groundstation.store.walk import locate_fields
 
-MAX_TEXT_BYTES = 64 << 20  # of the matrix in which texts of one piece are laid side by side
+MAX_TEXT_BYTES = 64 << 20  # matrix in which the texts of one piece are laid side by side
 ROWS_ALIKE, MAX_PARTIAL = 512, 60  # rows with the same fields that are worth a matrix; fields that some rows lack
 
 Rows = slice | NDArray[np.intp]
@@ -29,7 +29,7 @@ Block = tuple[Rows, bytes, ByteArray]  # rows, the bytes before each value, the 
 
 
 class Slot(NamedTuple):
-    """One field's values on their way into messages.
+    """Values of one field on their way into messages.
 
     Parameters
     ----------
@@ -50,18 +50,21 @@ class Slot(NamedTuple):
 
     @property
     def has_many_widths(self) -> bool:
-        """Whether the texts that are present differ in length."""
+        """Tell whether the texts that are present differ in length."""
         if self.lengths is None:
             return False
         lengths = self.lengths if self.present is None else self.lengths[self.present]
         return len(lengths) > 0 and bool(lengths.min() != lengths.max())
 
     def take(self, rows: Rows, present: BoolArray | None = None) -> "Slot":
-        """The slot of some rows, which are present as ``present`` tells."""
+        """Return the slot of some rows, which are present where ``present`` says."""
         return Slot(self.prefix, self.values[rows], present, None if self.lengths is None else self.lengths[rows])
 
     def alike(self) -> tuple[bytes, NDArray[Any]]:
-        """What stands before each value, and the values, where all are present and texts have one length."""
+        """Return the bytes before each value, and the values.
+
+        For a slot whose values are all present and whose texts have one length.
+        """
         if self.lengths is None:
             return self.prefix, self.values
         length = int(self.lengths[0])
@@ -69,7 +72,10 @@ class Slot(NamedTuple):
         return self.prefix + varint(length), narrow
 
     def blocks(self) -> Iterator[Block]:
-        """Rows whose bytes have one width: their positions, the bytes before each value, the values as (k, width)."""
+        """Yield the rows whose bytes have one width.
+
+        Their positions, the bytes before each value, the values as (k, width).
+        """
         rows: Rows = slice(None)
         if self.present is not None and not self.present.all():
             rows = np.flatnonzero(self.present)
@@ -91,7 +97,7 @@ class Slot(NamedTuple):
 
 
 def taken(slots: Sequence[Slot], rows: Rows) -> list[Slot]:
-    """Slots of some rows; those that share a mask still do."""
+    """Return the slots of some rows; those that share a mask still do."""
     if isinstance(rows, slice) and rows.indices(len(slots[0].values)) == (0, len(slots[0].values), 1):
         return list(slots)
     masks = {id(mask): mask[rows] for mask in _masks(slots).values()}
@@ -99,12 +105,12 @@ def taken(slots: Sequence[Slot], rows: Rows) -> list[Slot]:
 
 
 def _masks(slots: Sequence[Slot]) -> dict[int, BoolArray]:
-    """The different masks of slots."""
+    """Return the different masks of slots."""
     return {id(slot.present): slot.present for slot in slots if slot.present is not None}
 
 
 def slot_of(field: WireField, values: NDArray[Any], present: BoolArray | None) -> Slot:
-    """The slot of a field; ``values`` in the field's wire dtype, or text."""
+    """Return the slot of a field; ``values`` in the field's wire dtype, or text."""
     if field.wire_dtype is not None:
         return Slot(field.tag, values, present)
     encoded = encode_text(values)
@@ -112,7 +118,10 @@ def slot_of(field: WireField, values: NDArray[Any], present: BoolArray | None) -
 
 
 def encode_text(values: NDArray[np.str_]) -> NDArray[np.bytes_]:
-    """UTF-8 of each text, dtype kind ``S``; each run of equal texts (modes, states) is encoded once."""
+    """Encode texts as UTF-8, dtype kind ``S``.
+
+    Each run of equal texts (modes, states) is encoded once.
+    """
     if not len(values):
         return np.empty(0, "S1")
     starts = np.concatenate(([0], np.flatnonzero(values[1:] != values[:-1]) + 1))
@@ -130,7 +139,7 @@ def _utf8(values: NDArray[np.str_]) -> NDArray[np.bytes_]:
 def encode(
     channel_id: int, first_sequence: int, log_time: Int64Array, publish_time: Int64Array, slots: Sequence[Slot]
 ) -> tuple[ByteArray, Int64Array]:
-    """Message records of rows, in the order of the rows.
+    """Encode rows as message records, in the order of the rows.
 
     Parameters
     ----------
@@ -174,7 +183,10 @@ def _blocks(slots: Iterable[Slot]) -> list[Block]:
 
 
 def _alike(slots: Sequence[Slot], count: int) -> list[tuple[Rows, list[Slot]]] | None:
-    """Rows in groups that have the same fields present, and the slots of those; None where few are alike."""
+    """Return groups of rows that have the same fields present, with the slots of those.
+
+    None where few are alike.
+    """
     masks = {identity: mask for identity, mask in _masks(slots).items() if not mask.all()}
     absent = {identity for identity, mask in masks.items() if not mask.any()}
     partial = {identity: mask for identity, mask in masks.items() if identity not in absent}
@@ -198,7 +210,10 @@ def _alike(slots: Sequence[Slot], count: int) -> list[tuple[Rows, list[Slot]]] |
 
 
 def _lay_out(channel_id: int, slots: Sequence[Slot]) -> ByteArray:
-    """Records that all have the same fields, shape (n, size): filled by columns over a copy of the constant bytes."""
+    """Return records that all have the same fields, shape (n, size).
+
+    They are filled by columns over a copy of the constant bytes.
+    """
     pairs = [slot.alike() for slot in slots]
     body = b"".join(prefix + bytes(values.itemsize) for prefix, values in pairs)
     head = _record_head(channel_id, len(body))
@@ -215,12 +230,15 @@ def _lay_out(channel_id: int, slots: Sequence[Slot]) -> ByteArray:
 
 
 def _record_head(channel_id: int, rest_bytes: int) -> bytes:
-    """Opcode, length and channel of a record that has so many bytes behind them."""
+    """Return opcode, length and channel of a record with so many bytes behind them."""
     return bytes([MESSAGE_OPCODE]) + (2 + rest_bytes).to_bytes(8, "little") + channel_id.to_bytes(2, "little")
 
 
 def _scatter(channel_id: int, slots: Sequence[Slot]) -> tuple[ByteArray, Int64Array]:
-    """Records of mixed fields and where each starts: every block's bytes go to the next free place of its rows."""
+    """Return records of mixed fields, and the start of each.
+
+    Every block's bytes go to the next free place of its rows.
+    """
     blocks = _blocks(slots)
     sizes = np.full(len(slots[0].values), len(_record_head(channel_id, 0)), np.int64)
     for rows, prefix, values in blocks:
@@ -262,7 +280,7 @@ class Decoded:
 
 
 def decode(messages: Messages, fields: Sequence[WireField]) -> Iterator[Decoded]:
-    """Columns of messages, one per field, mostly in one piece.
+    """Yield columns of messages, one per field, mostly in one piece.
 
     Absent stays absent; fields that are not asked for are skipped. Text is as wide as the longest of a piece: pieces
     get smaller when a few long texts among many short ones would blow it up.
@@ -292,10 +310,10 @@ def decode(messages: Messages, fields: Sequence[WireField]) -> Iterator[Decoded]
 
 
 def _template(messages: Messages, fields: Sequence[WireField]) -> list[tuple[int, int] | None] | None:
-    """Place and width of each field's value (None: absent) in records that are all laid out like the first.
+    """Return place and width of each field's value in records laid out like the first.
 
-    Returns None when they are not, or when the first has anything but the fields asked for, each once, with one-byte
-    bools: such messages are walked one by one.
+    An absent field is None. The result is None when some record has another layout, or when the first has anything but
+    the fields asked for, each once, with one-byte bools: such messages are walked one by one.
     """
     by_tag = {field.tag: k for k, field in enumerate(fields)}
     matrix = messages.matrix()
@@ -327,7 +345,10 @@ def _template(messages: Messages, fields: Sequence[WireField]) -> list[tuple[int
 
 
 def _after_varint(data: bytes, at: int) -> int:
-    """Place after the variable-length integer that starts at ``at``; no more than five bytes are taken."""
+    """Return the place after the variable-length integer that starts at ``at``.
+
+    At most five bytes are taken.
+    """
     end = min(at + 5, len(data))
     while at < end and data[at] & 0x80:
         at += 1
@@ -369,12 +390,15 @@ def _filler(field: WireField) -> Any:
 
 
 def absent_column(field: WireField, count: int) -> Column:
-    """A column of ``count`` absent values."""
+    """Return a column of ``count`` absent values."""
     return Column(np.full(count, _filler(field), field.dtype), np.zeros(count, dtype=bool))
 
 
 def _decode_text(matrix: ByteArray) -> NDArray[np.str_]:
-    """Text of each row of UTF-8 bytes padded with zeros; each run of equal rows is decoded once."""
+    """Return the text of each row of UTF-8 bytes padded with zeros.
+
+    Each run of equal rows is decoded once.
+    """
     count, width = matrix.shape
     if not count or not width:
         return np.full(count, "", "U1")

@@ -1,4 +1,7 @@
-"""Write a store file: chunks go to a spool as they fill, and into the file in order of time when all are known."""
+"""Write a store file.
+
+Chunks go to a spool as they fill, and into the file in order of time when all are known.
+"""
 
 import glob
 import hashlib
@@ -45,7 +48,7 @@ from groundstation.store.marks import MAGIC, METADATA_NAME, PACKAGE
 LIBRARY = f"groundstation {__version__}"
 # Higher levels save 4 to 7 % of recorded flights and read random mantissas a quarter slower: docs/decisions/005.
 ZSTD_LEVEL = -1
-MEMORY_BYTES = 32 << 20  # of finished chunks that are kept in memory; when there are more, all go to the spool
+MEMORY_BYTES = 32 << 20  # finished chunks kept in memory; when there are more, all go to the spool
 MOST_ON_THEIR_WAY = 4  # chunks that wait for the thread which compresses and writes them
 PART = ".part"  # end of the name of a file that is being written
 MAX_CHANNELS = 65_535  # MCAP's channel ids have 16 bits
@@ -53,7 +56,10 @@ MAX_CHANNELS = 65_535  # MCAP's channel ids have 16 bits
 
 @dataclass
 class _Finished:
-    """A chunk and its message index: in memory, or at a place of the spool where there are no ``parts``."""
+    """Chunk and its message index, in memory or in the spool.
+
+    It stands at a place of the spool where there are no ``parts``.
+    """
 
     parts: tuple[bytes, ...]
     place: int
@@ -64,7 +70,7 @@ class _Finished:
 
 
 class _Digested:
-    """A file that is written from its beginning to its end, and the digest of what was."""
+    """File that is written from beginning to end, with a digest of its content."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file, self._digest, self._at = file, hashlib.sha256(), 0
@@ -91,7 +97,7 @@ class _Digested:
 
 
 class StoreWriter:
-    """Write batches of corrected records into an MCAP file.
+    """Writer of batches of corrected records into an MCAP file.
 
     The file appears under its name when the ``with`` block ends without an exception; until then its chunks are in
     memory, or, beyond ``MEMORY_BYTES``, in an unnamed temporary file of the same folder. Chunks stand in order of their
@@ -165,7 +171,9 @@ class StoreWriter:
             part.unlink(missing_ok=True)
 
     def write(self, batch: RecordBatch) -> None:
-        """Take in a batch with ``time_ns`` set; times of a topic never decrease from one batch to the next.
+        """Take in a batch with ``time_ns`` set.
+
+        Times of a topic never decrease from one batch to the next.
 
         Raises
         ------
@@ -183,7 +191,7 @@ class StoreWriter:
 
     def _channels_of(self, topic: str) -> Iterator[ChannelWriter]:
         if topic not in self._channels:
-            if len(self._channels) + 3 > MAX_CHANNELS:  # its own, one made from it, and the log
+            if len(self._channels) + 3 > MAX_CHANNELS:  # room for its channel, one derived from it, and the log
                 raise GroundstationError(str(self.path), "more topics than an MCAP file has channels")
             new_id = len(self._channels) + 1
             self._channels[topic] = TopicWriter(new_id, topic, self._name_for(topic), self._hand_over)
@@ -198,7 +206,7 @@ class StoreWriter:
             yield self._derived_of[topic]
 
     def _derived(self, channel_id: int, topic: str) -> ChannelWriter | None:
-        """The channel made from a topic for other programs; None where there is none."""
+        """Return the channel made from a topic for other programs; None without one."""
         kind = kind_of(topic)
         if kind == "gnss":
             return LocationFixWriter(channel_id, topic, self._hand_over, self._has_utc)
@@ -216,7 +224,7 @@ class StoreWriter:
             self._channels[LOG_TOPIC] = self._log
 
     def _name_for(self, topic: str) -> str:
-        """Full message name of a topic that is not canonical, unlike that of any other."""
+        """Return a unique full message name for a topic that is not canonical."""
         if is_canonical(topic):
             return ""
         words = [word for word in re.split(r"[^A-Za-z0-9]+", topic.removeprefix("raw.")) if word]
@@ -229,7 +237,10 @@ class StoreWriter:
         return name
 
     def _hand_over(self, chunk: Chunk) -> None:
-        """Let the thread spool a chunk; waits while too many are on their way, and tells what went wrong with those."""
+        """Let the thread spool a chunk.
+
+        Waits while too many are on their way, and raises what went wrong with those.
+        """
         self._on_their_way.append(self._thread.submit(self._spool_chunk, chunk))
         self._wait_until_left(MOST_ON_THEIR_WAY)
 
@@ -287,7 +298,7 @@ class StoreWriter:
             (channel_id,) = chunk.index.message_index_offsets
             indexes.append(self._copy_chunk(file, chunk))
             count[channel_id] += 1
-            if count[channel_id].bit_count() == 1:  # behind chunks 1, 2, 4, 8 ...: should those at both ends be lost
+            if count[channel_id].bit_count() == 1:  # after chunks 1, 2, 4, 8 ..., in case those at both ends are lost
                 file.write(again[channel_id])
         places.append(MetadataIndex(offset=file.tell(), length=len(copy), name=COPY_NAME))
         file.write(copy + to_bytes(DataEnd(0)))
@@ -301,7 +312,7 @@ class StoreWriter:
         file.write(_summary(groups, file.tell()) + MAGIC)
 
     def _copy_chunk(self, file: _Digested, chunk: _Finished) -> ChunkIndex:
-        """Copy a chunk from the spool; returns its index with the places it now has."""
+        """Copy a chunk from the spool; return its index with its new places."""
         assert self._spool is not None
         start = file.tell()
         if chunk.parts:
@@ -339,7 +350,7 @@ class StoreWriter:
 
 
 def clear_parts(path: Path) -> None:
-    """Remove what processes that died while they wrote a file have left beside it."""
+    """Remove the partial files of processes that died while they wrote a file."""
     for part in path.parent.glob(f".{glob.escape(path.name)}.*{PART}"):
         number = part.name.removesuffix(PART).rpartition(".")[2]
         if number.isdecimal() and not _is_alive(int(number)):
@@ -347,7 +358,7 @@ def clear_parts(path: Path) -> None:
 
 
 def _is_alive(process: int) -> bool:
-    if os.name != "posix":  # there the signal 0 is another one
+    if os.name != "posix":  # signal 0 means something else there
         return True
     try:
         os.kill(process, 0)
@@ -363,12 +374,12 @@ def _joined(parts: Sequence[NDArray[Any]]) -> NDArray[Any]:
 
 
 def _order(chunk: _Finished) -> tuple[int, str, int]:
-    """Chunks by first log time; of equal times by topic, and of one topic as they came."""
+    """Sort chunks by first log time, then by topic, then as they came."""
     return chunk.index.message_start_time, chunk.topic, chunk.ordinal
 
 
 def _summary(groups: list[tuple[Opcode, list[McapRecord]]], start: int) -> bytes:
-    """The summary section with its offsets and the footer, which has the checksum of both."""
+    """Return the summary section with its offsets and the footer, which has the checksum."""
     body, offsets = b"", []
     for opcode, records in groups:
         data = to_bytes(*records)

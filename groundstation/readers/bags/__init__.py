@@ -1,4 +1,7 @@
-"""Robots' logs: MCAP of other programs, ROS 1 bags (.bag), ROS 2 bags (sqlite3, MCAP, split ones by their folder)."""
+"""Robots' logs: MCAP of other programs, ROS 1 bags (.bag), ROS 2 bags (sqlite3, MCAP).
+
+A ROS 2 bag that was split is read by its folder.
+"""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,13 +14,16 @@ NAME = "bag"
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim a file by its first bytes, the metadata of a bag of ROS 2, and what has lost them but holds a chunk."""
+    """Claim a file by its first bytes, by ROS 2 metadata, or by a chunk in it.
+
+    The chunk counts where the first bytes are lost.
+    """
     kind = kind_of(source)
     return Claim(NAME, kind, confidence=1.0 if is_begun(source) else 0.5) if kind else None
 
 
 def claim_by(source: Source, profile: Path) -> Claim:
-    """Claim of a bag whose messages the user's profile explains.
+    """Claim a bag whose messages the user's profile explains.
 
     Raises
     ------
@@ -30,7 +36,7 @@ def claim_by(source: Source, profile: Path) -> Claim:
 
 
 def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
-    """Yield the header, batches of every topic (raw and canonical), remarks and damages."""
+    """Yield the header, batches of every topic (raw and canonical), remarks and damage."""
     from groundstation.readers.bags.profile import load
     from groundstation.readers.bags.reader import items
 

@@ -1,4 +1,4 @@
-"""A log of messages as one: a single file, or the files that a bag of ROS 2 was split into."""
+"""Log of messages as one: a single file, or the files that a ROS 2 bag was split into."""
 
 import re
 from collections import Counter
@@ -26,7 +26,7 @@ from groundstation.readers.source import Source
 
 METADATA = "metadata.yaml"
 MARK = b"rosbag2_bagfile_information:"
-KEPT_BYTES, MESSAGE_BYTES = 64 << 20, 64  # of messages kept for the second pass; beside its own, of each
+KEPT_BYTES, MESSAGE_BYTES = 64 << 20, 64  # messages kept for the second pass; what each adds to its own
 MOST_METADATA_BYTES = 16 << 20
 _ENDINGS = ("", ".zstd")  # rosbag2 names a file it compressed later without the ending
 Item: TypeAlias = Block | Damage
@@ -40,7 +40,7 @@ _TABLES = tuple(re.compile(rb"(?i)CREATE TABLE (IF NOT EXISTS )?[\"'`\[]?" + nam
 
 
 def kind_of(source: Source) -> str:
-    """What kind of bag a file is, by its first bytes; empty for none."""
+    """Return the kind of bag that a file is, by its first bytes; empty for none."""
     if source.head.lstrip().startswith(MARK):
         return "ROS 2"
     if source.head.startswith(SQLITE_MAGIC):
@@ -52,19 +52,19 @@ def kind_of(source: Source) -> str:
 
 
 def is_begun(source: Source) -> bool:
-    """Whether a file has the first bytes of a bag, or is the metadata of one."""
+    """Tell whether a file has the first bytes of a bag, or is the metadata of one."""
     return source.head.lstrip().startswith(MARK) or source.head.startswith(tuple(_CONTAINERS))
 
 
 def _is_ours(source: Source) -> bool:
-    """Whether groundstation wrote an MCAP: the store reads it."""
+    """Tell whether groundstation wrote an MCAP: then the store reads it."""
     from groundstation.store.recognition import is_groundstation_mcap
 
     return is_groundstation_mcap(source.head) or is_groundstation_mcap(source.path)  # the second: by what is left of it
 
 
 def is_bag_folder(folder: Path) -> bool:
-    """Whether a folder is a bag of ROS 2: rosbag2 lays its metadata into it."""
+    """Tell whether a folder is a bag of ROS 2: rosbag2 puts its metadata there."""
     try:
         with (folder / METADATA).open("rb") as stream:
             return stream.read(4096).lstrip().startswith(MARK)
@@ -96,7 +96,9 @@ def _account_of(metadata: Path) -> BagMetadata:
 
 @dataclass
 class Bag:
-    """Iterates over the messages of a log; may be iterated over again, then from memory where they are few.
+    """Iterable over the messages of a log.
+
+    It may be iterated over again, then from memory where the messages are few.
 
     Parameters
     ----------
@@ -120,7 +122,7 @@ class Bag:
 
     @cached_property
     def size(self) -> int:
-        """Bytes of all its files that are there."""
+        """Bytes of all files of the bag that are present."""
         size = 0
         for file in self.files():
             try:
@@ -147,7 +149,7 @@ class Bag:
         self._kept = kept
 
     def _read(self) -> Iterator[Item]:
-        """Messages and damages, then what the metadata of the bag counts beyond what its files tell."""
+        """Yield messages and damage, then what the bag's metadata counts beyond them."""
         account = _account_of(self.source.path).messages if self._is_folder else {}
         told: Counter[str] = Counter()
         count, most = 0, most_messages(self.size)

@@ -1,4 +1,4 @@
-"""Messages of robots as canonical signals: which fields a message gives, in which unit and frame.
+"""Canonical signals from robots' messages: fields, units and frames by message type.
 
 Units and frames are those of the message definitions and of REP 103, 105 and 145: metres, radians, tesla; east-north-up
 and forward-left-up.
@@ -27,7 +27,7 @@ EARTH_FRAMES = frozenset({"map", "earth", "enu", "world", "utm", "ned", "local_e
 
 @dataclass(frozen=True)
 class Message:
-    """What a message type gives.
+    """Message type and the canonical columns that it gives.
 
     Parameters
     ----------
@@ -45,12 +45,18 @@ class Message:
 
 
 def is_ned(values: Values) -> bool:
-    """Whether a message names a frame that is north-east-down already (REP 103: its name ends with ``_ned``)."""
+    """Tell whether a message names a frame that is north-east-down already.
+
+    By REP 103 the name of such a frame ends with ``_ned``.
+    """
     return _frame(values) == "ned" or _frame(values).endswith("_ned")
 
 
 def is_earth_frame(values: Values) -> bool:
-    """Whether a message names a frame whose axes are those of the earth (REP 105: ``odom`` begins anywhere)."""
+    """Tell whether a message names a frame whose axes are those of the earth.
+
+    By REP 105 ``odom`` begins anywhere.
+    """
     return _frame(values) in EARTH_FRAMES or _frame(values).endswith(("_enu", "_ned"))
 
 
@@ -59,7 +65,10 @@ def _frame(values: Values) -> str:
 
 
 def imu(values: Values) -> Columns:
-    """Attitude, rates and specific force; a covariance that begins with -1 says that a driver has no such value."""
+    """Return attitude, rates and specific force.
+
+    A covariance that begins with -1 says that a driver has no such value.
+    """
     known = {name: _is_known(values, f"{name}_covariance[0]") for name in _IMU_PARTS}
     columns: Columns = {}
     if values.has_triple("orientation"):
@@ -76,7 +85,7 @@ def _is_known(values: Values, covariance: str) -> np.ndarray | None:
 
 
 def navsatfix(values: Values) -> Columns:
-    """Position where the receiver has a fix; an altitude that is NaN is none."""
+    """Return the position where the receiver has a fix; a NaN altitude is absent."""
     has_fix = values["status.status"] >= 0.0
     altitude = values["altitude"]
     return {
@@ -89,7 +98,10 @@ def navsatfix(values: Values) -> Columns:
 
 
 def sigmas(values: Values, present: np.ndarray) -> Columns:
-    """Standard deviations of a position by its covariance, east-north-up, where the message says that it is known."""
+    """Return the standard deviations of a position by its covariance, east-north-up.
+
+    Only where the message says that the covariance is known.
+    """
     if not all(name in values for name in _COVARIANCE):
         return {}
     east, north, up = (values[name] for name in _COVARIANCE[:3])
@@ -108,7 +120,7 @@ _UNKNOWN = ("UNKNOWN", "COVARIANCE_TYPE_UNKNOWN", "")  # names of the number 0, 
 
 
 def location_fix(values: Values) -> Columns:
-    """Position of Foxglove's LocationFix; an altitude of exactly 0 is one that was not set."""
+    """Return the position of Foxglove's LocationFix; an altitude of exactly 0 was not set."""
     columns = {"latitude_deg": values["latitude"], "longitude_deg": values["longitude"]}
     found = {name: Column(part, ~np.isnan(part)) for name, part in columns.items()}
     if "altitude" in values:
@@ -118,7 +130,10 @@ def location_fix(values: Values) -> Columns:
 
 
 def gps_fix(values: Values) -> Columns:
-    """Position, velocity and dilution of gps_msgs/GPSFix (gpsd); NaN is a value that it does not have."""
+    """Return position, velocity and dilution of gps_msgs/GPSFix (gpsd).
+
+    NaN is a value that the message does not have.
+    """
     has_fix = values["status.status"] >= 0.0
     track, speed = values["track"], values["speed"]
     has_track = has_fix & np.isfinite(track) & np.isfinite(speed)
@@ -160,7 +175,7 @@ def magnetic_field(values: Values) -> Columns:
 
 
 def wheel_odometry(values: Values) -> Columns:
-    """Speed forward and rate of turn to the right, of odometry whose frame begins anywhere."""
+    """Return speed forward and rate of turn to the right of odometry with a free origin."""
     return {
         "speed_mps": Column(values["twist.twist.linear.x"]),
         "turn_rate_dps": Column(-values["twist.twist.angular.z"] * DEG_PER_RAD),
@@ -168,7 +183,10 @@ def wheel_odometry(values: Values) -> Columns:
 
 
 def odometry(values: Values) -> Columns:
-    """Attitude, local position and velocity of an odometry whose frame has the axes of the earth."""
+    """Return attitude, local position and velocity of an odometry in an earth frame.
+
+    Its frame must have the axes of the earth.
+    """
     x, y, z = rotated(values, "pose.pose.orientation", "twist.twist.linear")
     velocity = _ned(values, x, y, z, VELOCITY)
     rates = body(values, "twist.twist.angular", RATES, DEG_PER_RAD, None, is_turned=not is_ned(values))
@@ -189,12 +207,12 @@ def _ned(values: Values, x: np.ndarray, y: np.ndarray, z: np.ndarray, fields: tu
 
 
 def pose(name: str) -> Callable[[Values], Columns]:
-    """Rule of a pose that stands in the field ``name``."""
+    """Return the rule for a pose in the field ``name``."""
     return lambda values: _pose(values, name)
 
 
 def twist(name: str) -> Callable[[Values], Columns]:
-    """Rule of a velocity along the axes of the earth that stands in the field ``name``."""
+    """Return the rule for a velocity along the axes of the earth in the field ``name``."""
     return lambda values: _ned(values, *values.triple(f"{name}.linear"), VELOCITY)
 
 

@@ -1,7 +1,8 @@
-"""Three clocks of a bag: log time, publish time, header stamp. Which of them was set, and which is believed.
+"""Three clocks of a bag: log time, publish time, header stamp.
 
-Log time is the recorder's computer's. Where it steps while stamps go on smoothly it was set: it is moved by as much.
-Stamps are believed where they go with the log time, or where they go on smoothly while messages were logged in bursts.
+This module finds which of them was set, and which is believed. Log time is that of the recorder's computer. Where it
+steps while stamps go on smoothly, the clock was set: log time is moved by as much. Stamps are believed where they go
+with the log time, or where they go on smoothly while messages were logged in bursts.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,20 +19,22 @@ from groundstation.readers.bags.sources import Line
 from groundstation.readers.clock_offsets import Jump, Offsets, offsets_by
 from groundstation.readers.two_clocks import FEWEST_READINGS, Readings, Stretch, Track, stretches_of
 
-LARGEST_LAG_S = 2.0  # between header stamp and log time: what is further apart is another clock
-MOST_QUEUED_S = 60.0  # that a message waits for the recorder
-USUAL_SHARE = 0.99  # of the stamps of a topic that must be within it, while neither clock steps
-BELIEVED_SHARE = 0.5  # of the messages of a topic while its stamps go with the log time: the others have log time
+LARGEST_LAG_S = 2.0  # between header stamp and log time: a larger lag means another clock
+MOST_QUEUED_S = 60.0  # longest time that a message waits for the recorder
+USUAL_SHARE = 0.99  # share of a topic's stamps that must be within that lag, while neither clock steps
+BELIEVED_SHARE = 0.5  # share of a topic's messages whose stamps go with the log time: the others have log time
 FIRST_NS = iso_to_utc_ns("1980-01-08T00:00:00Z")[0]  # a clock before it was not set
 MOST_SAMPLES = 4_096
 MOST_JUMPS = 1_000
-_LEAP_S = 5.0  # of the log time of a topic from one message to the next: another clock may have been set there
-_SLIP_NS = 60 * NS_PER_S  # from the last message before a slip to the first behind it, at most
+_LEAP_S = 5.0  # leap of a topic's log time between two messages: another clock may have been set there
+_SLIP_NS = 60 * NS_PER_S  # longest slip, from the last message before it to the first one after it
 _LARGEST_LAG_NS = int(LARGEST_LAG_S * NS_PER_S)
 
 
 def was_set(jumps: Sequence[Jump], offsets: Offsets) -> bool:
-    """Whether a corrected log time falls by a second or more, or leaps from before 1980, for more than a few messages.
+    """Tell whether a corrected log time falls by a second or more, or leaps from before 1980.
+
+    A slip of a few messages does not count.
 
     Parameters
     ----------
@@ -51,13 +54,16 @@ def was_set(jumps: Sequence[Jump], offsets: Offsets) -> bool:
 
 
 def _is_back(jump: Jump, later: Jump) -> bool:
-    """Whether the log time is a few messages behind a jump where it was."""
+    """Tell whether the log time returns to its old course a few messages after a jump."""
     return later.number - jump.number < FEWEST_READINGS and 0 <= later.time_ns - jump.before_ns < _SLIP_NS
 
 
 @dataclass
 class Sample:
-    """Columns of integers, thinned evenly as they grow: each row that is kept stands for ``stride`` rows."""
+    """Columns of integers, thinned evenly as they grow.
+
+    Each row that is kept stands for ``stride`` rows.
+    """
 
     columns: int
     stride: int = 1
@@ -76,7 +82,7 @@ class Sample:
             self._size, self.stride = self._kept[0].shape[1], 2 * self.stride
 
     def all(self) -> Int64Array:
-        """The rows that are kept, shape (columns, n)."""
+        """Return the rows that are kept, shape (columns, n)."""
         return np.concatenate([np.zeros((self.columns, 0), dtype=np.int64), *self._kept], axis=1)
 
 
@@ -102,7 +108,7 @@ class Stamped:
     _last: Int64Array = field(default_factory=lambda: np.zeros((2, 0), dtype=np.int64))
 
     def take(self, record_index: Int64Array, log_ns: Int64Array, rows: Int64Array, stamp_ns: Int64Array) -> None:
-        """Add messages in the order of the log; ``stamp_ns`` are those of the messages ``rows``."""
+        """Add messages in the order of the log; ``stamp_ns`` are the stamps of ``rows``."""
         self.log.take(log_ns)
         self.stamps.take(record_index[rows], log_ns[rows], stamp_ns)
         self.readings.take(record_index[rows], log_ns[rows], stamp_ns)
@@ -122,16 +128,16 @@ class Stamped:
 
     @cached_property
     def stretches(self) -> list[Stretch]:
-        """The same, parted where one of the clocks was set."""
+        """Readings of the stamps, parted where one of the clocks was set."""
         return stretches_of(self.track)
 
     def line(self, connection: Connection) -> Line:
-        """When the connection was written."""
+        """Return the log times at which the connection was written."""
         return Line(connection, np.sort(self.log.all()[0]), self.log.stride)
 
 
 def told(offsets: Offsets, names: Mapping[int, str]) -> str:
-    """What was set when, for people; ``names`` are topics by their numbers."""
+    """Describe for people how the clock was set; ``names`` are topics by their numbers."""
     parts = [f"by {size_ns / NS_PER_S:+.3f} s before record {record}" for record, size_ns in offsets.steps()]
     if not parts:
         added_s = int(offsets.added_ns[0]) / NS_PER_S
@@ -141,7 +147,9 @@ def told(offsets: Offsets, names: Mapping[int, str]) -> str:
 
 
 def offsets_of(stamped: Mapping[int, Stamped]) -> Offsets:
-    """How log times are to be moved so that they go on smoothly with the stamps; zero where they were set right.
+    """Return offsets that make log times go on smoothly with the stamps.
+
+    Zero where the clock was set right.
 
     Parameters
     ----------
@@ -160,7 +168,10 @@ def offsets_of(stamped: Mapping[int, Stamped]) -> Offsets:
 
 
 def _added_where_right(track: Track, offsets: Offsets) -> tuple[int, int] | None:
-    """Last stretch of the log time that is plausible and near the stamps: its first record, and what was added."""
+    """Return first record and offset of the last stretch of log time that can be right.
+
+    It is plausible and near the stamps.
+    """
     for place in range(len(offsets.starts) - 1, -1, -1):
         end = offsets.starts[place + 1] if place + 1 < len(offsets.starts) else np.iinfo(np.int64).max
         within = track.take((track.record_index >= offsets.starts[place]) & (track.record_index < end))
@@ -172,7 +183,10 @@ def _added_where_right(track: Track, offsets: Offsets) -> tuple[int, int] | None
 
 
 def _least_unset(tracks: Iterable[Track], offsets: Offsets) -> int | None:
-    """Least difference of a log time that was never set and stamps that are a time; None where there are none."""
+    """Return the least difference between a log time that was never set and dated stamps.
+
+    None where there are none.
+    """
     levels = []
     for track in tracks:
         is_date = track.clock_ns >= FIRST_NS
@@ -184,7 +198,7 @@ def _least_unset(tracks: Iterable[Track], offsets: Offsets) -> int | None:
 
 @dataclass(frozen=True, eq=False)
 class Lags:
-    """How long after their stamps the messages of a source were logged.
+    """Lags of a source's messages: how long after their stamps they were logged.
 
     Parameters
     ----------
@@ -208,7 +222,7 @@ class Lags:
 
     @classmethod
     def of(cls, several: Sequence[Stamped], offsets: Offsets) -> "Lags":
-        """The lags of a source, by what was seen of its connections."""
+        """Compute the lags of a source from what was seen of its connections."""
         if several and all(map(_is_stopped, several)):
             lag_ns = np.concatenate([cls._of([one], offsets).lag_ns for one in several])
             return cls(lag_ns, 1.0, True, offsets, is_stopped=True)
@@ -244,33 +258,33 @@ class Lags:
 
     @property
     def usual_ns(self) -> int:
-        """Their median."""
+        """Median of the lags."""
         return int(np.sort(self.lag_ns)[len(self.lag_ns) // 2]) if len(self.lag_ns) else 0
 
     @property
     def most_ns(self) -> int:
-        """The longest that is believed."""
+        """Longest lag that is believed."""
         return round((MOST_QUEUED_S if self.is_queued else LARGEST_LAG_S) * NS_PER_S)
 
     @property
     def are_good(self) -> bool:
-        """Whether the stamps are believed."""
+        """Tell whether the stamps are believed."""
         if self.is_stopped or self.share < BELIEVED_SHARE:
             return self.is_stopped
         return bool(self.believed(self.lag_ns).mean() >= USUAL_SHARE)
 
     def believed(self, lag_ns: Int64Array) -> BoolArray:
-        """Which stamps are near enough to the log time, shape (n,)."""
+        """Tell which stamps are near enough to the log time, shape (n,)."""
         if self.is_stopped:
             return np.ones(len(lag_ns), dtype=bool)
         return (lag_ns >= -_LARGEST_LAG_NS) & (lag_ns <= self.most_ns)
 
     def may_be_late(self, lag_ns: Int64Array) -> BoolArray:
-        """Which messages may have waited, if their stamps are in order, shape (n,)."""
+        """Tell which messages may have waited, if their stamps are in order, shape (n,)."""
         return (lag_ns > 0) & (lag_ns <= round(MOST_QUEUED_S * NS_PER_S))
 
     def text(self) -> str:
-        """The middle one, and their range."""
+        """Describe the lags: the median and the range."""
         if self.is_stopped:
             return "unknown, log time stands still"
         lags_s = np.sort(self.lag_ns) / NS_PER_S
@@ -279,7 +293,7 @@ class Lags:
 
 
 def _is_stopped(one: Stamped) -> bool:
-    """Whether the log time stands still while stamps that are a date go on."""
+    """Tell whether the log time stands still while stamps that are a date go on."""
     _record, log_ns, stamp_ns = one.stamps.all()
     if len(log_ns) < FEWEST_READINGS or np.ptp(one.log.all()[0]) or stamp_ns.min() < FIRST_NS:
         return False
@@ -292,7 +306,10 @@ def _is_near(track: Track) -> bool:
 
 
 def _astray(track: Track, stretches: Sequence[Stretch]) -> Int64Array:
-    """Records of readings that are not of the stretches, and of a few in a row that did not merely wait."""
+    """Return the records of readings that are not of the stretches.
+
+    A few readings in a row that did not merely wait are included.
+    """
     sound = [track.record_index[:0], *(one.track.record_index for one in stretches)]
     kept = np.concatenate(sound)
     found = [np.setdiff1d(track.record_index, kept) if len(kept) < len(track) else kept[:0]]
@@ -307,7 +324,10 @@ def _astray(track: Track, stretches: Sequence[Stretch]) -> Int64Array:
 
 
 def _is_queued(late: Int64Array) -> bool:
-    """Whether messages waited, by their lags, log times and stamps: the stamps are evener than the log times."""
+    """Tell whether messages waited, by their lags, log times and stamps.
+
+    If they did, the stamps are evener than the log times.
+    """
     if not np.any(late[0] > _LARGEST_LAG_NS):
         return True  # none did
     stamp, log = (float(np.mean(np.abs(change - np.median(change)))) for change in np.diff(late[[2, 1]], axis=1))

@@ -28,7 +28,7 @@ from groundstation.readers.bags.work import BYTES_PER_STEP, STEPS_PER_VALUE, Wor
 
 DEEPEST = 32  # objects within objects
 BYTES = "bytes"  # column of messages that cannot be read: how long they are
-MOST_SHAPES = 64  # of a connection that are kept: messages of ever new lengths are walked one by one
+MOST_SHAPES = 64  # shapes kept for a connection: messages of ever new lengths are walked one by one
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Decoded:
 
 @dataclass
 class Decoder:
-    """Decodes the messages of one connection.
+    """Decoder of the messages of one connection.
 
     Attributes
     ----------
@@ -88,16 +88,19 @@ class Decoder:
 
     @property
     def has_places(self) -> bool:
-        """Whether the values of messages stand at places that many share."""
+        """Tell whether the values of messages stand at places that many messages share."""
         return self._definition is not None and not self.reason
 
     def stands_at_one_place(self, name: str) -> bool:
-        """Whether a value stands at one place in all messages."""
+        """Tell whether a value stands at one place in all messages."""
         shape = next(iter(self._shapes.values()), None)
         return shape is not None and shape.at_one_place(name) is not None
 
     def values_at_one_place(self, block: Block, name: str) -> tuple[Int64Array, Column] | None:
-        """Rows of messages that are long enough, and a value of them that stands at one place in all; None else."""
+        """Return the rows of messages that are long enough, and one value of each.
+
+        The value must stand at one place in all messages; None otherwise.
+        """
         shape = next(iter(self._shapes.values()), None)
         leaf = shape.at_one_place(name) if shape is not None else None
         if shape is None or leaf is None:
@@ -112,7 +115,7 @@ class Decoder:
         return rows, Column(values_of(leaf, block.buffer, block.starts[rows]))
 
     def decode(self, block: Block) -> Iterator[Decoded]:
-        """Columns of the messages; those that cannot be read have their length alone."""
+        """Yield columns of the messages; unreadable ones have their length alone."""
         bad: list[Int64Array] = []
         if self.reason:
             bad.append(np.arange(len(block), dtype=np.int64))
@@ -188,7 +191,7 @@ class Decoder:
         yield from self._laid_out(block, np.array(rows, dtype=np.int64), found)
 
     def _laid_out(self, block: Block, rows: Int64Array, found: list[dict[str, Any]]) -> Iterator[Decoded]:
-        """Columns of flat objects; those without a value have their length."""
+        """Yield columns of flat objects; those without any value have their length."""
         columns: dict[str, Column] = {}
         for name in dict.fromkeys(name for one in found for name in one):
             if name not in self.kinds and len(self.kinds) >= MOST_COLUMNS:
@@ -218,7 +221,7 @@ def _sizes(block: Block, rows: Int64Array) -> Decoded:
 
 
 def _definition(connection: Connection) -> tuple[Definition | None, str]:
-    """Definition of a connection, or why there is none."""
+    """Return the definition of a connection, or the reason why there is none."""
     usual = {"ros1": "ros1msg", "cdr": "ros2msg"}[connection.encoding]
     try:
         found = known(connection.type) if connection.encoding == "cdr" else None
@@ -261,7 +264,7 @@ def _kind(value: Any) -> str:
 
 
 def _column(values: list[Any], kind: str) -> Column:
-    """A column of one kind; a value that is none of it is absent."""
+    """Return a column of one kind; values of another kind are absent."""
     if kind == "U":
         present = np.array([value is not None for value in values])
         texts = [str(value)[:MAX_TEXT_CHARACTERS] if value is not None else "" for value in values]
@@ -273,7 +276,7 @@ def _column(values: list[Any], kind: str) -> Column:
 
 
 def _fits(value: Any, kind: str) -> bool:
-    """Whether a value can stand in a column of flags, integers of 64 bits or other numbers."""
+    """Tell whether a value fits in a column of flags, 64-bit integers or other numbers."""
     if kind == "b" or isinstance(value, bool) or value is None:
         return kind == "b" and isinstance(value, bool)
     if not isinstance(value, int | float):

@@ -1,4 +1,6 @@
-"""Message definitions of ROS 1 and ROS 2 as a bag carries them: the text of the type, then those of its parts.
+"""Message definitions of ROS 1 and ROS 2 as a bag carries them.
+
+The text of the type comes first, then those of its parts.
 
 Source: http://wiki.ros.org/msg (ROS 1); https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html (ROS 2).
 """
@@ -12,7 +14,7 @@ import numpy as np
 
 from groundstation.readers.bags.known_types import KNOWN_TYPES
 
-MOST_FIELDS = 4_000  # of one definition with all its parts: a longer text is no definition
+MOST_FIELDS = 4_000  # fields of one definition with all its parts: a longer text is no definition
 _SEPARATOR = re.compile(r"^=+\s*$", re.MULTILINE)
 _PART = re.compile(r"\s*MSG:\s*(\S+)\s*\n")
 _CONSTANT = re.compile(r"[\w/<=]+\s+\w+\s*=")
@@ -86,7 +88,7 @@ def plain_name(name: str) -> str:
 
 
 def parse(root: str, text: str) -> Definition:
-    """The definition in a text.
+    """Parse the text of a definition.
 
     Raises
     ------
@@ -126,7 +128,7 @@ def parse(root: str, text: str) -> Definition:
 
 @cache
 def known(type_name: str) -> Definition | None:
-    """Definition of a common type of ROS 2, for bags that carry none."""
+    """Return the definition of a common ROS 2 type, for bags that carry none."""
     text = KNOWN_TYPES.get(type_name)
     return None if text is None else parse(type_name, text)
 
@@ -160,7 +162,7 @@ def _full_name(name: str, owner: str, texts: Mapping[str, str]) -> str:
 
 
 def _refuse_circles(types: Mapping[str, tuple[Field, ...]]) -> None:
-    """A type that holds itself has no end."""
+    """Refuse a type that contains itself."""
     left = {name: {field.type for field in fields} & types.keys() for name, fields in types.items()}
     while ready := [name for name, parts in left.items() if not parts & left.keys()]:
         for name in ready:

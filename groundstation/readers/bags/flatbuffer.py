@@ -1,7 +1,8 @@
-"""FlatBuffers messages as nested dictionaries, by the reflection schema (.bfbs) that their file carries.
+"""FlatBuffers messages as nested dictionaries.
 
-A message is a web of offsets. Each is held against the ends of the message before it is followed, and the values that a
-message gives are counted: many offsets to one table would unfold without end.
+They are read by the reflection schema (.bfbs) that their file carries. A message is a web of offsets. Each is held
+against the ends of the message before it is followed, and the values that a message gives are counted: many offsets to
+one table would unfold without end.
 
 Source: FlatBuffers, Internals, and reflection/reflection.fbs (Google, 2025); https://flatbuffers.dev/internals.
 """
@@ -30,7 +31,7 @@ Reader = Callable[[bytes], dict[str, Any]]
 
 
 class _Table(NamedTuple):
-    """A table: the buffer it stands in, its place, that of its list of offsets and how long that is."""
+    """Table: its buffer, its place, and the place and size of its list of offsets."""
 
     data: bytes
     at: int
@@ -70,7 +71,7 @@ def _table(data: bytes, at: int) -> _Table:
 
 
 def _followed(data: bytes, at: int) -> int:
-    """Where an offset leads: always on."""
+    """Return the place that an offset leads to, always further on."""
     return int(at + _WORD.unpack_from(data, at)[0])
 
 
@@ -90,7 +91,10 @@ def _text(data: bytes, at: int) -> str:
 
 @dataclass(frozen=True)
 class _Type:
-    """A type: base type, that of its elements, object or enumeration by number, length and width of elements."""
+    """Type of a field: base type, object or enumeration by number, and its elements.
+
+    For elements: their base type, length and width.
+    """
 
     base: int
     element: int
@@ -122,7 +126,10 @@ class _Object:
 
 @dataclass(frozen=True)
 class _Enumeration:
-    """Names by value; of a union the number of the object of each as well, -1 for a text or nothing."""
+    """Names of an enumeration by value.
+
+    For a union also the number of the object of each value, -1 for a text or nothing.
+    """
 
     names: Mapping[int, str]
     objects: Mapping[int, int]
@@ -136,9 +143,10 @@ class _Schema:
 
 
 def message_reader(name: str, schema: bytes) -> Reader:
-    """A function from the bytes of a message to its fields; scalars that a message leaves out have their default.
+    """Return a function from the bytes of a message to its fields.
 
-    Bytes are told by their length. The function raises ValueError for what is no such message.
+    Scalars that a message leaves out have their default; bytes are told by their length. The function raises ValueError
+    for what is no such message.
 
     Raises
     ------
@@ -212,7 +220,7 @@ def _object(table: _Table, fields: list[_Table]) -> _Object:
 
 @dataclass
 class _Message:
-    """Reads one message."""
+    """Reader of one message."""
 
     schema: _Schema
     data: bytes
@@ -244,7 +252,7 @@ class _Message:
         return found
 
     def _value(self, kind: _Type, at: int, depth: int) -> Any:
-        """A value that stands at a place, or is led to from there."""
+        """Return a value that stands at a place, or that the place leads to."""
         if kind.base == _STRING:
             text = _text(self.data, at)
             self._left -= len(text)
@@ -281,13 +289,13 @@ class _Message:
         return self.schema.objects[index]
 
     def _named(self, kind: _Type, value: Any) -> Any:
-        """A number, of an enumeration its name."""
+        """Return a number, or its name where it is of an enumeration."""
         if value is None or not 0 <= kind.index < len(self.schema.enumerations):
             return value
         return self.schema.enumerations[kind.index].names.get(value, str(value))
 
     def _union(self, one: _Field, table: _Table, place: int, depth: int) -> Any:
-        """The table of a union, whose kind the field before it tells."""
+        """Return the table of a union; the field before it states its kind."""
         if not place or not 0 <= one.type.index < len(self.schema.enumerations):
             return None
         objects = self.schema.enumerations[one.type.index].objects

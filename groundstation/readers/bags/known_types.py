@@ -1,4 +1,6 @@
-"""Fields of common message types of ROS 2, for bags that carry no definitions (sqlite3 before Iron).
+"""Fields of common ROS 2 message types, for bags that carry no definitions.
+
+Such bags are sqlite3 before Iron.
 
 Source: common_interfaces (message definitions of ROS 2 Humble); names and types alone.
 """

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from groundstation.store.foreign import ForeignLost, ForeignMessages
 
 MAGIC = b"\x89MCAP0\r\n"
-_HEAD_BYTES = 31  # of a message record, before its payload
+_HEAD_BYTES = 31  # bytes of a message record before its payload
 
 
 class Mcap:
-    """Iterates over the messages of an MCAP.
+    """Iterable over the messages of an MCAP.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Mcap:
         key = channel.id, channel.message_encoding, kind, text
         if key not in self._connections:
             encoding, number = channel.message_encoding, len(self._connections)
-            publisher = channel.metadata.get("callerid") or f"channel {channel.id}"  # of ROS 1, by its converters
+            publisher = channel.metadata.get("callerid") or f"channel {channel.id}"  # converters of ROS 1 bags write it
             self._connections[key] = Connection(number, channel.topic, kind, encoding, form, text, publisher)
         return self._connections[key]
 

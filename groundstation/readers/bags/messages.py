@@ -1,4 +1,7 @@
-"""What a bag holds, whatever its container: connections, and blocks of messages that are not decoded yet."""
+"""Contents of a bag, whatever its container: connections, and blocks of messages.
+
+The messages are not decoded yet.
+"""
 
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -13,7 +16,7 @@ ByteArray = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Connection:
-    """A topic as one writer wrote it.
+    """Topic as one writer wrote it.
 
     Parameters
     ----------
@@ -69,7 +72,7 @@ class Block:
         return len(self.starts)
 
     def take(self, rows: NDArray[np.int64] | slice) -> "Block":
-        """The messages that ``rows`` selects; the buffer is shared."""
+        """Return the messages that ``rows`` selects; the buffer is shared."""
         return Block(
             self.connection,
             self.buffer,
@@ -88,19 +91,22 @@ class Block:
 
 @dataclass(frozen=True)
 class Missing:
-    """Messages of a topic that are not in the log although something in it counts them, as ``what`` says."""
+    """Messages of a topic that are not in the log although something in it counts them.
+
+    ``what`` says which account counts them.
+    """
 
     topic: str
     count: int
     what: str
 
     def damage(self) -> Damage:
-        """As damage of the log."""
+        """Return it as damage of the log."""
         return Damage("dropped_rows", "the whole log", self.count, f"{self.what} (topic {self.topic})")
 
 
 def counted_by(account: str) -> str:
-    """What is missing by an account that a log has of itself.
+    """Describe what is missing by an account that a log has of itself.
 
     Examples
     --------
@@ -114,9 +120,10 @@ Part: TypeAlias = Block | Damage | Missing
 
 
 def joined(gathered: dict[int, list[Block]]) -> list[Block]:
-    """One block for each connection, in the order of their numbers, its messages in that of the log.
+    """Join blocks into one for each connection, in the order of their numbers.
 
-    All share one buffer. Several nodes may publish on one topic: then the blocks of a connection interlace.
+    Its messages are in the order of the log. All blocks share one buffer. Several nodes may publish on one topic: then
+    the blocks of a connection interlace.
 
     Parameters
     ----------
@@ -150,5 +157,5 @@ def joined(gathered: dict[int, list[Block]]) -> list[Block]:
 
 
 def is_ascending(values: Int64Array) -> bool:
-    """Whether each value is larger than the one before."""
+    """Tell whether each value is larger than the one before."""
     return bool((values[1:] > values[:-1]).all())

@@ -1,6 +1,6 @@
-"""Profiles of messages (TOML): which path of which message is which quantity, in which unit and frame.
+"""Profiles of messages (TOML): the quantity, unit and frame of paths in messages.
 
-docs/bags.md describes every key; what is not said there is that of the profiles of tables.
+docs/bags.md describes every key; all other keys are those of the profiles of tables.
 """
 
 from collections.abc import Callable, Mapping
@@ -34,12 +34,15 @@ _VECTORS: Mapping[str, tuple[tuple[str, str, str], str, tuple[str, str]]] = Mapp
     }
 )
 LATEST_NS = 2.0**62
-ATTITUDE = "attitude"  # of a quaternion x, y, z, w: flu in enu, or frd in ned
+ATTITUDE = "attitude"  # from a quaternion x, y, z, w: flu in enu, or frd in ned
 
 
 @dataclass(frozen=True)
 class VectorRule:
-    """A vector of the message: where it goes, what it is, its frame, and the factor to the unit of the fields."""
+    """Rule for a vector of the message: its topic, quantity, frame and factor.
+
+    ``factor`` converts to the unit of the fields.
+    """
 
     name: str
     topic: str
@@ -48,7 +51,7 @@ class VectorRule:
     factor: float = 1.0
 
     def columns(self, values: Values) -> Columns:
-        """Its fields; none where the message lacks it."""
+        """Return the fields of the vector; none where the message lacks it."""
         if not values.has_triple(self.name) or (self.quantity == ATTITUDE and f"{self.name}.w" not in values):
             return {}
         if self.quantity == ATTITUDE:
@@ -62,7 +65,7 @@ class VectorRule:
 
 @dataclass(frozen=True)
 class MessageRule:
-    """What the messages of a topic, or of a type, mean."""
+    """Rule for the messages of a topic, or of a type."""
 
     topic: str
     type: str
@@ -72,17 +75,17 @@ class MessageRule:
     time: tuple[str, str] | None = None
 
     def serves(self, connection: Connection) -> bool:
-        """Whether the rule is for a connection's messages."""
+        """Tell whether the rule is for a connection's messages."""
         return fnmatchcase(connection.topic, self.topic) and (not self.type or connection.type == self.type)
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """Canonical topics that it feeds."""
+        """Canonical topics that the rule feeds."""
         fed = [*(rule.topic for rule in self.columns), *(vector.topic for vector in self.vectors)]
         return tuple(dict.fromkeys(fed))
 
     def feeding(self, topic: str) -> Callable[[Values], Columns]:
-        """The function from messages to the fields of one canonical topic."""
+        """Return the function from messages to the fields of one canonical topic."""
 
         def columns(values: Values) -> Columns:
             found: Columns = {}
@@ -96,7 +99,7 @@ class MessageRule:
         return columns
 
     def stamp_ns(self, columns: Mapping[str, Column]) -> Int64Array | None:
-        """Time of validity of messages by the rule, shape (n,); None where they lack it."""
+        """Return the time of validity of messages by the rule, shape (n,); None without one."""
         if self.time is None or self.time[0] not in columns:
             return None
         digits, multiple = TIME_UNITS[self.time[1]]
@@ -109,7 +112,10 @@ class MessageRule:
         return np.asarray(whole.astype(np.int64) * unit_ns + np.rint((number - whole) * unit_ns).astype(np.int64))
 
     def told(self, present: Mapping[str, Column]) -> tuple[str, tuple[str, ...]]:
-        """What the rule understood, with units and frames, and the names it has that the messages lack."""
+        """Describe what the rule maps, and list its names that the messages lack.
+
+        The description has units and frames.
+        """
         parts, missing = [], []
         for rule in self.columns:
             factor = f" x {rule.factor:g}" if rule.factor != 1.0 else ""
@@ -167,7 +173,7 @@ def load(path: Path) -> MessageProfile:
 
 
 class _Checker(Checker):
-    """Turns the TOML tables into the rules of messages."""
+    """Parser of the TOML tables into rules of messages."""
 
     def messages(self, table: dict[str, Any]) -> MessageProfile:
         self.table(table, "", ("name", "description", "messages"), ("name", "messages"))

@@ -1,4 +1,7 @@
-"""Messages of px4_msgs (PX4 over ROS 2): those of its own log by other names, mapped by the ULog reader's rules."""
+"""Messages of px4_msgs (PX4 over ROS 2), mapped by the ULog reader's rules.
+
+They are those of PX4's own log under other names.
+"""
 
 import re
 from collections.abc import Callable, Mapping
@@ -13,12 +16,12 @@ _UPPER = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 
 
 def is_px4(type_name: str) -> bool:
-    """Whether a type is one of px4_msgs."""
+    """Tell whether a type is one of px4_msgs."""
     return type_name.startswith(_PACKAGE)
 
 
 def log_topic(type_name: str) -> str:
-    """Topic of PX4's own log for a type of px4_msgs.
+    """Return the topic of PX4's own log for a type of px4_msgs.
 
     Examples
     --------
@@ -29,9 +32,10 @@ def log_topic(type_name: str) -> str:
 
 
 def feed(seen: Mapping[int, Any], feeds: dict[int, list[Any]], remarks: list[Remark], make: Callable[..., Any]) -> None:
-    """Add what messages of px4_msgs give to ``feeds``, each made by ``make(topic, needs, columns)``.
+    """Add to ``feeds`` what messages of px4_msgs give.
 
-    Topics that other messages of the log serve already are left to those.
+    Each feed is made by ``make(topic, needs, columns)``. Topics that other messages of the log serve already are left
+    to those.
     """
     taken = {one.topic.partition(".")[0] for several in feeds.values() for one in several}
     offers = [

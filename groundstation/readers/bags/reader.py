@@ -1,4 +1,4 @@
-"""The second pass over a bag: batches of every topic, raw and canonical, then remarks and damages."""
+"""Second pass over a bag: batches of every topic, raw and canonical, remarks and damage."""
 
 import re
 from collections import Counter
@@ -31,8 +31,8 @@ from groundstation.readers.parts import Part, bounded, merged, occupied, one_row
 from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
 
-GATHERED_BYTES = 8 << 20  # of messages that are decoded together
-MESSAGE_BYTES = 64  # that a message takes beside its own
+GATHERED_BYTES = 8 << 20  # size of messages that are decoded together
+MESSAGE_BYTES = 64  # memory that a message takes beside its own bytes
 LATEST_NS = 1 << 62
 MAX_NAME_CHARACTERS = 200
 PUBLISHED, PUBLISHER = "publish_time_ns", "publisher"
@@ -40,7 +40,7 @@ _ODD = re.compile(r"[^A-Za-z0-9_\-/]")
 
 
 def items(source: Source, reader_name: str, profile: MessageProfile | None = None) -> Iterator[Item]:
-    """Items of a bag; ``profile`` says what messages of its own mean."""
+    """Yield the items of a bag; ``profile`` says what its own messages mean."""
     bag = Bag(source)
     found = survey(bag, profile)
     names = _raw_names(found)
@@ -75,7 +75,10 @@ def _type_text(connection: Connection) -> str:
 
 
 def _raw_names(found: Survey) -> dict[int, str]:
-    """Raw topic of each connection, the same for all that write one topic; a name that clashes gets a number."""
+    """Return the raw topic of each connection, the same for all that write one topic.
+
+    A name that clashes gets a number.
+    """
     names: dict[int, str] = {}
     given: dict[Key, str] = {}
     for number, seen in sorted(found.seen.items()):
@@ -93,7 +96,7 @@ def _raw_names(found: Survey) -> dict[int, str]:
 
 
 def _publishers(found: Survey, names: dict[int, str]) -> dict[int, str]:
-    """Who wrote each connection, where several sources write its raw topic."""
+    """Return the publisher of each connection, where several sources write its raw topic."""
     writers = Counter(names[seen.connection.number] for seen in found.sources)
     return {
         number: seen.connection.publisher
@@ -104,7 +107,10 @@ def _publishers(found: Survey, names: dict[int, str]) -> dict[int, str]:
 
 
 def _fits_in(time_ns: Int64Array, record_index: Int64Array, is_far: BoolArray) -> BoolArray:
-    """Whether times lie between those of the records before and behind that are not far, shape (n,)."""
+    """Tell which times lie between those of the near records before and behind, shape (n,).
+
+    Near records are those that are not far from the log time.
+    """
     order = np.argsort(record_index)
     time_ns, near = time_ns[order], np.flatnonzero(~is_far[order])
     fits = np.zeros(len(order), dtype=bool)
@@ -117,7 +123,7 @@ def _fits_in(time_ns: Int64Array, record_index: Int64Array, is_far: BoolArray) -
 
 
 class _Topics:
-    """Decodes blocks and lays them on topics."""
+    """Decoder of blocks into batches of topics."""
 
     def __init__(self, found: Survey, names: dict[int, str], work: Work) -> None:
         self._work = work
@@ -128,7 +134,7 @@ class _Topics:
         self._nowhere: Counter[str] = Counter()
 
     def batches(self, gathered: dict[int, list[Block]]) -> Iterator[RecordBatch]:
-        """Batches of blocks that stand together in the log."""
+        """Yield the batches of blocks that stand together in the log."""
         canonical: dict[str, list[Part]] = {}
         raw: dict[str, list[Part]] = {}
         for block in joined(gathered):
@@ -149,7 +155,7 @@ class _Topics:
             yield from bounded(one_row_each(merged(topic, parts)) if len(parts) > 1 else merged(topic, parts))
 
     def _part(self, block: Block, decoded: Decoded) -> Part:
-        """Raw columns of decoded messages, with their three times."""
+        """Return raw columns of decoded messages, with their three times."""
         log_ns, publish_ns = block.log_time_ns[decoded.rows], block.publish_time_ns[decoded.rows]
         is_time = (log_ns >= 0) & (log_ns < LATEST_NS)
         columns = dict(decoded.columns)
@@ -169,9 +175,10 @@ class _Topics:
     def _validity(
         self, number: int, decoded: Decoded, record_index: Int64Array, log_ns: Int64Array
     ) -> Int64Array | None:
-        """Header stamps where they are believed, by the recorder's clock; log time where one is far from it.
+        """Return times of validity: header stamps where they are believed, else log time.
 
-        A log time that is out of order while the stamps are in order is not believed either.
+        The stamps are by the recorder's clock. The log time counts where a stamp is far from it. A log time that is out
+        of order while the stamps are in order is not believed either.
         """
         lags = self._found.lags.get(number)
         stamp_ns = self._found.seen[number].stamp_of(decoded.columns) if lags is not None else None
@@ -192,7 +199,7 @@ class _Topics:
         return np.where(is_far, logged_ns, stamp_ns)
 
     def remarks(self) -> Iterator[Remark]:
-        """What was not kept as columns, and stamps that were not believed."""
+        """Yield remarks on what was not kept as columns, and on stamps that were not believed."""
         for number, decoder in sorted(self._decoders.items()):
             if decoder.shortened:
                 names = ", ".join(list(decoder.shortened)[:5])
@@ -206,7 +213,7 @@ class _Topics:
             yield Remark("clock_used", text, topic)
 
     def damages(self) -> Iterator[Damage]:
-        """Messages that could not be read, of which time and length are kept, and positions that are none."""
+        """Yield unreadable messages, of which time and length are kept, and missing positions."""
         for topic, count in sorted(self._nowhere.items()):
             if count:
                 yield nowhere(topic, count)

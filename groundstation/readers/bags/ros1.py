@@ -1,4 +1,4 @@
-"""Bags of ROS 1 (version 2.0): records of a header and data, most of them in compressed chunks.
+"""Bags of ROS 1 (version 2.0): records of a header and data, mostly in compressed chunks.
 
 The index at the end tells the connections before the first chunk is read, and how many messages there should be; a bag
 that was cut has none, and is read without. A bag has no checksums.
@@ -40,7 +40,7 @@ from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 
 MAX_CHUNK_BYTES = 256 << 20  # decompressed; recorders close a chunk at 768 kB
-FREE_BYTES = 32 << 20  # that chunks may expand to, whatever the size of the file
+FREE_BYTES = 32 << 20  # size that chunks may expand to, whatever the size of the file
 MOST_SEARCHED = 20_000  # times that a record is searched for in the contents of chunks
 _TIME = struct.Struct("<II")
 
@@ -56,7 +56,7 @@ class _Gathered:
 
 
 class Ros1Bag:
-    """Iterates over the messages of a bag.
+    """Iterable over the messages of a bag.
 
     Parameters
     ----------
@@ -103,7 +103,10 @@ class Ros1Bag:
             yield from self._messages(records.read(start, end - start), bytes_place(start, end))
 
     def _missing(self, index: Index) -> Iterator[Missing | Damage]:
-        """Messages and chunks that the bag counts and that were not met; a bag without its index was cut."""
+        """Yield the messages and chunks that the bag counts and that were not met.
+
+        A bag without its index was cut.
+        """
         is_told = False
         if not self._source.head.startswith(MAGIC) and not self._skipped:
             yield Damage("corrupt", "byte 0", 1, "header of the bag is missing", loses_data=False)
@@ -138,10 +141,10 @@ class Ros1Bag:
         yield from self._messages(content, place, is_told=len(content) != size)
 
     def _messages(self, content: bytes, place: str, *, is_told: bool = False) -> Iterator[Part]:
-        """Messages that stand one after the other; definitions among them are taken in."""
+        """Read consecutive messages; definitions among them are taken in."""
         found: dict[int, _Gathered] = {}
         at = lost = 0
-        most = most_messages(self._source.size) + 1  # that many are told to be too many
+        most = most_messages(self._source.size) + 1  # one more than is allowed: reported as too many
         while at < len(content) and self._count <= most:
             end = self._known_message(content, at, found)
             if end:
@@ -175,9 +178,9 @@ class Ros1Bag:
             )
 
     def _behind(self, content: bytes, at: int) -> int:
-        """Where the next record stands behind bytes that are none; the end of the content when none does.
+        """Return the place of the next record behind bytes that are none.
 
-        Where that was asked too often the rest is given up.
+        The end of the content when there is no record, or when this was asked too often: then the rest is given up.
         """
         self._searched += 1
         if self._searched > MOST_SEARCHED:
@@ -197,7 +200,10 @@ class Ros1Bag:
         self._known_message(content, at, found)
 
     def _known_message(self, content: bytes, at: int, found: dict[int, _Gathered]) -> int:
-        """Take in a message whose header is known but for its time; returns where it ends, 0 when it is another."""
+        """Take in a message whose header is known but for its time; return its end.
+
+        0 when it is another message.
+        """
         length = int.from_bytes(content[at : at + 4], "little")
         place = at + self._time_places.get(length, 0)
         number = self._heads.get(content[at + 4 : place] + content[place + 8 : at + 4 + length]) if place > at else None
@@ -227,7 +233,10 @@ class Ros1Bag:
 
 
 def _decompress(compression: bytes, data: bytes, size: int) -> tuple[bytes, str]:
-    """What a chunk holds, no more than it claims, and why it is not all; damaged ones give what stands before."""
+    """Decompress a chunk to at most the size it claims, and say why it is not all.
+
+    A damaged chunk gives what stands before the damage.
+    """
     if compression in (b"none", b""):
         return data[:size], ""
     if compression not in (b"bz2", b"lz4"):

@@ -1,4 +1,6 @@
-"""Records of a bag of ROS 1 that stand in no chunk: found one after the other, searched for where bytes are damaged.
+"""Records of a ROS 1 bag that stand in no chunk.
+
+They are found one after the other, and searched for where bytes are damaged.
 
 Source: http://wiki.ros.org/Bags/Format/2.0.
 """
@@ -11,16 +13,16 @@ from typing import BinaryIO, NamedTuple
 
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, HEADER, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
-MAX_HEADER_BYTES, MOST_FIELDS = 4096, 32  # of a header, and of the description of a connection
+MAX_HEADER_BYTES, MOST_FIELDS = 4096, 32  # largest header, and fields in it; also of the description of a connection
 SEARCH_BYTES = 1 << 20
 BEYOND_BYTES = 4096  # room for a header that begins within a record and ends behind it
-BACK_BYTES, MOST_BEGINNINGS = 512, 8  # before an operation: how far its header begins, and places that are tried
-MOST_TRIES = 5_000  # of a file: what looks like an operation stands in damaged bytes once in many gigabytes
+BACK_BYTES, MOST_BEGINNINGS = 512, 8  # how far before an operation its header may begin, and places that are tried
+MOST_TRIES = 5_000  # for one file: damaged bytes look like an operation once in many gigabytes
 LOOKED_AT, MOST_TRIED = 1 << 16, 200  # bytes of a file without the first ones of a bag, and headers in them
-INDEX_BYTES = 64 << 20  # of an index at most
+INDEX_BYTES = 64 << 20  # largest index
 # Every record's header has the field "op" of one byte: 4 bytes of length, "op=", the number.
 OP = re.compile(rb"\x04\0\0\0op=[\x02-\x07]")
-OP_OUTSIDE = re.compile(rb"\x04\0\0\0op=[\x04-\x06]")  # of records that stand in no chunk
+OP_OUTSIDE = re.compile(rb"\x04\0\0\0op=[\x04-\x06]")  # operations of records outside chunks
 # A header begins with its length and that of its first field, then a name; both lengths are below a megabyte.
 _BEGINNING = re.compile(rb"(?=[\0-\xff]{2}[\0-\x0f]\0[\0-\xff]{2}[\0-\x0f]\0[a-z_])")
 
@@ -35,7 +37,7 @@ class Head(NamedTuple):
 
 
 def parse_header(data: bytes) -> dict[bytes, bytes] | None:
-    """Fields of a header; None when the bytes are none.
+    """Parse the fields of a header; None when the bytes are no header.
 
     Examples
     --------
@@ -57,13 +59,13 @@ def parse_header(data: bytes) -> dict[bytes, bytes] | None:
 
 
 def number_of(fields: dict[bytes, bytes], name: bytes) -> int | None:
-    """An unsigned number of a header; None when it lacks it."""
+    """Return an unsigned number of a header; None when the header lacks it."""
     value = fields.get(name)
     return int.from_bytes(value, "little") if value is not None and len(value) <= 8 else None
 
 
 def head_at(data: bytes, at: int) -> Head | None:
-    """The record at a place of ``data``, which may end behind its header."""
+    """Return the record at a place of ``data``, which may end behind its header."""
     length = int.from_bytes(data[at : at + 4], "little")
     if not 8 <= length <= MAX_HEADER_BYTES or at + 8 + length > len(data):
         return None
@@ -77,13 +79,16 @@ def head_at(data: bytes, at: int) -> Head | None:
 
 @dataclass
 class Tries:
-    """How often a header may still be looked for before what looks like an operation and is none."""
+    """Number of false headers that may still be met in the search for records.
+
+    Their bytes look like the operation of a record and are none.
+    """
 
     left: int = MOST_TRIES
 
 
 def heads_in(block: bytes, ops: re.Pattern[bytes], tries: Tries, start: int = 0) -> Iterator[tuple[int, Head]]:
-    """Headers of records in some bytes, told by their operation, with where each begins."""
+    """Yield the headers of records in some bytes and their places, by their operation."""
     for match in ops.finditer(block, start):
         tries.left -= 1
         if tries.left < 0:
@@ -100,14 +105,17 @@ def heads_in(block: bytes, ops: re.Pattern[bytes], tries: Tries, start: int = 0)
 
 
 def has_chunk(head: bytes) -> bool:
-    """Whether a chunk of a bag begins in the first bytes of a file, whatever stands before it."""
+    """Tell whether a chunk of a bag begins in the first bytes of a file.
+
+    Anything may stand before it.
+    """
     heads = islice(heads_in(head[:LOOKED_AT], OP_OUTSIDE, Tries()), MOST_TRIED)
     return any(one.op == CHUNK and {b"compression", b"size"} <= one.fields.keys() for _, one in heads)
 
 
 @dataclass(frozen=True)
 class Record:
-    """A record in the bytes ``start`` to ``end`` of the file; without a head, bytes that are none.
+    """Record in the bytes ``start`` to ``end`` of the file; without a head, bytes of none.
 
     ``is_cut``: the file ends before the record does.
     """
@@ -120,7 +128,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Records:
-    """Iterates over the records of a bag that stand in no chunk, and over the bytes between them.
+    """Iterable over the records of a bag that stand in no chunk, and the bytes between them.
 
     Parameters
     ----------
@@ -148,15 +156,16 @@ class Records:
         if head.end > self.size:
             if head.op == CHUNK and self._next(head.data_at, self.size, OP_OUTSIDE) == self.size:
                 return Record(at, self.size, head, is_cut=True)
-            end = self._next(at + 1, self.size)  # its length is not to be trusted, or the end is cut
+            end = self._next(at + 1, self.size)  # the stated length cannot be trusted, or the end is cut
             return Record(at, end, is_cut=end == self.size)
         inside = self._inside(head)
         return Record(at, inside) if inside else Record(at, head.end, head)
 
     def _inside(self, head: Head) -> int:
-        """Where the next record begins within one behind which none does; 0 for a record that ends where it says.
+        """Return the place of the next record inside one that states too large a length.
 
-        Bytes are missing in such a record, and its length leads too far.
+        Bytes are missing in such a record, and no other begins where it says that it ends. 0 for a record that ends
+        where it says.
         """
         if head.end >= self.size or self.head(head.end) is not None:
             return 0
@@ -164,12 +173,15 @@ class Records:
         return place if place < head.end else 0
 
     def head(self, at: int) -> Head | None:
-        """The header of the record at a place of the file."""
+        """Return the header of the record at a place of the file."""
         head = head_at(self.read(at, MAX_HEADER_BYTES + 8), 0)
         return None if head is None else head._replace(data_at=at + head.data_at, end=at + head.end)
 
     def _next(self, start: int, end: int, ops: re.Pattern[bytes] = OP) -> int:
-        """Where a record begins from ``start`` on, told by its operation; ``end`` when none does before it."""
+        """Return the first place from ``start`` on where a record begins, by its operation.
+
+        ``end`` when none does before it.
+        """
         at = start
         while at < end:
             block = self.read(at, min(SEARCH_BYTES, end - at) + 64)
@@ -182,7 +194,7 @@ class Records:
         return end
 
     def read(self, at: int, size: int) -> bytes:
-        """Bytes of the file; none from a place beyond its end, which damaged bytes may name."""
+        """Read bytes of the file; none beyond its end, which damaged bytes may name."""
         if at >= self.size:
             return b""
         self.stream.seek(at)
@@ -191,7 +203,7 @@ class Records:
 
 @dataclass
 class Index:
-    """What a bag says of itself.
+    """Statements of a bag about itself.
 
     Attributes
     ----------
@@ -214,12 +226,12 @@ class Index:
 
     @property
     def is_there(self) -> bool:
-        """Whether anything of the index was found."""
+        """Tell whether anything of the index was found."""
         return bool(self.listed or self.connections)
 
     @classmethod
     def of(cls, stream: BinaryIO, size: int) -> "Index":
-        """The index of a file, looked for among its records where it does not stand at its place."""
+        """Read the index of a file; if it is not at its place, search the records for it."""
         records, found = Records(stream, size), cls()
         first = records.head(len(MAGIC)) if records.read(0, len(MAGIC)) == MAGIC else None
         if first is not None and first.op == HEADER:

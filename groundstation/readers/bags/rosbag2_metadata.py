@@ -1,6 +1,7 @@
-"""What rosbag2 writes about a bag, in metadata.yaml and in the database: its files, how many messages each topic has.
+"""Metadata of rosbag2 about a bag: its files, and the number of messages of each topic.
 
-Read by its indents, as rosbag2 and its peers lay it out; nothing else of YAML is understood.
+It stands in metadata.yaml and in the database. It is read by its indents, as rosbag2 and its peers lay it out; nothing
+else of YAML is understood.
 """
 
 import re
@@ -29,7 +30,7 @@ class BagMetadata:
 
     @classmethod
     def of(cls, text: str) -> "BagMetadata":
-        """What a text says."""
+        """Parse a text of metadata."""
         found = _FILES.search(text)
         names = _FILE.findall(found.group(1)) if found else []
         messages: dict[str, int] = {}
@@ -42,7 +43,7 @@ class BagMetadata:
 
 
 def _items(text: str) -> list[str]:
-    """The topics of the list, each as its lines."""
+    """Split the list of topics into items, each as its lines."""
     head = _TOPICS.search(text)
     if head is None:
         return []

@@ -1,4 +1,7 @@
-"""What the first pass over a bag keeps of a connection: columns of its first messages, its stamps and log times."""
+"""Facts that the first pass over a bag keeps of a connection.
+
+Columns of its first messages, its stamps and log times.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,14 +16,14 @@ from groundstation.readers.bags.messages import Block, Connection
 from groundstation.readers.bags.profile import MessageRule
 
 SAMPLE = 4_000  # messages of a connection that are looked at
-LOOKED_AT = 200  # of those whose values stand at places that are found once
-LATER = 4  # of each block behind them, where a stamp does not stand at one place in all messages
+LOOKED_AT = 200  # messages looked at if their values stand at places that are found once
+LATER = 4  # messages of each later block, where a stamp does not stand at one place in all messages
 STAMPS = ("header.stamp_ns", "timestamp_ns")
 
 
 @dataclass
 class Seen:
-    """What was seen of one connection, or of all those of one source.
+    """Facts seen of one connection, or of all connections of one source.
 
     Attributes
     ----------
@@ -49,7 +52,7 @@ class Seen:
 
     @classmethod
     def of(cls, several: Sequence["Seen"]) -> "Seen":
-        """What was seen of a source, of all its connections in their order."""
+        """Join the facts of all connections of a source, in their order."""
         return replace(
             several[0],
             numbers=tuple(one.connection.number for one in several),
@@ -61,11 +64,11 @@ class Seen:
 
     @property
     def first_stamps(self) -> Int64Array:
-        """Stamps of its first messages that have one."""
+        """Stamps of the first messages that have one."""
         return np.concatenate([np.zeros(0, dtype=np.int64), *self._first_stamps])
 
     def take(self, block: Block, decoder: Decoder) -> None:
-        """Count a block, and look into it."""
+        """Count a block, and decode some of it."""
         rows, stamp_ns = self._stamps(block, decoder)
         if len(rows):
             self.has_header = True
@@ -78,7 +81,10 @@ class Seen:
         self.stamped[0].take(block.record_index, block.log_time_ns, rows, stamp_ns)
 
     def _stamps(self, block: Block, decoder: Decoder) -> tuple[Int64Array, Int64Array]:
-        """Messages that have a stamp, and the stamps: of all where it stands at one place in all, else of some."""
+        """Return the messages that have a stamp, and the stamps.
+
+        Those of all messages where the stamp stands at one place in all, else of some.
+        """
         found: list[tuple[Int64Array, Int64Array]] = []
         for part_rows, columns in self._looked_into(block, decoder):
             self.columns = self.columns or columns
@@ -97,11 +103,11 @@ class Seen:
         return rows[order], np.concatenate([stamp_ns for _rows, stamp_ns in found])[order]
 
     def _looked_into(self, block: Block, decoder: Decoder) -> Iterable[tuple[Int64Array, dict[str, Column]]]:
-        """Some messages of a block, decoded."""
+        """Yield some messages of a block, decoded."""
         rows = np.arange(min(len(block), SAMPLE - self._looked_at), dtype=np.int64)
         if decoder.has_places and not self.columns:
             rows = rows[:LOOKED_AT]
-        elif decoder.stands_at_one_place(self._stamp_name()):  # then it is read without a look at the rest
+        elif decoder.stands_at_one_place(self._stamp_name()):  # the stamp is read without decoding the rest
             rows = rows[:0]
         elif not len(rows):
             rows = np.unique(np.linspace(0, len(block) - 1, LATER).astype(np.int64))
@@ -110,14 +116,17 @@ class Seen:
             yield rows[part.rows], part.columns
 
     def _stamp_name(self) -> str:
-        """The column that tells when values were true."""
+        """Return the name of the column with the time of validity."""
         if self.rule is not None and self.rule.time is not None:
             return self.rule.time[0]
         name = next((name for name in STAMPS if name in self.columns), "")
         return name or ("timestamp" if px4.is_px4(self.connection.type) and "timestamp" in self.columns else "")
 
     def stamp_of(self, columns: dict[str, Column]) -> Int64Array | None:
-        """When values of messages were true by the messages themselves, shape (n,); None where they do not tell."""
+        """Return the times of validity that messages state themselves, shape (n,).
+
+        None where they state none.
+        """
         if self.rule is not None and self.rule.time is not None:
             return self.rule.stamp_ns(columns)
         name = next((name for name in (*STAMPS, "timestamp") if name in columns), "")

@@ -1,8 +1,8 @@
-"""Where the values of a message stand: found once for all messages that are laid out alike.
+"""Places of the values of a message, found once for all messages that are laid out alike.
 
-A message of ROS has no offsets: what stands behind a text or a sequence moves with its length. One message is walked;
-its shape is the place of every value and every length met. All messages of the same size with the same lengths in the
-same places have that shape, so numpy reads them together.
+A message of ROS has no offsets: values behind a text or a sequence move with its length. One message is walked; its
+shape is the place of every value and every length met. All messages of the same size with the same lengths in the same
+places have that shape, so numpy reads them together.
 
 Source: OMG DDS-XTypes 1.3, 7.4.1 (CDR); http://wiki.ros.org/ROS/Technical%20Overview (ROS 1).
 """
@@ -20,21 +20,21 @@ from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags.definitions import PRIMITIVES, TEXT, TIMES, WIDE_TEXT, Definition
 from groundstation.readers.bags.messages import ByteArray
 
-MOST_NUMBERS, MOST_PARTS = 64, 16  # of an array that become columns: of a longer one the length is kept
+MOST_NUMBERS, MOST_PARTS = 64, 16  # elements of an array that become columns: of a longer one only the length is kept
 MOST_COLUMNS = 2_000
-MOST_STEPS = 100_000  # of a walk through one message
-COUNT = ".count"  # behind the name of an array of which the length alone is kept
+MOST_STEPS = 100_000  # steps of a walk through one message
+COUNT = ".count"  # added to the name of an array of which only the length is kept
 
 
 class ShapeError(Exception):
-    """A message that its definition does not describe; ``steps`` that it took to find out."""
+    """Message that its definition does not describe; ``steps`` taken to find out."""
 
     steps: int = 0
 
 
 @dataclass(frozen=True)
 class Serialisation:
-    """How values follow each other.
+    """Serialisation of values: where they start, their byte order, their alignment.
 
     Parameters
     ----------
@@ -64,7 +64,10 @@ CDR: Mapping[bytes, Serialisation] = {
 
 
 class Leaf(NamedTuple):
-    """One column: name, place, and how it is read (``number``, ``bool``, ``time``, ``text``, ``empty``)."""
+    """Column of a message: its name, its place, and how it is read.
+
+    ``kind`` is ``number``, ``bool``, ``time``, ``text`` or ``empty``.
+    """
 
     name: str
     offset: int
@@ -100,7 +103,7 @@ class Shape:
     steps: int = 0
 
     def holds(self, buffer: ByteArray, starts: Int64Array) -> BoolArray:
-        """Which messages of this size have this shape, shape (n,)."""
+        """Tell which messages of this size have this shape, shape (n,)."""
         fits = np.ones(len(starts), dtype=bool)
         words = at_any_byte(buffer, np.dtype(f"{self.order}u4"))
         for offset, value in self.guards:
@@ -108,7 +111,10 @@ class Shape:
         return fits
 
     def at_one_place(self, name: str) -> Leaf | None:
-        """The value of that name where no length before it moves it: it stands there in all messages of the type."""
+        """Return the value of a name if it stands at one place in all messages of the type.
+
+        No length before it may move it.
+        """
         leaf = next((leaf for leaf in self.leaves if leaf.name == name), None)
         lengths = [offset for offset, _value in self.guards[1 if self.start else 0 :]]
         return None if leaf is None or any(offset < leaf.offset for offset in lengths) else leaf
@@ -137,12 +143,15 @@ class Shape:
 
 
 def values_of(leaf: Leaf, buffer: ByteArray, starts: Int64Array) -> NDArray[Any]:
-    """One value of messages in which it stands at one place."""
+    """Return one value of messages in which it stands at one place."""
     return _values(at_any_byte(buffer, leaf.dtype)[starts + leaf.offset], leaf.kind)
 
 
 def at_any_byte(buffer: ByteArray, dtype: np.dtype[Any]) -> NDArray[Any]:
-    """View of a buffer in which entry ``k`` is the value that starts at byte ``k``; entries overlap."""
+    """Return a view of a buffer whose entry ``k`` is the value that starts at byte ``k``.
+
+    Entries overlap.
+    """
     return np.ndarray((max(len(buffer) - dtype.itemsize + 1, 0),), dtype, buffer.data, strides=(1,))
 
 
@@ -159,14 +168,14 @@ def _values(values: NDArray[Any], kind: str) -> NDArray[Any]:
 
 
 def decoded_text(values: NDArray[Any]) -> NDArray[np.str_]:
-    """Texts of bytes in UTF-8; each different one is decoded once."""
+    """Decode UTF-8 texts; each different one is decoded once."""
     found, place = np.unique(values, return_inverse=True)
     texts = np.array([text.decode("utf-8", "replace").replace("\0", "") for text in found.tolist()], dtype=np.str_)
     return np.asarray(texts[place])
 
 
 def walk(definition: Definition, message: bytes, serialisation: Serialisation) -> Shape:
-    """The shape of a message.
+    """Return the shape of a message.
 
     Raises
     ------
@@ -194,7 +203,7 @@ def _walked(walker: "_Walker", definition: Definition, message: bytes, serialisa
 
 
 class _Walker:
-    """Goes through one message and notes what stands where."""
+    """Walk through one message that notes the place of each value."""
 
     def __init__(self, definition: Definition, message: bytes, serialisation: Serialisation) -> None:
         self._types, self._message, self._how = definition.types, message, serialisation
@@ -206,7 +215,7 @@ class _Walker:
         self.shortened: list[str] = []
 
     def part(self, name: str, prefix: str) -> None:
-        """A message or a part of one."""
+        """Walk through a message or a part of one."""
         fields = self._types[name]
         if not fields and self._how.alignment > 1:
             self._pass(1, 1)  # CDR has no empty type: ROS 2 writes a byte
@@ -218,7 +227,7 @@ class _Walker:
                 self.array(field.type, path, field.count)
 
     def array(self, kind: str, path: str, count: int) -> None:
-        """An array of fixed length, or (-1) one whose length stands before it."""
+        """Walk through an array of fixed length, or (-1) with its length before it."""
         is_told = count < 0
         if is_told:
             count = self._length()
@@ -241,7 +250,7 @@ class _Walker:
             self.value(kind, f"{path}[{number}]")
 
     def value(self, kind: str, path: str) -> None:
-        """One value, or one part."""
+        """Walk over one value, or one part."""
         self.steps += 1
         if self.steps > MOST_STEPS:
             raise ShapeError("too many values")
@@ -286,7 +295,7 @@ class _Walker:
         return value
 
     def _pass(self, size: int, alignment: int) -> int:
-        """Go behind a value of so many bytes; returns its place."""
+        """Pass a value of so many bytes and return its place."""
         step = min(alignment, self._how.alignment)
         place = self.at + -(self.at - self._how.start) % step
         self.at = place + size

@@ -1,7 +1,8 @@
-"""Who wrote a topic: connections of one topic that interlace are several sources, those one after the other are one.
+"""Sources of a topic: the connections that wrote it, put together by who wrote them.
 
-A node that is started again opens another connection, and a recording that was split goes on with one of the next file:
-the source stays. Two nodes that publish on one topic at the same time are two, whatever the name of the topic.
+Connections of one topic that interlace are several sources, those one after the other are one. A node that is started
+again opens another connection, and a recording that was split goes on with one of the next file: the source stays. Two
+nodes that publish on one topic at the same time are two, whatever the name of the topic.
 """
 
 import re
@@ -14,20 +15,23 @@ import numpy as np
 from groundstation.base.records import Int64Array
 from groundstation.readers.bags.messages import Connection
 
-OVERLAP_SHARE, OVERLAP_MESSAGES = 0.05, 3  # of either of two connections within the time of the other: they interlace
+OVERLAP_SHARE, OVERLAP_MESSAGES = 0.05, 3  # connections interlace with this share of one, and messages of both
 Key: TypeAlias = tuple[str, str, str, bytes]
 
 
 @dataclass(frozen=True)
 class Line:
-    """When a connection was written: log times in their order, each of which stands for ``stride`` messages."""
+    """Log times at which a connection was written, in their order.
+
+    Each stands for ``stride`` messages.
+    """
 
     connection: Connection
     time_ns: Int64Array
     stride: int
 
     def overlaps(self, other: "Line") -> bool:
-        """Whether messages of both interlace."""
+        """Tell whether messages of both interlace."""
         pairs = ((self, other), (other, self))
         counts = [one._within(two) for one, two in pairs]
         shares = [count / len(one.time_ns) for count, (one, _two) in zip(counts, pairs, strict=True)]
@@ -40,12 +44,12 @@ class Line:
 
 
 def key_of(connection: Connection) -> Key:
-    """What connections of one source have in common."""
+    """Return the key that connections of one source have in common."""
     return connection.topic, connection.type, connection.encoding, connection.schema
 
 
 def in_order(connection: Connection) -> tuple[str, list[tuple[int, str]], int]:
-    """Key to sort connections by: topic, then publisher, numbers in it by their size."""
+    """Return the sort key of a connection: topic, then publisher, numbers by size."""
     parts = re.findall(r"\d+|\D+", connection.publisher)
     return (
         connection.topic,
@@ -55,7 +59,7 @@ def in_order(connection: Connection) -> tuple[str, list[tuple[int, str]], int]:
 
 
 def sources_of(lines: Iterable[Line]) -> list[list[int]]:
-    """Numbers of the connections of each source, in the order in which they were first met."""
+    """Return the numbers of each source's connections, in order of first appearance."""
     topics: dict[Key, list[Line]] = {}
     for line in lines:
         topics.setdefault(key_of(line.connection), []).append(line)
@@ -65,7 +69,7 @@ def sources_of(lines: Iterable[Line]) -> list[list[int]]:
 
 
 def _of_topic(lines: Sequence[Line]) -> list[list[Line]]:
-    """The connections of a topic, those together that one source wrote one after the other."""
+    """Group the connections of a topic that one source wrote one after the other."""
     sources: list[list[Line]] = []
     for line in sorted(lines, key=lambda line: (int(line.time_ns[0]), line.connection.number)):
         free = [source for source in sources if not any(line.overlaps(one) for one in source)]

@@ -1,8 +1,9 @@
-"""Bags of ROS 2 in sqlite3 (.db3). A file that was cut or has damaged pages gives the rows that sqlite still finds.
+"""Bags of ROS 2 in sqlite3 (.db3).
 
-A database is a program as well: views, triggers, generated columns and virtual tables compute what they give. Only
-plain tables are read, sqlite may do nothing else (its authorizer sees to it), and the steps of its machine and the
-bytes that come out are bounded by the size of the file.
+A file that was cut or has damaged pages gives the rows that sqlite still finds. A database is a program as well: views,
+triggers, generated columns and virtual tables compute what they give. Only plain tables are read, sqlite may do nothing
+else (its authorizer sees to it), and the steps of its machine and the bytes that come out are bounded by the size of
+the file.
 
 Source: rosbag2_storage_sqlite3 (schema versions 1 to 4).
 """
@@ -32,18 +33,18 @@ ROWS, BLOCK_BYTES = 2_000, 32 << 20  # taken at once, at most
 STEPS, LOOKS = (
     1_000,
     4_000,
-)  # of sqlite's machine between two looks, and looks at most; as many again as the file has kB
+)  # machine steps of sqlite between two looks, and looks at most; plus two for each kB of the file
 MOST_TOPICS = 10_000
-MOST_FAILURES = 200  # of reading, each at another place of the table
+MOST_FAILURES = 200  # failures of reading, each at another place of the table
 MAX_MESSAGE_BYTES = 64 << 20
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _COPY_BYTES = 1 << 20
-_FAILURES = (sqlite3.Error, OverflowError, UnicodeDecodeError, MemoryError)  # of lengths that are none, too
+_FAILURES = (sqlite3.Error, OverflowError, UnicodeDecodeError, MemoryError)  # impossible lengths raise some of them
 _READABLE = frozenset({TOPICS, MESSAGES, DEFINITIONS, METADATA, "sqlite_master", "sqlite_schema"})
 
 
 class Ros2Sqlite:
-    """Iterates over the messages of a .db3.
+    """Iterable over the messages of a .db3.
 
     Parameters
     ----------
@@ -101,15 +102,15 @@ class Ros2Sqlite:
             yield Damage("dropped_channel", "the whole log", self._unknown, what)
 
     def _missing(self, database: "_Database", topics: set[str]) -> Iterator[Missing]:
-        """What the bag's own account counts and was not met."""
+        """Yield the messages that the bag's own account counts and that were not met."""
         gone = {name: count - self._met.get(name, 0) for name, count in database.metadata.messages.items()}
         gone = {name: count for name, count in gone.items() if count > 0 and name in topics}
-        if sum(gone.values()) > self._odd + self._unknown:  # else it is those
+        if sum(gone.values()) > self._odd + self._unknown:  # otherwise the missing ones are those
             for name, count in gone.items():
                 yield Missing(name, count, counted_by("metadata in the database"))
 
     def _blocks(self, rows: list[Any], connections: dict[int, Connection]) -> Iterator[Block]:
-        """Rows of one stretch by topic."""
+        """Yield the rows of one stretch by topic."""
         sound = [row for row in rows if type(row[1]) is type(row[2]) is type(row[3]) is int]
         self._odd += len(rows) - len(sound)
         known = [row for row in sound if row[2] in connections]
@@ -129,7 +130,7 @@ class Ros2Sqlite:
             yield Block(connections[number], buffer, starts, sizes, times, times, index[which])
 
     def _payload(self, data: Any) -> bytes:
-        """Bytes of a message, decompressed where the bag compresses its messages."""
+        """Return the bytes of a message, decompressed where the bag compresses them."""
         content = data if isinstance(data, bytes) else b""
         if not content.startswith(_ZSTD):
             return content
@@ -147,7 +148,7 @@ class Ros2Sqlite:
 
 @dataclass
 class _Database:
-    """A database of a stranger, of which tables are read within bounds.
+    """Untrusted database whose tables are read within bounds.
 
     Attributes
     ----------
@@ -169,11 +170,11 @@ class _Database:
 
     @property
     def is_spent(self) -> bool:
-        """Whether it gave or did more than its file can hold."""
+        """Tell whether the database gave or did more than its file can hold."""
         return self.looks <= 0 or self.bytes <= 0
 
     def execute(self, query: str, *values: Any) -> sqlite3.Cursor:
-        """A query; one that goes on when the bounds are spent fails."""
+        """Run a query; it fails when the bounds are spent."""
         self.connection.set_progress_handler(self._look, STEPS)
         return self.connection.execute(query, values)
 
@@ -182,7 +183,7 @@ class _Database:
         return self.looks <= 0
 
     def refuse_programs(self) -> None:
-        """See that topics and messages are plain tables, and let sqlite read such tables only.
+        """Check that topics and messages are plain tables, and let sqlite read only those.
 
         Raises
         ------
@@ -216,14 +217,14 @@ class _Database:
             pass  # before schema version 4
 
     def newest(self) -> int:
-        """The largest number of a row."""
+        """Return the largest row number."""
         try:
             return int(self.execute("SELECT max(_rowid_) FROM messages").fetchone()[0] or 0) if self.has_rowid else 0
         except (*_FAILURES, TypeError, ValueError):
             return 0
 
     def next_rows(self, last: int) -> tuple[list[Any], bool]:
-        """The rows behind the one of number ``last``, and whether reading failed behind them.
+        """Return the rows after number ``last``, and whether reading failed after them.
 
         Each is (number of the row, id, topic_id, timestamp, data). A table without row numbers is read in one go.
         """
@@ -259,12 +260,15 @@ class _Database:
 
 
 def _is_sound(row: Any) -> bool:
-    """Whether the number, topic and time of a message are integers."""
+    """Tell whether the number, topic and time of a message are integers."""
     return isinstance(row[1], int) and isinstance(row[2], int) and isinstance(row[3], int)
 
 
 def _authorized(action: int, first: str | None, _second: str | None, _base: str | None, inside: str | None) -> int:
-    """Whether sqlite may do something: read plain tables, with the functions that the queries here have."""
+    """Return whether sqlite may do something, as its code.
+
+    It may read plain tables, with the functions that the queries here have.
+    """
     if action == sqlite3.SQLITE_SELECT and inside is None:
         return sqlite3.SQLITE_OK
     if action == sqlite3.SQLITE_READ and inside is None and first in _READABLE:
@@ -296,7 +300,7 @@ def _connections(database: _Database) -> dict[int, Connection]:
 
 @contextmanager
 def _connected(source: Source) -> Iterator[_Database]:
-    """The database, read only; a compressed one is laid beside in a file for the time."""
+    """Open the database read-only; a compressed one is unpacked to a temporary file."""
     if not source.compression:
         with closing(_open(source.path, source.name)) as connection:
             yield _bounded(connection, source)

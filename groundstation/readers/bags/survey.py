@@ -1,4 +1,7 @@
-"""The first pass over a bag: which messages serve as what, which of three clocks tells when values were true."""
+"""First pass over a bag: which messages serve which topic, and which clock is believed.
+
+One of three clocks tells when values were true.
+"""
 
 from collections import Counter
 from collections.abc import Callable
@@ -22,17 +25,17 @@ from groundstation.readers.bags.work import Work
 from groundstation.readers.clock_offsets import Offsets
 from groundstation.readers.mapping import Columns, mapped
 
-SHARED_SHARE = 0.8  # of the stamps of the slower of two topics that the faster has too: one unit's solution
+SHARED_SHARE = 0.8  # share of the slower topic's stamps that the faster one must have too, to be one unit
 ATTITUDE = ("roll_deg", "pitch_deg", "true_heading_deg")
-_ORDER = ("imu", "odometry", "pose", "fix", "twist")  # of a unit's messages: who gives a field first
+_ORDER = ("imu", "odometry", "pose", "fix", "twist")  # order in which the messages of a unit give a field
 _TURNED = "east-north-up turned to north-east-down, forward-left-up to forward-right-down"
 
 
 @dataclass(frozen=True)
 class Feed:
-    """What the messages of a connection that have the columns ``needs`` give to a canonical topic.
+    """Feed of a canonical topic by the messages of a connection.
 
-    ``without`` are fields that another connection gives.
+    The messages must have the columns ``needs``. ``without`` are fields that another connection gives.
     """
 
     topic: str
@@ -41,11 +44,11 @@ class Feed:
     without: frozenset[str] = frozenset()
 
     def of(self, columns: dict[str, Column]) -> Columns:
-        """Fields of the canonical topic that messages with these columns give; those that have a value."""
+        """Return the canonical fields that messages with these columns give a value for."""
         if not columns.keys() >= set(self.needs):
             return {}
         try:
-            with np.errstate(over="ignore", invalid="ignore"):  # of absurd numbers: becomes infinite or NaN
+            with np.errstate(over="ignore", invalid="ignore"):  # absurd numbers become infinite or NaN
                 found = self.columns(Values(columns))
         except KeyError:  # a type of a common name whose definition lacks a field: its messages stay raw
             return {}
@@ -58,7 +61,7 @@ class Feed:
 
 @dataclass
 class Survey:
-    """What the first pass found.
+    """Findings of the first pass.
 
     Attributes
     ----------
@@ -82,12 +85,18 @@ class Survey:
 
     @property
     def is_set(self) -> bool:
-        """Whether the log time of a topic still falls by a second or more, or leaps from 1970: a clock that was set."""
+        """Tell whether a clock was set: the log time of a topic falls or leaps from 1970.
+
+        The fall is a second or more; the log time is the corrected one.
+        """
         return any(was_set(one.jumps, self.offsets) for seen in self.seen.values() for one in seen.stamped)
 
 
 def survey(bag: Bag, profile: MessageProfile | None = None) -> Survey:
-    """Look at all messages of a bag, into the first of each topic; ``profile`` says what some of them mean."""
+    """Read the times of all messages of a bag, and the content of the first of each topic.
+
+    ``profile`` says what some of them mean.
+    """
     found = Survey()
     decoders: dict[int, Decoder] = {}
     work = Work.of(bag.size).of_a_first_look()
@@ -107,7 +116,7 @@ def survey(bag: Bag, profile: MessageProfile | None = None) -> Survey:
 
 
 def _map(found: Survey) -> None:
-    """Lay the messages on canonical topics, those of the profile first."""
+    """Map the messages to canonical topics, those of the profile first."""
     named = _map_by_rules(found)
     served = [seen for seen in found.sources if seen.rule is None and _serves(seen)]
     units = _units([seen for seen in served if MESSAGES[seen.connection.type].role in _ORDER])
@@ -135,7 +144,10 @@ def _map(found: Survey) -> None:
 
 
 def _named_sources(found: Survey) -> dict[str, list[str]]:
-    """Topics of the log that feed each canonical topic, with their publishers where several write one."""
+    """Return the topics of the log that feed each canonical topic.
+
+    With their publishers where several write one topic.
+    """
     writers = Counter(seen.connection.topic for seen in found.sources)
     sources: dict[str, list[str]] = {}
     for seen in found.sources:
@@ -152,7 +164,10 @@ def _serves(seen: Seen) -> bool:
 
 
 def _units(seen: list[Seen]) -> list[list[Seen]]:
-    """Messages of one namespace that share their header stamps: what one unit says of the same instants."""
+    """Group messages of one namespace that share their header stamps into units.
+
+    They are what one unit says of the same instants.
+    """
     units: list[list[Seen]] = []
     for one in sorted(seen, key=lambda seen: _ORDER.index(MESSAGES[seen.connection.type].role)):
         fitting = [unit for unit in units if _belongs(one, unit)]
@@ -174,7 +189,10 @@ def _belongs(one: Seen, unit: list[Seen]) -> bool:
 
 
 def _kind_of(unit: list[Seen]) -> str:
-    """``ins``, ``gnss``, ``odometry``, or nothing where a message alone does not tell what it is of."""
+    """Return ``ins``, ``gnss`` or ``odometry``, the kind of topic that a unit feeds.
+
+    Empty where a message alone does not tell what it is of.
+    """
     roles = {MESSAGES[seen.connection.type].role for seen in unit}
     is_of_earth = is_earth_frame(Values(unit[0].columns))
     if "imu" in roles or ({"odometry", "pose"} & roles and ("fix" in roles or is_of_earth)):
@@ -185,7 +203,7 @@ def _kind_of(unit: list[Seen]) -> str:
 
 
 def _map_by_rules(found: Survey) -> set[str]:
-    """Lay messages on topics as the profile says; returns the kinds of topics that it names."""
+    """Map messages to topics as the profile says; return the kinds of topics it names."""
     kinds: set[str] = set()
     served: dict[int, list[Seen]] = {}
     for seen in sorted(found.sources, key=lambda seen: in_order(seen.connection)):
@@ -213,7 +231,10 @@ def _leave_raw(found: Survey, seen: Seen, why: str) -> None:
 
 
 def _feed(found: Survey, topic: str, unit: list[Seen]) -> None:
-    """Lay the messages of one unit on a topic; of a field that two have, the first in :data:`_ORDER` gives it."""
+    """Map the messages of one unit to a topic.
+
+    A field that two messages have is given by the first in :data:`_ORDER`.
+    """
     given: set[str] = set()
     for seen in unit:
         message = MESSAGES[seen.connection.type]
@@ -233,7 +254,7 @@ def _feed(found: Survey, topic: str, unit: list[Seen]) -> None:
 
 
 def _choose_clock(found: Survey) -> None:
-    """Header stamps tell when values were true, unless they are of another clock than the log time."""
+    """Choose header stamps as times of validity, if they are of the clock of log time."""
     found.offsets = offsets_of({number: seen.stamped[0] for number, seen in found.seen.items()})
     if found.offsets.stated:
         names = {number: seen.connection.topic for number, seen in found.seen.items()}

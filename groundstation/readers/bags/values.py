@@ -14,7 +14,9 @@ from groundstation.readers.mapping import Columns
 
 
 class Values:
-    """Columns by name, as floating-point numbers; NaN where a message lacks the field. Texts are no numbers.
+    """Columns by name, as floating-point numbers; NaN where a message lacks the field.
+
+    Texts are no numbers.
 
     Parameters
     ----------
@@ -57,12 +59,14 @@ class Values:
         return self[f"{name}.x"], self[f"{name}.y"], self[f"{name}.z"]
 
     def has_triple(self, name: str) -> bool:
-        """Whether the columns have a vector of that name."""
+        """Tell whether the columns have a vector of that name."""
         return all(f"{name}.{axis}" in self for axis in "xyz")
 
 
 def attitude(values: Values, name: str, present: BoolArray | None, *, is_turned: bool = True) -> Columns:
-    """Roll, pitch and heading of a quaternion that turns body forward-left-up into east-north-up.
+    """Return roll, pitch and heading of a quaternion.
+
+    It turns body forward-left-up into east-north-up.
 
     heading = 90 deg - yaw, pitch = -pitch of ROS, roll = roll of ROS. Without ``is_turned`` the axes are
     forward-right-down and north-east-down already. A quaternion whose length is not one is none: drivers write zeros
@@ -101,14 +105,20 @@ def body(
     *,
     is_turned: bool = True,
 ) -> Columns:
-    """A vector along forward, left and up along forward, right and down; as it is without ``is_turned``."""
+    """Turn a vector along forward, left and up to forward, right and down.
+
+    It stays as it is without ``is_turned``.
+    """
     signs = (1.0, -1.0, -1.0) if is_turned else (1.0, 1.0, 1.0)
     parts = zip(fields, values.triple(name), signs, strict=True)
     return {field: Column(sign * factor * part, present) for field, part, sign in parts}
 
 
 def level(east: FloatArray, north: FloatArray, up: FloatArray, fields: tuple[str, str, str]) -> Columns:
-    """A vector along east, north and up as fields along north, east and down; absent where it is NaN."""
+    """Return a vector along east, north and up as fields along north, east and down.
+
+    Absent where it is NaN.
+    """
     return {
         name: Column(np.where(np.isnan(part), 0.0, part), ~np.isnan(part))
         for name, part in zip(fields, (north, east, -up), strict=True)
@@ -116,7 +126,7 @@ def level(east: FloatArray, north: FloatArray, up: FloatArray, fields: tuple[str
 
 
 def rotated(values: Values, quaternion: str, vector: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """A vector of the body along the axes that its quaternion turns it into."""
+    """Rotate a vector of the body into the axes that its quaternion refers to."""
     x, y, z = values.triple(quaternion)
     w = values[f"{quaternion}.w"]
     a, b, c = values.triple(vector)

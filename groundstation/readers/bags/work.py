@@ -1,6 +1,7 @@
-"""What a bag may cost, by its size: chunks expand, and a message may be made to take long.
+"""Bounds on the work that a bag may cause, by its size.
 
-Steps are some microseconds of decoding. Messages of recorded bags take less than a tenth of what is allowed.
+Chunks expand, and a message may be made to take long. Steps are some microseconds of decoding. Messages of recorded
+bags take less than a tenth of what is allowed.
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ STEPS_PER_VALUE, BYTES_PER_STEP = 3, 16
 
 @dataclass
 class Work:
-    """Steps that are left.
+    """Work in steps that are left.
 
     Parameters
     ----------
@@ -30,11 +31,11 @@ class Work:
 
     @classmethod
     def of(cls, size: int) -> "Work":
-        """What a file of so many bytes is given."""
+        """Return the work that a file of so many bytes is given."""
         return cls(FREE_STEPS + STEPS_PER_BYTE * size)
 
     def of_a_first_look(self) -> "Work":
-        """What a first look may take."""
+        """Return the work that a first look may take."""
         return Work(self.steps // FIRST_LOOK)
 
     def spend(self, steps: int) -> bool:

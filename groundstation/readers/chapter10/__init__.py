@@ -1,4 +1,4 @@
-"""IRIG 106 Chapter 10 and 11 recordings: every bus word kept, navigation words named by an ICD."""
+"""IRIG 106 Chapter 10 and 11 recordings: every bus word kept, navigation named by an ICD."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -17,7 +17,10 @@ _ENOUGH_PACKETS = 3
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim a file that begins with a packet, or (where its start is damaged) holds several headers that add up."""
+    """Claim a file that begins with a packet.
+
+    Where the start of the file is damaged, several headers with a right checksum are enough.
+    """
     if _is_header(source.head, 0):
         return Claim(NAME)
     found = (one for one in _PACKET.finditer(source.head) if _is_header(source.head, one.start()))
@@ -26,13 +29,16 @@ def sniff(source: Source) -> Claim | None:
 
 
 def _is_header(data: bytes, at: int) -> bool:
-    """Whether 24 bytes begin with the sync pattern and end with their sum."""
+    """Tell whether 24 bytes begin with the sync pattern and end with their sum."""
     words = memoryview(data[at : at + 24]).cast("H") if len(data) >= at + 24 else None
     return words is not None and words[0] == 0xEB25 and sum(words[:11]) & 0xFFFF == words[11]
 
 
 def read(source: Source, icds: "Sequence[Icd]" = ()) -> Iterator[Item]:
-    """Yield the header, then the recording's batches and the signals that ICDs find in them, remarks and damages."""
+    """Yield the header, the recording's batches, the signals of ICDs, remarks and damage.
+
+    The signals are those that the ICDs find in the batches.
+    """
     from groundstation.readers.chapter10.reader import items  # brings numba
 
     return items(source, icds)

@@ -1,4 +1,6 @@
-"""Words of the buses as raw topics, one for each channel; every bit stays, so that an ICD can name them afterwards.
+"""Words of the buses as raw topics, one for each channel.
+
+Every bit stays, so that an ICD can name them afterwards.
 
 ``raw.bus.1553.<channel>`` has a record for each message: ``block_status`` and ``gap_times`` as recorded,
 ``word_count``, and the message's words, command words first, four in a number of 64 bits, the first in its lowest 16:
@@ -30,13 +32,16 @@ ANY_ERROR = MESSAGE_ERROR | FORMAT_ERROR | TIME_OUT | WORD_COUNT_ERROR | SYNC_ER
 
 
 def bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
-    """A batch in pieces that are not too long."""
+    """Yield a batch in pieces that are not too long."""
     for start in range(0, len(batch), MAX_BATCH_ROWS):
         yield batch if len(batch) <= MAX_BATCH_ROWS else batch.take(slice(start, start + MAX_BATCH_ROWS))
 
 
 def messages_1553(block: Block, channel: int, packets: Int64Array) -> tuple[RecordBatch, int]:
-    """Messages of a channel in a block, and how many the packets lack of those that they say they have."""
+    """Return the messages of a channel in a block, and how many its packets lack.
+
+    The number lacking is by the count that the packets state.
+    """
     room = int(np.maximum(packets[:, scan.BODY_END] - packets[:, scan.BODY], 0).sum()) // _HEAD_BYTES
     places, times = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
     heads, words = np.empty((room, 3), dtype=np.uint16), np.zeros((room, MOST_WORDS), dtype=np.uint16)
@@ -57,7 +62,10 @@ def messages_1553(block: Block, channel: int, packets: Int64Array) -> tuple[Reco
 
 
 def words_429(block: Block, channel: int, packets: Int64Array) -> tuple[RecordBatch, int]:
-    """Words of a channel in a block, and how many the packets lack of those that they say they have."""
+    """Return the words of a channel in a block, and how many its packets lack.
+
+    The number lacking is by the count that the packets state.
+    """
     room = int(np.maximum(packets[:, scan.BODY_END] - packets[:, scan.BODY], 0).sum()) // _WORD_BYTES
     places, times = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
     heads, words = np.empty(room, dtype=np.uint32), np.empty(room, dtype=np.uint32)

@@ -1,4 +1,4 @@
-"""What is on the buses: terminals and subaddresses, buses and labels, how often each is there."""
+"""Contents of the buses: terminals and subaddresses, buses and labels, how often each."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -70,7 +70,7 @@ class OnBus:
 
     @property
     def title(self) -> str:
-        """As people say it.
+        """Name that people use for it.
 
         Examples
         --------
@@ -85,7 +85,10 @@ class OnBus:
 
 
 def keys_1553(words: NDArray[np.uint16], block_status: NDArray[np.uint16]) -> tuple[NDArray[np.uint16], ...]:
-    """Command words of messages, and the sender's of those between terminals, 0 of all others; shape (n,) each."""
+    """Return the command words of messages, and the sender's, shape (n,) each.
+
+    The sender's is that of messages between terminals, 0 of all others.
+    """
     return words[:, 0], np.where(block_status & scan.BETWEEN_TERMINALS, words[:, 1], 0).astype(np.uint16)
 
 
@@ -125,7 +128,7 @@ class _Counts:
 
 
 class BusContents:
-    """Counts what is on the buses, batch by batch."""
+    """Counter of what is on the buses, batch by batch."""
 
     def __init__(self) -> None:
         self._counts: dict[str, _Counts] = {}
@@ -133,7 +136,10 @@ class BusContents:
         self._names = BusNames({})
 
     def add(self, item: Item) -> None:
-        """Take in an item of a log; what is neither its header nor a batch of bus words is passed over."""
+        """Take in an item of a log.
+
+        Anything but its header and batches of bus words is passed over.
+        """
         if isinstance(item, LogHeader):
             self._names = BusNames(item.metadata)
         elif isinstance(item, RecordBatch) and item.topic.startswith((TOPIC_1553, TOPIC_429)):
@@ -175,7 +181,7 @@ class BusContents:
 
 
 def named_by(entry: OnBus, icds: Iterable[Icd]) -> tuple[Word429 | Message1553, ...]:
-    """Words or messages of ICDs that name what is on a bus."""
+    """Return the words or messages of ICDs that name an entry of a bus."""
     found: list[Word429 | Message1553] = []
     for icd in icds:
         if entry.sub_channel is not None:

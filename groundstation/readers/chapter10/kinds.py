@@ -1,4 +1,7 @@
-"""Types of packets, and what TMATS calls the channels that hold them. Source: IRIG 106-22 Chapter 11, table 11-8."""
+"""Types of packets, and the names that TMATS has for the channels that hold them.
+
+Source: IRIG 106-22 Chapter 11, table 11-8.
+"""
 
 from collections.abc import Mapping
 from types import MappingProxyType

@@ -1,4 +1,7 @@
-"""Words of the buses become signals by ICDs: a mapping over the raw topics, of a recording or of its MCAP alike."""
+"""Mapping of bus words to signals by ICDs.
+
+It works on the raw topics, of a recording or of its MCAP alike.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
@@ -35,7 +38,7 @@ TIME_TAG = "time_tag"  # element that counts the samples of a message sent more 
 
 
 class Seen:
-    """Which command words and labels are on the buses of each channel."""
+    """Command words and labels that are on the buses of each channel."""
 
     def __init__(self) -> None:
         self._keys: dict[str, BoolArray] = {}
@@ -51,11 +54,11 @@ class Seen:
                 self.of(batch.topic)[keys] = True
 
     def of(self, topic: str) -> BoolArray:
-        """Which keys a raw topic has, shape (65536,), to be marked."""
+        """Return which keys a raw topic has, shape (65536,), to be marked by the caller."""
         return self._keys.setdefault(topic, np.zeros(KEYS, dtype=bool))
 
     def places(self, holder: Word429 | Message1553, names: BusNames) -> list[tuple[int, int | None]]:
-        """Channels (and of 429 their buses, from 1) where a word or message is."""
+        """Return the channels (for 429 also the buses, from 1) where a word or message is."""
         prefix = TOPIC_429 if isinstance(holder, Word429) else TOPIC_1553
         found: list[tuple[int, int | None]] = []
         for topic, keys in sorted(self._keys.items(), key=lambda one: channel_of(one[0])):
@@ -83,7 +86,10 @@ class Found:
 
 
 def found_on(seen: Seen, icds: Sequence[Icd], names: BusNames) -> Found:
-    """What of the ICDs is on the buses. A word that may be on any bus is one of another unit on each."""
+    """Find the words and messages of the ICDs that are on the buses.
+
+    A word that may be on any bus is one of another unit on each.
+    """
     words: list[Word429] = []
     messages: list[Message1553] = []
     remarks = []
@@ -103,7 +109,10 @@ def found_on(seen: Seen, icds: Sequence[Icd], names: BusNames) -> Found:
 
 
 def _placed(holder: Any, channel: int, bus: int | None, names: BusNames) -> Any:
-    """The word or message at one of its places; the units of one that may be on any bus are numbered by place."""
+    """Return the word or message at one of its places.
+
+    The units of one that may be on any bus are numbered by place.
+    """
     elements = holder.elements
     if not holder.bus and holder.channel is None:
         elements = tuple(
@@ -115,7 +124,7 @@ def _placed(holder: Any, channel: int, bus: int | None, names: BusNames) -> Any:
 
 @dataclass
 class _Tally:
-    """What of a word or message was used, and why not the rest."""
+    """Counts of the used and the unusable rows of a word or message, by reason."""
 
     used: int = 0
     unusable: int = 0
@@ -138,11 +147,11 @@ class _Table:
         self.holders[self.group[key]].append(holder)
 
     def each(self) -> list[Any]:
-        """Every word or message once."""
+        """Return every word or message once."""
         return list({id(holder): holder for several in self.holders for holder in several}.values())
 
     def rows(self, keys: NDArray[np.uint16]) -> Iterator[tuple[Any, NDArray[np.int64]]]:
-        """Each word or message that occurs, and its rows; those of one key share them."""
+        """Yield each word or message that occurs, and its rows; those of one key share them."""
         groups = self.group[keys]
         wanted = np.flatnonzero(groups >= 0)
         groups = groups[wanted]
@@ -153,7 +162,7 @@ class _Table:
 
 
 class Namer:
-    """Makes signals of batches of bus words.
+    """Converter of bus words to signals.
 
     Parameters
     ----------
@@ -181,7 +190,7 @@ class Namer:
                 self._tables.setdefault(f"{TOPIC_1553}{message.channel}", _Table()).add(side, message)
 
     def signals(self, batch: RecordBatch) -> Iterator[RecordBatch]:
-        """Batches of the signals that a batch of bus words holds."""
+        """Yield batches of the signals in a batch of bus words."""
         table = self._tables.get(batch.topic)
         if table is None:
             return
@@ -199,7 +208,7 @@ class Namer:
                 yield from bounded(self._placed(made))
 
     def _placed(self, batch: RecordBatch) -> RecordBatch:
-        """The batch without positions of zeros, which a unit sends before it has one."""
+        """Drop positions of zeros, which a unit sends before it has one."""
         columns, zeros = placed(batch.topic, batch.columns)
         if not len(zeros):
             return batch
@@ -262,7 +271,10 @@ class Namer:
             yield from self._piece(batch, holder, whole, decoded)
 
     def _is_new(self, holder: Message1553, data: NDArray[np.uint16]) -> BoolArray:
-        """Messages whose time tag is another than in the one before; all of a message without a tag."""
+        """Tell which messages have another time tag than the one before.
+
+        Messages without a tag are all new.
+        """
         tag = next((one for one in holder.elements if one.name == TIME_TAG), None)
         if tag is None:
             return np.ones(len(data), dtype=bool)
@@ -297,7 +309,7 @@ class Namer:
         return self._tallies.setdefault(_title(holder), _Tally())
 
     def remarks(self) -> Iterator[Item]:
-        """What serves as what, and what was not used."""
+        """Yield remarks on what serves each topic, and what was not used."""
         for topic, sources in sorted(self._sources.items()):
             yield Remark("mapped", f"{topic} from {'; '.join(sources)}", topic)
         for kind in sorted({kind_of(topic) for topic in self._sources}):
@@ -338,7 +350,7 @@ def _key(holder: Any) -> str:
 
 
 def _title(holder: Any) -> str:
-    """Name and place of a word or message, for people."""
+    """Return name and place of a word or message, for people."""
     bus = f"{holder.bus} (channel {holder.channel}" if holder.bus else f"channel {holder.channel}"
     place = f"{bus})" if holder.bus else bus
     if isinstance(holder, Word429):
@@ -348,7 +360,7 @@ def _title(holder: Any) -> str:
 
 
 def named(items: Iterable[Item], icds: Sequence[Icd], seen: Seen) -> Iterator[Item]:
-    """Items of a log, with the signals that ICDs find in its bus words behind each batch of those."""
+    """Yield the items of a log, and after bus words the signals that ICDs find in them."""
     namer: Namer | None = None
     for item in items:
         yield item

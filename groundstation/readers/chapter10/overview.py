@@ -1,4 +1,7 @@
-"""The first pass over a recording: TMATS and the time packets, and dates on the buses where they lack the year."""
+"""First pass over a recording: TMATS, time packets, and dates on the buses.
+
+Dates on the buses are read where the time packets lack the year.
+"""
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
@@ -21,7 +24,7 @@ _WORD_BYTES = 8
 
 @dataclass
 class Overview:
-    """What must be known before the first record is told."""
+    """Facts that must be known before the first record is yielded."""
 
     tmats: Tmats = field(default_factory=Tmats)
     readings: list[Reading] = field(default_factory=list)
@@ -30,7 +33,10 @@ class Overview:
 
 
 def overview(source: Source, *, with_buses: bool) -> Overview:
-    """Read a recording once; of several TMATS packets in a row all are one text. What is on the buses takes longer."""
+    """Read a recording once.
+
+    Several TMATS packets in a row are one text. Reading what is on the buses (``with_buses``) takes longer.
+    """
     found, texts, is_setup = Overview(), [], True
     for block in Walk(source):
         for packet in block.of(TMATS) if is_setup else ():
@@ -56,7 +62,7 @@ def overview(source: Source, *, with_buses: bool) -> Overview:
 
 
 def _dates(block: Block) -> Counter[date]:
-    """Dates that words with label 260 tell, by the places of words alone."""
+    """Count the dates in ARINC-429 words with label 260."""
     found: Counter[date] = Counter()
     for packet in block.of(ARINC_429):
         whole = max(0, packet[scan.BODY_END] - packet[scan.BODY]) // _WORD_BYTES

@@ -1,4 +1,7 @@
-"""Cuts a recording into blocks of packets; what belongs to no packet, and packets that are damaged, are counted."""
+"""Cut a recording into blocks of packets.
+
+Bytes that belong to no packet, and damaged packets, are counted.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +20,7 @@ from groundstation.readers.source import Source
 
 BLOCK_BYTES = 4 << 20
 MAX_SPANS = 4_096
-NS_PER_COUNT = 100  # of the relative time counter, which runs at 10 MHz
+NS_PER_COUNT = 100  # the relative time counter runs at 10 MHz
 _SLACK = 64  # bytes behind the data, so that it may be seen as numbers of four bytes
 _SMALLEST_PACKET = scan.HEADER_BYTES
 
@@ -60,7 +63,7 @@ class Block:
 
 
 class Walk:
-    """Iterates over the blocks of a recording; what it met is known at the end.
+    """Iterator over the blocks of a recording; the damage is known at the end.
 
     Parameters
     ----------
@@ -96,12 +99,15 @@ class Walk:
         self.tally.filler_bytes = int(self._state[scan.FILLER])
 
     def damages(self) -> Iterator[Damage]:
-        """What was skipped and what was damaged."""
+        """Yield the bytes that were skipped and the packets that were damaged."""
         yield from self._skipped.damages()
         yield from self.tally.damages()
 
     def _longer(self, data: NDArray[np.uint8], size: int, stream: BinaryIO) -> tuple[NDArray[np.uint8], int, bool]:
-        """The data with the next bytes of the file behind them, how many they are, and whether those were the last."""
+        """Append the next bytes of the file to the data.
+
+        Returns the data, the number of bytes appended, and whether those were the last.
+        """
         whole = np.empty(size + BLOCK_BYTES + _SLACK, dtype=np.uint8)
         whole[:size] = data[:size]
         try:
@@ -113,7 +119,7 @@ class Walk:
         return whole[: (size + count + _SLACK) // 4 * 4], size + count, count < BLOCK_BYTES
 
     def _blocks(self, data: NDArray[np.uint8], size: int, is_last: bool) -> Iterator[Block]:
-        """Packets of the data at hand: one block, more where there are very many damaged places."""
+        """Yield the packets of the data at hand: one block, more if damage is frequent."""
         packets = np.empty((size // _SMALLEST_PACKET + 1, scan.COLUMNS), dtype=np.int64)
         halves, words, state = data.view("<u2"), data.view("<u4"), self._state
         syncs = magic_places(data[:size], scan.SYNC)

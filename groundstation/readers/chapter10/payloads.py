@@ -1,4 +1,6 @@
-"""What is recorded beside bus words: bytes of messages and frames, discretes, events, the times of time packets.
+"""Recorded data other than bus words: bytes, discretes, events, times of time packets.
+
+The bytes are those of messages and frames.
 
 Bytes, ``raw.bytes.<kind>.<channel>``, stand in records of up to 64, eight in a number of 64 bits, the first in its
 lowest eight: ``bytes_00``, ``bytes_08`` ...; ``piece`` counts the records of one message from 0, ``size`` is that of
@@ -25,7 +27,10 @@ _STAMP_ALWAYS, _STAMP_IF_FLAGGED = True, False
 
 
 class _Stamped(NamedTuple):
-    """Messages behind headers: always with a time, or where bit 31 of the specific word says so; header, length."""
+    """Layout of messages that stand behind headers: their time, their header, their length.
+
+    A time is always there, or where bit 31 of the specific word says so.
+    """
 
     name: str
     is_always_timed: bool
@@ -57,7 +62,7 @@ _WHOLE: Mapping[int, str] = MappingProxyType(
 
 
 def batch_of(block: Block, kind: int, channel: int, packets: Int64Array, tmats: Tmats) -> RecordBatch | None:
-    """Records of a channel in a block; None where there are none, or the type is but counted."""
+    """Return the records of a channel in a block; None without any, or if only counted."""
     if kind in _STAMPED:
         return _messages(block, _STAMPED[kind], channel, packets)
     if kind in _WHOLE:
@@ -165,7 +170,7 @@ def _events(block: Block, packets: Int64Array, tmats: Tmats) -> RecordBatch | No
 
 
 def _times(block: Block, channel: int, packets: Int64Array) -> RecordBatch | None:
-    """Time packets that tell a time: ``day_of_year`` and ``time_of_day_ms``."""
+    """Return the time packets that state a time: ``day_of_year``, ``time_of_day_ms``."""
     told = [
         (
             packet,

@@ -1,4 +1,4 @@
-"""Samples of words that come one after the other, put together: what belongs together, then in the order of the log."""
+"""Merge of consecutive words into samples, in the order of the log."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -42,13 +42,15 @@ class Piece:
     fine_of: str = ""
 
     def take(self, rows: Int64Array | BoolArray) -> "Piece":
-        """The samples that ``rows`` selects."""
+        """Return the samples that ``rows`` selects."""
         fields = {name: (values[rows], known[rows]) for name, (values, known) in self.fields.items()}
         return replace(self, index=self.index[rows], time_ns=self.time_ns[rows], fields=fields)
 
 
 def completed(kind: str, pieces: list[Piece], *, has_velocity: bool) -> tuple[list[Piece], bool]:
-    """Pieces with fine parts added and pairs together, and whether velocities were derived from track and speed.
+    """Add fine parts to pieces and join pairs.
+
+    Returns the pieces, and whether velocities were derived from track and speed.
 
     Parameters
     ----------
@@ -87,7 +89,10 @@ def _with_velocity(piece: Piece, track: str) -> Piece:
 
 
 def _nearest(one: Piece, other: Piece) -> tuple[Int64Array, Int64Array]:
-    """Rows of two pieces that are each other's nearest in time and near enough; equally many of both."""
+    """Return the rows of two pieces that are each other's nearest in time.
+
+    They are near enough; there are equally many of both.
+    """
     if not len(one.index) or not len(other.index):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     to_other, to_one = (_closest(a.time_ns, b.time_ns) for a, b in ((one, other), (other, one)))
@@ -97,14 +102,14 @@ def _nearest(one: Piece, other: Piece) -> tuple[Int64Array, Int64Array]:
 
 
 def _closest(times: Int64Array, among: Int64Array) -> Int64Array:
-    """Place of the nearest of ``among``, which increase, to each time."""
+    """Return the place of the nearest of ``among``, which increase, to each time."""
     after = np.minimum(np.searchsorted(among, times), len(among) - 1)
     before = np.maximum(after - 1, 0)
     return np.where(times - among[before] < among[after] - times, before, after)
 
 
 def _with_fine(piece: Piece, fine: Piece) -> Piece:
-    """Values with their fine parts added; a sample without one stays as it is."""
+    """Add fine parts to values; a sample without one stays as it is."""
     rows, parts = _nearest(piece, fine)
     fields = dict(piece.fields)
     for name, (values, known) in piece.fields.items():
@@ -117,7 +122,10 @@ def _with_fine(piece: Piece, fine: Piece) -> Piece:
 
 
 def _paired(pieces: list[Piece], first: str, second: str) -> list[Piece]:
-    """Two fields that come in two words, in one sample at the time of the earlier word; what has no partner stays."""
+    """Join two fields that come in two words into one sample.
+
+    It has the time of the earlier word. Words without a partner stay.
+    """
     ones = [piece for piece in pieces if first in piece.fields and second not in piece.fields]
     others = [piece for piece in pieces if second in piece.fields and first not in piece.fields]
     if len(ones) != 1 or len(others) != 1:
@@ -132,10 +140,10 @@ def _paired(pieces: list[Piece], first: str, second: str) -> list[Piece]:
 
 
 def merged(topic: str, pieces: list[Piece], span_ns: int) -> RecordBatch | None:
-    """One batch in the order of the log: a record for each sample, with time and place of its first word.
+    """Merge pieces into one batch in the order of the log, a record for each sample.
 
-    Words are of one sample until one tells a field again, or comes more than ``span_ns`` after the first. What is not
-    known is absent; None when nothing is known.
+    A record has the time and place of its first word. Words are of one sample until one tells a field again, or comes
+    more than ``span_ns`` after the first. What is not known is absent; None when nothing is known.
     """
     names = list(dict.fromkeys(name for piece in pieces for name in piece.fields))
     index = np.concatenate([piece.index for piece in pieces])

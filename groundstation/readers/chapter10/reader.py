@@ -1,4 +1,7 @@
-"""Puts a recording together: an overview, then block by block what every channel holds, then what was found."""
+"""Read a recording: an overview, then what every channel holds, then what was found.
+
+Channels are read block by block.
+"""
 
 from collections.abc import Iterator, Sequence
 
@@ -24,9 +27,9 @@ _FACTS = {
 
 
 def items(source: Source, icds: Sequence[Icd] = ()) -> Iterator[Item]:
-    """Yield the header, batches in the order of the blocks of the file, then remarks and damages.
+    """Yield the header, batches in the order of the blocks of the file, remarks and damage.
 
-    Behind each batch of bus words are the signals that ``icds`` find in it.
+    Each batch of bus words is followed by the signals that ``icds`` find in it.
     """
     found = overview(source, with_buses=bool(icds))
     told = _recorded(source, found)
@@ -50,7 +53,7 @@ def _recorded(source: Source, found: Overview) -> Iterator[Item]:
 
 
 def metadata(tmats: Tmats) -> dict[str, str]:
-    """Facts for the header: what the recording is of, and the name of each channel's bus."""
+    """Return facts for the header: the recording's subject, and each channel's bus name."""
     facts = {key: value for key, pattern in _FACTS.items() if (value := tmats.get(pattern))}
     if facts.get("tmats.test_item"):
         facts["aircraft"] = facts["tmats.test_item"]
@@ -64,7 +67,10 @@ def metadata(tmats: Tmats) -> dict[str, str]:
 
 
 def _batches(block: Block, tmats: Tmats, lost: dict[str, int]) -> Iterator[RecordBatch]:
-    """What a block holds, channel by channel; a topic's records in the order of the file."""
+    """Yield the batches of a block, channel by channel.
+
+    A topic's records are in the order of the file.
+    """
     for kind, channel, packets in block.by_channel():
         if kind in (MIL_STD_1553, ARINC_429):
             batch, missing = (messages_1553 if kind == MIL_STD_1553 else words_429)(block, channel, packets)

@@ -1,8 +1,8 @@
 """Compiled loops over the bytes of a recording: packets, and the messages in them.
 
 A header counts when its sync pattern and its checksum are right: 32 bits that noise does not meet. Its packet counts
-where its data checksum is right, or it has none and another header (or the end of the file) follows; else no other
-header may begin inside it: what lost bytes must not pass for whole.
+where its data checksum is right, or where it has none and another header (or the end of the file) follows. Else no
+other header may begin inside it: a packet that lost bytes must not pass for whole.
 """
 
 from typing import Any
@@ -12,13 +12,13 @@ import numpy as np
 from groundstation.base.compile import in_place, scanner
 
 HEADER_BYTES, SECONDARY_BYTES, SYNC = 24, 12, 0xEB25
-MOST_BYTES, MOST_COMPUTER_BYTES = 524_288, 134_217_728  # of a packet, by the standard
+MOST_BYTES, MOST_COMPUTER_BYTES = 524_288, 134_217_728  # largest packet, by the standard
 LAST_COMPUTER_TYPE = 7
 
 # Columns of a packet: where it begins and ends, its data begin and end (behind the channel-specific word), its header.
 AT, END, BODY, BODY_END, CHANNEL, TYPE, FLAGS, SEQUENCE, RTC, STATE, COLUMNS = range(11)
 WHOLE, WRONG_CHECKSUM, TORN, CUT = range(4)
-BETWEEN_TERMINALS = 0x0800  # of a 1553 message's block status
+BETWEEN_TERMINALS = 0x0800  # flag of a 1553 message's block status
 IEEE_1588 = 1  # format of a secondary header's time
 HAS_SECONDARY, STAMPS_ARE_SECONDARY, RTC_UNSYNCED, OVERFLOW = 0x80, 0x40, 0x20, 0x10
 
@@ -52,7 +52,7 @@ def _sum16(data: Any, at: int, words: int) -> int:
 
 @in_place
 def _is_header(data: Any, at: int, size: int) -> bool:
-    """Whether a packet may begin at a place: sync, checksum, lengths that fit each other."""
+    """Tell whether a packet may begin at a place: sync, checksum, lengths that fit."""
     if at + HEADER_BYTES > size or data[at] != 0x25 or data[at + 1] != 0xEB:
         return False
     if _sum16(data, at, 11) != _u16(data, at + 22):
@@ -69,7 +69,7 @@ def _is_header(data: Any, at: int, size: int) -> bool:
 
 @in_place
 def _header_inside(data: Any, syncs: Any, start: int, end: int, size: int) -> int:
-    """Where a header begins between two places; NOWHERE when none does."""
+    """Return the first place between two others where a header begins; NOWHERE without one."""
     number = np.searchsorted(syncs, start)
     while number < len(syncs) and syncs[number] < end:
         if _is_header(data, syncs[number], size):
@@ -80,7 +80,10 @@ def _header_inside(data: Any, syncs: Any, start: int, end: int, size: int) -> in
 
 @in_place
 def _checksum_is_right(data: Any, halves: Any, words: Any, at: int, start: int, end: int) -> bool:
-    """Whether the data checksum at the end of a packet is the sum of what precedes it, filler among it."""
+    """Tell whether the data checksum at the end of a packet is right.
+
+    It is the sum of what precedes it, filler included.
+    """
     kind = int(data[at + 14]) & 3
     total = 0
     if kind == 1:
@@ -172,7 +175,10 @@ def scan(
 
 @in_place
 def _stamp(data: Any, at: int, packet: Any) -> int:
-    """Time of a message in counts of 100 ns: its own counter, or the packet's and how much later it is."""
+    """Return the time of a message in counts of 100 ns.
+
+    It is the message's own counter, or that of the packet plus how much later the message is.
+    """
     flags = packet[FLAGS]
     if not flags & STAMPS_ARE_SECONDARY or not flags & HAS_SECONDARY:
         return _u48(data, at)
@@ -185,7 +191,7 @@ def _stamp(data: Any, at: int, packet: Any) -> int:
 
 @scanner
 def messages_1553(data: Any, packets: Any, places: Any, times: Any, heads: Any, words: Any, lost: Any) -> int:
-    """Messages of MIL-STD-1553 packets; how many there are.
+    """Find the messages of MIL-STD-1553 packets and return their number.
 
     Parameters
     ----------
@@ -224,7 +230,10 @@ def messages_1553(data: Any, packets: Any, places: Any, times: Any, heads: Any, 
 
 @in_place
 def see_1553(data: Any, packets: Any, seen: Any) -> None:
-    """Mark the command words of all messages in ``seen``, ndarray of bool of shape (65536,): see messages_1553."""
+    """Mark the command words of all messages in ``seen``: see messages_1553.
+
+    ``seen`` is an ndarray of bool of shape (65536,).
+    """
     for k in range(len(packets)):
         at, end = packets[k, BODY], packets[k, BODY_END]
         while at + 16 <= end:
@@ -237,7 +246,10 @@ def see_1553(data: Any, packets: Any, seen: Any) -> None:
 
 @in_place
 def see_429(data: Any, packets: Any, seen: Any) -> None:
-    """Mark bus (from 0) and label byte of all words in ``seen``, ndarray of bool of shape (65536,)."""
+    """Mark bus (from 0) and label byte of all words in ``seen``.
+
+    ``seen`` is an ndarray of bool of shape (65536,).
+    """
     for k in range(len(packets)):
         for at in range(packets[k, BODY], packets[k, BODY_END] - 7, 8):
             seen[int(data[at + 3]) << 8 | int(data[at + 4])] = True
@@ -245,7 +257,7 @@ def see_429(data: Any, packets: Any, seen: Any) -> None:
 
 @scanner
 def words_429(data: Any, packets: Any, places: Any, times: Any, heads: Any, words: Any, lost: Any) -> int:
-    """Words of ARINC-429 packets; how many there are.
+    """Find the words of ARINC-429 packets and return their number.
 
     ``heads`` is each word's header (bus, errors, gap to the word before), ``words`` the word; both uint32, shape (n,).
     The first word has the packet's time, and each gap is counted in its unit. Else as :func:`messages_1553`.
@@ -277,7 +289,9 @@ def messages_stamped(
     times: Any,
     sizes: Any,
 ) -> int:
-    """Messages that tell their length in a header behind their time (UART, Ethernet, message, CAN); how many.
+    """Find messages whose length stands in a header behind their time; return their number.
+
+    Such are UART, Ethernet, message and CAN.
 
     Parameters
     ----------
@@ -306,7 +320,7 @@ def messages_stamped(
 
 @in_place
 def samples(time_ns: Any, fields: Any, span_ns: int, sample: Any) -> int:
-    """Which words are of one sample; how many samples there are.
+    """Group words into samples and return the number of samples.
 
     A sample ends where a word tells a field again, or comes more than a span after its first word.
 

@@ -1,4 +1,7 @@
-"""What a recording holds and lacks by its packets' headers: types, sums, sequence numbers, what TMATS says of it."""
+"""Account of a recording by its packets' headers: types, sums, sequence numbers, TMATS.
+
+It tells what the recording holds and lacks, and what TMATS says of it.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -11,7 +14,7 @@ from groundstation.readers.chapter10 import kinds, scan
 from groundstation.readers.chapter10.tmats import Tmats
 from groundstation.readers.skipped import bytes_place
 
-RESTART_TICKS = 10 * 10_000_000  # of the relative time counter, which runs at 10 MHz: a step back of no recording
+RESTART_TICKS = 10 * 10_000_000  # step back of a new recording; the counter runs at 10 MHz
 WRAP_TICKS = 1 << 47  # a longer one is a wrap: numbers go on
 
 
@@ -26,7 +29,10 @@ class _Wrong(NamedTuple):
 
 @dataclass
 class _Sequence:
-    """Sequence number and counter of a channel's last packet, and how many packets are missing by the number."""
+    """Sequence number and counter of a channel's last packet, and its missing packets.
+
+    The number of missing packets follows from the sequence number.
+    """
 
     last: int
     last_rtc: int
@@ -39,7 +45,7 @@ class Tally:
     """Counts of a whole recording."""
 
     packets: int = 0
-    by_channel: dict[tuple[int, int], int] = field(default_factory=dict)  # of channel and type
+    by_channel: dict[tuple[int, int], int] = field(default_factory=dict)  # by channel and type
     checked: int = 0
     secondary: int = 0
     filler_bytes: int = 0
@@ -50,7 +56,7 @@ class Tally:
     wrong: list[_Wrong] = field(default_factory=list)
 
     def add(self, packets: Int64Array, base: int) -> None:
-        """Count packets, damaged ones among them; ``base`` is the place of their places."""
+        """Count packets, damaged ones too; ``base`` is the byte that their places count from."""
         self.packets += len(packets)
         flags, channels, types = (packets[:, column] for column in (scan.FLAGS, scan.CHANNEL, scan.TYPE))
         has_secondary = (flags & scan.HAS_SECONDARY) > 0
@@ -82,7 +88,7 @@ class Tally:
             sequence.missing += int(missing.sum())
 
     def remarks(self, tmats: Tmats) -> Iterator[Remark]:
-        """What was checked, and where TMATS says otherwise."""
+        """Yield remarks on what was checked, and where TMATS says otherwise."""
         types: dict[int, int] = {}
         for (_channel, kind), count in self.by_channel.items():
             types[kind] = types.get(kind, 0) + count
@@ -108,7 +114,7 @@ class Tally:
                 yield Remark("tmats_contradicted", text)
 
     def damages(self) -> Iterator[Damage]:
-        """Damaged packets, and packets that were never written."""
+        """Yield damaged packets, and packets that were never written."""
         setup = [one for one in self.wrong if one.kind == kinds.TMATS and one.verdict == scan.WRONG_CHECKSUM]
         if setup:
             what = "TMATS packets with a wrong data checksum, read all the same"

@@ -1,4 +1,7 @@
-"""UTC of the relative time counter, by the time packets; their year, where they have none, from elsewhere."""
+"""UTC of the relative time counter, by the time packets.
+
+Where these have no year, it comes from elsewhere.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -17,7 +20,7 @@ from groundstation.readers.start import zero_of_readings
 
 NS_PER_DAY = 86_400 * NS_PER_S
 _GPS_NATIVE, _NONE = 5, 15
-_RESTART_NS = -NS_PER_S  # of the counter: recordings joined end to end
+_RESTART_NS = -NS_PER_S  # step of the counter where recordings are joined end to end
 _SPREAD_NS = 500_000_000  # readings that differ by more are of a clock that was set
 _TMATS_DAYS = 40.0
 _LABEL_260 = 0x0D  # octal 260 as it stands in a word, its first bit last
@@ -25,7 +28,7 @@ _LABEL_260 = 0x0D  # octal 260 as it stands in a word, its first bit last
 
 @dataclass(frozen=True)
 class Reading:
-    """What a time packet tells.
+    """Time that a time packet states.
 
     Parameters
     ----------
@@ -53,7 +56,7 @@ class Reading:
 
 
 def reading(channel: int, device_ns: int, specific_word: int, body: bytes) -> Reading | None:
-    """Read a time packet of format 1, None where it tells no time.
+    """Read a time packet of format 1; None where it states no time.
 
     Source: IRIG 106-22 Chapter 11, 11.2.3.2; binary coded decimals, hundredths of a second first.
 
@@ -88,7 +91,9 @@ def reading(channel: int, device_ns: int, specific_word: int, body: bytes) -> Re
 
 
 def dates_in(words: NDArray[np.uint32]) -> Counter[date]:
-    """Dates that ARINC-429 words with label 260 tell, and how often; the year is of this century.
+    """Return the dates of ARINC-429 words with label 260, and how often each occurs.
+
+    The year is of this century.
 
     Source: ARINC 429, part 1: day in bits 24 to 29, month in 19 to 23, year in 11 to 18, binary coded decimals.
     """
@@ -119,10 +124,10 @@ class Start:
 
 
 def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) -> Start:
-    """UTC of the counter's zero: the median over the readings of the channel that has most of them.
+    """Return the UTC of the counter's zero: the median over the readings of one channel.
 
-    Of a time source that was set in the recording, the readings count that it told in the end. A date that is behind
-    that of TMATS by whole rollovers of the GPS week is of a source that missed them.
+    It is the channel that has most readings. If the time source was set in the recording, its last readings count. A
+    date that is behind that of TMATS by whole rollovers of the GPS week is of a source that missed them.
 
     Examples
     --------
@@ -160,7 +165,7 @@ def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) ->
 
 
 def _of_tmats(tmats: Tmats) -> tuple[OtherDate, ...]:
-    """The date of TMATS, which may be some weeks older than the recording."""
+    """Return the date of TMATS; it may be some weeks older than the recording."""
     if tmats.day is None:
         return ()
     day, code = tmats.day
@@ -189,14 +194,14 @@ def _year_of(first: Reading, dates: Counter[date], tmats: Tmats) -> tuple[int | 
 
 
 def _last_start(used: Sequence[Reading]) -> int:
-    """The first reading behind the counter's last restart."""
+    """Return the place of the first reading after the counter's last restart."""
     steps = np.diff(np.array([one.device_ns for one in used], dtype=np.int64))
     restarts = np.flatnonzero(steps < _RESTART_NS)
     return int(restarts[-1]) + 1 if len(restarts) else 0
 
 
 def _every_zero(used: Iterable[Reading], year: int) -> Int64Array:
-    """UTC less the counter, of each reading; a day that falls begins a new year."""
+    """Return UTC less the counter for each reading; a day that falls begins a new year."""
     zeros: list[int] = []
     before: Reading | None = None
     for one in used:
@@ -212,7 +217,7 @@ def _every_zero(used: Iterable[Reading], year: int) -> Int64Array:
 
 
 def _spread(zeros: Int64Array, channel: int) -> Iterable[Remark]:
-    """What is to be said when the readings do not run with the counter."""
+    """Yield a remark when the readings do not run with the counter."""
     spread_ns = int(zeros.max() - zeros.min())
     if spread_ns > _SPREAD_NS:
         text = (

@@ -1,12 +1,12 @@
-"""TMATS, the text in which a recording describes itself: channels, buses, the aircraft, a date."""
+"""TMATS, the text that describes a recording: channels, buses, the aircraft, a date."""
 
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import date
 
-YEARS = range(1970, 2200)  # of recordings; others are damage
-MOST_CHARACTERS = 4 << 20  # of attributes; real ones have some 100 thousand
+YEARS = range(1970, 2200)  # years of recordings; others are damage
+MOST_CHARACTERS = 4 << 20  # characters of all attributes; real ones have some 100 thousand
 _VALUE_CHARACTERS = 200
 _ATTRIBUTE = re.compile(r"([A-Za-z]{1,4}(?:-\d+)?\\[^:;\r\n]{1,60}):([^;]*);")
 _YEAR_FIRST, _YEAR_LAST = (
@@ -44,7 +44,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Tmats:
-    """What is used of a recording's TMATS; empty where it has none."""
+    """Used part of a recording's TMATS; empty where it has none."""
 
     attributes: Mapping[str, str] = field(default_factory=dict)
     channels: Mapping[int, Channel] = field(default_factory=dict)
@@ -56,7 +56,10 @@ class Tmats:
 
     @property
     def day(self) -> tuple[date, str] | None:
-        """A date that stands in it, and the attribute that has it; it may be that of its generator."""
+        """Date that TMATS states, and the attribute that has it.
+
+        It may be the date on which TMATS was generated.
+        """
         for pattern in _DATES:
             found = _date_of(self.get(pattern))
             if found:
@@ -70,7 +73,7 @@ class Tmats:
 
 
 def parse(text: bytes) -> Tmats:
-    """Read TMATS; what is no attribute is passed over.
+    """Parse TMATS; text that is no attribute is passed over.
 
     Examples
     --------
@@ -130,7 +133,10 @@ def _pcm_streams(attributes: Mapping[str, str]) -> dict[str, dict[str, str]]:
 
 
 def _sub_channels(attributes: Mapping[str, str]) -> dict[tuple[str, str], dict[int, str]]:
-    """Names of ARINC-429 buses by recorder, place of the channel, and sub-channel number from 1."""
+    """Return the names of ARINC-429 buses by recorder, place, and sub-channel number from 1.
+
+    The place is that of the channel.
+    """
     names: dict[tuple[str, str], dict[int, str]] = {}
     for code, value in attributes.items():
         found = re.fullmatch(r"(R-\d+)\\ASN-(\d+)-(\d+)", code)

@@ -1,4 +1,4 @@
-"""ArduPilot DataFlash logs (.BIN): every message kept, navigation mapped to the canonical topics."""
+"""ArduPilot DataFlash logs (.BIN): every message kept, navigation in canonical topics."""
 
 import re
 from collections.abc import Iterator
@@ -13,7 +13,10 @@ _ENOUGH_DEFINITIONS = 3
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim a file that begins with a definition, or (where its start is damaged) holds several of them."""
+    """Claim a file that begins with a format definition.
+
+    Where the start of the file is damaged, several definitions in the head are enough.
+    """
     if _DEFINITION.match(source.head):
         return Claim(NAME)
     found = zip(range(_ENOUGH_DEFINITIONS), _DEFINITION.finditer(source.head), strict=False)
@@ -21,7 +24,7 @@ def sniff(source: Source) -> Claim | None:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, then the log's batches, then remarks and damages."""
+    """Yield the header, the log's batches, remarks and damage."""
     from groundstation.readers.dataflash.reader import items  # brings numba
 
     return items(source)

@@ -1,4 +1,7 @@
-"""Cuts a log into blocks of records that the definitions in force describe; what belongs to no record is counted."""
+"""Cut a log into blocks of records that the definitions in force describe.
+
+Bytes that belong to no record are counted.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,10 +27,10 @@ from groundstation.readers.source import Source
 BLOCK_BYTES = 4 << 20
 REFUSED_SHOWN = 20  # definitions left out that are told one by one
 MAX_SPANS = 4_096
-BYTES_KEPT, RECORDS_KEPT = 96 << 20, 1 << 22  # of a log whose places are kept for a second pass, 5 bytes a record
+BYTES_KEPT, RECORDS_KEPT = 96 << 20, 1 << 22  # log whose places are kept for a second pass, 5 bytes a record
 MOST_LOGS, MOST_DEFINITIONS = 256, 10_000  # joined in a file, and different ones in it: more is no log but an attack
 _LOG_BEGINS = bytes((FMT_ID, FMT_BYTES)) + b"FMT"  # every log begins with the definition of definitions
-FILLERS = (b"\0", b"\xff")  # what a recorder fills the rest of a page with
+FILLERS = (b"\0", b"\xff")  # bytes with which a recorder fills the rest of a page
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +55,10 @@ class Block:
     definitions: dict[int, Definition]
 
     def groups(self) -> Iterator[tuple[Definition, Int64Array]]:
-        """Each type that occurs and which of the block's records (numbered from 0) are of it, increasing."""
+        """Yield each record type that occurs, and the numbers of its records in the block.
+
+        Records are numbered from 0; the numbers increase.
+        """
         order = np.argsort(self.types, kind="stable")
         counts = np.bincount(self.types)
         ends = np.cumsum(counts)
@@ -83,7 +89,7 @@ class _Places(NamedTuple):
 
 
 class _Chunk(NamedTuple):
-    """Data that were at hand at once: how many bytes, how many of them are done with, and their blocks."""
+    """Data that were at hand at once: their bytes, how many of them are done, their blocks."""
 
     length: int
     done: int
@@ -99,7 +105,7 @@ class Spans:
     cut: tuple[int, int, str] | None = None
 
     def damages(self) -> Iterator[Damage]:
-        """What was skipped, in the order of the file."""
+        """Yield the skipped bytes and a record cut off by the end, in the order of the file."""
         yield from self.skipped.damages()
         if self.cut is not None:
             start, end, name = self.cut
@@ -114,7 +120,7 @@ class Spans:
 
 
 class Scanner:
-    """Iterates over the blocks of a log.
+    """Iterator over the blocks of a log.
 
     Definitions are taken in as they come. One that contradicts an earlier one of the same id is believed while no
     record of that id was met, or when a new log has begun in the file (logs joined end to end): a flipped bit in a late
@@ -170,7 +176,9 @@ class Scanner:
         self._finish(data)
 
     def again(self) -> Iterator[Block]:
-        """The same blocks once more; records are looked for again only where they were too many to keep their places.
+        """Yield the same blocks once more.
+
+        Records are searched for again only where they were too many to keep their places.
 
         Raises
         ------
@@ -190,7 +198,7 @@ class Scanner:
                 data = data[chunk.done :]
 
     def _longer(self, data: NDArray[np.uint8], stream: BinaryIO) -> tuple[NDArray[np.uint8], bool]:
-        """The data with the next block of the file behind it, and whether that was the last."""
+        """Append the next block of the file to the data; tell whether it was the last."""
         whole = np.empty(len(data) + BLOCK_BYTES, dtype=np.uint8)
         whole[: len(data)] = data
         try:
@@ -202,7 +210,10 @@ class Scanner:
             ) from error
 
     def _blocks(self, data: NDArray[np.uint8], is_last: bool) -> Iterator[Block]:
-        """Blocks of the data at hand: one, and more where a definition changes or there are very many records."""
+        """Yield the blocks of the data at hand.
+
+        There are several where a definition changes or where there are very many records.
+        """
         offsets = np.empty(len(data) // HEADER_BYTES + 1, dtype=np.int64)
         types = np.empty(len(offsets), dtype=np.uint8)
         magic = scan.magic_places(data)
@@ -239,7 +250,7 @@ class Scanner:
             yield block
 
     def _accepted(self, payload: bytes, types: NDArray[np.uint8], place: int) -> Definition | None:
-        """The definition of a FMT record where it is new and believed."""
+        """Return the definition of a FMT record if it is new and believed."""
         type_id = payload[0]
         if type_id == FMT_ID or self.payloads.get(type_id) == payload:
             return None
@@ -255,7 +266,7 @@ class Scanner:
         return None
 
     def _contradicts(self, type_id: int, types: NDArray[np.uint8]) -> bool:
-        """Whether records of an id that a new definition is for were met under another one."""
+        """Tell whether records of the id of a new definition were met under another one."""
         pending = types[: int(self._state[scan.COUNT])]
         return type_id in self.definitions and (bool(self._seen[type_id]) or bool((pending == type_id).any()))
 
@@ -265,7 +276,7 @@ class Scanner:
         self._time_kind[new.type_id] = _time_kind(new)
 
     def _finish(self, data: NDArray[np.uint8]) -> None:
-        """Account for what stands behind the last record."""
+        """Account for the bytes behind the last record."""
         size = self._base + len(data)
         cut_at, skip_start = int(self._state[scan.CUT_AT]), int(self._state[scan.SKIP_START])
         if cut_at != scan.NOWHERE:
@@ -280,7 +291,7 @@ class Scanner:
 
 
 def _time_kind(definition: Definition) -> int:
-    """How the scan finds the time of a record of this type."""
+    """Return the code by which the scan finds the time of a record of this type."""
     time = definition.time_field
     if time is None or definition.fields[0].name != time[0]:
         return scan.NO_TIME

@@ -1,4 +1,7 @@
-"""Canonical topics from the records of a block: ins, gnss, magnetometer, baro, air, electric, discrete."""
+"""Canonical topics from the records of a block.
+
+These are ins, gnss, magnetometer, baro, air, electric and discrete.
+"""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
@@ -23,7 +26,7 @@ RANGE_GOOD, FACING_DOWN = 4, 25
 
 
 class Mapper:
-    """Gathers the canonical records of a block and yields them merged, in the order of the file.
+    """Gatherer of the canonical records of a block; yields them merged, in file order.
 
     Parameters
     ----------
@@ -35,7 +38,7 @@ class Mapper:
     def __init__(self, found: Overview, choices: Choices) -> None:
         self._found, self._choices = found, choices
         self._parts: dict[str, list[Part]] = {}
-        self.fields: dict[str, dict[str, None]] = {}  # what was yielded, for the remarks
+        self.fields: dict[str, dict[str, None]] = {}  # fields that were yielded, for the remarks
         self._refused: dict[tuple[str, str], int] = {}
         self._nowhere: Counter[str] = Counter()
         self._unknown = UnknownUnits()
@@ -50,7 +53,7 @@ class Mapper:
                 self._parts.setdefault(topic, []).append(part)
 
     def batches(self) -> Iterator[RecordBatch]:
-        """Yield what was taken in since the last call."""
+        """Yield the records taken in since the last call."""
         parts, self._parts = self._parts, {}
         for topic, of_topic in sorted(parts.items()):
             for piece in bounded(merged(topic, of_topic)):
@@ -58,14 +61,17 @@ class Mapper:
                 yield piece
 
     def damages(self) -> Iterator[Damage]:
-        """Pressures and positions that are none, values in unknown units; the log's own values are kept."""
+        """Yield counts of refused values; the log's own values are kept.
+
+        Refused are pressures and positions that are none, and values in unknown units.
+        """
         for (topic, what), count in self._refused.items():
             yield Damage("unreadable_cells", topic, count, what, topic, loses_data=False)
         yield from (nowhere(topic, count) for topic, count in self._nowhere.items() if count)
         yield from self._unknown.damages()
 
     def remarks(self) -> Iterator[Remark]:
-        """Multipliers of floats that were passed over."""
+        """Yield remarks on multipliers of floats that were passed over."""
         for (topic, field), (multiplier, source) in self._passed_over.items():
             text = (
                 f"{source} is a float in its unit; the multiplier {multiplier:g} that the log gives it is not applied"
@@ -77,7 +83,7 @@ class Mapper:
             self._refused[topic, what] = self._refused.get((topic, what), 0) + count
 
     def _all_takers(self) -> Mapping[Unit, list[tuple[str, Callable[[str, Rows], dict[str, Column]]]]]:
-        """For each sensor the topics it gives to, and the function that makes the columns."""
+        """Return, for each sensor, its topics and the functions that make their columns."""
         choices = self._choices
         takers: dict[Unit, list[tuple[str, Callable[[str, Rows], dict[str, Column]]]]] = {}
 
@@ -108,7 +114,10 @@ class Mapper:
         return takers
 
     def _values(self, topic: str, rows: Rows, wanted: tuple[Rule, ...]) -> dict[str, FloatArray]:
-        """Values of the rules whose field the type has, in canonical units; none of a field in an unknown unit."""
+        """Return the values of the rules whose field the type has, in canonical units.
+
+        A field in an unknown unit has none.
+        """
         found = {}
         definition, units = rows.definition, self._found.units
         for rule in wanted:
@@ -126,7 +135,10 @@ class Mapper:
         return found
 
     def _placed(self, topic: str, values: Mapping[str, FloatArray], claimed: BoolArray | bool = True) -> BoolArray:
-        """Records with a position among those that claim one; zeros in its place are counted, a NaN stays one."""
+        """Return which of the records that claim a position have one.
+
+        Zeros in place of a position are counted as missing; a NaN stays a NaN.
+        """
         latitude, longitude = values["latitude_deg"], values["longitude_deg"]
         placed = has_position(latitude, longitude) | np.isnan(latitude) | np.isnan(longitude)
         self._nowhere[topic] += int(np.count_nonzero(claimed & ~placed))
@@ -163,7 +175,10 @@ class Mapper:
     def _of_core(
         self, core: int | None, wanted: tuple[Rule, ...], is_solution: bool
     ) -> Callable[[str, Rows], dict[str, Column]]:
-        """Columns that are present while this core of the filter is the one in use; at first the first one told."""
+        """Return the function for columns that are present while this filter core is in use.
+
+        Until the log tells the core in use, it is the first one that it tells.
+        """
         primary = self._choices.primary_core
 
         def columns_of(topic: str, rows: Rows) -> dict[str, Column]:
@@ -188,7 +203,7 @@ class Mapper:
         placed = has_2d
         if {"latitude_deg", "longitude_deg"} <= position.keys():
             placed = self._placed(topic, position, has_2d)
-        if not has_status:  # then a record with a position has a fix
+        if not has_status:  # without a status, a record with a position has a fix
             has_2d = has_3d = placed
         placed_3d = frozen(placed & has_3d)
         columns = {
@@ -207,7 +222,7 @@ class Mapper:
         return columns | self._speed_sigma(rows, has_3d)
 
     def _speed_sigma(self, rows: Rows, has_fix: BoolArray) -> dict[str, Column]:
-        """Speed accuracy that the receiver gave in a record of its own, with the time of this one."""
+        """Return the speed accuracy that the receiver logged separately at the same time."""
         times, sigmas = self._found.speed_sigma.get((rows.definition.name, rows.instance), (None, None))
         if times is None or sigmas is None or not len(times):
             return {}

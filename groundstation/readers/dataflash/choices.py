@@ -1,4 +1,4 @@
-"""Which of several sources a canonical field is taken from, and what must be said of it."""
+"""Choice among several sources of a canonical field, and the remarks on it."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -50,7 +50,10 @@ class Choices:
     vehicle: str
 
     def remarks(self, found: Overview, fields: Mapping[str, Iterable[str]]) -> list[Remark]:
-        """What must be said of the canonical topics that have records (``fields`` of each topic)."""
+        """Return the remarks on the canonical topics that have records.
+
+        ``fields`` has the fields of each topic.
+        """
         given = {topic: set(names) for topic, names in fields.items()}
         remarks = []
         for topic in sorted(given):
@@ -80,7 +83,7 @@ class Choices:
 
 
 def choose(found: Overview, vehicle: str) -> Choices:
-    """Choose by the parameters, and by what has records."""
+    """Choose sources by the parameters, and by what has records."""
     ekf = _filter_in_use(found)
     is_second = not ekf and found.parameters.get("AHRS_EKF_USE") == 0.0 and "AHRS_EKF_TYPE" not in found.parameters
     yaw, origin = _yaw(found, ekf)
@@ -122,7 +125,10 @@ def _sensor_topics(found: Overview) -> dict[Unit, str]:
 
 
 def _filter_in_use(found: Overview) -> str:
-    """The Kalman filter that the parameters name, and that has records; without parameters the newest that has."""
+    """Return the Kalman filter that the parameters name, if it has records.
+
+    Without parameters it is the newest filter that has records.
+    """
     kind, used = found.parameters.get("AHRS_EKF_TYPE"), found.parameters.get("AHRS_EKF_USE")
     if kind is not None:
         candidates = [_EKF_OF_TYPE[kind]] if kind in _EKF_OF_TYPE else []
@@ -134,7 +140,10 @@ def _filter_in_use(found: Overview) -> str:
 
 
 def _cores(found: Overview, ekf: str, number: str) -> dict[Unit, int | None]:
-    """Records ``number`` of each core of a filter, the core told by the instance field or by the type's number."""
+    """Return the core of each unit of a filter's records ``number``.
+
+    The core is told by the instance field, or by the type's number.
+    """
     if not ekf:
         return {}
     if f"{ekf}4" not in found.primary_core:
@@ -145,7 +154,7 @@ def _cores(found: Overview, ekf: str, number: str) -> dict[Unit, int | None]:
 
 
 def _yaw(found: Overview, ekf: str) -> tuple[Rule, str]:
-    """What the yaw of ATT is, by the parameters that set its declination."""
+    """Return the meaning of the yaw of ATT, by the parameters that set its declination."""
     names = {"XKF": "EKF3", "NKF": "EKF2", "EKF": "the EKF"}
     origin = f"yaw of ATT ({names.get(ekf, 'DCM or a filter that is not logged')})"
     automatic, fixed_rad = found.parameters.get("COMPASS_AUTODEC"), found.parameters.get("COMPASS_DEC")

@@ -1,4 +1,6 @@
-"""What a log says of its own record types: FMT definitions, and the units and multipliers of FMTU, UNIT and MULT.
+"""Record types as a log defines them: FMT definitions, units and multipliers.
+
+Units and multipliers come from FMTU, UNIT and MULT records.
 
 Source: ArduPilot, libraries/AP_Logger/README.md ("Format Types", "Units", "Multipliers") and LogStructure.h.
 """
@@ -50,7 +52,10 @@ DIVISORS: Mapping[str, float] = MappingProxyType({"c": 100.0, "C": 100.0, "e": 1
 
 @dataclass(frozen=True)
 class Unit:
-    """Unit of a field by FMTU: ``text`` ("Gauss"), and what the stored number is multiplied by (None: not given)."""
+    """Unit of a field by FMTU: ``text`` ("Gauss"), and the multiplier of the stored number.
+
+    ``multiplier`` is None where it is not given.
+    """
 
     text: str = ""
     multiplier: float | None = None
@@ -58,24 +63,27 @@ class Unit:
 
 @dataclass(frozen=True)
 class FieldSpec:
-    """One field of a record type: its name in the log and the character that says how it is stored."""
+    """Field of a record type: its name in the log and its format character.
+
+    The character says how the field is stored.
+    """
 
     name: str
     character: str
 
     @property
     def divisor(self) -> float | None:
-        """What the format character divides the stored integer by; None when it implies no scale."""
+        """Divisor that the format character implies for the stored integer; None without a scale."""
         return DIVISORS.get(self.character)
 
     @property
     def is_integer(self) -> bool:
-        """Whether the value is a plain integer, without a scale of its own."""
+        """Tell whether the value is a plain integer, without a scale of its own."""
         return self.character in "bBhHiIqQM"
 
     @property
     def is_text(self) -> bool:
-        """Whether the value is text."""
+        """Tell whether the value is text."""
         return self.character in "nNZ"
 
 
@@ -111,24 +119,24 @@ class Definition:
         return next((spec for spec in self.fields if spec.name == name), None)
 
     def has_numbers(self, *names: str) -> bool:
-        """Whether all these fields exist and are numbers, scaled or not."""
+        """Tell whether all these fields exist and are numbers, scaled or not."""
         return all(
             (spec := self.find(name)) is not None and not spec.is_text and spec.character != "a" for name in names
         )
 
     def has_integers(self, *names: str) -> bool:
-        """Whether all these fields exist and are integers without a scale."""
+        """Tell whether all these fields exist and are integers without a scale."""
         return all((spec := self.find(name)) is not None and spec.is_integer for name in names)
 
     def has_texts(self, *names: str) -> bool:
-        """Whether all these fields exist and are texts."""
+        """Tell whether all these fields exist and are texts."""
         return all((spec := self.find(name)) is not None and spec.is_text for name in names)
 
     @property
     def time_field(self) -> tuple[str, int] | None:
-        """The field that holds the autopilot's clock and its unit in nanoseconds; None when there is none.
+        """Field that holds the autopilot's clock, and its unit in nanoseconds; None without one.
 
-        It stands first, as ``TimeUS`` or (before 2015) ``TimeMS``. The old GPS types hold the satellites' time under
+        It is the first field, ``TimeUS`` or (before 2015) ``TimeMS``. The old GPS types hold the satellites' time under
         that name and the autopilot's under ``T``; the old ACC and GYR types hold that of another clock.
         """
         first = self.fields[0] if self.fields else None
@@ -142,13 +150,16 @@ class Definition:
 
 
 def fmt_definition() -> Definition:
-    """The definition of definitions, which a log need not hold."""
+    """Return the definition of FMT records, which a log need not hold."""
     return parse(FMT_ID, FMT_BYTES, "FMT", "BBnNZ", ["Type", "Length", "Name", "Format", "Columns"])
 
 
 @lru_cache(maxsize=256)  # both passes over a log meet the same ones
 def parse_fmt(payload: bytes) -> Definition | None:
-    """Definition that the payload of a FMT record gives; None when no record could have such a length."""
+    """Parse the payload of a FMT record into a definition.
+
+    None when no record could have the length that it states.
+    """
     type_id, length, name, characters, labels = np.frombuffer(payload, FMT_DTYPE, 1)[0].item()
     if length < HEADER_BYTES:
         return None
@@ -156,7 +167,7 @@ def parse_fmt(payload: bytes) -> Definition | None:
 
 
 def parse(type_id: int, length: int, name: str, characters: str, labels: Sequence[str]) -> Definition:
-    """Definition from the parts of a FMT record; what contradicts itself is a ``fault``.
+    """Return a definition from the parts of a FMT record; a contradiction is a ``fault``.
 
     Examples
     --------
@@ -190,7 +201,7 @@ def parse(type_id: int, length: int, name: str, characters: str, labels: Sequenc
 
 
 def _distinct(labels: Sequence[str]) -> list[str]:
-    """Labels without empty and repeated ones."""
+    """Return labels without empty and repeated ones."""
     names: list[str] = []
     for at, label in enumerate(labels):
         name = label or f"unnamed_{at + 1}"
@@ -209,9 +220,9 @@ def _text(raw: bytes) -> str:
 
 @dataclass
 class Units:
-    """Units, multipliers and instance fields of the types of a log, as its FMTU, UNIT and MULT records give them.
+    """Units, multipliers and instance fields of a log's types, by FMTU, UNIT and MULT records.
 
-    What FMTU says holds for the definition that was in force: in logs joined end to end an id may be another type's.
+    An FMTU record applies to the definition that was in force: in logs joined end to end an id may be another type's.
     """
 
     texts: dict[str, str] = field(default_factory=dict)
@@ -228,19 +239,28 @@ class Units:
         return unit
 
     def _multiplier(self, code: str) -> float | None:
-        """The multiplier of an id; None when it is that of a text (0), not worked out (``?``) or no factor at all."""
+        """Return the multiplier of an id, or None.
+
+        None for that of a text (0), one that was not worked out (``?``), and one that is no factor at all.
+        """
         value = self.multipliers.get(code)
         return value if value is not None and code != "?" and 0.0 < value < math.inf else None
 
     def instance_field(self, definition: Definition) -> str | None:
-        """The field that tells instances of a type apart (unit ``#``); None when there is none or it is a text."""
+        """Return the field that tells instances of a type apart (unit ``#``).
+
+        None when there is none or it is a text.
+        """
         at = self.of_definition.get(definition, ("", ""))[0].find("#")
         if not 0 <= at < len(definition.fields) or not definition.fields[at].is_integer:
             return None
         return definition.fields[at].name
 
     def describe(self, definition: Definition) -> str:
-        """Fields that have a unit, for people: ``"TimeUS s x 1e-06, GyrX rad/s"``; implied scales are in the values."""
+        """List the fields that have a unit, for people: ``"TimeUS s x 1e-06, GyrX rad/s"``.
+
+        Implied scales are already in the values.
+        """
         parts = []
         for spec in definition.fields:
             unit = self.of(definition, spec.name)

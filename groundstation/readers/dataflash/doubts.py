@@ -1,7 +1,8 @@
-"""Definitions and instances that no autopilot writes: records were read by them, and some may not be what they were.
+"""Doubts about definitions and instances that no autopilot writes.
 
-A FMT record has no checksum. One that is damaged may still describe records of the right length, under another name or
-with other fields: then nothing is left over, and what the analyses want is silently not there.
+Records were read by them, and some may not be what they were. A FMT record has no checksum. A damaged one may still
+describe records of the right length, under another name or with other fields: then no bytes are left over, and the
+fields that the analyses want are missing without notice.
 """
 
 import re
@@ -59,7 +60,7 @@ WANTED: Mapping[str, tuple[str, ...]] = MappingProxyType(
 def doubts(
     payloads: Mapping[int, bytes], definitions: Mapping[int, Definition], counts: Mapping[int, int]
 ) -> Iterator[Damage]:
-    """Say of which types the definition is doubtful, with the number of records read by it.
+    """Yield damage for types with a doubtful definition; it counts the records read by it.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ def doubts(
 
 
 def odd_instances(counts: Mapping[str, int]) -> Iterator[Damage]:
-    """Say of which topics ``raw.<type>.<instance>`` the instance is one that no autopilot has."""
+    """Yield damage for topics ``raw.<type>.<instance>`` whose instance no autopilot has."""
     for topic, count in counts.items():
         instance = topic.split(".")[-1]
         if instance.isdecimal() and int(instance) >= MOST_SENSORS and topic.split(".")[1] in WANTED:
@@ -87,7 +88,7 @@ def odd_instances(counts: Mapping[str, int]) -> Iterator[Damage]:
 
 
 def _fault(payload: bytes, definition: Definition) -> str:
-    """What in a FMT record no autopilot writes; empty where all is well."""
+    """Return the part of a FMT record that no autopilot writes; empty where there is none."""
     record = np.frombuffer(payload, FMT_DTYPE, 1)[0]
     starts = {name: FMT_DTYPE.fields[name][1] for name in ("Name", "Format", "Columns")}  # type: ignore[index]
     texts = {name: payload[at : at + FMT_DTYPE[name].itemsize] for name, at in starts.items()}
@@ -97,7 +98,7 @@ def _fault(payload: bytes, definition: Definition) -> str:
     if not _NAME.fullmatch(plain["Name"]) or not _LABELS.fullmatch(plain["Columns"] or b"a"):
         return "a name with characters that no name has"
     fields, labels = len(plain["Format"]), plain["Columns"].split(b",") if plain["Columns"] else []
-    is_full = len(plain["Columns"]) >= FMT_DTYPE["Columns"].itemsize - 1  # then the last names may be left out
+    is_full = len(plain["Columns"]) >= FMT_DTYPE["Columns"].itemsize - 1  # the last names may be left out then
     is_short = any(wanted.encode() not in labels for wanted in WANTED.get(definition.name, ()))
     if len(labels) != fields and (is_short or not is_full):
         return f"{len(labels)} names for {fields} fields"
@@ -108,7 +109,7 @@ def _fault(payload: bytes, definition: Definition) -> str:
 
 
 def _slip(definition: Definition, names: set[str]) -> str:
-    """A field, or the type itself, that almost has the name of one that is expected and is not there."""
+    """Return a field, or the type, whose name is almost one that is expected and missing."""
     labels = [spec.name for spec in definition.fields]
     if labels and labels[0] not in _TIMES and any(_is_slip(labels[0], time) for time in _TIMES):
         return f"field {labels[0]}: unknown, meant {_TIMES[0]}?"
@@ -128,5 +129,5 @@ def _slip(definition: Definition, names: set[str]) -> str:
 
 
 def _is_slip(found: str, wanted: str) -> bool:
-    """Whether one character is another."""
+    """Tell whether two names differ in exactly one character."""
     return len(found) == len(wanted) and sum(a != b for a, b in zip(found, wanted, strict=True)) == 1

@@ -1,4 +1,7 @@
-"""Names of events: what the autopilot logged of arming, modes, landings, failures, and its messages."""
+"""Names of the events that the autopilot logged.
+
+Arming, modes, landings, failures, and its messages.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,7 +14,10 @@ from groundstation.readers.dataflash.values import Rows
 
 
 def event_names(rows: Rows, vehicle: str) -> NDArray[np.str_] | None:
-    """A name for each record of EV, ARM, MODE, MSG or ERR; None when the type lacks the fields."""
+    """Return a name for each record of EV, ARM, MODE, MSG or ERR.
+
+    None when the type lacks the fields.
+    """
     definition = rows.definition
     match definition.name:
         case "MSG" if definition.has_texts("Message"):

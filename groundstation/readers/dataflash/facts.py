@@ -60,7 +60,10 @@ def metadata(found: Overview) -> dict[str, str]:
 
 
 def utc_readings(times: GpsTimes, firmware: str = "") -> UtcReadings | None:
-    """UTC of the autopilot's time zero by each fix, where that zero changes: the autopilot was started again."""
+    """Return the UTC of the autopilot's time zero by each fix, if that zero changes.
+
+    It changes when the autopilot was started again; otherwise the result is None.
+    """
     good, device_ns = _dated(times), times.device_ns
     if not (np.diff(device_ns[good]) < _RESTART_NS).any():
         return None
@@ -71,11 +74,12 @@ def utc_readings(times: GpsTimes, firmware: str = "") -> UtcReadings | None:
 
 
 def utc_of_power_up(times: GpsTimes, firmware: str = "") -> tuple[int | None, list[Remark]]:
-    """UTC nanoseconds of the autopilot's time zero, None when no receiver told the time, and what was assumed.
+    """Return the UTC nanoseconds of the autopilot's time zero, and remarks.
 
-    The median over the fixes that count of UTC by GPS week minus the autopilot's clock. Where the clock starts again
-    (logs joined end to end) the fixes after its last start count: the clock model believes what comes after the last
-    step. ``firmware`` shows whether the date can be true.
+    None when no receiver told the time. The remarks tell what was assumed. The value is the median of UTC by GPS week
+    minus the autopilot's clock, over the fixes that count. Where the clock starts again (logs joined end to end) the
+    fixes after its last start count: the clock model believes what comes after the last step. ``firmware`` shows
+    whether the date can be true.
 
     Examples
     --------
@@ -110,7 +114,7 @@ def utc_of_power_up(times: GpsTimes, firmware: str = "") -> tuple[int | None, li
 
 
 def _dated(times: GpsTimes) -> BoolArray:
-    """Fixes whose week can be that of a log, shape (n,); else a few that agree on any."""
+    """Tell which fixes have a credible week, shape (n,); else a few that agree on any."""
     in_week = (times.week_ms >= 0) & (times.week_ms < _MS_PER_WEEK)
     good = in_week & (times.week >= _FIRST_WEEK) & (times.week < _LAST_WEEK)
     early = in_week & (times.week > 0) & (times.week < _FIRST_WEEK)
@@ -118,7 +122,7 @@ def _dated(times: GpsTimes) -> BoolArray:
 
 
 def _earliest(firmware: str) -> Earliest:
-    """Year before which a firmware did not exist; without a version that of the format.
+    """Return the year before which a firmware, or else the format, did not exist.
 
     Examples
     --------
@@ -131,7 +135,10 @@ def _earliest(firmware: str) -> Earliest:
 
 
 def _disagreement(zeros_ns: Int64Array, device_ns: Int64Array) -> list[Remark]:
-    """What is to be said when the autopilot's clock and GPS time drift apart: speeds and rates suffer from it."""
+    """Return a remark when the autopilot's clock and GPS time drift apart.
+
+    Speeds and rates suffer from such a drift.
+    """
     low, high = np.percentile(zeros_ns - zeros_ns[0], (5.0, 95.0))
     if high - low <= _SPREAD_NS:
         return []

@@ -1,4 +1,7 @@
-"""What a first pass over a log finds: units, parameters, firmware, satellite time, sensors, states that last."""
+"""First pass over a log: units, parameters, firmware, satellite time, sensors, states.
+
+The states are those that last until the next record of them.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -26,13 +29,13 @@ Unit = tuple[str, int | None]  # type and instance: one sensor
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """A state that lasts until the next record of it: places where it was logged, and its values."""
+    """State that lasts until its next record: the places where it was logged, and its values."""
 
     record_index: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     values: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def at(self, record_index: Int64Array, before: int) -> Int64Array:
-        """The state at places in the log; ``before`` where none was logged yet."""
+        """Return the state at places in the log; ``before`` where none was logged yet."""
         at = np.searchsorted(self.record_index, record_index, side="right")
         return np.concatenate(([before], self.values))[at]
 
@@ -44,7 +47,10 @@ class States:
 
 @dataclass(frozen=True, eq=False)
 class GpsTimes:
-    """Fixes of all receivers that tell a time: GPS week, milliseconds of the week, the autopilot's clock, the place."""
+    """Fixes with a time, of all receivers.
+
+    Each has its GPS week, milliseconds of the week, the autopilot's clock, and the place.
+    """
 
     week: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     week_ms: Int64Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
@@ -54,7 +60,7 @@ class GpsTimes:
 
 @dataclass(frozen=True, eq=False)
 class Overview:
-    """What a log holds.
+    """Contents of a log, by the first pass over it.
 
     Parameters
     ----------
@@ -95,7 +101,10 @@ class Overview:
 
 
 def overview(scanner: Scanner) -> Overview:
-    """Read a log once and say what it holds; what is kept does not grow with the file but for GPS records."""
+    """Read a log once and return its contents.
+
+    The memory it takes does not grow with the file, but for GPS records.
+    """
     survey = _Survey()
     for block in scanner:
         survey.add(block)
@@ -103,7 +112,7 @@ def overview(scanner: Scanner) -> Overview:
 
 
 class _Survey:
-    """Collects an :class:`Overview` block by block."""
+    """Collector of an :class:`Overview`, block by block."""
 
     def __init__(self) -> None:
         self._units = Units()
@@ -133,7 +142,7 @@ class _Survey:
         }
 
     def add(self, block: Block) -> None:
-        """Take in one block; units first, as they say which field tells instances apart."""
+        """Take in one block; units first, as they tell the field of instances."""
         self._definitions = block.definitions
         groups = sorted(block.groups(), key=lambda group: group[0].name not in ("UNIT", "MULT", "FMTU"))
         for definition, which in groups:
@@ -155,7 +164,7 @@ class _Survey:
                 self._takers[name](rows)
 
     def result(self, scanner: Scanner) -> Overview:
-        """What was found."""
+        """Return the contents found."""
         split = frozenset(key for key, seen in self._instances.items() if 0 < len(seen) <= MOST_INSTANCES)
         sensors: list[Unit] = []
         for key, seen in self._instances.items():
@@ -268,7 +277,10 @@ def _states(parts: list[tuple[Any, Any]]) -> States:
 
 
 def _fixed(rows: Rows) -> BoolArray:
-    """Records of a receiver with a 3D fix; a type without a status has one where it has a position."""
+    """Return which records of a receiver have a 3D fix.
+
+    A record of a type without a status has one where it has a position.
+    """
     if rows.definition.has_numbers("Status"):
         return np.asarray(rows.values("Status") >= FIX_3D)
     if rows.definition.has_numbers("Lat", "Lng"):

@@ -1,4 +1,4 @@
-"""Puts a log together: an overview, then block by block every record as raw, and what maps to canonical topics."""
+"""Read a log: an overview, then block by block every record, raw and canonical."""
 
 import re
 from collections import Counter
@@ -19,7 +19,7 @@ READER = "dataflash"
 
 
 def items(source: Source) -> Iterator[Item]:
-    """Yield the header, batches in the order of the blocks of the file, then remarks and damages."""
+    """Yield the header, batches in the order of the blocks of the file, remarks and damage."""
     scanner = Scanner(source)
     found = overview(scanner)
     facts = metadata(found)
@@ -75,13 +75,16 @@ def _batches(topic: str, rows: Rows) -> Iterator[RecordBatch]:
 
 
 class _Topics:
-    """Names of the raw topics: one layout, one topic. A type that takes another's name gets its id added."""
+    """Names of the raw topics: one layout, one topic.
+
+    A type that takes another's name gets its id added.
+    """
 
     def __init__(self) -> None:
         self._layouts: dict[str, tuple[int, object]] = {}
 
     def of(self, rows: Rows) -> str:
-        """``raw.<type>`` or ``raw.<type>.<instance>``."""
+        """Return ``raw.<type>`` or ``raw.<type>.<instance>``."""
         name = self._name(rows.definition)
         return f"raw.{name}" if rows.instance is None else f"raw.{name}.{rows.instance}"
 

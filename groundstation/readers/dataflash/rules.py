@@ -1,4 +1,7 @@
-"""Which fields of which record types become canonical fields, and in what unit they are when the log does not say."""
+"""Rules that map fields of record types to canonical fields, and their documented units.
+
+A documented unit is used when the log does not say the unit.
+"""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -57,7 +60,9 @@ class Rule:
     integer_multiplier: float | None = None
 
     def scale(self, definition: Definition, units: Units) -> float | None:
-        """Factor from the values of the raw column to the canonical unit; None when the log's unit is unknown.
+        """Return the factor from the values of the raw column to the canonical unit.
+
+        None when the log's unit is unknown.
 
         The unit of FMTU counts if it measures what the field measures. Where it is another of ArduPilot's units, it is
         a slip (HDop in m, the longitude in us, ACC in m/s) and the documented unit counts. A multiplier counts for
@@ -84,7 +89,7 @@ class Rule:
         return factor * multiplier
 
     def passed_over(self, definition: Definition, units: Units) -> float | None:
-        """The log's multiplier of a float that is not applied, None where there is none."""
+        """Return the log's multiplier of a float that is not applied; None without one."""
         spec, stated = definition.find(self.source), units.of(definition, self.source).multiplier
         assert spec is not None
         if stated is None or isclose(stated, 1.0) or spec.divisor is not None or spec.is_integer:
@@ -93,7 +98,7 @@ class Rule:
 
 
 class UnknownUnits:
-    """Counts the values that stay raw because the log gives them a unit that nobody knows."""
+    """Count of values that stay raw because the log gives them an unknown unit."""
 
     def __init__(self) -> None:
         self._counts: dict[tuple[str, str, str], int] = {}
@@ -104,7 +109,7 @@ class UnknownUnits:
         self._counts[key] = self._counts.get(key, 0) + count
 
     def damages(self) -> Iterator[Damage]:
-        """One for each field; the log's own values are kept."""
+        """Yield one damage for each field; the log's own values are kept."""
         for (source, unit, topic), count in self._counts.items():
             what = f"values of {source} in the unit {unit!r}, which is unknown, kept as raw values alone"
             yield Damage("unreadable_cells", f"raw.{source}", count, what, topic, loses_data=False)
@@ -144,7 +149,7 @@ WIND = (Rule("VWN", "wind_north_mps", "m/s"), Rule("VWE", "wind_east_mps", "m/s"
 HEIGHT = (Rule("Dist", "height_m", "m", integer_multiplier=0.01),)
 
 FIX_2D, FIX_3D = 2, 3  # states of a receiver
-MOST_SENSORS = 16  # of one type; another instance is damage
+MOST_SENSORS = 16  # sensors of one type; a higher instance is damage
 # Sensors of one kind in the order in which their topics are numbered; the first group that has records is taken.
 SENSOR_TYPES: Mapping[str, tuple[tuple[str, ...], ...]] = MappingProxyType(
     {

@@ -1,11 +1,11 @@
-"""The one loop over the bytes of a log: where its records stand and which bytes belong to none. Compiled.
+"""Compiled loop over the bytes of a log: it finds its records and the bytes of none.
 
 A record is ``A3 95 id`` and as many bytes as the id's definition says; there is no checksum. While records follow one
 another each is believed if two magic bytes stand where it ends. Where they do not, either this record is false (a
-damaged id gave it a wrong length) or the next one is damaged: it is false if a credible record begins inside it. (A
-wrong length may also swallow whole records and end well: their times betray them.) After
-a damaged span a record is credible if it ends at the header of another, which may have one flipped bit, or if its time
-is near that of the last good record: so an intact record between two damaged ones is kept.
+damaged id gave it a wrong length) or the next one is damaged: it is false if a credible record begins inside it. A
+wrong length may also swallow whole records and end well: their times betray them. After a damaged span a record is
+credible if it ends at the header of another, which may have one flipped bit, or if its time is near that of the last
+good record: so an intact record between two damaged ones is kept.
 """
 
 from typing import Any
@@ -17,7 +17,7 @@ from groundstation.base.compile import in_place, scanner
 
 LOOKAHEAD = 1_024  # bytes that must follow the record that is judged: itself and two more, at most 255 each
 NEAR_US = 10_000_000  # a record whose time is within 10 s of the last good one is believed
-MAGIC_BYTES = 0x95A3  # as a little-endian number
+MAGIC_BYTES = 0x95A3  # both bytes as a little-endian number
 NO_TIME, TIME_US_8, TIME_US_4, TIME_MS = 0, 1, 2, 3
 
 # Places in the state array.
@@ -33,7 +33,10 @@ def new_state() -> NDArray[np.int64]:
 
 
 def magic_places(data: NDArray[np.uint8], magic: int = MAGIC_BYTES) -> NDArray[np.int64]:
-    """Where the two bytes of magic stand: looked for in pairs of bytes at even places, then at odd ones."""
+    """Return the places of the two magic bytes.
+
+    Pairs of bytes at even places are searched first, then those at odd ones.
+    """
     even, odd = (data[start:][: (len(data) - start) // 2 * 2].view("<u2") == magic for start in (0, 1))
     places = np.concatenate((2 * np.flatnonzero(even), 2 * np.flatnonzero(odd) + 1))
     places.sort(kind="stable")
@@ -42,7 +45,7 @@ def magic_places(data: NDArray[np.uint8], magic: int = MAGIC_BYTES) -> NDArray[n
 
 @in_place
 def _length_at(data: Any, at: int, lengths: Any) -> int:
-    """Length of the record that begins at a place, 0 when none does."""
+    """Return the length of the record that begins at a place, 0 when none does."""
     if at + 3 > len(data) or data[at] != 0xA3 or data[at + 1] != 0x95:
         return 0
     return int(lengths[data[at + 2]])
@@ -50,7 +53,7 @@ def _length_at(data: Any, at: int, lengths: Any) -> int:
 
 @in_place
 def _time_us(data: Any, at: int, time_kind: Any) -> int:
-    """The record's time in microseconds, -1 when it has none."""
+    """Return the record's time in microseconds, -1 when it has none."""
     kind = time_kind[data[at + 2]]
     if kind == NO_TIME:
         return -1
@@ -63,21 +66,21 @@ def _time_us(data: Any, at: int, time_kind: Any) -> int:
 
 @in_place
 def _has_time(data: Any, at: int, time_kind: Any) -> Any:
-    """Whether the record has a time, which is not negative."""
+    """Tell whether the record has a time that is not negative."""
     kind = time_kind[data[at + 2]]
     return kind != NO_TIME and (kind != TIME_US_8 or data[at + 10] < 128)
 
 
 @in_place
 def _is_near(data: Any, at: int, time_kind: Any, last_us: int) -> bool:
-    """Whether the record at a place has a time near that of the last good one."""
+    """Tell whether the record at a place has a time near that of the last good one."""
     time = _time_us(data, at, time_kind)
     return time >= 0 and last_us >= 0 and abs(time - last_us) <= NEAR_US
 
 
 @in_place
 def _is_header(data: Any, at: int, lengths: Any) -> bool:
-    """Whether three bytes begin a record of a known type, or would with one bit flipped back."""
+    """Tell whether three bytes begin a record of a known type, one flipped bit allowed."""
     if at + 3 > len(data):
         return False
     first, second, type_id = int(data[at]) ^ 0xA3, int(data[at + 1]) ^ 0x95, int(data[at + 2])
@@ -92,7 +95,10 @@ def _is_header(data: Any, at: int, lengths: Any) -> bool:
 
 @in_place
 def _is_credible(data: Any, at: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
-    """Whether a record that begins at a place among doubtful bytes is one: see the module's first lines."""
+    """Tell whether a record that begins at a place among doubtful bytes is credible.
+
+    The module's docstring has the rule.
+    """
     length = _length_at(data, at, lengths)
     if length == 0 or at + length > len(data):
         return False
@@ -103,7 +109,10 @@ def _is_credible(data: Any, at: int, lengths: Any, time_kind: Any, last_us: int)
 
 @in_place
 def _is_swallowed(data: Any, at: int, end: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
-    """Whether a record with a near time begins inside another, and it or those after it end where that ends."""
+    """Tell whether a record with a near time begins inside another and ends with it.
+
+    It counts as well when records that follow it end there.
+    """
     length = _length_at(data, at, lengths)
     if length == 0 or at + length > end or not _is_near(data, at, time_kind, last_us):
         return False
@@ -115,10 +124,10 @@ def _is_swallowed(data: Any, at: int, end: int, lengths: Any, time_kind: Any, la
 
 @in_place
 def _is_false(data: Any, at: int, length: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
-    """Whether a record is false, its id being damaged: another record begins inside it.
+    """Tell whether a record is false, with a damaged id: another record begins inside it.
 
     Where magic (or the end of the file) follows it, only a record that ends there too and has a near time counts: a
-    payload that looks like that by chance is not to be met.
+    payload is most unlikely to look like that by chance.
     """
     end = at + length
     ends_well = end + 2 > len(data) or (data[end] == 0xA3 and data[end + 1] == 0x95)
@@ -133,7 +142,10 @@ def _is_false(data: Any, at: int, length: int, lengths: Any, time_kind: Any, las
 
 @in_place
 def _is_cut(data: Any, at: int, length: int, lengths: Any, time_kind: Any, last_us: int) -> bool:
-    """Whether what is left of the file is the beginning of one record (and no other begins inside it)."""
+    """Tell whether the rest of the file is the beginning of one record.
+
+    No other record may begin inside it.
+    """
     left = len(data) - at
     if length == 0:
         return left < 3 and data[at] == 0xA3 and (left < 2 or data[at + 1] == 0x95)
@@ -156,7 +168,9 @@ def scan(
     spans: Any,
     state: Any,
 ) -> bool:
-    """Find records from ``state[POSITION]`` on; returns whether it stopped behind a record of type ``stop_at``.
+    """Find records from ``state[POSITION]`` on.
+
+    Returns whether it stopped after a record of type ``stop_at``.
 
     Parameters
     ----------
@@ -182,7 +196,7 @@ def scan(
     size = len(data)
     limit = size if is_last else size - LOOKAHEAD
     at, count, skip, last_us = state[POSITION], state[COUNT], state[SKIP_START], state[LAST_US]
-    after = state[MAGIC]  # of the magic, the first behind the header that is judged
+    after = state[MAGIC]  # first magic behind the header that is judged
     timed = NOWHERE  # the last good record with a time, which is looked at when somebody asks for it
     stopped = False
     while at < limit and count < len(offsets) and state[SPANS] < len(spans):

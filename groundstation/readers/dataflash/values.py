@@ -1,4 +1,7 @@
-"""Values of records as columns: implied scales applied, texts ended at their first NUL, times in nanoseconds."""
+"""Values of records as columns.
+
+Implied scales are applied, texts end at their first NUL, times are in nanoseconds.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -77,7 +80,7 @@ def by_instance(rows: Rows, name: str) -> Iterator[Rows]:
 
 
 def device_time(definition: Definition, records: NDArray[Any]) -> Column:
-    """Times of records; absent for a type without a clock, and where the number is no time."""
+    """Return times of records; absent without a clock, and where a number is no time."""
     if definition.time_field is None:
         return Column(np.zeros(len(records), dtype=np.int64), np.zeros(len(records), dtype=bool))
     name, scale = definition.time_field
@@ -90,7 +93,7 @@ def device_time(definition: Definition, records: NDArray[Any]) -> Column:
 
 
 def column(records: NDArray[Any], spec: FieldSpec) -> NDArray[Any]:
-    """Values of one field, contiguous: numbers with the scale that the format implies, texts."""
+    """Return the values of one field, contiguous: scaled numbers, or texts."""
     values = records[spec.name]
     if spec.is_text:
         return texts(values)
@@ -105,13 +108,13 @@ def _plain(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def as_double(values: NDArray[Any]) -> FloatArray:
-    """Numbers in double precision; a signalling NaN, of which numpy warns, is a NaN."""
+    """Convert numbers to double precision, a signalling NaN to a quiet one."""
     with np.errstate(invalid="ignore"):
         return values.astype(np.float64)
 
 
 def texts(values: NDArray[np.bytes_]) -> NDArray[np.str_]:
-    """Texts up to their first NUL; UTF-8, or else Latin-1.
+    """Return texts up to their first NUL, decoded as UTF-8, or else Latin-1.
 
     Examples
     --------
@@ -136,7 +139,10 @@ def _decoded(text: bytes) -> str:
 
 
 def _hexadecimal(values: NDArray[np.bytes_]) -> NDArray[np.str_]:
-    """Bytes of a file that the autopilot logged in pieces: no text, kept as hexadecimal digits."""
+    """Return bytes as hexadecimal digits.
+
+    They are of a file that the autopilot logged in pieces, and are no text.
+    """
     width = values.dtype.itemsize
     digits = np.frombuffer(b"0123456789abcdef", dtype=np.uint8)
     raw = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), width)

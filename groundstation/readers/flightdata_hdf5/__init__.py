@@ -1,4 +1,7 @@
-"""Airliner flight data in HDF5 (FlightDataAnalyzer): every parameter, and the canonical ones in their units."""
+"""Airliner flight data in HDF5 (FlightDataAnalyzer): every parameter, canonical ones too.
+
+The canonical parameters are in their units.
+"""
 
 from collections.abc import Iterator
 
@@ -11,14 +14,17 @@ _MARKS = (b"series", b"supf_offset")
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim an HDF5 file whose first bytes name the group or the attribute that only these recordings have."""
+    """Claim an HDF5 file by a group or attribute name in its first bytes.
+
+    Only these recordings have it.
+    """
     if not source.head.startswith(_MAGIC) or not any(mark in source.head for mark in _MARKS):
         return None
     return Claim(NAME)
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, batches, remarks and damages of a recording.
+    """Yield the header, batches, remarks and damage of a recording.
 
     Raises
     ------

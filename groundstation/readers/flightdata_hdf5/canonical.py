@@ -1,4 +1,4 @@
-"""Which parameters feed which canonical fields, with their units and signs.
+"""Rules that map parameters to canonical fields, with their units and signs.
 
 A topic has the times of its leading parameter, the first of its rules that the file has; the others are interpolated to
 them between two neighbouring samples. The samples as recorded stay in ``raw.<parameter>``.
@@ -16,15 +16,16 @@ from groundstation.base.signals import Field, field_of
 from groundstation.base.units import CONVERSIONS
 from groundstation.readers.flightdata_hdf5.container import Container, Parameter
 
-_UNITS: Mapping[str, str] = {"kts": "kt", "deg/sec": "dps"}  # as these files write them -> as base.units does
+_UNITS: Mapping[str, str] = {"kts": "kt", "deg/sec": "dps"}  # units as these files write them -> as base.units does
 Way = Literal["plain", "circle", "step"]
 
 
 @dataclass(frozen=True)
 class Rule:
-    """A parameter and the field it feeds: ``sign`` times the value; ``unit`` where the file names none.
+    """Parameter and the field it feeds: ``sign`` times the value.
 
-    ``way``: how it is brought to another time; ``step`` keeps the last sample.
+    ``unit`` counts where the file names none. ``way`` is the way to bring it to another time; ``step`` keeps the last
+    sample.
     """
 
     parameter: str
@@ -68,7 +69,7 @@ RULES: Mapping[str, tuple[Rule, ...]] = {
     ),
     "discrete": (Rule("Gear On Ground", "weight_on_wheels", "", way="step"),),
 }
-TRACK = "Track True"  # with Groundspeed: the velocities of ins
+TRACK = "Track True"  # gives the velocities of ins, with Groundspeed
 _SAID: Mapping[str, str] = {
     "Heading True Continuous": "counts on past north: brought into [0, 360)",
     "Heading Continuous": "counts on past north: brought into [0, 360)",
@@ -78,7 +79,7 @@ _SAID: Mapping[str, str] = {
 
 @dataclass(frozen=True, eq=False)
 class Feed:
-    """A parameter laid on a field: value times factor."""
+    """Parameter that feeds a field: value times factor."""
 
     parameter: Parameter
     field: Field
@@ -87,7 +88,7 @@ class Feed:
 
 
 def feeds_of(container: Container) -> tuple[dict[str, tuple[Feed, ...]], tuple[tuple[str, str], ...]]:
-    """Feeds by topic, the leading one first, and (topic, remark) for what is told of them."""
+    """Return feeds by topic, the leading one first, and remarks by topic."""
     by_name = {parameter.name: parameter for parameter in container.parameters}
     feeds: dict[str, tuple[Feed, ...]] = {}
     remarks: list[tuple[str, str]] = []
@@ -119,7 +120,10 @@ def track_feed(container: Container) -> Feed | None:
 
 
 def _factor(unit: str, usual: str) -> float | None:
-    """Factor from the file's unit (the usual one where it names none) to that of the field; None for another kind."""
+    """Return the factor from the file's unit to that of the field.
+
+    Where the file names no unit, the usual one counts. None when the unit is of another kind.
+    """
     wanted = _UNITS.get(usual, usual)
     found = _UNITS.get(unit, unit) or wanted
     if found == wanted and wanted not in CONVERSIONS:
@@ -130,7 +134,10 @@ def _factor(unit: str, usual: str) -> float | None:
 
 
 def values_at(feed: Feed, times_ns: Int64Array) -> tuple[FloatArray, BoolArray]:
-    """Values of a feed at given times, and where it has one; between samples only if both neighbours are valid."""
+    """Return the values of a feed at given times, and where it has one.
+
+    A value between samples needs both neighbours to be valid.
+    """
     parameter = feed.parameter
     nothing = np.zeros(len(times_ns)), np.zeros(len(times_ns), dtype=bool)
     if not len(times_ns):

@@ -1,4 +1,6 @@
-"""The HDF5 container: parameters with their data, masks and rates. Only this module imports h5py.
+"""HDF5 container: parameters with their data, masks and rates.
+
+Only this module imports h5py.
 
 Nothing in a file is believed before it is checked: links, data stored elsewhere or never written, more data than a file
 of its size holds and attributes of any type are refused, each with its reason.
@@ -74,7 +76,7 @@ class Parameter:
         return min(int(around[np.argmax(reached)]) if reached.any() else int(around[-1]) + 1, self.samples)
 
     def read(self, first: int, last: int) -> "Samples":
-        """Values and where they are valid, samples [first, last); those that are lost are not valid.
+        """Read the samples [first, last) and which of them are valid; lost ones are not.
 
         Raises one of :data:`FAILURES` where the library cannot read it.
         """
@@ -102,7 +104,7 @@ class Samples:
 
 
 def _runs(wanted: BoolArray) -> list[tuple[int, int]]:
-    """First and last number (exclusive) of each run of true ones."""
+    """Return first and last number (exclusive) of each run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], wanted, [False]))))
     return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
 
@@ -117,9 +119,10 @@ class Refused:
 
 @dataclass(frozen=True, eq=False)
 class Container:
-    """What a recording holds: start (UTC seconds since 1970, None where it is not told), parameters, refused ones.
+    """Contents of a recording: start, parameters, refused ones.
 
-    ``missing_bytes``: how much was cut off; ``mended``: where heaps of text without an end were given one.
+    The start is in UTC seconds since 1970, None where it is not told. ``missing_bytes``: how much was cut off;
+    ``mended``: places of heaps of text without an end that were given one.
     """
 
     start_utc_s: float | None
@@ -166,7 +169,7 @@ def _unreadable(source: Source, error: BaseException) -> UnreadableLogError:
 
 
 class _Mended(io.RawIOBase):
-    """A file with zeros in place of what was cut off, and other bytes at some places.
+    """File with zeros in place of what was cut off, and other bytes at some places.
 
     The library refuses a file that is shorter than it says, and reads heaps without an end for ever.
     """
@@ -201,7 +204,10 @@ class _Mended(io.RawIOBase):
 
 
 def _announced_size(head: bytes) -> int:
-    """Size of the file by its superblock (HDF5 file format 3.0, II.A), 0 where it cannot be told or believed."""
+    """Return the size of the file by its superblock (HDF5 file format 3.0, II.A).
+
+    0 where it cannot be told or believed.
+    """
     place = {0: 40, 1: 44, 2: 28, 3: 28}.get(head[8] if len(head) > 8 else -1)
     if place is None or len(head) < place + 8:
         return 0
@@ -211,7 +217,7 @@ def _announced_size(head: bytes) -> int:
 
 @dataclass
 class _Room:
-    """How much more a file of its size may hold: bytes that are stored in it, and bytes that come out of those."""
+    """Room left in a file of its size: bytes stored in it, and bytes unpacked from those."""
 
     stored_bytes: int
     held_bytes: int
@@ -278,14 +284,14 @@ def _dataset(group: Any, part: str, size: int) -> Storage:
 
 
 def _place_of(group: Any, name: str) -> int:
-    """Where a member of a group stands in the file, -1 for one that is only a link."""
+    """Return the place of a group's member in the file; -1 for one that is only a link."""
     if not isinstance(group.get(name, getlink=True), h5py.HardLink):
         return -1
     return int(h5o.get_info(group.id, name.encode("utf-8", "surrogateescape")).addr)
 
 
 def _inside(group: Any, name: str, kind: type) -> Any:
-    """A member of a group that lies in the same file and is of that kind; no link is followed."""
+    """Return a group's member of a kind in the same file; no link is followed."""
     link = group.get(name, getlink=True)
     if link is None:
         raise ValueError(f"no {name}")
@@ -298,7 +304,7 @@ def _inside(group: Any, name: str, kind: type) -> Any:
 
 
 def _attribute(attributes: Any, name: str, kinds: frozenset[int] = _NUMBERS) -> Any:
-    """An attribute of one of these kinds of values, None where there is none or a large one."""
+    """Return an attribute of one of these kinds; None without one, or if it is large."""
     try:
         found = attributes.get_id(name)
         if found.get_type().get_class() not in kinds or found.get_storage_size() > MOST_ATTRIBUTE_BYTES:
@@ -317,7 +323,7 @@ def _number(attributes: Any, name: str) -> float:
 
 
 def _text(value: Any) -> str:
-    """Text of any encoding in one line, without what cannot be shown."""
+    """Return text of any encoding in one line, without unprintable characters."""
     if isinstance(value, bytes):
         value = value.decode("utf-8", errors="replace")
     text = value if isinstance(value, str) else ""

@@ -1,4 +1,7 @@
-"""Heaps of text without an end, which the HDF5 library reads for ever (seen with its version 1.14)."""
+"""Heaps of text without an end; the HDF5 library reads them for ever.
+
+This was seen with version 1.14 of the library.
+"""
 
 import struct
 from typing import BinaryIO
@@ -11,10 +14,10 @@ MOST_READ = 16  # times the size of the file: heaps do not overlap, but what is 
 
 
 def endless_heaps(stream: BinaryIO, size: int) -> dict[int, bytes]:
-    """What has to stand where so that heaps end that the library would read for ever: bytes by their place.
+    """Return the bytes, by place, that give an end to heaps that have none.
 
-    ``stream``, of ``size`` bytes, is read from its beginning to its end. The free space of such a heap is made to reach
-    to its end.
+    The library would read such heaps for ever. ``stream``, of ``size`` bytes, is read from its beginning to its end.
+    The free space of such a heap is made to reach to its end.
 
     Raises
     ------
@@ -40,9 +43,9 @@ def endless_heaps(stream: BinaryIO, size: int) -> dict[int, bytes]:
 
 
 def _without_end(stream: BinaryIO, at: int, file_bytes: int) -> tuple[dict[int, bytes], int]:
-    """The length of the object that has none in the heap that begins there, as it should be, by its place.
+    """Return the right length, by place, of the object without one in a heap.
 
-    Beside it stands how many bytes were looked at.
+    The heap begins at ``at``. The second value is the number of bytes that were looked at.
     """
     stream.seek(at + len(HEAP))
     size = min(int.from_bytes(stream.read(8), "little"), LARGEST_HEAP)

@@ -1,4 +1,7 @@
-"""Items of a recording: every parameter under its own name, the canonical topics beside them, in slices of time."""
+"""Items of a recording: every parameter under its own name, and the canonical topics.
+
+They come in slices of time.
+"""
 
 import math
 import re
@@ -28,7 +31,7 @@ _ODD = re.compile(r"[^A-Za-z0-9_\-]+")
 
 @dataclass
 class _Losses:
-    """Parameters whose data turned out to be damaged, and by what; positions that are none, by topic."""
+    """Damaged parameters with the reason, and missing positions by topic."""
 
     broken: dict[str, str] = field(default_factory=dict)
     lost: dict[str, int] = field(default_factory=dict)
@@ -46,7 +49,7 @@ class _Losses:
 
 
 def items(source: Source, reader_name: str) -> Iterator[Item]:
-    """Items of a recording, all slices of time one after the other."""
+    """Yield the items of a recording, one slice of time after the other."""
     with opened(source) as container:
         start = container.start_utc_s
         utc_ns = None if start is None else round(start * NS_PER_S)
@@ -91,7 +94,7 @@ def _raw_topics(container: Container) -> dict[str, Parameter]:
     return topics
 
 
-Span = tuple[int, int]  # of time: nanoseconds since the start, the second one exclusive
+Span = tuple[int, int]  # of time: nanoseconds since the start, end exclusive
 
 
 def _slices(parameters: Sequence[Parameter]) -> list[Span]:
@@ -164,7 +167,7 @@ def _canonical_batches(
 
 
 def _apart(columns: dict[str, Column], placed: dict[str, Column]) -> dict[str, Column]:
-    """Positions but for those beside a row of zeros, which were interpolated from it."""
+    """Drop positions next to a row of zeros, which were interpolated from it."""
     is_zero = columns["latitude_deg"].mask & ~placed["latitude_deg"].mask
     beside = np.append(False, is_zero[:-1]) | np.append(is_zero[1:], False)
     names = ("latitude_deg", "longitude_deg")
@@ -172,7 +175,7 @@ def _apart(columns: dict[str, Column], placed: dict[str, Column]) -> dict[str, C
 
 
 def _with_velocities(columns: dict[str, Column]) -> None:
-    """Velocities in place of the track, which ``ins`` has no field for."""
+    """Replace the track by velocities, as ``ins`` has no field for it."""
     track, speed = columns.pop("track_deg", None), columns.get(SPEED)
     if track is None or speed is None:
         return
@@ -193,7 +196,10 @@ def _batch(topic: str, times_ns: Int64Array, columns: dict[str, Column]) -> Reco
 
 
 def _numbered(batch: RecordBatch, instants: Int64Array, next_index: int) -> Iterator[RecordBatch]:
-    """A batch, in parts that are not too long, with its place in the source: instants are numbered in order of time."""
+    """Yield a batch, in parts that are not too long, with its places in the source.
+
+    Instants are numbered in order of time.
+    """
     index = next_index + np.searchsorted(instants, batch.device_time_ns.values).astype(np.int64)
     yield from bounded(RecordBatch(batch.topic, index, batch.device_time_ns, batch.columns))
 

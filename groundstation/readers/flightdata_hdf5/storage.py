@@ -1,4 +1,4 @@
-"""Where the samples of a dataset stand in the file, and which of them can be believed.
+"""Places of a dataset's samples in the file, and which of them can be believed.
 
 The library gives zeros for samples that were never written, and whatever stood in memory where a piece unpacks to less
 than its samples take. So each dataset is placed first: in one block, in its header, or in pieces.
@@ -16,12 +16,12 @@ FILTERS = frozenset((DEFLATE, SHUFFLE, FLETCHER32, LZF))
 CHECKSUM_BYTES = 4
 MOST_PIECE_BYTES = 1 << 26
 NEVER_WRITTEN = "never written"
-_LITERAL, _LONG = 32, 7  # of LZF: first control byte of a copy, length that has one more byte
+_LITERAL, _LONG = 32, 7  # LZF: first control byte of a copy, length that has one more byte
 
 
 @dataclass(frozen=True)
 class Piece:
-    """One piece of a dataset: its place and bytes in the file, and the filters that it was not put through (bits)."""
+    """Piece of a dataset: its place and bytes in the file, and the filters left out (bits)."""
 
     place: int
     nbytes: int
@@ -59,20 +59,23 @@ class Storage:
 
     @property
     def stored_bytes(self) -> int:
-        """Bytes of the file that it takes."""
+        """Bytes of the file that the dataset takes."""
         if not self.per_piece:
             return self.whole * self.sample_bytes
         return sum(piece.nbytes for piece in self.pieces.values())
 
     @property
     def held_bytes(self) -> int:
-        """Bytes that come out of it when all is read."""
+        """Bytes that come out of the dataset when all is read."""
         if not self.per_piece:
             return self.samples * self.sample_bytes
         return max(len(self.pieces) * self.per_piece, self.samples) * self.sample_bytes
 
     def lost(self, first: int, last: int) -> Iterator[tuple[int, int, str]]:
-        """Samples of [first, last) that are not there or cannot be believed: first, last (exclusive) and the reason."""
+        """Yield the samples of [first, last) that are missing or cannot be believed.
+
+        Each entry: first, last (exclusive) and the reason.
+        """
         if not self.per_piece:
             if last > self.whole:
                 yield max(first, self.whole), last, "cut off"
@@ -90,7 +93,7 @@ class Storage:
         return self._reasons[number]
 
     def _fault(self, number: int, piece: Piece) -> str:
-        """What is wrong with a piece; empty for a sound one."""
+        """Return the fault of a piece; empty for a sound one."""
         if piece.place + piece.nbytes > self.file_bytes:
             return "cut off"
         wanted = self.per_piece * self.sample_bytes
@@ -152,12 +155,12 @@ def _pieces(dataset: Any, per_piece: int) -> dict[int, Piece]:
 
 
 def inflated_length(packed: bytes, most: int) -> int:
-    """Bytes that a deflated piece unpacks to; ``most`` + 1 where they are more."""
+    """Return the bytes that a deflated piece unpacks to; ``most`` + 1 if more."""
     return len(zlib.decompressobj().decompress(packed, most + 1))
 
 
 def lzf_length(packed: bytes) -> int:
-    """Bytes that a piece packed by LZF unpacks to.
+    """Return the bytes that a piece packed by LZF unpacks to.
 
     Examples
     --------

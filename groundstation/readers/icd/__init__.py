@@ -1,4 +1,7 @@
-"""ICDs: what the words of MIL-STD-1553 and ARINC 429 buses mean. DTS files in YAML, and some that are shipped."""
+"""ICDs: the meaning of the words of MIL-STD-1553 and ARINC 429 buses.
+
+They are DTS files in YAML; some are shipped.
+"""
 
 from groundstation.readers.icd.dump import to_yaml
 from groundstation.readers.icd.instances import numbered

@@ -1,4 +1,7 @@
-"""An ICD as the text of a DTS file: what :func:`groundstation.readers.icd.load.load` reads back as it was."""
+"""ICD as the text of a DTS file.
+
+:func:`groundstation.readers.icd.load.load` reads it back unchanged.
+"""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -119,5 +122,5 @@ def _common(one: Element, holders: tuple[str, ...]) -> list[str]:
 
 
 def _text(text: str) -> str:
-    """A text as it may stand in a flow mapping: in quotes where it is no plain word."""
+    """Return a text for a flow mapping, in quotes where it is no plain word."""
     return text if PLAIN.fullmatch(text) else "'" + " ".join(text.split()).replace("'", "''") + "'"

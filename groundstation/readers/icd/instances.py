@@ -1,4 +1,4 @@
-"""Which unit each word or message belongs to: two that feed the same signal are two units, ``ins.1`` and ``ins.2``."""
+"""Units of words and messages: two that feed the same signal are ``ins.1`` and ``ins.2``."""
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
@@ -11,7 +11,7 @@ Holder: TypeAlias = Word429 | Message1553
 
 @dataclass
 class _Unit:
-    """A piece of equipment of one kind: where it speaks, and the signals that are known of it."""
+    """Equipment of one kind: its place on the buses, and its known signals."""
 
     place: Hashable
     signals: set[str] = field(default_factory=set)
@@ -20,7 +20,9 @@ class _Unit:
 def numbered(
     words: tuple[Word429, ...], messages: tuple[Message1553, ...]
 ) -> tuple[tuple[Word429, ...], tuple[Message1553, ...]]:
-    """Words and messages whose signals found by name are numbered where there are several units of a kind.
+    """Number words and messages where there are several units of a kind.
+
+    Only signals found by name are numbered.
 
     A unit is all words of a bus, or all messages of a terminal; of two messages of one terminal that hold the same
     signal (inertial alone and blended with GNSS) each is a unit. Signals that the ICD states are left as they are.
@@ -42,7 +44,7 @@ def numbered(
 
 
 def _with_fine(words: list[Word429]) -> tuple[Word429, ...]:
-    """Words whose fine parts feed the signal of their word on the same bus."""
+    """Make fine parts feed the signal of their word on the same bus."""
     coarse = {(_place(word), word.name): word.elements[0] for word in words if word.elements}
 
     def of(word: Word429, element: Element429) -> Element429:
@@ -57,12 +59,12 @@ def _holding(holder: Any, elements: list[Any]) -> Any:
 
 
 def _plain(holder: Holder) -> Any:
-    """The holder with the signals found by name as they are without numbers."""
+    """Return the holder without numbers in the signals that were found by name."""
     return _holding(holder, [_unnumbered(one) for one in holder.elements])
 
 
 def _is_numbered(element: Element) -> bool:
-    """Whether the signal was found by name; a fine part has that of its word."""
+    """Tell whether the signal was found by name; a fine part has that of its word."""
     return element.is_by_name and not (isinstance(element, Element429) and element.fine_of)
 
 
@@ -86,7 +88,10 @@ def _place(holder: Holder) -> Hashable:
 
 
 def _unit_of(units: list[_Unit], place: Hashable, signals: set[str]) -> int:
-    """Number of the unit that speaks there and has none of the signals yet; a new one where there is none."""
+    """Return the number of the unit at a place that has none of the signals yet.
+
+    A new unit is made where there is none.
+    """
     for number, unit in enumerate(units):
         if unit.place == place and not unit.signals & signals:
             unit.signals |= signals

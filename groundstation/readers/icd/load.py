@@ -1,7 +1,8 @@
-"""Reads an ICD: a DTS file in YAML for 1553 messages, ARINC 429 words or both. A slip names the file, word and key.
+"""Read an ICD: a DTS file in YAML for 1553 messages, ARINC 429 words or both.
 
-Keys of our own: ``channel`` and ``subchannel`` of a word or message; ``signal``, ``sign``, ``transform``, ``status``,
-``step``, ``fine_of`` and ``valid_if`` of an element. docs/chapter10.md describes them.
+The error of a mistake names the file, word and key. We add these keys: ``channel`` and ``subchannel`` of a word or
+message; ``signal``, ``sign``, ``transform``, ``status``, ``step``, ``fine_of`` and ``valid_if`` of an element.
+docs/chapter10.md describes them.
 """
 
 from collections.abc import Callable, Mapping
@@ -84,7 +85,10 @@ def shipped(name: str) -> Icd:
 
 
 def usual_status(schema: str, unit: str) -> Status:
-    """How the sign/status matrix of an element is read that does not say so; bits without a unit are discrete."""
+    """Return the reading of the sign/status matrix of an element that does not state it.
+
+    Bits without a unit are discrete.
+    """
     return STATUS_OF.get(schema, "bnr" if unit else "discrete")
 
 
@@ -102,7 +106,10 @@ def named_icd(name: str) -> Icd:
 
 @dataclass
 class _Checker:
-    """Turns the mappings into words and messages; every complaint names the file, the word and the key."""
+    """Parser of the mappings into words and messages.
+
+    Every error names the file, the word and the key.
+    """
 
     where: str
     unknown: dict[str, int] = field(default_factory=dict)
@@ -112,7 +119,7 @@ class _Checker:
         raise SettingsError(place, found, expected, "see docs/chapter10.md")
 
     def told(self) -> tuple[str, ...]:
-        """One note for each key that is not known here."""
+        """Return one note for each unknown key."""
         return tuple(f"{self.where}: key {key!r} is not known, {count} times" for key, count in self.unknown.items())
 
     def known(self, table: Mapping[str, Value], _place: str, keys: tuple[str, ...]) -> None:
@@ -126,7 +133,7 @@ class _Checker:
         return value
 
     def named(self, value: Value, place: str, make: Callable[[str, str, dict[str, Value]], Any]) -> tuple[Any, ...]:
-        """What ``make`` gives for every named entry; nothing where there are no entries."""
+        """Return the results of ``make`` for every named entry; empty without entries."""
         if value is None:
             return ()
         entries = self.table(value, place)
@@ -272,7 +279,7 @@ class _Checker:
     def with_validity(
         self, words: tuple[Element1553, ...], bits: tuple[Element1553, ...], table: dict[str, Value], place: str
     ) -> tuple[Element1553, ...]:
-        """Elements of a message, each with the bit that ``valid_if`` names."""
+        """Return the elements of a message, each with the bit that ``valid_if`` names."""
         by_bit = {bit.name: bit for bit in bits}
         entries = {**self.table(table.get("bit_elem") or {}, place), **self.table(table.get("word_elem") or {}, place)}
         twice = [word.name for word in words if word.name in by_bit]
@@ -307,7 +314,7 @@ class _Checker:
         return replace(word, elements=made)
 
     def fine(self, words: tuple[Word429, ...]) -> None:
-        """Refuse a fine part of a word that is not there."""
+        """Refuse a fine part of a word that does not exist."""
         names = {word.name for word in words}
         for word in words:
             for element in word.elements:
@@ -352,7 +359,7 @@ class _Checker:
         return {"msbval": msbval, "unit": unit, "description": text}
 
     def signal(self, element: AnyElement, table: dict[str, Value], place: str, holders: tuple[str, ...]) -> AnyElement:
-        """The element with the signal that the ICD states, else with what its name makes plain."""
+        """Return the element with the signal that the ICD states, or that its name implies."""
         signal = self.text(table, "signal", place)
         if "fine_of" in table and signal:
             self.fail(f"{place}: signal", repr(signal), "none beside fine_of: it is that of the word it is added to")

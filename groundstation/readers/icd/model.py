@@ -1,4 +1,4 @@
-"""An ICD as values: which words of which bus hold what, and which canonical signal each element feeds."""
+"""ICD as values: the contents of each bus word, and the canonical signal of each element."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -52,11 +52,11 @@ class Element:
 
 @dataclass(frozen=True)
 class Element429(Element):
-    """An element of an ARINC 429 word: ``bit_count`` bits from bit ``lsb`` upwards; bits count from 1 to 32.
+    """Element of an ARINC 429 word: ``bit_count`` bits from bit ``lsb`` upwards.
 
-    The sign bit of a signed one is its highest and counts. ``status`` says how the sign/status matrix is read;
-    ``step`` is the value of the last digit of BCD. ``fine_of`` names the word whose values are cut off downwards and to
-    which those of this one, in the same unit, are added; its signal is that word's.
+    Bits count from 1 to 32. The sign bit of a signed element is its highest and counts. ``status`` says how the
+    sign/status matrix is read; ``step`` is the value of the last digit of BCD. ``fine_of`` names the word whose values
+    are cut off downwards; those of this element, in the same unit, are added to them, and its signal is that word's.
     """
 
     lsb: int = 11
@@ -68,10 +68,11 @@ class Element429(Element):
 
 @dataclass(frozen=True)
 class Element1553(Element):
-    """An element of a 1553 message: ``count`` words from ``offset`` (0 is the first data word), high word first.
+    """Element of a 1553 message: ``count`` words from ``offset``, high word first.
 
-    Of bits, ``msb`` is the first in the first word and ``lsb`` the last in the last word; 1 is the most significant
-    bit of a word, 16 the least. ``valid_if`` names the bit element of the message that is 1 where this one is valid.
+    Offset 0 is the first data word. For bits, ``msb`` is the first in the first word and ``lsb`` the last in the last
+    word; 1 is the most significant bit of a word, 16 the least. ``valid_if`` names the bit element of the message that
+    is 1 where this one is valid.
     """
 
     offset: int = 0
@@ -114,7 +115,7 @@ class Word429:
     elements: tuple[Element429, ...] = ()
 
     def is_on(self, bus: str, channel: int, subchannel: int) -> bool:
-        """Whether it is a word of that bus (TMATS name, channel id, number of the bus from 1)."""
+        """Tell whether it is a word of a bus (TMATS name, channel id, number of the bus from 1)."""
         return (
             self.bus in ("", bus)
             and self.channel in (None, channel)
@@ -122,7 +123,7 @@ class Word429:
         )
 
     def takes(self, words: NDArray[np.uint32]) -> NDArray[np.bool_]:
-        """Which words, of shape (n,), have its label and SDI."""
+        """Tell which words, of shape (n,), have its label and SDI."""
         is_label = (words & np.uint32(0xFF)) == REVERSED_BYTE[self.label]
         if self.sdi == ANY_SDI:
             return np.asarray(is_label)
@@ -161,11 +162,11 @@ class Message1553:
     elements: tuple[Element1553, ...] = ()
 
     def is_on(self, bus: str, channel: int) -> bool:
-        """Whether it is a message of that bus (TMATS name, channel id)."""
+        """Tell whether it is a message of a bus (TMATS name, channel id)."""
         return self.bus in ("", bus) and self.channel in (None, channel)
 
     def takes(self, commands: NDArray[np.uint16], second: NDArray[np.uint16] | None = None) -> NDArray[np.bool_]:
-        """Which messages have its command words.
+        """Tell which messages have its command words.
 
         Parameters
         ----------

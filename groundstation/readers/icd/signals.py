@@ -1,4 +1,7 @@
-"""What the elements of an ICD mean: canonical signals that it states (``signal``) or that name and unit make plain."""
+"""Meaning of the elements of an ICD as canonical signals.
+
+The ICD states a signal (``signal``), or name and unit make it plain.
+"""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -81,7 +84,9 @@ _GNSS_WORDS = ("gps", "gnss")
 
 
 def canonical_factor(unit: str, signal: str) -> float | None:
-    """Factor from an ICD's unit to that of a canonical signal; None when the unit is unknown or of another kind.
+    """Return the factor from an ICD's unit to that of a canonical signal.
+
+    None when the unit is unknown or of another kind.
 
     Examples
     --------
@@ -96,7 +101,9 @@ def canonical_factor(unit: str, signal: str) -> float | None:
 
 
 def unit_of(signal: str) -> str | None:
-    """Unit of a signal that an ICD may feed, empty when it has none; None when there is no such signal of numbers.
+    """Return the unit of a signal that an ICD may feed, empty when it has none.
+
+    None when there is no such signal of numbers.
 
     Examples
     --------
@@ -111,7 +118,7 @@ def unit_of(signal: str) -> str | None:
 
 
 def by_name(element: AnyElement, holders: Iterable[str]) -> AnyElement:
-    """The element with the signal that its name and unit make plain; itself where they do not.
+    """Return the element with the signal that its name and unit imply, else unchanged.
 
     A name of the holder or its equipment with ``gps`` or ``gnss`` in it makes it ``gnss``, all else is ``ins``.
 
@@ -134,7 +141,9 @@ def by_name(element: AnyElement, holders: Iterable[str]) -> AnyElement:
 
 
 def is_count(element: Element) -> bool:
-    """Check for a plain count: bits without a value, of which the unit says nothing.
+    """Tell whether an element is a plain count: whole numbers without a scale.
+
+    Its unit says nothing then.
 
     Examples
     --------
@@ -164,13 +173,19 @@ def signal_values(values: FloatArray, element: Element) -> FloatArray:
 
 
 def word_values(values: FloatArray, element: Element) -> FloatArray:
-    """Values of the word from those of its element's signal: the inverse of :func:`signal_values`."""
+    """Return the values of a word from those of its element's signal.
+
+    The inverse of :func:`signal_values`.
+    """
     values = values / element.factor
     return np.asarray(np.sin(np.deg2rad(values))) if element.transform == "asin_deg" else values
 
 
 def turns_around(element: Element) -> bool:
-    """Whether the element is an angle with a full scale of half a turn, where 180 deg and -180 deg are one."""
+    """Tell whether the element is an angle with a full scale of half a turn.
+
+    There 180 deg and -180 deg are one.
+    """
     unit = CONVERSIONS.get(UNITS.get(element.unit.lower().replace(" ", "").replace(".", ""), "?"))
     return unit is not None and unit[0] == "deg" and abs(2.0 * element.msbval * unit[1] - 180.0) < 1e-9
 

@@ -1,7 +1,8 @@
-"""A start of an ICD from what is on the buses: known equipment under its names, all else as numbers with their range.
+"""Draft of an ICD from what is on the buses.
 
-Equipment is known by what it sends together, never by one label or address alone: labels mean other things on other
-equipment's buses. Whoever uses the file has to check it.
+Known equipment is put in under its names, all else as numbers with their range. Equipment is known by what it sends
+together, never by one label or address alone: labels mean other things on other equipment's buses. Whoever uses the
+file has to check it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -21,7 +22,7 @@ from groundstation.readers.icd.words_429 import decode_429, status_of
 from groundstation.readers.icd.words_1553 import Data1553, decode_1553
 
 TRANSMIT = 0x400
-NEEDED_LABELS = 2  # of those below, with values that may be used, before a bus is taken for that equipment's
+NEEDED_LABELS = 2  # labels below, with usable values, that a bus needs to count as that equipment's
 _TELLING = {
     "arinc429_inertial": (0o314, 0o320, 0o324, 0o325),
     "arinc429_gnss": (0o110, 0o111, 0o120, 0o121, 0o370),
@@ -35,7 +36,7 @@ HEAD = (
 
 
 class BusEntry(Protocol):
-    """What is on a bus under one command word or label, with some of its words.
+    """Entry of a bus: one command word or label, with some of its words.
 
     ``key`` is the command word or the label as a number; ``sub_channel`` is None on 1553; ``sample`` has words of
     shape (m,), or messages of shape (m, words) as recorded, command words first.
@@ -65,7 +66,10 @@ class _Units:
     count: dict[str, int] = field(default_factory=dict)
 
     def named(self, holders: Sequence[Holder]) -> list[Holder]:
-        """Words or messages of one piece of equipment, as the next unit of every kind that it feeds."""
+        """Return the words or messages of one piece of equipment, as the next units.
+
+        They are the next unit of every kind that the equipment feeds.
+        """
         kinds = {kind_of(one.signal) for holder in holders for one in holder.elements if one.signal}
         for kind in kinds:
             self.count[kind] = self.count.get(kind, 0) + 1
@@ -82,7 +86,7 @@ class _Units:
 
 
 def suggest(entries: Iterable[BusEntry]) -> str:
-    """YAML text of an ICD that names everything on the buses, for its reader to go on with.
+    """Return a draft ICD in YAML that names everything on the buses.
 
     A bus is taken for an inertial reference's, a GNSS receiver's or an air data computer's when it has at least two of
     the labels that tell it, with values that may be used. A message is taken for one of the public layouts when its
@@ -139,13 +143,13 @@ def _words(on_bus: Sequence[BusEntry], units: _Units) -> Iterator[Word429]:
 
 
 def _usable(word: Word429, by_label: Mapping[int, BusEntry]) -> FloatArray:
-    """Values of a word's first element, none where less than half of its words may be used."""
+    """Return values of a word's first element; none if less than half may be used."""
     values, usable = decode_429(by_label[word.label].sample, word.elements[0])
     return values[usable] if 2 * int(np.count_nonzero(usable)) > len(usable) else values[:0]
 
 
 def _with_position(found: dict[int, Word429], by_label: Mapping[int, BusEntry]) -> dict[int, Word429]:
-    """The words without a latitude or longitude that is no part of a position."""
+    """Drop latitudes and longitudes that are no part of a position."""
     for pair in _POSITIONS:
         there = [_usable(found[label], by_label) for label in pair if label in found]
         if len(there) < 2 or not _is_position(*there):
@@ -164,7 +168,10 @@ def _range_429(entry: BusEntry, element: Element429) -> str:
 
 
 def _message(entry: BusEntry, units: _Units) -> list[Message1553]:
-    """The message of a command word; none for the receiver of what another terminal sends, which its sender names."""
+    """Return the message of a command word.
+
+    None for the receiver of what another terminal sends: the message is named by its sender.
+    """
     data = _data(entry)
     if data is None:
         return []
@@ -185,7 +192,10 @@ def _message(entry: BusEntry, units: _Units) -> list[Message1553]:
 
 
 def _data(entry: BusEntry) -> Data1553 | None:
-    """Data words of the sample, shape (m, n): behind the command word, of a sender behind its status word too."""
+    """Return the data words of the sample, shape (m, n).
+
+    They follow the command word, of a sender the status word too.
+    """
     rows, count = entry.sample, entry.key & 31 or 32
     if entry.key >> 5 & 31 in (0, 31):
         return None  # a mode code
@@ -204,7 +214,7 @@ def _data(entry: BusEntry) -> Data1553 | None:
 
 
 def _counts_1553(data: Data1553) -> Iterator[Element1553]:
-    """A count for every word that changes; words that do not are left out."""
+    """Yield a count for every word that changes; constant words are left out."""
     for place in np.flatnonzero((data != data[:1]).any(axis=0)).tolist():
         name = f"word_{place + 1:02d}"
         yield Element1553(name, "SIGNED16", 0.0, "", _range(data[:, place].view(np.int16)), offset=place)
@@ -234,7 +244,7 @@ def _named_values(data: Data1553, layout: str, *names: str) -> list[FloatArray]:
 
 
 def _is_position(latitude_deg: FloatArray, longitude_deg: FloatArray) -> bool:
-    """A place on the Earth, but not 0, 0, that does not jump by more than a degree."""
+    """Tell whether values are a place on Earth, not 0, 0, without jumps over a degree."""
     if not len(latitude_deg) or not len(longitude_deg) or not latitude_deg.all():
         return False
     is_inside = np.abs(latitude_deg).max() <= 90.0 and np.abs(longitude_deg).max() <= 180.0
@@ -242,19 +252,22 @@ def _is_position(latitude_deg: FloatArray, longitude_deg: FloatArray) -> bool:
 
 
 def _fits_egi(data: Data1553) -> bool:
-    """Direction cosines of length one."""
+    """Tell whether the direction cosines have length one."""
     cxx, cxy, cxz, longitude_deg = _named_values(data, "egi", "cxx", "cxy", "cxz", "longitude")
     return bool(np.abs(np.sqrt(cxx**2 + cxy**2 + cxz**2) - 1.0).max() < 1e-3) and _is_position(cxz, longitude_deg)
 
 
 def _fits_b100(data: Data1553) -> bool:
-    """Nothing in the words that are not used, and a position."""
+    """Tell whether the unused words are zero and there is a position."""
     unused = [1, *range(16, 20), *range(25, 32)]
     return not data[:, unused].any() and _is_position(*_named_values(data, "b100", "latitude", "longitude"))
 
 
 def _fits_f15(data: Data1553) -> bool:
-    """Nothing in the spare words, a position, and a ground speed that is that of its parts."""
+    """Tell whether the spare words are zero, there is a position, and ground speed agrees.
+
+    The ground speed must be that of its north and east parts.
+    """
     latitude_deg, longitude_deg, north, east, speed = _named_values(
         data, "f15_ins", "latitude", "longitude", "velocity_north", "velocity_east", "ground_speed"
     )

@@ -1,4 +1,6 @@
-"""Data words of MIL-STD-1553 messages to values and back, in every schema of the DTS files; whole arrays at once.
+"""Conversion of MIL-STD-1553 data words to values and back, in every schema of DTS files.
+
+Whole arrays are converted at once.
 
 Of several words the first is the most significant. Sources: MIL-STD-1750A, 4.1.5 (floating point); IS-GPS-059 (GPS
 floating point and CAPS); IEEE 754; scaling by the value of the most significant bit as in the DTS files.
@@ -60,7 +62,10 @@ def decode_1553(data: Data1553, element: Element1553) -> FloatArray:
 
 
 def usable_1553(data: Data1553, element: Element1553) -> NDArray[np.bool_]:
-    """Whether the message itself says that the element is valid; all are where no bit says so. Shape (n,)."""
+    """Tell whether the message says that the element is valid, shape (n,).
+
+    All are valid where no bit says so.
+    """
     bit = element.valid_if
     if bit is None:
         return np.ones(len(data), dtype=bool)
@@ -68,7 +73,9 @@ def usable_1553(data: Data1553, element: Element1553) -> NDArray[np.bool_]:
 
 
 def encode_1553(message: Message1553, values: Mapping[str, FloatArray]) -> Data1553:
-    """Data words that hold values, the inverse of :func:`decode_1553`: rounded, saturated at full scale.
+    """Encode values as data words: rounded, saturated at full scale.
+
+    The inverse of :func:`decode_1553`.
 
     An angle whose full scale is a half turn goes on at its other end. Where a value is NaN its words are 0, and so is
     the bit that says it is valid; that bit is 1 elsewhere. Words that no value fills are 0.
@@ -139,7 +146,7 @@ def _encoded(values: FloatArray, element: Element1553) -> UInt64Array:
 
 
 def _parts(field: UInt64Array, fraction_bits: int) -> tuple[NDArray[np.bool_], NDArray[np.int64], FloatArray]:
-    """Sign, exponent of eight bits and fraction of a field laid out as sign, exponent, fraction from the top."""
+    """Split a field into sign, exponent of eight bits and fraction, laid out from the top."""
     fraction = (field & np.uint64((1 << fraction_bits) - 1)).astype(np.float64)
     exponent = ((field >> np.uint64(fraction_bits)) & np.uint64(0xFF)).astype(np.int64)
     is_negative = (field >> np.uint64(fraction_bits + 8)) & np.uint64(1) == 1
@@ -147,7 +154,10 @@ def _parts(field: UInt64Array, fraction_bits: int) -> tuple[NDArray[np.bool_], N
 
 
 def _from_gps(field: UInt64Array, fraction_bits: int) -> FloatArray:
-    """Sign x 2^(exponent - 128) x (1/2 + fraction); without an exponent the fraction, with a sign undefined."""
+    """Return sign x 2^(exponent - 128) x (1/2 + fraction).
+
+    With exponent 0 it is the fraction; with exponent 0 and a sign it is undefined.
+    """
     is_negative, exponent, fraction = _parts(field, fraction_bits)
     part = fraction / 2.0 ** (fraction_bits + 1)
     number = np.where(is_negative, -1.0, 1.0) * np.ldexp(0.5 + part, exponent - GPS_BIAS)
@@ -170,7 +180,10 @@ def _from_caps(field: UInt64Array) -> FloatArray:
 
 
 def _swapped_caps(field: UInt64Array) -> UInt64Array:
-    """CAPS as sign, exponent, fraction from the top: its last word has the sign and the fraction's upper bits."""
+    """Rearrange CAPS to sign, exponent, fraction from the top.
+
+    The last word of CAPS has the sign and the fraction's upper bits.
+    """
     first, middle, last = (
         (field >> np.uint64(32)),
         (field >> np.uint64(16)) & np.uint64(0xFFFF),
@@ -190,7 +203,7 @@ def _to_caps(values: FloatArray) -> UInt64Array:
 
 
 def _from_1750(field: UInt64Array) -> FloatArray:
-    """Mantissa of 24 bits and exponent of 8, both in two's complement."""
+    """Convert MIL-STD-1750A floats: mantissa of 24 bits, exponent of 8, two's complement."""
     mantissa = (field.astype(np.int64) << 32) >> 40
     exponent = (field.astype(np.int64) << 56) >> 56
     return np.asarray(np.ldexp(mantissa / 2.0**23, exponent))
@@ -210,7 +223,7 @@ def _to_1750(values: FloatArray) -> UInt64Array:
 
 
 def _from_16(field: UInt64Array) -> FloatArray:
-    """Sign, eleven bits of mantissa, four bits of exponent to the base of 16."""
+    """Convert floats with sign, eleven bits of mantissa, four bits of exponent to base 16."""
     mantissa = ((field >> np.uint64(4)) & np.uint64(0x7FF)).astype(np.float64)
     scale = 16.0 ** (field & np.uint64(0xF)).astype(np.float64)
     return np.asarray(np.where(field >> np.uint64(15) == 1, -mantissa, mantissa) * scale)

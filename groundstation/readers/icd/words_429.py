@@ -1,4 +1,6 @@
-"""ARINC 429 words to values and back. Bits count from 1, label, to 32, parity; whole arrays at once.
+"""Conversion of ARINC 429 words to values and back, whole arrays at once.
+
+Bits count from 1, label, to 32, parity.
 
 Source: ARINC Specification 429 part 1, chapter 2 (word formats; sign/status matrix, tables 2-1 to 2-3); value of the
 most significant bit as in the DTS files.
@@ -17,7 +19,7 @@ Words429 = NDArray[np.uint32]
 # Sign/status matrix, bits 31 and 30, of a value that may be used; all others say: failure, no computed data, test.
 USABLE: Mapping[Status, tuple[int, ...]] = {"bnr": (3,), "bcd": (0, 3), "discrete": (0,), "none": (0, 1, 2, 3)}
 NO_COMPUTED_DATA = 1
-MINUS = 3  # of BCD: minus, south, west, left, from, below
+MINUS = 3  # sign/status of BCD: minus, south, west, left, from, below
 SIGN_AT = 29
 
 
@@ -27,15 +29,15 @@ def status_of(words: Words429) -> NDArray[np.uint32]:
 
 
 def has_odd_parity(words: Words429) -> NDArray[np.bool_]:
-    """Whether the number of ones in each word is odd, as it is in every sound one."""
+    """Tell whether the number of ones in each word is odd, as in every sound one."""
     return np.asarray(np.bitwise_count(words) & np.uint8(1) == 1)
 
 
 def decode_429(words: Words429, element: Element429) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Values of an element in the ICD's unit, and whether each may be used.
 
-    Not usable are words of even parity, those whose sign/status matrix says anything but normal operation (of BCD also
-    minus), and digits above nine. Label and SDI are for :meth:`Word429.takes`.
+    Words of even parity are not usable, nor those whose sign/status matrix says anything but normal operation (for BCD
+    also minus), nor those with digits above nine. Label and SDI are for :meth:`Word429.takes`.
 
     Parameters
     ----------
@@ -83,7 +85,9 @@ def step_429(element: Element429) -> float:
 
 
 def encode_429(word: Word429, values: Mapping[str, FloatArray], *, sdi: int = 0) -> Words429:
-    """Words that hold values, the inverse of :func:`decode_429`: rounded, of odd parity, saturated at full scale.
+    """Encode values as words: rounded, of odd parity, saturated at full scale.
+
+    The inverse of :func:`decode_429`.
 
     An angle whose full scale is a half turn goes on at its other end. NaN in any element becomes "no computed data".
 
@@ -136,5 +140,5 @@ def _field(values: FloatArray, element: Element429) -> NDArray[np.int64]:
 
 
 def _digits(field: NDArray[np.int64], bit_count: int) -> list[NDArray[np.int64]]:
-    """Decimal digits, the last first; the first of a number may have fewer than four bits."""
+    """Return decimal digits, the last first; the first may have fewer than four bits."""
     return [(field >> place) & 0xF for place in range(0, bit_count, 4)]

@@ -1,4 +1,6 @@
-"""YAML read as plain mappings, lists and texts: nothing is constructed, nested deeply or repeated without bound.
+"""YAML read as plain mappings, lists and texts.
+
+Nothing is constructed, nested deeply or repeated without bound.
 
 Scalars stay the text that was written. YAML 1.1 would read the key ``off`` as false and the label ``076`` as 62.
 """
@@ -63,7 +65,7 @@ def parse_yaml(text: str, where: str) -> dict[str, Value]:
 
 
 def kind_of_value(value: Value) -> str:
-    """What a value is, for errors: never its whole content."""
+    """Describe a value for errors, never with its whole content."""
     if isinstance(value, dict):
         return f"a mapping of {len(value)}"
     if isinstance(value, list):
@@ -73,7 +75,10 @@ def kind_of_value(value: Value) -> str:
 
 @dataclass
 class _Open:
-    """A mapping or list that has begun: its value, the key that waits for a value, its anchor and count of values."""
+    """Mapping or list that has begun.
+
+    Its value, the key that waits for a value, its anchor, and its count of values.
+    """
 
     value: Any
     anchor: str | None
@@ -83,7 +88,7 @@ class _Open:
 
 @dataclass
 class _Builder:
-    """Puts the events of a parser together."""
+    """Builder of a value from the events of a parser."""
 
     where: str
     root: Value = None

@@ -1,4 +1,4 @@
-"""Satellite receivers: UBX, NMEA 0183 and NovAtel OEM in one stream, RTCM 3 between them counted."""
+"""Satellite receivers: UBX, NMEA 0183 and NovAtel OEM in one stream, RTCM 3 is counted."""
 
 import re
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from groundstation.readers.receiver.checksums import binary_frame_at, is_novatel
 from groundstation.readers.source import Claim, Source
 
 NAME = "receiver"
-_NAME = rb"(?<![ -~].)(?=[A-Z][A-Z0-9]{2,29},)"  # behind a $ or ! with no text before it
+_NAME = rb"(?<![ -~].)(?=[A-Z][A-Z0-9]{2,29},)"  # after a $ or ! with no text before it
 _ASCII = rb"(?=[A-Z][A-Z0-9_]*A,)"  # NovAtel's messages as text
 # Every branch begins with one byte: then re skips what begins none, seven times as fast.
 _START = re.compile(
@@ -21,7 +21,10 @@ _LEADING = 2  # bytes in front of the first frame that are still a beginning: th
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim what begins with a frame, or holds several in its first 64 KiB, alone or in a computer's text."""
+    """Claim a file that begins with a frame, or has several in its first 64 KiB.
+
+    The frames may stand alone, or in text that a computer wrote.
+    """
     head = source.head[:_LOOKED_AT]
     found = 0
     for tried, match in enumerate(_START.finditer(head)):
@@ -45,7 +48,7 @@ def _is_frame(head: bytes, at: int) -> bool:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, batches, remarks and damages of a stream."""
+    """Yield the header, batches, remarks and damage of a stream."""
     from groundstation.readers.receiver.reader import items  # brings numba
 
     return items(source)

@@ -1,4 +1,4 @@
-"""Whether one frame stands at a place, in plain Python: what a look at the first bytes of a file needs."""
+"""Checks of one frame at a place, in plain Python, for the first bytes of a file."""
 
 import re
 import zlib
@@ -9,7 +9,9 @@ _NOVATEL_TEXT = re.compile(rb"[#%]([A-Z][A-Z0-9_]*A,[ -)+-~]{0,8000};[ -)+-~]{0,
 
 
 def is_sentence(data: bytes, at: int) -> bool:
-    """Whether a sentence of NMEA 0183 stands at a place; one without a checksum ends with its line.
+    """Tell whether a sentence of NMEA 0183 stands at a place.
+
+    A sentence without a checksum ends with its line.
 
     Examples
     --------
@@ -26,7 +28,7 @@ def is_sentence(data: bytes, at: int) -> bool:
 
 
 def is_novatel_text(data: bytes, at: int) -> bool:
-    """Whether a NovAtel log in text stands at a place, its checksum right.
+    """Tell whether a NovAtel log in text stands at a place, with a right checksum.
 
     Examples
     --------
@@ -39,7 +41,7 @@ def is_novatel_text(data: bytes, at: int) -> bool:
 
 
 def binary_frame_at(data: bytes, at: int) -> bool:
-    """Whether a frame of UBX or NovAtel stands at a place, its checksum right.
+    """Tell whether a frame of UBX or NovAtel stands at a place, with a right checksum.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Positions and attitudes that can be: the last step of what becomes ``gnss`` and ``ins``."""
+"""Checks of positions and attitudes: the last step of ``gnss`` and ``ins``."""
 
 import numpy as np
 
@@ -21,7 +21,9 @@ _MOST_DEG = {"roll_deg": MOST_ROLL_DEG, "pitch_deg": MOST_PITCH_DEG} | dict.from
 
 
 def credible_position(columns: Columns, topic: str, places: Int64Array, tally: Tally) -> Columns:
-    """Columns without what falls away at 0, 0, which ``tally`` counts, and without positions that are no numbers.
+    """Drop positions that are no numbers, and the values of fixes at 0, 0.
+
+    ``tally`` counts the fixes at 0, 0.
 
     Parameters
     ----------
@@ -40,13 +42,15 @@ def credible_position(columns: Columns, topic: str, places: Int64Array, tally: T
 
 
 def credible_dilution(columns: Columns) -> Columns:
-    """Columns without the dilutions of 99.99 and more, by which a receiver says that it has none."""
+    """Drop dilutions of 99.99 and more, by which a receiver says that it has none."""
     told = {name: columns[name] for name in DILUTIONS if name in columns}
     return columns | {name: _without(one, one.values > MOST_DILUTION) for name, one in told.items()}
 
 
 def credible_attitude(columns: Columns, places: Int64Array, tally: Tally) -> Columns:
-    """Attitude with headings on the circle; a row with an angle that cannot be has none of its angles.
+    """Drop impossible attitudes and bring headings into [0, 360).
+
+    A row with one impossible angle keeps none of its angles.
 
     Parameters
     ----------

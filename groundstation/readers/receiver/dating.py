@@ -21,7 +21,7 @@ _IN_TEXT = re.compile(rb"HW UBX[^\r\n*]{0,24}?(000[0-9A]0000|00190000)")
 
 @dataclass
 class Told:
-    """Times and facts of a stream that bear on its date.
+    """Times and facts of a stream that show its date.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def dated(told: Told) -> Dated:
     if not len(anchors):
         return Dated(anchors, tuple(remarks))
     last_ns = int(anchors.utc_ns[-1])
-    is_old = last_ns < _NEWEST_NS  # else nothing that a stream tells of itself can contradict its date
+    is_old = last_ns < _NEWEST_NS  # nothing that a stream states can contradict a newer date
     leap_s, earliest = (_leap_seconds(told, last_ns), _earliest(told)) if is_old else (None, None)
     found = rollovers(last_ns, leap_s=leap_s, earliest=earliest, others=_others(other))
     remarks += found.remarks
@@ -79,7 +79,7 @@ def dated(told: Told) -> Dated:
 
 
 def _set(anchors: Anchors) -> Anchors:
-    """Anchors without those of a clock that was not set, where any was."""
+    """Drop anchors of a clock that was not set, if any clock was."""
     is_set = anchors.utc_ns >= _UNSET_NS
     if is_set.all() or not is_set.any():
         return anchors
@@ -125,7 +125,7 @@ def _wrong_leaps(wrong_leaps: Mapping[int, int]) -> Iterator[Remark]:
 
 
 def _apart(of_week: Anchors, of_day: Anchors) -> Iterator[Remark]:
-    """Remark that binary messages and sentences tell different days."""
+    """Yield a remark that binary messages and sentences state different days."""
     if not len(of_week) or not len(of_day):
         return
     by_week_ns, by_day_ns = int(of_week.utc_ns[-1]), int(of_day.utc_ns[-1])

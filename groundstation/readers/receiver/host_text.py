@@ -1,4 +1,6 @@
-"""Text that a computer wrote around the sentences it recorded: stamps in front of them, words and marks behind.
+"""Text that a computer wrote around the sentences it recorded.
+
+Time stamps in front of them, words and marks behind.
 
 ``2024-05-06 12:00:00.123 COM3> $GNGGA,...*6D``: the text of a line is believed to be the computer's where it has the
 shape of many others. Its time is the time of arrival by the clock of that computer (:mod:`host_times`).
@@ -16,7 +18,7 @@ from groundstation.readers.receiver.checksums import is_sentence
 
 LOOKED_AT, GLANCED_AT, TEXT_BYTES = 1 << 16, 1 << 14, 1 << 10
 FEWEST = 3  # sentences in text, before a log is believed to be of that kind
-_MOST_LINES, _MOST_STARTS = 2_000, 4  # that are looked at
+_MOST_LINES, _MOST_STARTS = 2_000, 4  # lines that are looked at, and sentence starts in each
 _SHARE_OF_SENTENCES = 0.5
 _SHARE_OF_SHAPE = 0.05
 _SHARE_WITH_TIME = 0.9
@@ -33,7 +35,7 @@ _SHAPES = ((re.compile(rb"\d+"), b"0"), (re.compile(rb"[A-Za-z]+"), b"a"), (re.c
 
 
 def shape_of(text: bytes) -> bytes:
-    """Shape of a text: digits, letters and spaces one for as many as there are.
+    """Return the shape of a text: one mark for each run of digits, letters or spaces.
 
     Examples
     --------
@@ -55,7 +57,9 @@ _GAP = r"[ T_,;\t-]{1,3}"
 
 @dataclass(frozen=True)
 class Clock:
-    """How a computer writes a time: its kind (:data:`DATE`, :data:`DAY`, :data:`ELAPSED`) and a pattern.
+    """Form in which a computer writes a time: its kind and a pattern.
+
+    Kinds are :data:`DATE`, :data:`DAY` and :data:`ELAPSED`.
 
     Examples
     --------
@@ -67,7 +71,10 @@ class Clock:
     pattern: re.Pattern[bytes]
 
     def read(self, text: bytes) -> int | None:
-        """Nanoseconds since 1970, of the day, or of the clock's own zero; None where the text tells none."""
+        """Read the time in a text, in nanoseconds.
+
+        They count from 1970, midnight, or the clock's own zero. None where the text has no time.
+        """
         match = self.pattern.search(text)
         if match is None:
             return None
@@ -75,7 +82,10 @@ class Clock:
         return _READ[self.kind](cells)
 
     def tells_zone(self, text: bytes) -> bool:
-        """Whether the text says how far from UTC its time is; seconds since 1970 are UTC."""
+        """Tell whether the text states the offset of its time from UTC.
+
+        Seconds since 1970 are UTC.
+        """
         match = self.pattern.search(text)
         cells = {} if match is None else match.groupdict()
         return any(cells.get(name) for name in ("utc", "zone", "epoch"))
@@ -126,14 +136,14 @@ CLOCKS = tuple(Clock(kind, re.compile(text.encode())) for kind, text in _PATTERN
 
 
 def _clock_of(texts: list[bytes]) -> Clock | None:
-    """The first clock that nearly all texts tell."""
+    """Return the first clock that reads a time in nearly all texts."""
     least = _SHARE_WITH_TIME * len(texts)
     return next((one for one in CLOCKS if sum(one.read(text) is not None for text in texts) >= least), None)
 
 
 @dataclass(frozen=True)
 class HostText:
-    """How a computer wrote around the sentences.
+    """Form of the text that a computer wrote around the sentences.
 
     Parameters
     ----------
@@ -155,11 +165,14 @@ class HostText:
 
     @property
     def tells_zone(self) -> bool:
-        """Whether the text says how far from UTC its time is."""
+        """Tell whether the text states the offset of its time from UTC."""
         return self.clock is not None and self.clock.tells_zone(self.example.encode("ascii", "replace"))
 
     def accepts(self, text: bytes, is_before: bool) -> bool:
-        """Whether a text is the computer's: of the shape of many, or with a time as theirs."""
+        """Tell whether a text is the computer's.
+
+        It is when it has the shape of many others, or a time as they have.
+        """
         if shape_of(text) in (self.before if is_before else self.behind):
             return True
         if b"$" in text:  # a sentence that is damaged
@@ -168,7 +181,9 @@ class HostText:
 
 
 def find(head: bytes) -> HostText | None:
-    """Tell how the sentences at the beginning of a log stand in text; None where most stand alone.
+    """Find the text that a computer wrote around the sentences at the beginning of a log.
+
+    None where most sentences stand alone.
 
     Examples
     --------
@@ -198,9 +213,9 @@ def find(head: bytes) -> HostText | None:
 
 
 def _around_sentences(head: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Text in front of the sentence of a line and behind it, of lines with one whose checksum is right.
+    """Yield the text before and after the sentence of each line that has one.
 
-    One without a checksum counts where its formatter is well known.
+    The checksum of the sentence must be right. One without a checksum counts where its formatter is well known.
     """
     for line in _LINES.split(head)[:_MOST_LINES]:
         for match in islice(_START.finditer(line), _MOST_STARTS):
@@ -212,6 +227,6 @@ def _around_sentences(head: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 
 def _shapes(texts: list[bytes]) -> frozenset[bytes]:
-    """Shapes of texts that many have."""
+    """Return the shapes that many texts have."""
     counts = Counter(shape_of(text) for text in texts if text)
     return frozenset(shape for shape, count in counts.items() if count >= max(2, _SHARE_OF_SHAPE * len(texts)))

@@ -1,8 +1,8 @@
-"""Times of arrival by the clock of the computer that recorded, where the receiver tells no time or no date of its own.
+"""Times of arrival by the clock of the computer that recorded.
 
-The receiver's time comes first. Sentences without any time (a compass alone) get that of their arrival. Where the
-receiver tells the time of the day and no date, the computer's clock gives the date: it must run beside the receiver's,
-some quarters of an hour (its zone) and at most a minute from it.
+They are used where the receiver states no time or no date. The receiver's time comes first. Sentences without any time
+(a compass alone) get that of their arrival. Where the receiver states the time of the day and no date, the computer's
+clock gives the date: its offset from the receiver's must be some quarters of an hour (its zone) and at most a minute.
 """
 
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ _SHARE_BESIDE = 0.9
 
 
 def texts_of(frames: Frames, is_before: bool) -> list[bytes]:
-    """Text of the computer in front of the frames of a block, or behind them."""
+    """Return the computer's text before the frames of a block, or behind them."""
     if frames.texts is None:
         return [b""] * len(frames)
     ends = frames.offsets + (0 if is_before else frames.lengths + frames.texts[:, 1])
@@ -33,7 +33,7 @@ def texts_of(frames: Frames, is_before: bool) -> list[bytes]:
 
 
 def times_of(host: HostText, frames: Frames) -> Column:
-    """Nanoseconds by the computer's clock for each frame of a block, as that clock counts."""
+    """Return the time of each frame of a block by the computer's clock, nanoseconds."""
     values, present = np.zeros(len(frames), dtype=np.int64), np.zeros(len(frames), dtype=bool)
     if host.clock is not None:
         for row, text in enumerate(texts_of(frames, host.clock_is_before)):
@@ -44,7 +44,10 @@ def times_of(host: HostText, frames: Frames) -> Column:
 
 
 def raw_batch(frames: Frames, epochs: Epochs, time: Column) -> RecordBatch | None:
-    """The text around the sentences of a block, a row each that has any; ``time`` is that of the epochs."""
+    """Return the text around the sentences of a block, a row for each that has any.
+
+    ``time`` is that of the epochs.
+    """
     if frames.texts is None or not frames.texts.any():
         return None
     columns = {}
@@ -61,7 +64,7 @@ def raw_batch(frames: Frames, epochs: Epochs, time: Column) -> RecordBatch | Non
 
 @dataclass
 class HostTimes:
-    """Gathers the computer's times over a stream, and tells whether they serve."""
+    """Computer's times gathered over a stream; it finds out whether they are of use."""
 
     host: HostText
     lines: int = 0
@@ -81,7 +84,7 @@ class HostTimes:
         self._day_ns.append(epochs.day_ns)
 
     def serve(self) -> "Served":
-        """What the computer's clock serves for in a stream whose receiver tells no full time."""
+        """Return the times that the computer's clock gives where the receiver states none in full."""
         clock = self.host.clock
         if any(len(places) for places in self._day_places):
             return self._dates() if clock is not None and clock.kind == DATE else Served("no date")
@@ -96,14 +99,20 @@ class HostTimes:
         return places, unrolled(told_ns, DAY_NS) if is_day else told_ns
 
     def _arrivals(self) -> Anchors | None:
-        """Places and times of arrival in order, where the clock is in order; None where it does not serve."""
+        """Return places and times of arrival, where the clock is in order.
+
+        None where it is not.
+        """
         places, told_ns = self._told()
         if len(places) < 2 or np.mean(np.diff(told_ns) >= 0) < _SHARE_IN_ORDER or told_ns[-1] <= told_ns[0]:
             return None
         return Anchors(places, np.maximum.accumulate(told_ns), np.full(len(places), -1, dtype=np.int64))
 
     def _dates(self) -> "Served":
-        """Full times of the epochs that arrived beside their time of the day, in the zone that most agree on."""
+        """Return full times of the epochs that arrived close to their time of the day.
+
+        They are in the zone that most of them agree on.
+        """
         places, told_ns = self._told()
         day_places, day_ns = np.concatenate(self._day_places), np.concatenate(self._day_ns)
         at = np.minimum(np.searchsorted(places, day_places), max(len(places) - 1, 0))
@@ -124,13 +133,13 @@ class HostTimes:
 
 
 def _half_day(ns: Int64Array) -> Int64Array:
-    """Differences of times of the day, from half a day before to half a day after."""
+    """Wrap differences of times of the day to half a day before or after."""
     return np.asarray((ns + DAY_NS // 2) % DAY_NS - DAY_NS // 2, dtype=np.int64)
 
 
 @dataclass(frozen=True)
 class Served:
-    """What the computer's clock gave.
+    """Times that the computer's clock gave.
 
     Parameters
     ----------
@@ -152,7 +161,7 @@ class Served:
 
 
 def remarks(host: HostText, lines: int, served: Served | None) -> Iterator[Remark]:
-    """What stands around the sentences, and what its time serves for."""
+    """Yield remarks on the text around the sentences and on the use of its time."""
     text = f"{lines} sentences stand in text of the computer that recorded, as {host.example!r}: kept as {TOPIC}"
     if served is None:
         text += "; times are the receiver's"

@@ -1,4 +1,4 @@
-"""Layouts of binary messages: a line of text says what a message holds, numpy takes the fields out.
+"""Layouts of binary messages: a line of text lists the fields, numpy reads them.
 
 ``iTOW:u4 lon:i4/1e7+lonHp lonHp:i1/1e9 valid:x1(date time -:6) | numSvs gnssId:u1``: a field is its name and its
 little-endian type (u, i, r, and c for texts, with a number of bytes); ``/1e7`` divides; ``+lonHp`` adds a finer part
@@ -23,7 +23,10 @@ _FIELD = re.compile(r"(?P<name>[\w-]+):(?P<kind>[uirxc])(?P<size>\d+)(?:/(?P<div
 
 @dataclass(frozen=True)
 class Field:
-    """One field: its name and the name of the structure's member; ``shift`` and ``width`` of bits, else -1 and 0."""
+    """Field of a message: its name and the name of the structure's member.
+
+    ``shift`` and ``width`` are those of bits, else -1 and 0.
+    """
 
     name: str
     member: str
@@ -35,7 +38,7 @@ class Field:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """The head of a message, or the group in it that repeats: a structure and the fields in it.
+    """Head of a message, or the group in it that repeats: a structure and its fields.
 
     ``ends`` is where each member ends, bytes: a message of an older version may be shorter.
     """
@@ -62,7 +65,9 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """What a message holds; ``count`` names the field that tells how often the group repeats (``*``: as it fits).
+    """Layout of a message: its head, the group that repeats, and the count of groups.
+
+    ``count`` names the field with the number of groups (``*``: as many as fit).
 
     ``tail`` bytes may stand behind the groups; they are not read.
     """

@@ -1,4 +1,7 @@
-"""Binary messages of a block: their fields as columns under the receiver's own names, one topic a message."""
+"""Binary messages of a block: their fields as columns, one topic a message.
+
+Columns have the receiver's own names.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,7 +22,7 @@ from groundstation.base.records import (
 from groundstation.readers.receiver.layouts import Layout
 from groundstation.readers.receiver.stream import Frames
 
-PIECE_BYTES = MAX_TEXT_CHARACTERS // 2  # of a payload that is kept as hexadecimal digits
+PIECE_BYTES = MAX_TEXT_CHARACTERS // 2  # bytes of a payload in one row, as hexadecimal digits
 PIECES_AT_ONCE = 4_096
 Columns = dict[str, Column]
 _DIGITS = np.frombuffer(b"0123456789abcdef", dtype=np.uint8)
@@ -57,12 +60,15 @@ class Messages:
 
     @property
     def size(self) -> int:
-        """Bytes of the shortest payload: fields behind it are not there."""
+        """Bytes of the shortest payload: fields behind it are missing."""
         return int(self.payload_sizes.min())
 
     @property
     def topic(self) -> str:
-        """``raw.<name>``; with the bytes of the payload behind it where that is shorter than the layout."""
+        """Topic ``raw.<name>``, or ``raw.<name>.<bytes>`` for a payload shorter than the layout.
+
+        The bytes are those of the payload.
+        """
         is_usual = self.layout is None or self.size >= self.layout.size
         return f"raw.{self.name}" if is_usual else f"raw.{self.name}.{self.size}"
 
@@ -76,18 +82,21 @@ class Messages:
         return self._head
 
     def has(self, member: str) -> bool:
-        """Whether the heads have a member."""
+        """Tell whether the heads have a member."""
         return self.layout is not None and self.layout.head.ends.get(member, self.size + 1) <= self.size
 
     @property
     def is_short(self) -> bool:
-        """Whether payloads are shorter than the layout, and of no older version that is known."""
+        """Tell whether payloads are shorter than the layout, and of no known older version."""
         if self.layout is None or self.size >= self.layout.size:
-            return False  # also of a text that its layout does not fit: is_sound tells that
+            return False  # also for a text that does not fit its layout, which is_sound tells
         return not self.is_sound or self.size >= self.layout.needed
 
     def misfits(self) -> BoolArray:
-        """Messages whose payload is longer than the layout, or does not hold the group as often as it says."""
+        """Tell which messages have a payload that does not fit the layout.
+
+        It is longer than the layout, or does not hold the group as often as it says.
+        """
         if self.layout is None or self.size < self.layout.size:
             return np.zeros(len(self), dtype=bool)
         behind = self.payload_sizes - self.layout.size
@@ -95,16 +104,19 @@ class Messages:
             return np.asarray(behind != 0)
         width = self.layout.group.dtype.itemsize
         told = np.zeros(len(self), dtype=np.int64) if self.layout.count == "*" else self._told()
-        as_they_fit = (told == 0) & (behind % width == 0)  # as older versions that tell no count
+        as_they_fit = (told == 0) & (behind % width == 0)  # older versions state no count
         return np.asarray((behind != width * told) & (behind != width * told + self.layout.tail) & ~as_they_fit)
 
     def _told(self) -> Int64Array:
-        """Groups that each message says it has."""
+        """Return the number of groups that each message states."""
         assert self.layout is not None
         return self.layout.head.values(self.head(), self.layout.count).astype(np.int64)
 
     def group(self) -> tuple[NDArray[Any], Int64Array, Int64Array]:
-        """Members of the repeated groups: structures, which message each is of, and its place in the file."""
+        """Return the members of the repeated groups, the message of each, its place in the file.
+
+        The members are structures.
+        """
         assert self.layout is not None and self.layout.group is not None
         width = self.layout.group.dtype.itemsize
         fits = np.maximum(self.payload_sizes - self.layout.size, 0) // width
@@ -120,13 +132,16 @@ class Messages:
 
 
 def _repeated(counts: Int64Array) -> tuple[Int64Array, Int64Array]:
-    """Owner of each repetition and its number within the owner."""
+    """Return the owner of each repetition and its number within the owner."""
     owner = np.repeat(np.arange(len(counts)), counts)
     return owner, np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def raw_batches(messages: Messages, time: Column) -> Iterator[RecordBatch]:
-    """Batches of ``raw.<name>``, and of ``raw.<name>.group`` where a group repeats: a row for each of its members."""
+    """Yield batches of ``raw.<name>``, and of ``raw.<name>.group`` where a group repeats.
+
+    The latter have a row for each member of the group.
+    """
     topic, layout = messages.topic, messages.layout
     columns = {} if layout is None else layout.head.columns(messages.head(), messages.size)
     if layout is None or not columns:
@@ -141,7 +156,7 @@ def raw_batches(messages: Messages, time: Column) -> Iterator[RecordBatch]:
 
 
 def _payloads(topic: str, messages: Messages, time: Column) -> Iterator[RecordBatch]:
-    """Payloads as hexadecimal digits, the long ones in pieces of PIECE_BYTES, each a row."""
+    """Yield payloads as hexadecimal digits, in rows of at most PIECE_BYTES."""
     owner, number = _repeated(np.maximum(-(-messages.payload_sizes // PIECE_BYTES), 1))
     for start in range(0, len(owner), PIECES_AT_ONCE):
         rows = slice(start, start + PIECES_AT_ONCE)
@@ -159,7 +174,7 @@ def _payloads(topic: str, messages: Messages, time: Column) -> Iterator[RecordBa
 
 
 def text_batches(messages: Messages, time: Column) -> Iterator[RecordBatch]:
-    """Batches of messages that are nothing but a text."""
+    """Yield batches of messages that are nothing but a text."""
     for start in range(0, len(messages), PIECES_AT_ONCE):
         rows = slice(start, start + PIECES_AT_ONCE)
         width = int(np.clip(messages.payload_sizes[rows].max(), 1, MAX_TEXT_CHARACTERS))
@@ -170,7 +185,7 @@ def text_batches(messages: Messages, time: Column) -> Iterator[RecordBatch]:
 
 
 def bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
-    """A batch in pieces of at most MAX_BATCH_ROWS rows."""
+    """Yield a batch in pieces of at most MAX_BATCH_ROWS rows."""
     if len(batch) <= MAX_BATCH_ROWS:
         yield batch
         return
@@ -195,7 +210,7 @@ class Block(dict[str, Messages]):
 
 
 def occupied(topic: str, places: Int64Array, time: Column, columns: Columns) -> RecordBatch | None:
-    """A batch of the rows that have any value."""
+    """Return a batch of the rows that have any value."""
     if not columns:
         return None
     rows = np.logical_or.reduce([column.mask for column in columns.values()])

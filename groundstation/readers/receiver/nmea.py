@@ -24,7 +24,7 @@ _CENTURY = 80  # two digits of a year from here on are of the last century
 
 @dataclass(frozen=True)
 class Choice:
-    """Which sentences of a stream give ``gnss``.
+    """Choice of the sentences of a stream that give ``gnss``.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Choice:
 
     @property
     def timed(self) -> tuple[str, ...]:
-        """Formatters of the sentences of which each has the time of its epoch."""
+        """Formatters of the sentences that state the time of their epoch."""
         return (*TIMED, self.maker) if self.maker else TIMED
 
 
@@ -75,7 +75,7 @@ class Epochs:
         return len(self.day_ns)
 
     def time_of(self, address: str, time: Column) -> Column:
-        """Time of each sentence, given that of the epochs."""
+        """Return the time of each sentence, given that of the epochs."""
         epoch = self.epoch[address]
         if not len(self) and self.arrivals is not None:
             return _arrival(self.arrivals, self.sentences[address].places)
@@ -85,7 +85,7 @@ class Epochs:
         return Column(time.values[at], time.mask[at] & (epoch >= 0))
 
     def of(self, *formatters: str) -> list[tuple[Sentences, Int64Array]]:
-        """Sentences with a formatter, those of combined solutions (GN) last, and their epochs."""
+        """Return sentences with a formatter and their epochs, combined solutions (GN) last."""
         several = (one for one in self.sentences.values() if one.address not in self.choice.passed_over)
         found = [one for one in several if one.formatter in formatters]
         return [(one, self.epoch[one.address]) for one in sorted(found, key=lambda one: one.address.startswith("GN"))]
@@ -93,7 +93,9 @@ class Epochs:
     def values(
         self, formatter: str, names: tuple[str, ...], rows_of: Callable[[Sentences], BoolArray] | None = None
     ) -> Columns:
-        """Fields of a formatter by epoch; where an epoch has several such sentences the last that has the field.
+        """Return the fields of a formatter by epoch.
+
+        Where an epoch has several such sentences the last that has the field counts.
 
         ``rows_of`` tells which sentences count, all where it is left out.
         """
@@ -114,13 +116,13 @@ class Epochs:
 
 
 def _arrival(arrivals: Anchors, places: Int64Array) -> Column:
-    """Times of arrival of the sentences at given places; absent for one that has none."""
+    """Return times of arrival of the sentences at given places; absent where unknown."""
     at = np.minimum(np.searchsorted(arrivals.places, places), len(arrivals) - 1)
     return Column(arrivals.utc_ns[at], arrivals.places[at] == places)
 
 
 def epochs_of(sentences: Mapping[str, Sentences], choice: Choice = ALL, arrivals: Anchors | None = None) -> Epochs:
-    """Put the sentences of a block into epochs."""
+    """Group the sentences of a block into epochs."""
     which, day_ns, is_whole = [], [], []
     for one in sentences.values():
         if one.formatter in choice.timed:
@@ -148,7 +150,7 @@ def epochs_of(sentences: Mapping[str, Sentences], choice: Choice = ALL, arrivals
 
 
 def _with_fractions(told_ns: Int64Array, is_whole: BoolArray) -> Int64Array:
-    """Times in whole seconds that stand behind one with a fraction in the same second take that time."""
+    """Give times in whole seconds the fraction of an earlier time in the same second."""
     if not len(told_ns) or not is_whole.any() or is_whole.all():
         return told_ns
     last = np.maximum.accumulate(np.where(is_whole, -1, np.arange(len(told_ns))))
@@ -158,7 +160,10 @@ def _with_fractions(told_ns: Int64Array, is_whole: BoolArray) -> Int64Array:
 
 
 def epoch_start(frames: Frames, sentences: Mapping[str, Sentences], choice: Choice = ALL) -> int:
-    """Number of the frame with which the last second of a block begins, ``len(frames)`` where none has a time."""
+    """Return the number of the frame with which the last second of a block begins.
+
+    ``len(frames)`` where no frame has a time.
+    """
     epochs = epochs_of(sentences, choice)
     if not len(epochs):
         return len(frames)
@@ -169,10 +174,10 @@ def epoch_start(frames: Frames, sentences: Mapping[str, Sentences], choice: Choi
 
 
 def full_times(sentences: Mapping[str, Sentences]) -> tuple[Int64Array, Int64Array]:
-    """Places and UTC nanoseconds of the sentences that tell date and time: RMC (two digits of the year) and ZDA.
+    """Return places and UTC nanoseconds of the sentences that state date and time.
 
-    Makers' sentences tell it where there is none of these. Where an RMC calls its fix valid those that do not are left
-    out: before it a receiver guesses.
+    These are RMC (two digits of the year) and ZDA, or makers' sentences where there is none of them. Where some RMC
+    calls its fix valid, those that do not are left out: before the fix a receiver guesses.
     """
     places, utc_ns = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
     has_standard = any(one.formatter in ("RMC", "ZDA") for one in sentences.values())
@@ -200,14 +205,17 @@ def full_times(sentences: Mapping[str, Sentences]) -> tuple[Int64Array, Int64Arr
 
 
 class DayTimes:
-    """Tells UTC of the epochs of one block after the other; the time of the day, counted on, where no date is told."""
+    """UTC of the epochs of consecutive blocks.
+
+    Where no date is stated it is the time of the day, counted on past midnight.
+    """
 
     def __init__(self, anchors: Anchors) -> None:
         self._anchors = anchors
         self._last_ns: int | None = None
 
     def of(self, epochs: Epochs) -> Column:
-        """Times of the epochs of the next block."""
+        """Return the times of the epochs of the next block."""
         time = self._anchors.of_day(epochs.places, epochs.day_ns)
         if len(self._anchors) or not len(time):
             return time

@@ -1,4 +1,7 @@
-"""Canonical topics from NMEA sentences: ``gnss`` by epochs, ``ins`` from the sentences that tell the heading."""
+"""Canonical topics from NMEA sentences.
+
+``gnss`` comes by epochs, ``ins`` from the sentences that state the heading.
+"""
 
 import numpy as np
 
@@ -24,7 +27,7 @@ _NONE, _AUTONOMOUS, _DIFFERENTIAL, _FIXED, _FLOAT, _PPP, _ESTIMATED, _MANUAL, _S
 _BY_GNSS = np.isin(np.arange(len(_FIXES)), (_AUTONOMOUS, _DIFFERENTIAL, _FIXED, _FLOAT, _PPP, _FLAT))
 _PLAIN = np.isin(np.arange(len(_FIXES)), (_AUTONOMOUS, _DIFFERENTIAL))
 _BY_HAND = np.isin(np.arange(len(_FIXES)), (_MANUAL, _SIMULATED))
-_OF_QUALITY = np.full(12, _OTHER)  # of GGA, 0 to 10; others are not known
+_OF_QUALITY = np.full(12, _OTHER)  # by the quality of GGA, 0 to 10; others are unknown
 _OF_QUALITY[:6] = _NONE, _AUTONOMOUS, _DIFFERENTIAL, _AUTONOMOUS, _FIXED, _FLOAT
 _OF_QUALITY[6:11] = _ESTIMATED, _MANUAL, _SIMULATED, _DIFFERENTIAL, _PPP
 # Letters of a mode by rank: GNS has one for each system, and the highest counts; 0 no letter, 2 one that is not known.
@@ -36,7 +39,7 @@ _RANKS[[0, *map(ord, "NSMEAPDFR")]] = 0, 1, 3, 4, 5, 6, 7, 8, 9, 10
 
 
 def gnss_batch(epochs: Epochs, time: Column, tally: Tally) -> RecordBatch | None:
-    """One row an epoch that has a fix, or the word that there is none."""
+    """Return one row for each epoch that has a fix, or says that it has none."""
     columns = makers_solution(epochs)
     for formatter in STANDARD_POSITIONS:  # the last that has a position gives it
         columns |= _merged(columns, _position(epochs, formatter))
@@ -53,7 +56,7 @@ def gnss_batch(epochs: Epochs, time: Column, tally: Tally) -> RecordBatch | None
 
 
 def _merged(columns: Columns, newer: Columns) -> Columns:
-    """The newer values where there are any, the older ones elsewhere."""
+    """Merge columns: newer values where there are any, older ones elsewhere."""
     merged = {}
     for name, column in newer.items():
         before = columns.get(name)
@@ -79,7 +82,10 @@ def _position(epochs: Epochs, formatter: str) -> Columns:
 
 
 def _has_fix(formatter: str, found: Columns) -> BoolArray:
-    """Whether a sentence says that its fix is valid; a mode N says that it is not, whatever the status."""
+    """Tell whether a sentence says that its fix is valid.
+
+    Mode N says that it is not, whatever the status.
+    """
     if formatter == "GGA":
         return np.asarray(found["quality"].mask & (found["quality"].values > 0))
     mode = found["posMode"]
@@ -90,9 +96,10 @@ def _has_fix(formatter: str, found: Columns) -> BoolArray:
 
 
 def _add_heights(epochs: Epochs, columns: Columns, tally: Tally) -> None:
-    """Heights of GGA or GNS, metres above the sea, and with the separation above the ellipsoid.
+    """Add the heights of GGA or GNS, metres above the sea and above the ellipsoid.
 
-    Where the separation cannot be one the sum is the height above the ellipsoid all the same, the rest is left out.
+    The latter needs the separation. Where the separation cannot be one the sum is the height above the ellipsoid all
+    the same, and the height above the sea is left out.
     """
     for formatter in ("GNS", "GGA"):
         units = ("altUnit", "sepUnit") if formatter == "GGA" else ()
@@ -113,7 +120,10 @@ def _add_heights(epochs: Epochs, columns: Columns, tally: Tally) -> None:
 
 
 def _velocity(epochs: Epochs) -> Columns:
-    """Speed and track of RMC, which has a time; of VTG where RMC has none. None where an epoch has no valid fix."""
+    """Return speed and track of RMC, which has a time, or of VTG where RMC has none.
+
+    Absent where an epoch has no valid fix.
+    """
     told: Columns = {}
     invalid: BoolArray = np.zeros(len(epochs), dtype=bool)
     found = epochs.values("RMC", ("spd", "cog", *_VALIDITY["RMC"]))
@@ -144,7 +154,10 @@ _SPEED_UNITS = {"N": MPS_PER_KNOT, "K": MPS_PER_KMH}
 
 
 def _of_track_made_good(found: Columns) -> Columns:
-    """Speed and true track of VTG by the units that it tells; one without them has each in its place."""
+    """Return speed and true track of VTG by the units that it states.
+
+    A sentence without units has each value in its usual place.
+    """
     if not found:
         return {}
     valid = ~(found["posMode"].mask & (found["posMode"].values == "N"))
@@ -190,7 +203,10 @@ def _has_satellites(sentences: Sentences) -> BoolArray:
 
 
 def _add_solution(epochs: Epochs, columns: Columns, tally: Tally) -> None:
-    """Kind of the fix, and whether GNSS gives it: not told of a fix in two dimensions, which has no height either."""
+    """Add the kind of the fix, and whether GNSS gives it.
+
+    The latter is absent for a fix in two dimensions, which has no height either.
+    """
     kind = _kind(epochs)
     tally.add(NOT_MEASURED, "gnss", epochs.places[kind.mask & _BY_HAND[kind.values]])
     trusted = Column(_BY_GNSS[kind.values], kind.mask & (kind.values != _OTHER))
@@ -210,7 +226,10 @@ def _add_solution(epochs: Epochs, columns: Columns, tally: Tally) -> None:
 
 
 def _kind(epochs: Epochs) -> Column:
-    """Kind of solution of each epoch by the mode of RMC or GNS, and by the quality of GGA before them."""
+    """Return the kind of solution of each epoch.
+
+    It follows from the quality of GGA, else from the mode of GNS or RMC.
+    """
     kind = Column(np.full(len(epochs), _NONE), np.zeros(len(epochs), dtype=bool))
     for formatter in ("RMC", "GNS"):
         found = epochs.values(formatter, ("posMode",))
@@ -234,7 +253,7 @@ def _and(one: Column, other: Column) -> Column:
 
 
 def has_heading(sentences: Sentences) -> bool:
-    """Whether sentences tell a heading at all."""
+    """Tell whether sentences state a heading at all."""
     if sentences.formatter not in HEADING_FORMATTERS:
         return False
     return any(one.mask.any() for name, one in _heading(sentences).items() if name in HEADINGS)
@@ -259,7 +278,10 @@ def _heading(sentences: Sentences) -> Columns:
 
 
 def _attitude(columns: Columns) -> Columns:
-    """Attitude of PASHR where the sentence has a time, calls its heading true, and has a fix or aligned sensors."""
+    """Return the attitude of PASHR, where it can be trusted.
+
+    The sentence must have a time, call its heading true, and have a fix or aligned sensors.
+    """
     quality, aligned = columns["gnssQual"], columns["imuAlign"]
     is_good = (quality.mask & (quality.values > 0)) | (aligned.mask & (aligned.values > 0))
     is_good |= ~quality.mask & ~aligned.mask

@@ -1,4 +1,4 @@
-"""Fixes of makers' own sentences, for a log without a standard sentence that tells a position."""
+"""Fixes of makers' own sentences, for a log without a standard position sentence."""
 
 import re
 
@@ -20,7 +20,10 @@ _POS_KIND = {0: "3d", 1: "dgnss", 2: "rtk_float", 3: "rtk_fixed"}
 
 
 def makers_solution(epochs: Epochs) -> Columns:
-    """Columns of ``gnss`` from the maker's sentence that was chosen; none where a standard one tells the position."""
+    """Return columns of ``gnss`` from the maker's sentence that was chosen.
+
+    There are none where a standard sentence states the position.
+    """
     match epochs.choice.maker:
         case "PUBX.00":
             return _of_ublox(epochs)
@@ -32,7 +35,7 @@ def makers_solution(epochs: Epochs) -> Columns:
 
 
 def _of_ublox(epochs: Epochs) -> Columns:
-    """PUBX 00: heights above the ellipsoid, km/h, vertical velocity positive down."""
+    """Return columns of PUBX 00: heights above the ellipsoid, km/h, down positive."""
     numbers = ("altRef", "hAcc", "vAcc", "SOG", "COG", "vVel", "HDOP", "numSVs")
     found = epochs.values("PUBX.00", ("lat", "lon", "navStat", *numbers))
     if not found:
@@ -64,7 +67,10 @@ def _of_ublox(epochs: Epochs) -> Columns:
 
 
 def _of_trimble(epochs: Epochs) -> Columns:
-    """PTNL GGK: a height of the kind EHT is above the ellipsoid, others are above another surface and stay raw."""
+    """Return columns of PTNL GGK.
+
+    A height of the kind EHT is above the ellipsoid; others are above another surface and stay raw.
+    """
     found = epochs.values("PTNL.GGK", ("lat", "lon", "gpsQual", "sip", "DOP", "height"))
     if not found:
         return {}
@@ -80,7 +86,10 @@ def _of_trimble(epochs: Epochs) -> Columns:
 
 
 def _of_ashtech(epochs: Epochs) -> Columns:
-    """PASHR POS: its height and speed are of several kinds and units by the device, and stay raw."""
+    """Return columns of PASHR POS.
+
+    Its height and speed are of several kinds and units by the device, and stay raw.
+    """
     found = epochs.values("PASHR.POS", ("lat", "lon", "solnType", "sip", "PDOP", "HDOP"))
     if not found:
         return {}

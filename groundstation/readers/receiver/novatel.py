@@ -1,4 +1,4 @@
-"""NovAtel OEM messages of a block: names, times, and the canonical topics ``gnss`` and ``ins``.
+"""NovAtel OEM messages of a block: names, times, canonical topics ``gnss`` and ``ins``.
 
 NovAtel's vehicle has y forward, x right and z up: roll about y is right wing down positive, pitch about x nose up,
 azimuth clockwise from north, as here. INSPVA's height is above the ellipsoid; others tell it above the sea, with the
@@ -50,7 +50,7 @@ _HEIGHT_IS_GIVEN, _LAST_TYPE = 2, 255  # types of position: FIXEDHEIGHT, and the
 
 
 def _fixes() -> NDArray[np.str_]:
-    """Kind of solution by NovAtel's type of position; ``other`` by a type that is not known."""
+    """Return the kind of solution by NovAtel's position type; ``other`` if unknown."""
     kinds = {"none": (0,), "2d": (2,), "3d": (8, 16), "dgnss": (17, 18, 20, 64, 65, 66), "dead_reckoning": (19,)}
     kinds |= {"ppp": (68, 69, 77, 78), "rtk_float": (32, 33, 34), "rtk_fixed": (48, 49, 50, 51)}
     kinds |= {"gnss_ins": (52, 53, 54, 55, 56, 57, 58, 59, 73, 74, 79, 80)}
@@ -85,7 +85,7 @@ class Timed(Messages):
 
     @property
     def frame_at(self) -> Int64Array:
-        """Where the frames begin in the data of the block."""
+        """Places where the frames begin in the data of the block."""
         return self.places - self.frames.first_byte
 
 
@@ -116,7 +116,7 @@ def _of_text(logs: novatel_text.TextLogs | None) -> Iterator[Timed]:
 
 
 def _by_size(name: str, frames: Frames, at: Int64Array, payload_at: Int64Array, sizes: Int64Array) -> Iterator[Timed]:
-    """Messages with a layout whose payloads are shorter than it apart from the others."""
+    """Yield messages by size of payload: those shorter than the layout apart."""
     known = layout(LAYOUTS[name]) if name in LAYOUTS else None
     is_short = sizes < (known.size if known is not None else 0)
     is_odd = name.removesuffix(novatel_text.KEPT) in LAYOUTS and known is None
@@ -128,7 +128,10 @@ def _by_size(name: str, frames: Frames, at: Int64Array, payload_at: Int64Array, 
 
 
 def epoch_start(frames: Frames) -> int:
-    """Number of the first message of the last epoch in a block, ``len(frames)`` where there is none."""
+    """Return the number of the first message of the last epoch in a block.
+
+    ``len(frames)`` where there is none.
+    """
     which = frames.of(scan.NOVATEL, scan.NOVATEL_TEXT)
     if not len(which):
         return len(frames)
@@ -145,7 +148,7 @@ def epoch_start(frames: Frames) -> int:
 
 @np.errstate(all="ignore")  # doubles of a device may be anything
 def gnss_batch(block: Block, leader: str, tally: Tally) -> RecordBatch | None:
-    """One row a position, with velocity and dilution of the same moment."""
+    """Return one row for each position, with velocity and dilution of the same moment."""
     messages, fields = block.get(leader), block.fields(leader)
     if not isinstance(messages, Timed) or fields is None:
         return None
@@ -173,7 +176,10 @@ def gnss_batch(block: Block, leader: str, tally: Tally) -> RecordBatch | None:
 
 @np.errstate(all="ignore")
 def ins_batch(block: Block, source: str, tally: Tally) -> RecordBatch | None:
-    """Position, velocity and attitude of the receiver's inertial filter, or the heading of its two antennas."""
+    """Return position, velocity and attitude of the receiver's inertial filter.
+
+    For a HEADING message it is the heading of the receiver's two antennas.
+    """
     messages, fields = block.get(source), block.fields(source)
     if not isinstance(messages, Timed) or fields is None:
         return None
@@ -189,7 +195,10 @@ def ins_batch(block: Block, source: str, tally: Tally) -> RecordBatch | None:
 
 
 def _solution_time(messages: Timed, fields: Mapping[str, NDArray[Any]]) -> Column:
-    """Time of validity: the week and second inside the message where it has them, else those of its header."""
+    """Return the time of validity: the week and second inside the message, or of its header.
+
+    Those of the header count where the message has none.
+    """
     if "seconds" not in fields:
         return messages.time()
     week, seconds = fields["week"].astype(np.int64), fields["seconds"]
@@ -267,7 +276,10 @@ def _spreads(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 def _covariance(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """Roots of the diagonals: position and velocity x east, y north, z up; attitude about x (pitch), y (roll), z."""
+    """Return the roots of the diagonals of the covariances.
+
+    Position and velocity: x east, y north, z up. Attitude: about x (pitch), y (roll), z.
+    """
 
     def root(kind: str, *axes: int) -> Column:
         return Column(np.sqrt(sum(fields[f"{kind}_cov_{axis}"] for axis in axes)))
@@ -283,7 +295,7 @@ def _covariance(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 def _joined(block: Block, leader: Timed, name: str, columns_of: Any) -> Columns:
-    """Columns of another message, on the rows of the leading one that have its time."""
+    """Return columns of another message, on the rows of the leading one with its time."""
     other, fields = block.get(name), block.fields(name)
     if not isinstance(other, Timed) or fields is None:
         return {}

@@ -1,4 +1,6 @@
-"""Messages of NovAtel OEM receivers: numbers, names and layouts, with the field names of NovAtel's message database.
+"""Messages of NovAtel OEM receivers: numbers, names and layouts.
+
+Field names are those of NovAtel's message database.
 
 Source: NovAtel, OEM7 commands and logs reference manual; the database of novatel_edie (MIT). Enumerations stay numbers.
 """

@@ -1,7 +1,7 @@
-"""NovAtel logs as text (``#BESTPOSA,...;...*CRC``): each becomes its binary form, which the same layouts read.
+"""NovAtel logs as text (``#BESTPOSA,...;...*CRC``), converted to their binary form.
 
-Names of enumerations become their numbers, hexadecimal words numbers. A log that its layout does not fit keeps its
-text.
+The same layouts read that form. Names of enumerations become their numbers, hexadecimal words numbers. A log that its
+layout does not fit keeps its text.
 
 Source: NovAtel, OEM7 commands and logs reference manual, ASCII and short ASCII headers; names of the database of
 novatel_edie (MIT).
@@ -20,10 +20,8 @@ from groundstation.readers.receiver import scan
 from groundstation.readers.receiver.novatel_messages import LAYOUTS
 from groundstation.readers.receiver.stream import Frames
 
-HEADER = struct.Struct(
-    "<3sBHBBHHBBHI8s"
-)  # of the binary form: header, number, kind ... time status, week, milliseconds
-KEPT = "-text"  # behind the name of a log of which the text is kept
+HEADER = struct.Struct("<3sBHBBHHBBHI8s")  # binary header: header, number, kind ... time status, week, milliseconds
+KEPT = "-text"  # added to the name of a log whose text is kept
 _TIME_STATUS = {"UNKNOWN": 20, "APPROXIMATE": 60, "COARSEADJUSTING": 80, "COARSE": 100, "COARSESTEERING": 120}
 _TIME_STATUS |= {"FREEWHEELING": 130, "FINEADJUSTING": 140, "FINE": 160, "FINEBACKUPSTEERING": 170}
 _TIME_STATUS |= {"FINESTEERING": 180, "SATTIME": 200}
@@ -31,7 +29,7 @@ _SHORT_STATUS = 180  # short headers do not tell it
 
 
 def _numbered(text: str, first: int = 0) -> dict[str, int]:
-    """Names in their order; ``=16`` goes on with that number."""
+    """Number names in their order; ``=16`` continues with that number."""
     found, number = {}, first
     for word in text.split():
         name, _, told = word.partition("=")
@@ -128,14 +126,17 @@ def as_binary(frames: Frames) -> TextLogs | None:
 
 
 def week_ms_of(frames: Frames, number: int) -> int:
-    """Millisecond of the week of one text by its header; -1 where it tells none."""
+    """Return the millisecond of the week in a text's header; -1 where it has none."""
     at = int(frames.offsets[number])
     head = frames.data[at : at + int(frames.lengths[number])].tobytes().partition(b";")[0]
     return int(HEADER.unpack(_header(head.decode("ascii").split(","))[1])[10])
 
 
 def _header(cells: Sequence[str]) -> tuple[str, bytes]:
-    """Name and binary header of the cells of a text's header; without a time where it tells none."""
+    """Return the name and binary header of the cells of a text's header.
+
+    Without a time where the text states none.
+    """
     is_short = cells[0].startswith("%")
     name = re.sub(r"A$", "", cells[0][1:])
     week, seconds = (cells[1:3] if is_short else cells[5:7]) if len(cells) >= (3 if is_short else 7) else ("", "")
@@ -147,14 +148,20 @@ def _header(cells: Sequence[str]) -> tuple[str, bytes]:
 
 @cache
 def _fields(name: str) -> tuple[tuple[tuple[str, str], ...], tuple[tuple[str, str], ...]]:
-    """Names and types of the head and of the group that repeats, fields that are passed over among them."""
+    """Return names and types of the head and of the group that repeats.
+
+    Fields that are passed over are included.
+    """
     head, _, group = LAYOUTS[name].partition("|")
     parts = head.split(), group.split()[1:]
     return tuple(tuple((one.partition(":")[0], one.partition(":")[2]) for one in part) for part in parts)  # type: ignore[return-value]
 
 
 def _body(name: str, text: str) -> bytes | None:
-    """Body of the binary form; None for a log that is not known or that its layout does not fit."""
+    """Return the body of the binary form.
+
+    None for a log that is not known or that its layout does not fit.
+    """
     if name not in LAYOUTS:
         return None
     head, group = _fields(name)
@@ -182,7 +189,7 @@ def _packed(name: str, kind: str, cell: str) -> bytes:
 
 @cache
 def _reader_of(name: str, kind: str) -> Callable[[str], float]:
-    """What makes a number of a cell."""
+    """Return the function that converts a cell to a number."""
     if kind[0] == "r":
         return float
     if name in _HEXADECIMAL:

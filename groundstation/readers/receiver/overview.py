@@ -1,4 +1,4 @@
-"""The first pass over a stream: full times, which messages there are, and which of them lead."""
+"""First pass over a stream: full times, the messages there are, and which of them lead."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -35,7 +35,7 @@ MOST_BLOCKS_KEPT = 1
 
 @dataclass
 class Overview:
-    """What a stream holds.
+    """Contents of a stream, by the first pass over it.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Overview:
 
 
 def overview(source: Source, bare: bool, host: HostText | None = None) -> Overview:
-    """Walk through a stream once; ``host`` is how a computer wrote around the sentences."""
+    """Read a stream once; ``host`` is the form of a computer's text in it."""
     found, full_times, attitudes, sound = Overview(), ubx.FullTimes(), Counter[str](), set[str]()
     places, utc_ns = [], []
     stream = Stream(source, bare, is_hosts=host.accepts if host else None)
@@ -125,7 +125,10 @@ _NOTHING: Int64Array = np.zeros(0, dtype=np.int64)
 
 
 def _choose(found: Overview, attitudes: Counter[str], sound: set[str]) -> None:
-    """Choose what gives ``gnss`` and ``ins``: of several the first in the order of the tables, for the whole stream."""
+    """Choose the sources of ``gnss`` and ``ins``, for the whole stream.
+
+    Of several the first in the order of the tables counts.
+    """
     leaders = (*POSITION_SOURCES, *novatel_messages.POSITION_SOURCES)
     found.leader = next((name for name in leaders if name in sound), "")
     found.choice = _choice_of(found.counts)
@@ -143,7 +146,7 @@ def _choose(found: Overview, attitudes: Counter[str], sound: set[str]) -> None:
 
 
 def _choice_of(counts: Counter[str]) -> nmea.Choice:
-    """Sentences that give ``gnss``, by the addresses of a stream."""
+    """Choose the sentences that give ``gnss``, by the addresses of a stream."""
     positions = {name for name in counts if formatter_of(name) in STANDARD_POSITIONS}
     if not positions:
         return nmea.Choice(maker=next((name for name in MAKERS_POSITIONS if counts[name]), ""))
@@ -173,7 +176,10 @@ def _set_times(
 
 
 def _take_hosts(found: Overview, host_clock: HostTimes) -> None:
-    """Take the date, or times of arrival, from the computer's clock where the stream tells none."""
+    """Take the date, or times of arrival, from the computer's clock.
+
+    Only where the stream states none.
+    """
     served = None if len(found.anchors) else host_clock.serve()
     if served is not None:
         found.arrivals, found.is_absolute = served.arrivals, served.is_absolute
@@ -183,7 +189,7 @@ def _take_hosts(found: Overview, host_clock: HostTimes) -> None:
 
 
 def _versions(messages: Messages) -> dict[str, str]:
-    """Firmware, hardware and extensions of MON-VER; of several the last."""
+    """Return firmware, hardware and extensions of the last MON-VER."""
     assert messages.layout is not None
     head = messages.layout.head.columns(messages.head(), messages.size)
     facts = {"receiver": "u-blox"}
@@ -205,7 +211,7 @@ def _rtcm_numbers(frames: Frames) -> Iterator[int]:
 
 
 def remarks(found: Overview) -> Iterator[Remark]:
-    """What serves as what, and what was passed over."""
+    """Yield remarks on what serves each topic, and what was passed over."""
     yield from found.remarks
     yield from _gnss_remarks(found)
     if found.attitude:
@@ -223,7 +229,10 @@ def remarks(found: Overview) -> Iterator[Remark]:
 
 
 def _gnss_remarks(found: Overview) -> Iterator[Remark]:
-    """What serves as ``gnss``, and the other solutions of the receiver, which would look like a second one."""
+    """Yield remarks on the source of ``gnss``, and on other solutions of the receiver.
+
+    The others would look like a second receiver.
+    """
     if found.leader:
         others = ", ".join(name for name in _added_to(found.leader) if found.counts[name])
         text = f"gnss from {found.leader}" + (f" with {others} of the same epoch" if others else "")

@@ -1,4 +1,7 @@
-"""The second pass over a stream: batches of every message and sentence, raw and canonical, remarks and damages."""
+"""Second pass over a stream: batches of messages and sentences, remarks and damage.
+
+Batches are raw, and canonical where a rule serves them.
+"""
 
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -28,7 +31,7 @@ _WITH_CHECKSUM = re.compile(rb"[$!][A-Z][A-Z0-9]{2,29},[^\r\n$*]{0,500}\*[0-9A-F
 
 
 def items(source: Source) -> Iterator[Item]:
-    """Yield the header, batches in the order of the blocks of the stream, then remarks and damages.
+    """Yield the header, batches in the order of the blocks of the stream, remarks and damage.
 
     Raises
     ------
@@ -106,7 +109,7 @@ def _ins(block: Block, epochs: nmea.Epochs, time: Column, found: Overview, tally
 
 
 def _in_their_week(batch: RecordBatch | None, found: Overview) -> RecordBatch | None:
-    """A batch whose times were made of the week that each of its messages tells."""
+    """Correct a batch whose times were made of the week that each message states."""
     if batch is None:
         return None
     time = found.anchors.in_their_week(batch.record_index, batch.device_time_ns)

@@ -1,4 +1,4 @@
-"""The one loop over the bytes of a receiver's stream: where its frames stand, what each is. Compiled.
+"""Compiled loop over the bytes of a receiver's stream: it finds and names its frames.
 
 A frame is believed when its checksum is right, so frames of several protocols may stand in one stream in any order, and
 after damage the next sound frame is found wherever it begins. Line ends between frames belong to none and are no loss.
@@ -17,7 +17,7 @@ from groundstation.base.compile import in_place, inlined
 UBX, NMEA, RTCM, NOVATEL, NOVATEL_SHORT, BARE_NMEA, NOVATEL_TEXT = 1, 2, 3, 4, 5, 6, 7
 UBX_EXTRA, RTCM_EXTRA, CRC_BYTES = 8, 6, 4
 NOVATEL_SHORT_HEADER = 12
-TEXT_CRC_BYTES = 9  # of a NovAtel log as text: an asterisk and eight digits
+TEXT_CRC_BYTES = 9  # checksum of a NovAtel log as text: an asterisk and eight digits
 SHORTEST_TEXT = 28  # bytes of such a log, which are those of the binary header
 LONGEST = 66_000  # bytes of the longest frame that any protocol can write
 LONGEST_SENTENCE, LONGEST_ADDRESS = 1_024, 31
@@ -40,7 +40,10 @@ def new_state() -> NDArray[np.int64]:
 
 
 def crc_tables() -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-    """Tables of the CRCs by byte: RTCM's of 24 bits (1864CFB), NovAtel's of 32 bits (EDB88320, reflected)."""
+    """Return the tables of the CRCs by byte, for RTCM and for NovAtel.
+
+    RTCM's has 24 bits (1864CFB), NovAtel's 32 bits (EDB88320, reflected).
+    """
     rtcm, novatel = np.arange(256, dtype=np.uint32) << 16, np.arange(256, dtype=np.uint32)
     for _bit in range(8):
         rtcm = np.where(rtcm & 0x800000, (rtcm << 1) ^ 0x1864CFB, rtcm << 1).astype(np.uint32)
@@ -103,7 +106,10 @@ def _bare_sentence(data: Any, at: int) -> int:
 
 @in_place
 def _is_address(data: Any, at: int) -> bool:
-    """Whether two capital letters or more and a comma stand behind the first character of a sentence."""
+    """Tell whether an address stands behind the first character of a sentence.
+
+    An address is two capital letters or more and a comma.
+    """
     for k in range(at + 1, min(at + LONGEST_ADDRESS, len(data))):
         byte = data[k]
         if byte == COMMA:
@@ -147,7 +153,10 @@ def _novatel(data: Any, at: int, table: Any) -> int:
 
 @in_place
 def _novatel_text(data: Any, at: int, table: Any) -> int:
-    """Length of the NovAtel log in text at a place if its checksum is right; where another begins in it, it is none."""
+    """Return the length of the NovAtel log in text at a place, if its checksum is right.
+
+    A text in which another begins is none.
+    """
     crc, end, has_body = 0, min(at + LONGEST, len(data)), False
     for k in range(at + 1, end):
         byte = data[k]
@@ -164,7 +173,7 @@ def _novatel_text(data: Any, at: int, table: Any) -> int:
         if byte < 32 or byte > 126 or (k == at + 1 and not 65 <= byte <= 90):
             return NO_FRAME
         if byte in (HASH, PERCENT) and k + 1 < end and 65 <= data[k + 1] <= 90:
-            return NO_FRAME  # else starts without an end would all be followed to the end
+            return NO_FRAME  # otherwise every start without an end would be followed to the end
         has_body |= byte == SEMICOLON
         crc = (crc >> 8) ^ table[(crc ^ byte) & 255]
     return PENDING if end == len(data) else NO_FRAME
@@ -172,7 +181,7 @@ def _novatel_text(data: Any, at: int, table: Any) -> int:
 
 @in_place
 def _declared(data: Any, at: int) -> int:
-    """Length that a binary frame at a place says it has, 0 where none begins."""
+    """Return the length that a binary frame at a place states, 0 where none begins."""
     left, byte = len(data) - at, data[at]
     if byte == 0xB5 and left >= 6 and data[at + 1] == 0x62:
         return int(data[at + 4]) + 256 * int(data[at + 5]) + UBX_EXTRA
@@ -185,7 +194,10 @@ def _declared(data: Any, at: int) -> int:
 
 @in_place
 def _frame(data: Any, at: int, bare: bool, rtcm: Any, novatel: Any) -> tuple[int, int]:
-    """Protocol and length of the frame at a place; length NO_FRAME, or PENDING where the data end inside it."""
+    """Return protocol and length of the frame at a place.
+
+    The length is NO_FRAME without one, PENDING where the data end inside it.
+    """
     left, byte = len(data) - at, data[at]
     if byte == 0xB5 and (left < 2 or data[at + 1] == 0x62):
         return UBX, _ubx(data, at) if left >= UBX_EXTRA else PENDING
@@ -205,7 +217,7 @@ def _frame(data: Any, at: int, bare: bool, rtcm: Any, novatel: Any) -> tuple[int
 
 @in_place
 def is_cut(data: Any, at: int) -> bool:
-    """Whether a frame begins at a place that the end of the data cuts off."""
+    """Tell whether a frame begins at a place and is cut off by the end of the data."""
     if data[at] == DOLLAR or data[at] == BANG or data[at] == HASH or data[at] == PERCENT:
         is_text = len(data) - at <= LONGEST
         for k in range(at + 1, len(data) if is_text else at):
@@ -221,7 +233,10 @@ def _is_text(byte: int) -> bool:
 
 @in_place
 def _text_before(data: Any, start: int, at: int) -> int:
-    """Bytes of text between the beginning of a line and a place, from ``start`` on; 0 where other bytes are between."""
+    """Return the number of text bytes from the beginning of the line to a place.
+
+    They are counted from ``start`` on at most; 0 where other bytes are between.
+    """
     k = at
     while k > start and at - k < LONGEST_TEXT and _is_text(data[k - 1]):
         k -= 1
@@ -231,7 +246,10 @@ def _text_before(data: Any, start: int, at: int) -> int:
 
 @in_place
 def _text_behind(data: Any, at: int) -> int:
-    """Bytes of text from a place to the end of its line; 0 where another sentence or other bytes come before it."""
+    """Return the number of text bytes from a place to the end of its line.
+
+    0 where another sentence or other bytes come before the end.
+    """
     k = at
     while k < len(data) and k - at < LONGEST_TEXT and _is_text(data[k]) and data[k] != DOLLAR:
         k += 1

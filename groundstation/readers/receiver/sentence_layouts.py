@@ -1,4 +1,6 @@
-"""Layouts of NMEA sentences: the fields of each formatter, and the makers' addresses whose next field chooses it.
+"""Layouts of NMEA sentences: the fields of each formatter, and addresses of makers.
+
+The addresses are those whose next field chooses the layout.
 
 Fields have the names of pynmeagps and the order of NMEA 0183 (4.11); a version that has fewer leaves the last ones out.
 A maker's address (``PASHR``, ``PUBX``) may stand for several layouts: then a word or a number behind it says which, and

@@ -1,4 +1,4 @@
-"""NMEA sentences of a block: fields found by one compiled loop, then whole columns at a time.
+"""NMEA sentences of a block: one compiled loop finds the fields, numpy reads columns.
 
 A sentence is ``$`` + address + fields parted by commas. The address is a talker (GP, GN ...) and a formatter (GGA); P
 and letters of the maker where the sentence is a maker's own, with the word behind it where that chooses the layout
@@ -22,22 +22,25 @@ from groundstation.readers.receiver.stream import Frames
 
 COMMA, STAR, POINT, MINUS, PLUS, MAKERS = 44, 42, 46, 45, 43, 80  # P begins a maker's own address
 CHECKSUM_BYTES = 3
-MOST_DIGITS = 18  # of a number: more do not fit 64 bits
+MOST_DIGITS = 18  # digits of a number: more do not fit 64 bits
 MOST_BEHIND = 13  # digits behind the point of an angle
-ADDRESS_BYTES = 30  # of the longest address, PQTMCFGORIENTATIONERROR among them, and of the word behind it
+ADDRESS_BYTES = 30  # longest address, such as PQTMCFGORIENTATIONERROR, and longest word behind it
 NAMELESS = "sentence"  # in place of an address that is none: such sentences are kept as text
-_EXACT_BYTES = 7  # of an address: they are its key; the bytes of a longer one are hashed
+_EXACT_BYTES = 7  # addresses of so many bytes are their own key; longer ones are hashed
 _PRIME, _LONG = (1 << 55) - 55, 1 << 57  # hashes are below the first, so that the next byte fits 64 bits
 
-_UPPER_CASE = 0xDF  # of a letter: the bit of lower case taken out
+_UPPER_CASE = 0xDF  # mask that turns a letter into upper case
 _HEMISPHERES = {"lat": "NS", "lon": "EW"}
-_FIELDS_OF_OLD_VTG = 5  # with a mode
+_FIELDS_OF_OLD_VTG = 5  # fields of such a sentence with a mode
 _SATELLITE_FIELDS, _BEFORE_SATELLITES, _NO_FIELD = 4, 3, -1
 
 
 @in_place
 def _split(data: Any, offsets: Any, ends: Any, starts: Any, counts: Any) -> None:
-    """Where the fields of sentences begin, one row a field; one more start stands behind the last field's end."""
+    """Find where the fields of sentences begin, one row a field.
+
+    One more start stands behind the last field's end.
+    """
     most = len(starts) - 1
     for sentence in range(len(offsets)):
         count = 0
@@ -51,8 +54,10 @@ def _split(data: Any, offsets: Any, ends: Any, starts: Any, counts: Any) -> None
 
 @inlined
 def _number(data: Any, at: int, end: int) -> tuple[int, int, int]:
-    """Digits of a decimal number as one integer, how many stand behind the point, and whether it is one (1, 0: empty,
-    -1: something else)."""
+    """Return the digits of a decimal number as one integer, its decimals, and its state.
+
+    State 1: a number, 0: empty, -1: something else.
+    """
     while at < end and data[at] == 32:
         at += 1
     while at < end and data[end - 1] == 32:
@@ -89,7 +94,10 @@ def _numbers(data: Any, starts: Any, counts: Any, field: int, value: Any, behind
 
 @inlined
 def _power_of_ten(exponent: int) -> int:
-    """10 to a power that is not negative; the operator may fail, and what may fail is not kept as machine code."""
+    """Return 10 to a power that is not negative.
+
+    The operator ``**`` may fail, and code that may fail is not kept as machine code.
+    """
     power = 1
     for _ in range(exponent):
         power *= 10
@@ -119,25 +127,28 @@ def _is_letter(byte: int) -> bool:
 
 @inlined
 def _is_word(byte: int) -> bool:
-    """Whether a byte may stand in an address or in the word behind it."""
+    """Tell whether a byte may stand in an address or in the word behind it."""
     return 48 <= byte <= 57 or 65 <= byte <= 90 or 97 <= byte <= 122 or byte == 95
 
 
 @inlined
 def _longer(key: int, byte: int, size: int) -> int:
-    """Key of ``size`` bytes and one more."""
+    """Append a byte to a key of ``size`` bytes."""
     return 256 * key + byte if size < _EXACT_BYTES else _LONG + (31 * (key % _PRIME) + byte) % _PRIME
 
 
 @inlined
 def _is_end(byte: int) -> bool:
-    """Whether an address or a field may end at a byte."""
+    """Tell whether an address or a field may end at a byte."""
     return byte in (COMMA, STAR) or byte < 32
 
 
 @in_place
 def _addresses(data: Any, offsets: Any, families: Any, keys: Any, sizes: Any) -> None:
-    """A number for each address, with the word behind it in a family, and their bytes; both 0 where there is none."""
+    """Compute a number and the length in bytes of each address.
+
+    The word behind the address is included in a family of makers' sentences. Both are 0 where there is no address.
+    """
     for row in range(len(offsets)):
         start, key = offsets[row] + 1, 0
         k, end = start, min(start + ADDRESS_BYTES, len(data))
@@ -193,7 +204,7 @@ class Sentences:
 
     @property
     def formatter(self) -> str:
-        """``GGA`` of ``GNGGA``; a maker's own address as it is."""
+        """Formatter, such as ``GGA`` of ``GNGGA``; a maker's own address as it is."""
         return formatter_of(self.address)
 
     @property
@@ -211,20 +222,25 @@ class Sentences:
 
     @property
     def _behind_address(self) -> Int64Array:
-        """Where the fields of each sentence begin; a sentence without an address has all of its text there."""
+        """Places where the fields of each sentence begin.
+
+        A sentence without an address has all of its text there.
+        """
         bytes_before = 1 if self.address == NAMELESS else len(self.address) + 2
         return self.frames.offsets[self.which] + bytes_before
 
     @property
     def _ends(self) -> Int64Array:
-        """Where the last field of each sentence ends."""
+        """Places where the last field of each sentence ends."""
         checksum = np.where(self.frames.kinds[self.which] == scan.NMEA, CHECKSUM_BYTES, 0)
         return self.frames.offsets[self.which] + self.frames.lengths[self.which] - checksum
 
     @cached_property
     def columns(self) -> dict[str, Column]:
-        """Fields by name in the units of the sentence, times of day in seconds, angles in degrees; ``text`` of all
-        fields where the sentence is not known here."""
+        """Fields by name in the units of the sentence, times of day in seconds, angles in degrees.
+
+        A sentence that is not known here has one column ``text`` of all its fields.
+        """
         text = FORMATTERS.get(self.formatter)
         if text is None:
             return {"text": self._rest()}
@@ -237,7 +253,10 @@ class Sentences:
         return self._with_signal(found) if self.formatter == "GSV" else found
 
     def numbers(self, number: int) -> tuple[Int64Array, Int64Array, NDArray[np.int8]]:
-        """Digits, decimals and state (1 a number, 0 empty, -1 something else) of one field, shape (n,) each."""
+        """Return digits, decimals and state of one field, shape (n,) each.
+
+        State 1: a number, 0: empty, -1: something else.
+        """
         starts, counts = self._fields
         value, behind = np.zeros(len(self), dtype=np.int64), np.zeros(len(self), dtype=np.int64)
         state = np.zeros(len(self), dtype=np.int8)
@@ -282,7 +301,10 @@ class Sentences:
         return Column(value / 10.0**behind, present)
 
     def _angle(self, number: int, name: str, told: Column, behind: Int64Array) -> Column:
-        """Latitude or longitude by its hemisphere, in the next field; absent where that or the minutes cannot be."""
+        """Return the latitude or longitude with the sign of its hemisphere, in the next field.
+
+        Absent where the hemisphere or the minutes cannot be.
+        """
         starts, counts = self._fields
         letters = self.frames.data[np.minimum(starts[number + 1], len(self.frames.data) - 1)] & _UPPER_CASE
         letters = np.where(counts > number + 1, letters, 0)
@@ -299,7 +321,10 @@ class Sentences:
         return Column(texts[where], present)
 
     def _with_old_form(self, found: dict[str, Column]) -> dict[str, Column]:
-        """VTG before NMEA 3: true and magnetic track, knots and km/h without a word of their units between them."""
+        """Read VTG sentences in the form before NMEA 3.
+
+        They have true and magnetic track, knots and km/h without a word of their units between them.
+        """
         old = (self._fields[1] <= _FIELDS_OF_OLD_VTG) & (self.numbers(1)[2] == 1)
         if not old.any():
             return found
@@ -313,7 +338,10 @@ class Sentences:
 
     @cached_property
     def _signal(self) -> Int64Array:
-        """GSV has as many satellites as there are; which field behind them is the signal (NMEA 4.11), -1: none."""
+        """Number of the field of GSV with the signal (NMEA 4.11); -1 without one.
+
+        It follows the fields of as many satellites as the sentence has.
+        """
         counts = self._fields[1]
         has = (counts - _BEFORE_SATELLITES) % _SATELLITE_FIELDS == 1
         return np.where(has, counts - 1, _NO_FIELD)
@@ -360,7 +388,9 @@ def by_address(frames: Frames) -> dict[str, Sentences]:
 
 
 def time_of_day_ns(value: Int64Array, behind: Int64Array) -> tuple[Int64Array, BoolArray]:
-    """Nanoseconds of the day of ``hhmmss.sss`` written as one integer, and whether there is such a time.
+    """Convert ``hhmmss.sss`` written as one integer to nanoseconds of the day.
+
+    The second array tells where there is such a time.
 
     Examples
     --------
@@ -373,7 +403,10 @@ def time_of_day_ns(value: Int64Array, behind: Int64Array) -> tuple[Int64Array, B
 
 
 def _degrees(value: Int64Array, behind: Int64Array) -> tuple[NDArray[np.float64], BoolArray]:
-    """Degrees of ``dddmm.mmmm`` written as one integer, and whether the minutes are at most 60, as some round them."""
+    """Convert ``dddmm.mmmm`` written as one integer to degrees.
+
+    The second array tells where the minutes are at most 60, as some devices round them.
+    """
     unit = 10**behind
     degrees, minutes = np.divmod(value, 100 * unit)
     return np.asarray((degrees * (60 * unit) + minutes) / (60 * unit)), minutes <= 60 * unit

@@ -1,4 +1,4 @@
-"""Cuts a receiver's stream into blocks of frames; what belongs to no frame is counted."""
+"""Cut a receiver's stream into blocks of frames; bytes of no frame are counted."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -53,11 +53,11 @@ class Frames:
         return self.first_byte + self.offsets
 
     def of(self, *kinds: int) -> Int64Array:
-        """Which frames are of these protocols, increasing."""
+        """Return the numbers of the frames of these protocols, increasing."""
         return np.flatnonzero(np.isin(self.kinds, kinds))
 
     def bytes_at(self, offsets: Int64Array, width: int) -> NDArray[np.uint8]:
-        """``width`` bytes at each place, shape (n, width); zeros behind the end of the data."""
+        """Return ``width`` bytes at each place, shape (n, width); zeros past the end of data."""
         if len(offsets) and int(offsets.max()) + width > len(self.data):
             padded = np.concatenate((self.data, np.zeros(width, dtype=np.uint8)))
             return np.lib.stride_tricks.sliding_window_view(padded, width)[offsets]
@@ -70,13 +70,13 @@ class Frames:
         return np.ascontiguousarray(self.bytes_at(offsets, dtype.itemsize)).view(dtype)[:, 0]
 
     def head(self, count: int) -> "Frames":
-        """The first ``count`` frames."""
+        """Return the first ``count`` frames."""
         texts = None if self.texts is None else self.texts[:count]
         return Frames(self.data, self.first_byte, self.offsets[:count], self.lengths[:count], self.kinds[:count], texts)
 
 
 class Stream:
-    """Iterates over the blocks of a stream; once through it knows what was damaged.
+    """Iterator over the blocks of a stream; knows the damage once it is through.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class Stream:
         self._finish(data, base)
 
     def damages(self) -> Iterator[Damage]:
-        """What was skipped, in the order of the file."""
+        """Yield the bytes that were skipped, in the order of the file."""
         yield from self._skipped.damages()
         if self._cut is not None:
             start, end = self._cut
@@ -129,7 +129,7 @@ class Stream:
             yield Damage("truncated", bytes_place(start, end), end - start, what, between_records=(start - 1, start))
 
     def _held_back(self, block: Frames) -> int:
-        """How many frames of a block are given now."""
+        """Return how many frames of a block are given now."""
         if self._epoch_start is None or not len(block):
             return len(block)
         first = self._epoch_start(block)
@@ -148,7 +148,7 @@ class Stream:
         return whole[: len(data) + count], count < BLOCK_BYTES
 
     def _blocks(self, data: NDArray[np.uint8], base: int, is_last: bool) -> Iterator[Frames]:
-        """Blocks of the data at hand: one, and more where damage is frequent."""
+        """Yield the blocks of the data at hand: one, or more where damage is frequent."""
         offsets = np.empty(len(data) // SMALLEST_FRAME + 1, dtype=np.int64)
         lengths, kinds = np.empty_like(offsets), np.empty(len(offsets), dtype=np.uint8)
         hosted = self._is_hosts is not None
@@ -165,7 +165,7 @@ class Stream:
             texts[:count] = 0
             is_whole = state[scan.POSITION] >= limit
             kept = self._held_back(found) if is_whole and not is_last else count
-            if kept < count:  # those that wait are found again
+            if kept < count:  # the frames held back are found again
                 first = int(found.offsets[kept]) - (0 if around is None else int(around[kept, 0]))
                 state[scan.POSITION], state[scan.SKIP_START] = first, scan.NOWHERE
                 spans = spans[spans[:, 1] <= first]
@@ -177,7 +177,10 @@ class Stream:
                 return
 
     def _strange_texts(self, frames: Frames) -> list[list[int]]:
-        """Texts around the frames that are none of the computer's, from start to end; the frames lose them."""
+        """Remove texts around the frames that are not the computer's.
+
+        Returns them as pairs of start and end.
+        """
         strange: list[list[int]] = []
         if frames.texts is None or self._is_hosts is None:
             return strange
@@ -191,7 +194,7 @@ class Stream:
         return strange
 
     def _finish(self, data: NDArray[np.uint8], base: int) -> None:
-        """Count what is left behind the last frame: a frame that was cut, or bytes of none."""
+        """Count the bytes behind the last frame: a frame that was cut, or bytes of none."""
         start = int(self._state[scan.SKIP_START])
         if start == scan.NOWHERE:
             return

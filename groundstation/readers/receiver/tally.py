@@ -1,4 +1,4 @@
-"""Counts of what a stream tells that cannot be, or cannot be read, and what is told of it once the stream was read."""
+"""Counts of values that cannot be or cannot be read, and their report at the end."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from groundstation.base.records import HEADING_IS_TRACK, Damage, Int64Array, Ite
 from groundstation.readers.receiver.messages import Messages
 from groundstation.readers.receiver.sentences import Sentences
 
-MOST_SEPARATION_M = 120.0  # of geoid and ellipsoid; on Earth they are within 107 m
+MOST_SEPARATION_M = 120.0  # separation of geoid and ellipsoid; on Earth it is within 107 m
 MOST_ROLL_DEG, MOST_PITCH_DEG, MOST_HEADING_DEG = 180.0, 90.0, 360.0
 MOVING_MPS = 1.0
 ZERO_POSITION, IMPOSSIBLE_ATTITUDE, ASTRAY, NOT_MEASURED = "no_position", "impossible", "odd_height", "not_measured"
@@ -38,7 +38,7 @@ _LENGTHS = {
 
 @dataclass
 class Tally:
-    """Rows, messages and cells by what is odd about them, and the byte of the file at which the first stands.
+    """Counts of odd rows, messages and cells by kind, each with the byte of the first.
 
     Parameters
     ----------
@@ -62,7 +62,10 @@ class Tally:
         self._count(self._rows, (what, topic), places)
 
     def add_lengths(self, messages: Messages, is_poll: bool) -> None:
-        """Count the messages whose payload their layout does not fit; one that asks for an answer has none."""
+        """Count the messages whose payload does not fit their layout.
+
+        A message that asks for an answer has no payload.
+        """
         if messages.is_short and not is_poll:
             self._count(self._lengths, (SHORTER, messages.name), messages.places)
         if messages.layout is None and not messages.is_sound:
@@ -93,7 +96,7 @@ class Tally:
             self._first.setdefault(key, int(np.min(places)))
 
     def items(self, counts: Counter[str]) -> Iterator[Item]:
-        """Remarks and damages. Of what was refused nothing is lost: the raw topics keep it.
+        """Yield remarks and damage; the raw topics keep what was refused.
 
         ``counts`` are those of all messages and sentences by name.
         """

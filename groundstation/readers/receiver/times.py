@@ -1,4 +1,6 @@
-"""Absolute times of a stream: receivers write the time of the week or of the day, and the date in some messages only.
+"""Absolute times of a stream.
+
+Receivers write the time of the week or of the day, and the date in some messages only.
 
 Every message that tells the full time is an anchor; another takes the week or day that brings it nearest to the anchor
 before it. So weeks and days roll over by themselves, also where the message that tells them comes late. GPS time is
@@ -29,7 +31,7 @@ WEEK_MS = 604_800_000
 DAY_NS = 86_400 * NS_PER_S
 NS_PER_MS = 1_000_000
 BEFORE_FIRST_NS = 3_600 * NS_PER_S  # a time so long before the first full one is a counter that was not set yet
-_GOES_ON_NS = 120 * NS_PER_S  # between two full times of one stretch
+_GOES_ON_NS = 120 * NS_PER_S  # largest step between two full times of one stretch
 _FEWEST = 3  # full times of a date that is believed, but for the last one
 _STEADY, _MOST_STEPS = 3, 3  # times around a step of UTC; steps of a stream
 _DAYS_A_WEEK = 7
@@ -37,7 +39,7 @@ _DAYS_A_WEEK = 7
 
 @dataclass(frozen=True)
 class LateStretch:
-    """Sentences up to a place in the file whose UTC is late, for want of leap seconds.
+    """Sentences up to a place in the file whose UTC is late for lack of leap seconds.
 
     ``last_place`` is that of the last one with a date, ``first_place`` that of the first one which is right, and
     ``day_ns`` its time of the day: other sentences of its epoch may stand before it. ``late_s`` is by how much.
@@ -51,8 +53,11 @@ class LateStretch:
 
 @dataclass(frozen=True, eq=False)
 class Anchors:
-    """Places in the file (increasing) at which the full time is known, UTC nanoseconds, and the week's milliseconds
-    told there (-1: none). ``late`` are stretches of sentences whose times of the day are late."""
+    """Places in the file (increasing) where the full time is known, in UTC nanoseconds.
+
+    ``week_ms`` are the week's milliseconds told there (-1: none). ``late`` are stretches of sentences whose times of
+    the day are late.
+    """
 
     places: Int64Array
     utc_ns: Int64Array
@@ -63,9 +68,10 @@ class Anchors:
         return len(self.places)
 
     def of_week(self, places: Int64Array, week_ms: Int64Array) -> Column:
-        """UTC of times of the week in milliseconds; that of the anchor itself where both are of one epoch.
+        """Return the UTC of times of the week in milliseconds.
 
-        Without an anchor the times of the week, counted on.
+        It is that of the anchor itself where both are of one epoch. Without an anchor it is the time of the week,
+        counted on.
         """
         if not len(self):
             return Column(unrolled(week_ms, WEEK_MS) * NS_PER_MS, week_ms < WEEK_MS)
@@ -80,7 +86,10 @@ class Anchors:
         return self._credible(places, utc_ns, week_ms < WEEK_MS)
 
     def of_day(self, places: Int64Array, day_ns: Int64Array) -> Column:
-        """UTC of times of the day in nanoseconds; without an anchor the times of the day, counted on."""
+        """Return the UTC of times of the day in nanoseconds.
+
+        Without an anchor it is the time of the day, counted on.
+        """
         day_ns = self._in_time(places, day_ns)
         if not len(self):
             return Column(unrolled(day_ns, DAY_NS))
@@ -94,7 +103,7 @@ class Anchors:
         return self._credible(places, utc_ns, np.ones(len(places), dtype=bool))
 
     def in_their_week(self, places: Int64Array, time: Column) -> Column:
-        """UTC of messages with a week of their own, in the week that is nearest to the anchor."""
+        """Put UTC of messages with an own week into the week nearest to the anchor."""
         if not len(self):
             return time
         weeks = np.rint((self.utc_ns[self._before(places)] - time.values) / WEEK_NS).astype(np.int64)
@@ -102,7 +111,7 @@ class Anchors:
         return Column(weeks_later_ns(time.values, weeks), time.present) if weeks.any() else time
 
     def _in_time(self, places: Int64Array, day_ns: Int64Array) -> Int64Array:
-        """Times of the day without the leap seconds that were not learnt yet."""
+        """Correct times of the day for leap seconds that were not learnt yet."""
         for one in self.late:
             is_right = (places >= one.first_place) | ((places > one.last_place) & (day_ns == one.day_ns))
             day_ns = np.where(is_right, day_ns, (day_ns - one.late_s * NS_PER_S) % DAY_NS)
@@ -122,10 +131,11 @@ NO_ANCHORS = Anchors(_NOTHING, _NOTHING, _NOTHING)
 
 
 def on_one_date(anchors: Anchors, *, is_gps_time: bool) -> tuple[Anchors, tuple[tuple[int, int], ...]]:
-    """Anchors on one date, and how many were on another: (number, days before) of each.
+    """Put anchors on one date; return also (number, days before) of each other date.
 
-    Times that jump by whole days and go on are of a receiver that did not know its week or date yet, or was late with a
-    new one. It tells one of the past, so the latest counts that is told a few times, or last.
+    Times that jump by whole days and go on are those of a receiver that did not know its week or date yet, or was late
+    with a new one. Such a receiver states a date of the past, so the latest date counts that is stated a few times, or
+    last.
 
     Examples
     --------
@@ -154,7 +164,7 @@ def on_one_date(anchors: Anchors, *, is_gps_time: bool) -> tuple[Anchors, tuple[
 
 
 def moved_on(anchors: Anchors, rollovers: int, *, is_gps_time: bool) -> Anchors:
-    """Anchors as many rollovers of the week later, as UTC of GPS time or as UTC that was told."""
+    """Move anchors by rollovers of the week, as UTC of GPS time or as stated UTC."""
     if not rollovers:
         return anchors
     if is_gps_time:
@@ -163,10 +173,10 @@ def moved_on(anchors: Anchors, rollovers: int, *, is_gps_time: bool) -> Anchors:
 
 
 def late_stretches(anchors: Anchors) -> tuple[LateStretch, ...]:
-    """Stretches of sentences before the leap seconds were learnt: then UTC falls back.
+    """Find stretches of sentences before the leap seconds were learnt: UTC falls back.
 
-    It falls by whole seconds, and times go on steadily before and after. What is late by no more than the time between
-    two is not seen.
+    UTC falls by whole seconds, and times go on steadily before and after. A lateness of no more than the time between
+    two sentences is not seen.
     """
     is_new = np.append(True, np.diff(anchors.utc_ns) != 0) if len(anchors) else np.zeros(0, dtype=bool)
     places, utc_ns = anchors.places[is_new], anchors.utc_ns[is_new]
@@ -196,7 +206,7 @@ def _nearest(choices: list[Int64Array], near_ns: Int64Array) -> Int64Array:
 
 
 def unrolled(values: Int64Array, period: int) -> Int64Array:
-    """Values that start again after ``period``, counted on.
+    """Count values on that start again after ``period``.
 
     Examples
     --------
@@ -209,7 +219,9 @@ def unrolled(values: Int64Array, period: int) -> Int64Array:
 
 
 def fine_utc_ns(utc_ns: Int64Array, week_ms: Int64Array) -> tuple[Int64Array, Int64Array]:
-    """UTC of a fix by its time of the week with the fraction of its UTC, and how many seconds the told UTC was wrong.
+    """Return the UTC of a fix by its time of the week, and the error of its stated UTC.
+
+    The fraction is that of its UTC. The error is in whole seconds.
 
     Parameters
     ----------
@@ -233,7 +245,7 @@ def fine_utc_ns(utc_ns: Int64Array, week_ms: Int64Array) -> tuple[Int64Array, In
 
 
 def calendar_ns(year: Int64Array, month: Int64Array, day: Int64Array) -> tuple[Int64Array, BoolArray]:
-    """UTC nanoseconds at the beginning of a day, and whether there is such a day."""
+    """Return UTC nanoseconds at the beginning of days, and whether the days exist."""
     sound = (month >= 1) & (month <= 12) & (day >= 1) & (year >= 1980) & (year < 2200)
     months = (np.where(sound, year, 1980) - 1970) * 12 + np.where(sound, month, 1) - 1
     first = months.astype("datetime64[M]").astype("datetime64[D]")
@@ -243,6 +255,6 @@ def calendar_ns(year: Int64Array, month: Int64Array, day: Int64Array) -> tuple[I
 
 
 def gps_to_utc_ns(week: Int64Array, week_s: Int64Array | np.ndarray) -> Int64Array:
-    """UTC of GPS week and (fractional) seconds of the week, to about a nanosecond."""
+    """Return UTC of GPS week and (fractional) seconds of week, to about a nanosecond."""
     ns = np.round(np.asarray(week_s, dtype=np.float64) * 1e9).astype(np.int64)
     return gps_week_to_utc_ns(week, ns // NS_PER_MS) + ns % NS_PER_MS

@@ -1,4 +1,4 @@
-"""UBX messages of a block: their names, times, and the full times that they tell."""
+"""UBX messages of a block: their names, times, and the full times that they state."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -40,11 +40,11 @@ _LEAPS = {
 _LEAPS |= {f"NAV2-{name[4:]}": told for name, told in _LEAPS.items() if name.startswith("NAV-")}
 _CLASSES = {"NAV": 0x01, "NAV2": 0x29, "HNR": 0x28}
 _ITOW_AT_4 = (0x14, 0x13, 0x3C, 0x3B)  # HPPOSLLH, HPPOSECEF, RELPOSNED, SVIN have a version in front
-_HNR_INS = 0x02  # of the class HNR; its time stands elsewhere
+_HNR_INS = 0x02  # message of the class HNR whose time stands elsewhere
 
 
 def messages_of(frames: Frames) -> Iterator[Messages]:
-    """UBX messages of a block by name; those shorter than the layout apart, by their length."""
+    """Yield UBX messages of a block by name; short ones apart, by their length."""
     which = frames.of(scan.UBX)
     at = frames.offsets[which]
     code = frames.data[at + 2].astype(np.int64) * 256 + frames.data[at + 3]
@@ -65,7 +65,7 @@ def messages_of(frames: Frames) -> Iterator[Messages]:
 
 
 def time_of(messages: Messages, anchors: Anchors) -> Column:
-    """UTC of each message; absent for those that tell no time."""
+    """Return the UTC of each message; absent for messages without a time."""
     if messages.has("iTOW"):
         return anchors.of_week(messages.places, messages.head()["iTOW"].astype(np.int64))
     if messages.has("rcvTow") and messages.has("week"):
@@ -78,7 +78,10 @@ def time_of(messages: Messages, anchors: Anchors) -> Column:
 
 
 def timed(frames: Frames, anchors: Anchors) -> list[tuple[Messages, Column]]:
-    """Messages of a block with their times; one that tells none has that of the message with a time before it."""
+    """Return the messages of a block with their times.
+
+    A message without a time has that of the message with a time before it.
+    """
     several = [(messages, time_of(messages, anchors)) for messages in messages_of(frames)]
     known = [(messages.places[time.mask], time.values[time.mask]) for messages, time in several]
     if not known:
@@ -102,7 +105,7 @@ def _is_gps_time(week: NDArray[Any], week_s: NDArray[Any]) -> BoolArray:
 
 @dataclass
 class FullTimes:
-    """Gathers the full times that the messages of a stream tell.
+    """Collector of the full times that the messages of a stream state.
 
     ``wrong_leaps`` counts the fixes whose UTC had another number of leap seconds than the day has, by the difference;
     ``leaps`` the messages that state their number.
@@ -115,7 +118,7 @@ class FullTimes:
     leaps: Counter[int] = field(default_factory=Counter)
 
     def take(self, messages: Messages) -> None:
-        """Take in messages that may tell the full time."""
+        """Take in messages that may state the full time."""
         head = messages.head() if messages.layout is not None and len(messages) and messages.has("iTOW") else None
         if messages.name in _SECONDS and head is not None:
             self._of_calendar(messages, head)
@@ -142,11 +145,11 @@ class FullTimes:
             self.leaps.update((-np.rint(head["utc_offset"][known])).astype(np.int64).tolist())
 
     def take_time(self, places: Int64Array, time: Column) -> None:
-        """Take in messages of which each tells its full time."""
+        """Take in messages that each state their full time."""
         self._add(places, time.values, np.full(len(places), -1), time.mask)
 
     def anchors(self) -> Anchors:
-        """What was gathered, in the order of the file."""
+        """Return the gathered anchors, in the order of the file."""
         if not self._places:
             return NO_ANCHORS
         places, utc_ns, week_ms = (np.concatenate(parts) for parts in (self._places, self._utc_ns, self._week_ms))
@@ -168,7 +171,10 @@ class FullTimes:
         self._add(messages.places, utc_ns, week_ms, np.asarray(sound))
 
     def _of_calendar(self, messages: Messages, head: NDArray[Any]) -> None:
-        """Dates and times of fixes that are called valid. Nanoseconds may be negative: they are added."""
+        """Take in dates and times of fixes that are called valid.
+
+        Nanoseconds may be negative: they are added.
+        """
         year, month, day = (head[name].astype(np.int64) for name in ("year", "month", "day"))
         midnight_ns, sound = calendar_ns(year, month, day)
         needed = 7 if messages.name.endswith("TIMEUTC") else 3
@@ -186,9 +192,10 @@ class FullTimes:
 
 
 def epoch_start(frames: Frames, leader: str) -> int:
-    """Number of the first message of the last epoch in a block, ``len(frames)`` where there is none.
+    """Return the number of the first message of the last epoch in a block.
 
-    Messages of the class of the leading one count: the others of its epoch stand beside it.
+    ``len(frames)`` where there is none. Messages of the class of the leading one count: the others of its epoch stand
+    beside it.
     """
     which = frames.of(scan.UBX)
     at = frames.offsets[which]

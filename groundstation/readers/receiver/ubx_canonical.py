@@ -1,4 +1,7 @@
-"""Canonical topics from UBX messages: ``gnss`` by epochs, ``ins`` where the receiver knows how the vehicle points."""
+"""Canonical topics from UBX messages.
+
+``gnss`` comes by epochs, ``ins`` where the receiver knows the vehicle's heading.
+"""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -33,7 +36,10 @@ INS_MODE = "gnss_aided"
 
 
 def gnss_batch(block: Block, leader: str, anchors: Anchors, tally: Tally) -> RecordBatch | None:
-    """One row an epoch: the leading message and what others of the same solution and time of the week add."""
+    """Return one row for each epoch, from the leading message and others.
+
+    The others are of the same solution and time of the week.
+    """
     messages, fields = block.get(leader), block.fields(leader)
     if messages is None or fields is None:
         return None
@@ -52,7 +58,10 @@ def gnss_batch(block: Block, leader: str, anchors: Anchors, tally: Tally) -> Rec
 
 
 def ins_batch(block: Block, source: str, anchors: Anchors, tally: Tally) -> RecordBatch | None:
-    """Attitude of the vehicle from the message that tells it; position and velocity stay those of ``gnss``."""
+    """Return the attitude of the vehicle from the message that states it.
+
+    Position and velocity stay those of ``gnss``.
+    """
     messages, fields = block.get(source), block.fields(source)
     if messages is None or fields is None:
         return None
@@ -66,14 +75,14 @@ def ins_batch(block: Block, source: str, anchors: Anchors, tally: Tally) -> Reco
 
 
 def has_attitude(block: Block, source: str) -> bool:
-    """Whether a message tells how the vehicle points, at least once in a block."""
+    """Tell whether a message states the vehicle's heading at least once in a block."""
     fields = block.fields(source)
     heading = None if fields is None else _ATTITUDES[source](fields).get("true_heading_deg")
     return heading is not None and bool(heading.mask.any())
 
 
 def heading_as_track(block: Block, source: str) -> tuple[int, int]:
-    """How many fixes of a moving vehicle tell the same heading as track, and how many there are."""
+    """Count the fixes of a moving vehicle whose heading equals its track, and all of them."""
     fields = block.fields(source)
     if fields is None or source != "NAV-PVAT":
         return 0, 0
@@ -83,7 +92,7 @@ def heading_as_track(block: Block, source: str) -> tuple[int, int]:
 
 
 def _solution(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """NAV-PVT and NAV-PVAT, and those of the second solution."""
+    """Return columns of NAV-PVT and NAV-PVAT, also those of the second solution."""
     kind = fields["fixType"]
     is_ok = fields["gnssFixOk"] if "gnssFixOk" in fields else fields["gnssFixOK"]
     has_fix = (kind >= DEAD_RECKONING) & (kind <= WITH_SENSORS)
@@ -108,12 +117,15 @@ def _solution(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 def _integrity(is_ok: NDArray[Any], kind: NDArray[Any]) -> Column:
-    """The receiver's word on the fix; not that a fix in two dimensions is good, whose height was assumed."""
+    """Return the receiver's word on the fix.
+
+    It is absent where a fix in two dimensions, whose height was assumed, is called good.
+    """
     return Column(is_ok.copy(), ~(is_ok & (kind == FIX_2D)))
 
 
 def _high_rate(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """HNR-PVT: speed and track in place of velocities."""
+    """Return columns of HNR-PVT: speed and track in place of velocities."""
     kind = fields["gpsFix"]
     has_fix = (kind >= DEAD_RECKONING) & (kind <= WITH_SENSORS)
     speed, track = fields["gSpeed"] * MM, wrap_360(fields["headMot"])
@@ -155,7 +167,10 @@ def _position(fields: Mapping[str, NDArray[Any]], present: BoolArray, has_height
 
 
 def _precise(block: Block, fields: Mapping[str, NDArray[Any]], columns: Columns) -> Columns:
-    """The finer position of NAV-HPPOSLLH where it is of the same epoch and valid, the leading message's elsewhere."""
+    """Return the finer position of NAV-HPPOSLLH where it is valid and of the same epoch.
+
+    Elsewhere it is that of the leading message.
+    """
     precise = block.fields("NAV-HPPOSLLH")
     if precise is None:
         return {}
@@ -181,7 +196,7 @@ def _status(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 def _old_solution(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """NAV-SOL, which receivers had before NAV-PVT."""
+    """Return columns of NAV-SOL, which receivers had before NAV-PVT."""
     no_carrier = np.zeros(len(fields["gpsFix"]), dtype=np.uint8)
     return {
         "integrity_ok": _integrity(fields["gpsfixOK"], fields["gpsFix"]),
@@ -192,7 +207,10 @@ def _old_solution(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 def _where_a_fix_is(columns: Columns) -> Columns:
-    """Columns of a message without a fix of its own, by that of its epoch: no height in two dimensions."""
+    """Drop values that the fix of the epoch does not support.
+
+    For messages without a fix of their own; a fix in two dimensions has no height.
+    """
     if "fix" not in columns:
         return columns
     fix = columns["fix"]
@@ -206,7 +224,10 @@ def _dilution(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 def _rates(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """Rates of ESF-INS; its accelerations are without gravity, no specific force, and stay raw."""
+    """Return the rates of ESF-INS.
+
+    Its accelerations are without gravity, no specific force, and stay raw.
+    """
     return {f"rate_{axis}_dps": Column(fields[f"{axis}AngRate"], fields[f"{axis}AngRateValid"]) for axis in "xyz"}
 
 
@@ -220,7 +241,7 @@ def _of_pvat(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 def _of_att(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """An accuracy of zero says that the angle is not known."""
+    """Return the angles; an accuracy of zero says that an angle is not known."""
     columns: Columns = {}
     for name, source in (("roll", "roll"), ("pitch", "pitch"), ("true_heading", "heading")):
         sigma = fields[f"acc{source.capitalize()}"]
@@ -230,7 +251,10 @@ def _of_att(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 def _of_relative(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """Heading of the line from one antenna to the other; a base that does not move is none of this vehicle's."""
+    """Return the heading of the line from one antenna to the other.
+
+    Absent where the base does not move: it is then not on this vehicle.
+    """
     present = fields["relPosHeadingValid"] & fields["relPosValid"] & fields["isMoving"] & fields["gnssFixOK"]
     return {
         "true_heading_deg": Column(fields["relPosHeading"], present),
@@ -239,7 +263,7 @@ def _of_relative(fields: Mapping[str, NDArray[Any]]) -> Columns:
 
 
 def _of_pvt(fields: Mapping[str, NDArray[Any]]) -> Columns:
-    """Heading of the vehicle by sensor fusion; elsewhere the field repeats the track."""
+    """Return the vehicle's heading by sensor fusion; without it the field is the track."""
     if "headVeh" not in fields:
         return {}
     return {"true_heading_deg": Column(fields["headVeh"], fields["headVehValid"])}
@@ -269,7 +293,7 @@ def _added(
     fields: Mapping[str, NDArray[Any]],
     columns_of: Callable[[Mapping[str, NDArray[Any]]], Columns],
 ) -> Columns:
-    """Columns of another message, on the rows whose epoch it is of."""
+    """Return columns of another message, on the rows of the same epoch."""
     other = block.fields(name)
     if other is None:
         return {}
@@ -278,7 +302,10 @@ def _added(
 
 
 def _same_epoch(fields: Mapping[str, NDArray[Any]], other: Mapping[str, NDArray[Any]]) -> tuple[Int64Array, BoolArray]:
-    """For each row the last row of another message with its time of the week, and whether there is one."""
+    """Find, for each row, the last row of another message with its time of the week.
+
+    The second array tells whether there is one.
+    """
     order = np.argsort(other["iTOW"], kind="stable")
     at = np.searchsorted(other["iTOW"], fields["iTOW"], side="right", sorter=order) - 1
     at = order[np.maximum(at, 0)]

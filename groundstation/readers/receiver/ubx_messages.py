@@ -1,4 +1,6 @@
-"""Messages of u-blox receivers: names and layouts. Fields have the names, units and order of u-blox's documents.
+"""Messages of u-blox receivers: names and layouts.
+
+Fields have the names, units and order of u-blox's documents.
 
 Source: u-blox, interface descriptions of protocol versions 15 (M8) to 33 (F9, M10). A message that stands here without
 a layout is kept with its bytes. Scaled fields are in the unit of the document (degrees, metres per second squared).
@@ -130,7 +132,9 @@ _NAMES = MappingProxyType(
 
 
 def name_of(code: int, size: int) -> str:
-    """Name of a message by its class and number (``class * 256 + number``) and the bytes of its payload.
+    """Return the name of a message by its code and the bytes of its payload.
+
+    The code is ``class * 256 + number``.
 
     Examples
     --------
@@ -144,7 +148,9 @@ def name_of(code: int, size: int) -> str:
 
 
 def layout_of(name: str) -> str:
-    """Layout of a message by its name, as a line of text; empty for one that is not known here.
+    """Return the layout of a message by its name, as a line of text.
+
+    Empty for a message that is not known here.
 
     The messages of the second solution (NAV2) are laid out as those of the first.
 
@@ -158,7 +164,7 @@ def layout_of(name: str) -> str:
 
 
 def is_version(name: str, size: int) -> bool:
-    """Whether a message had a version with so many bytes, fewer than today's layout.
+    """Tell whether a message had an older, shorter version of so many bytes.
 
     Examples
     --------

@@ -1,4 +1,7 @@
-"""MAVLink telemetry as ground stations record it (.tlog): frames, each behind the time of receipt."""
+"""MAVLink telemetry as ground stations record it (.tlog).
+
+Each frame stands behind its time of receipt.
+"""
 
 import re
 from collections.abc import Iterator
@@ -17,9 +20,10 @@ _LOOKED_AT, _MOST_TRIED = 1 << 16, 200
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim a file of times of this century, each before a frame: at its beginning, or in its first 64 KiB.
+    """Claim a file of frames, each behind a time of this century.
 
-    Of a ground station whose clock was not set the times may be of another; then three frames within an hour are.
+    They stand at its beginning, or in its first 64 KiB. The clock of a ground station may not have been set: then three
+    frames within an hour are enough.
     """
     if _frames_at(source.head, 0):
         return Claim(NAME)
@@ -31,7 +35,10 @@ def sniff(source: Source) -> Claim | None:
 
 
 def _frames_at(head: bytes, at: int, first_us: int = _FIRST_US) -> int:
-    """How many frames stand one behind the other from there on, up to three; 0 where something else is among them."""
+    """Count the consecutive frames from a place on, up to three.
+
+    0 where something else is among them.
+    """
     found, before_us = 0, -1
     while found < _FRAMES and at + 10 <= len(head):
         sizes, time_us = _STX.get(head[at + 8]), int.from_bytes(head[at : at + 8], "big")
@@ -47,7 +54,7 @@ def _frames_at(head: bytes, at: int, first_us: int = _FIRST_US) -> int:
 
 
 def read(source: Source) -> Iterator[Item]:
-    """Yield the header, batches of every message (raw and canonical), remarks and damages."""
+    """Yield the header, batches of every message (raw and canonical), remarks and damage."""
     from groundstation.readers.tlog.reader import items
 
     yield from items(source, NAME)

@@ -1,4 +1,6 @@
-"""MAVLink messages as canonical signals. Units and frames are those of the message definitions (common.xml).
+"""MAVLink messages as canonical signals.
+
+Units and frames are those of the message definitions (common.xml).
 
 The vehicle's axes are forward-right-down, those of the earth north-east-down: nothing is turned.
 """
@@ -47,7 +49,7 @@ def global_position(rows: Numbers) -> Columns:
 
 
 def gnss(rows: Numbers) -> Columns:
-    """Fix of a receiver; what it does not know is the largest number, or zero."""
+    """Return the fix of a receiver; unknown values are the largest number, or zero."""
     has_fix = rows["fix_type"] >= _2D_FIX
     has_track = has_fix & (rows["cog"] != UNKNOWN_16) & (rows["vel"] != UNKNOWN_16)
     speed, track = rows["vel"] * 0.01, rows["cog"] * 0.01
@@ -77,7 +79,7 @@ def imu(rows: Numbers) -> Columns:
 
 
 def field(rows: Numbers) -> Columns:
-    """Magnetic field in milligauss; zeros of a vehicle without a compass are none."""
+    """Return the magnetic field from milligauss; zeros without a compass are absent."""
     known: BoolArray = (rows["xmag"] != 0.0) | (rows["ymag"] != 0.0) | (rows["zmag"] != 0.0)
     axes = zip("xyz", ("forward", "right", "down"), strict=True)
     return {f"field_{name}_nt": Column(rows[f"{axis}mag"] * 1e-3 * NT_PER_GAUSS, known) for axis, name in axes}
@@ -89,7 +91,7 @@ def pressure(rows: Numbers) -> Columns:
 
 
 def battery(rows: Numbers) -> Columns:
-    """Current of the first battery; -1 is none."""
+    """Return the current of the first battery; -1 is absent."""
     known = rows["current_battery"] >= 0.0
     if "id" in rows:
         known &= rows["id"] == 0.0
@@ -97,13 +99,13 @@ def battery(rows: Numbers) -> Columns:
 
 
 def wind(rows: Numbers) -> Columns:
-    """Velocity of the air from the direction the wind blows from."""
+    """Return the wind velocity from the direction the wind blows from."""
     north, east = wind_from_direction(rows["direction"], rows["speed"])
     return {"wind_north_mps": Column(north), "wind_east_mps": Column(east)}
 
 
 def landed(rows: Numbers) -> Columns:
-    """Weight on wheels by the autopilot; 0 is not known."""
+    """Return weight on wheels by the autopilot; 0 is unknown."""
     return {"weight_on_wheels": Column(rows["landed_state"] == ON_GROUND, rows["landed_state"] != 0.0)}
 
 

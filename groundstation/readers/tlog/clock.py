@@ -1,8 +1,9 @@
-"""The vehicle's clock in a telemetry log: when values were true, though frames arrive late and in bursts.
+"""Vehicle's clock in a telemetry log: times of validity, though frames arrive late.
 
-Most messages tell the time since the sender was switched on (``time_boot_ms``, ``time_usec``), or since 1970. Receipt
-less clock is never below the offset between the two: its lower envelope places the clock on the time of receipt.
-SYSTEM_TIME tells UTC. A message without a time is placed by those that its system sent before and behind it.
+Frames also arrive in bursts. Most messages state the time since the sender was switched on (``time_boot_ms``,
+``time_usec``), or since 1970. Receipt less clock is never below the offset between the two: its lower envelope places
+the clock on the time of receipt. SYSTEM_TIME states UTC. A message without a time is placed by those that its system
+sent before and behind it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,16 +22,16 @@ from groundstation.readers.two_clocks import FEWEST_READINGS, Line, Readings, St
 
 Key: TypeAlias = tuple[int, int, bool]  # sender, number of message, and whether its times count from 1970
 NS_PER_MS, NS_PER_US = 1_000_000, 1_000
-SINCE_1970_US = 10**15  # a time_usec of more counts from 1970, of less from when the sender was switched on
+SINCE_1970_US = 10**15  # a larger time_usec counts from 1970, a smaller one from when the sender was switched on
 _LAST_US = 4_102_444_800 * 10**6  # 2100
-RECEIPT_STEP_S = 10.0  # of the ground station's clock ahead: a link may go on being late by less
-LEAST_PACE = 0.1  # of a clock against the time of receipt
+RECEIPT_STEP_S = 10.0  # least step of the ground station's clock ahead: a link may stay late by less
+LEAST_PACE = 0.1  # least pace of a clock against the time of receipt
 SHARE_STEPS = 512
-MOST_SHARE = 0.5  # of the frames of a message whose times go with its sender's clock
-OFF_S = 5.0  # between the times of a message and its sender's clock
+MOST_SHARE = 0.5  # least share of a message's frames whose times go with its sender's clock
+OFF_S = 5.0  # largest difference between the times of a message and its sender's clock
 ROLLOVER_S, DAY_S = 1_024 * 604_800, 86_400
 MOST_JUMPS = 1_000
-_WRAP_MS, _EDGE_MS = 1 << 32, 3_600_000  # of time_boot_ms, in 49.7 days
+_WRAP_MS, _EDGE_MS = 1 << 32, 3_600_000  # time_boot_ms starts again after 49.7 days; distance that counts as near to it
 _UTC_READINGS = 20
 # Messages whose times are read for the clock of their sender, the best first; any others where it sends none of them.
 _STEADY = (
@@ -41,7 +42,7 @@ _STEADY = (
 
 @dataclass(frozen=True)
 class TimeField:
-    """Field of a message that tells its time, and how."""
+    """Field of a message with its time, and how to read it."""
 
     name: str
     unit_ns: int
@@ -49,7 +50,7 @@ class TimeField:
 
     @classmethod
     def of(cls, message: Message) -> "TimeField | None":
-        """The field of a message that has one."""
+        """Return the time field of a message, None without one."""
         units = {"time_boot_ms": NS_PER_MS, "time_boot_us": NS_PER_US, "time_usec": NS_PER_US}
         for name, unit_ns in units.items():
             if message.dtype.fields is not None and name in message.dtype.fields:
@@ -59,7 +60,7 @@ class TimeField:
 
 @cache
 def time_fields() -> Mapping[int, TimeField]:
-    """Fields that tell the time, by number of message."""
+    """Return the time fields by number of message."""
     found = {number: TimeField.of(message) for number, message in messages().items()}
     return {number: one for number, one in found.items() if one is not None}
 
@@ -71,13 +72,13 @@ def _steady() -> frozenset[int]:
 
 @dataclass
 class _Unwrapped:
-    """Goes on counting where a number of 32 bits starts again."""
+    """Counter that goes on where a number of 32 bits starts again."""
 
     wraps: int = 0
     last: int | None = None
 
     def take(self, values_ms: Int64Array) -> Int64Array:
-        """Values in the order of the log."""
+        """Take in values in the order of the log and return them counted on."""
         before = np.concatenate(([values_ms[0] if self.last is None else self.last], values_ms[:-1]))
         is_end, is_start = before > _WRAP_MS - _EDGE_MS, before < _EDGE_MS
         ahead = is_end & (values_ms < _EDGE_MS)
@@ -89,13 +90,16 @@ class _Unwrapped:
 
 @dataclass
 class TimeReader:
-    """Reads the times in frames of one message of one sender."""
+    """Reader of the times in frames of one message of one sender."""
 
     number: int
     unwrapped: _Unwrapped = field(default_factory=_Unwrapped)
 
     def read(self, block: Block, which: Int64Array) -> tuple[Int64Array, BoolArray]:
-        """Times in nanoseconds, -1 where there is none, and which count from 1970; shape (n,) each."""
+        """Return times in nanoseconds, and which of them count from 1970; shape (n,) each.
+
+        A time is -1 where there is none.
+        """
         one = time_fields()[self.number]
         numbers = block.rows(which, messages()[self.number])[one.name]
         if one.unit_ns == NS_PER_MS:
@@ -107,7 +111,7 @@ class TimeReader:
 
 @dataclass(frozen=True, eq=False)
 class Epoch:
-    """A sender's clock from one start to the next: what is added to its times to have UTC.
+    """Sender's clock from one start to the next: the offset from its times to UTC.
 
     ``line`` places it on the time of receipt; ``utc_ns`` is by the sender itself, None where it does not tell.
     """
@@ -117,7 +121,7 @@ class Epoch:
     utc_ns: int | None
 
     def utc_of(self, clock_ns: Int64Array, ground_ns: int) -> Int64Array:
-        """UTC of times of the clock; ``ground_ns`` is what the ground station's clock is off."""
+        """Return UTC of times of the clock; ``ground_ns`` is the ground station's error."""
         if self.utc_ns is not None:
             return np.asarray(clock_ns + self.utc_ns)
         return np.asarray(clock_ns + self.line.at(clock_ns) + ground_ns)
@@ -125,7 +129,7 @@ class Epoch:
 
 @dataclass(frozen=True, eq=False)
 class SenderClock:
-    """The clock of one sender (system x 256 + component).
+    """Clock of one sender (system x 256 + component).
 
     Parameters
     ----------
@@ -147,7 +151,7 @@ class SenderClock:
     unix_ns: int | None
 
     def epoch_of(self, record_index: Int64Array) -> Int64Array:
-        """Place of the epoch of records."""
+        """Return the number of the epoch of records."""
         starts = [epoch.first for epoch in self.epochs[1:]]
         return np.asarray(np.searchsorted(np.array(starts, dtype=np.int64), record_index, side="right"))
 
@@ -163,7 +167,7 @@ class SenderClock:
         return found
 
     def late_ns(self, record_index: Int64Array, received_ns: Int64Array, clock_ns: Int64Array) -> Int64Array:
-        """How late records arrived, by the ground station's clock."""
+        """Return how late records arrived, by the ground station's clock."""
         found = received_ns - clock_ns
         if len(self.epochs) == 1:
             return np.asarray(found - self.epochs[0].line.at(clock_ns))
@@ -174,14 +178,17 @@ class SenderClock:
         return np.asarray(found)
 
     def lateness(self, track: Track, since_1970: bool) -> "Lateness":
-        """How late the readings of a message arrived; those whose relation to the clock is known."""
+        """Return how late the readings of a message arrived.
+
+        Only those whose relation to the clock is known.
+        """
         own_ns = self.by_its_clock(track.clock_ns, np.full(len(track), since_1970))
         known = track.take(own_ns >= 0)
         late_ns = self.late_ns(known.record_index, known.receipt_ns, own_ns[own_ns >= 0])
         return Lateness(known.record_index, known.number, late_ns)
 
     def by_its_clock(self, time_ns: Int64Array, since_1970: BoolArray) -> Int64Array:
-        """Times of messages by this clock, -1 where it is not known how they relate."""
+        """Return times of messages by this clock, -1 where the relation is unknown."""
         if not since_1970.any() and not self.counts_from_1970:
             return time_ns
         if self.counts_from_1970:
@@ -209,7 +216,10 @@ class Clocks:
     ground_ns: int
 
     def texts(self, vehicle: int, most_late_ns: int) -> Iterator[str]:
-        """What a user must know; ``most_late_ns`` is how late a frame arrived at most."""
+        """Yield texts on the clocks for the user.
+
+        ``most_late_ns`` is how late a frame arrived at most.
+        """
         for record, size_ns in self.offsets.steps():
             yield f"the ground station's clock was set by {size_ns / NS_PER_S:+.3f} s before frame {record}"
         if self.ground_ns:
@@ -230,7 +240,7 @@ class Clocks:
 
 
 class ClockSurvey:
-    """Takes readings of all clocks from the frames of a log."""
+    """Collector of readings of all clocks from the frames of a log."""
 
     def __init__(self) -> None:
         self._readers: dict[tuple[int, int], TimeReader] = {}
@@ -240,7 +250,7 @@ class ClockSurvey:
         self._last: tuple[int, int] | None = None
 
     def take(self, block: Block) -> None:
-        """Take those of a block."""
+        """Take in the readings of a block."""
         received = block.received
         self._note_jumps(block.record_index, received)
         for sender, groups in block.by_sender():
@@ -287,7 +297,7 @@ class ClockSurvey:
         self._last = int(index[-1]), int(time_ns[-1])
 
     def clocks(self, vehicle: int) -> Clocks:
-        """The clocks that were found."""
+        """Return the clocks that were found."""
         tracks = {key: readings.all() for key, readings in self._readings.items()}
         parted: dict[int, list[Stretch]] = {}
         found: dict[int, Key] = {}
@@ -308,7 +318,7 @@ class ClockSurvey:
         return Clocks(senders, offsets.plus(ground_ns), ground_ns)
 
     def _ranked(self, sender: int, tracks: Mapping[Key, Track]) -> list[Key]:
-        """The messages that may be read for the clock of a sender, the best first."""
+        """Rank the messages that may serve as the clock of a sender, the best first."""
         known = messages()
         places = {name: place for place, name in enumerate(_STEADY)}
 
@@ -337,12 +347,12 @@ class ClockSurvey:
         clock = SenderClock(number, frozenset(), epochs, of_1970, unix_ns)
         late = {other: clock.lateness(track, other[2]) for other, track in own.items()}
         trusted = [other for other in late if _go_together(late[key], late[other])]
-        unread = time_fields().keys() - {other[1] for other in own}  # of these each frame is judged by itself
+        unread = time_fields().keys() - {other[1] for other in own}  # each frame of these is judged by itself
         return replace(clock, trusted=frozenset({other[1] for other in trusted} | unread))
 
 
 class Lateness(NamedTuple):
-    """How late some records arrived, and their places among all of their message; shape (n,) each."""
+    """Lateness of some records, and their places among all of their message; shape (n,) each."""
 
     record_index: Int64Array
     number: Int64Array
@@ -350,28 +360,34 @@ class Lateness(NamedTuple):
 
 
 def _pace(stretches: Sequence[Stretch]) -> float:
-    """Time of a clock over time of receipt."""
+    """Return the pace of a clock: its time over time of receipt."""
     clock = sum(int(np.ptp(one.track.clock_ns)) for one in stretches)
     receipt = sum(int(np.ptp(one.track.receipt_ns)) for one in stretches)
     return clock / receipt if receipt else float(clock > 0)
 
 
 def _level(track: Track) -> int:
-    """Least difference of receipt and clock in the last stretch of readings."""
+    """Return the least difference of receipt and clock in the last stretch of readings."""
     return stretches_of(track, receipt_step_s=RECEIPT_STEP_S)[-1].level_ns
 
 
 def _go_together(reference: Lateness, other: Lateness) -> bool:
-    """Whether the times of a message are by the clock of its sender: mostly as late as those that are read for it."""
+    """Tell whether the times of a message are by the clock of its sender.
+
+    They are when they are mostly as late as those that are read for it.
+    """
     if len(other.late_ns) == 0:
         return False
     off_ns = other.late_ns - np.interp(other.record_index, reference.record_index, reference.late_ns)
-    evenly = np.linspace(other.number[0], other.number[-1], SHARE_STEPS)  # those that are kept are not
+    evenly = np.linspace(other.number[0], other.number[-1], SHARE_STEPS)  # the readings kept are not evenly spread
     return bool(np.mean(np.abs(np.interp(evenly, other.number, off_ns)) <= OFF_S * NS_PER_S) >= MOST_SHARE)
 
 
 def _utc_within(utc: Track | None, first: int, end: int, line: Line) -> int | None:
-    """UTC less the clock by SYSTEM_TIME between two records: its last level; None where it does not tell."""
+    """Return UTC less the clock by SYSTEM_TIME between two records: its last level.
+
+    None where SYSTEM_TIME does not tell.
+    """
     if utc is None:
         return None
     within = utc.take((utc.record_index >= first) & (utc.record_index < end))
@@ -384,7 +400,10 @@ def _utc_within(utc: Track | None, first: int, end: int, line: Line) -> int | No
 
 
 def _ground_ns(senders: Mapping[int, SenderClock], by: Mapping[int, Track], vehicle: int) -> int:
-    """What is added to the ground station's clock to have UTC, by the vehicle, or by another sender that tells it."""
+    """Return what must be added to the ground station's clock to get UTC.
+
+    It follows from the vehicle, or another sender that states UTC.
+    """
     for sender in sorted(senders, key=lambda sender: (sender != vehicle, sender)):
         for epoch in reversed(senders[sender].epochs):
             if epoch.utc_ns is not None:

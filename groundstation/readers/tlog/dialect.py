@@ -1,4 +1,6 @@
-"""What MAVLink messages hold: the tables of pymavlink (LGPL), which is installed beside by `groundstation[tlog]`.
+"""Fields of MAVLink messages, from the tables of pymavlink (LGPL).
+
+``groundstation[tlog]`` installs it.
 
 Only its tables of fields are used; frames are found and read by our own code.
 """
@@ -32,7 +34,7 @@ _DTYPES = {
 
 @dataclass(frozen=True)
 class Message:
-    """Layout of one message: its dtype, the fields that are text, and those that are arrays with their length."""
+    """Layout of one message: its dtype, its text fields, and its arrays with their length."""
 
     name: str
     dtype: np.dtype[Any]
@@ -54,7 +56,7 @@ def messages() -> dict[int, Message]:
 
 @cache
 def crc_extras() -> NDArray[np.int16]:
-    """The byte that each message's checksum ends with, by number; :data:`UNKNOWN` for others."""
+    """Return each message's extra checksum byte by number; :data:`UNKNOWN` for others."""
     extras = np.full(MOST_IDS, UNKNOWN, dtype=np.int16)
     for number, kind in _map().items():
         if 0 <= number < MOST_IDS:

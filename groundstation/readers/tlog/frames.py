@@ -1,4 +1,4 @@
-"""Frames of a stretch of a telemetry log: who sent them, when they were received, the values of their fields."""
+"""Frames of a stretch of a telemetry log: senders, times of receipt, field values."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -44,7 +44,10 @@ class Block:
 
     @cached_property
     def groups(self) -> Sequence[tuple[int, int, Int64Array]]:
-        """Sender (system x 256 + component), number of message, and which frames are of both, in that order."""
+        """Groups of frames: sender, number of message, and the frames of both, in that order.
+
+        The sender is system x 256 + component.
+        """
         senders, numbers = (self.frames[:, column].astype(np.uint16) for column in (2, 1))  # sorted by their digits
         order = np.argsort(numbers, kind="stable")
         order = order[np.argsort(senders[order], kind="stable")]
@@ -55,12 +58,15 @@ class Block:
         return [(*pair, which) for pair, which in zip(pairs, np.split(order, edges), strict=False)]
 
     def by_sender(self) -> Iterator[tuple[int, list[tuple[int, Int64Array]]]]:
-        """Each sender, with its messages by their number and which frames are of them."""
+        """Each sender, with its messages by number and the frames of each."""
         for sender, groups in groupby(self.groups, key=itemgetter(0)):
             yield sender, [(number, which) for _sender, number, which in groups]
 
     def rows(self, which: Int64Array, message: Message) -> NDArray[Any]:
-        """Frames of one message as records; a payload of version 2 leaves out the zeros at its end."""
+        """Return the frames of one message as records.
+
+        A payload of version 2 leaves out the zeros at its end.
+        """
         key = message.name, int(which[0]) if len(which) else -1
         if key not in self._rows or len(self._rows[key]) != len(which):
             self._rows[key] = self._read(which, message)
@@ -80,7 +86,7 @@ class Block:
         return payloads.view(message.dtype)[:, 0]
 
     def _at_any_byte(self, dtype: np.dtype[Any]) -> NDArray[Any]:
-        """View of the bytes in which entry ``k`` is the value that starts at byte ``k``."""
+        """Return a view of the bytes whose entry ``k`` is the value that starts at byte ``k``."""
         return np.ndarray((max(len(self.data) - dtype.itemsize + 1, 0),), dtype, self.data.data, strides=(1,))
 
     @cached_property

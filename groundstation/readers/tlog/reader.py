@@ -1,4 +1,7 @@
-"""Items of a telemetry log: batches of every message, raw and canonical, then remarks and damages."""
+"""Items of a telemetry log: batches of every message, then remarks and damage.
+
+Each message comes raw, and canonical where a rule serves it.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,13 +25,13 @@ from groundstation.readers.tlog.frames import Block
 from groundstation.readers.tlog.timer import Timer
 
 BLOCK_BYTES = 4 << 20
-KEPT_BYTES = 32 << 20  # of a log whose frames are kept for the second pass
+KEPT_BYTES = 32 << 20  # size of a log whose frames are kept for the second pass
 AUTOPILOT = 1  # component
 
 
 @dataclass
 class _Frames:
-    """Iterates over the frames of a log in blocks; again from memory where they are few."""
+    """Iterable over the frames of a log in blocks; again from memory if they are few."""
 
     source: Source
     skipped: SkippedBytes = field(default_factory=lambda: SkippedBytes("frame"))
@@ -80,7 +83,7 @@ class _Frames:
                     return
 
     def _note(self, data: NDArray[np.uint8], spans: NDArray[np.int64], base: int, count: int, ends: bool) -> None:
-        """Count stretches that belong to no frame; the last of the file is a frame that was cut."""
+        """Count stretches of no frame; the last one may be a frame that was cut."""
         for number, (start, end, before) in enumerate(spans.tolist()):
             if ends and number == len(spans) - 1 and end == len(data) and _begins_frame(data[start:end]):
                 self.cut = base + start, base + end
@@ -88,7 +91,7 @@ class _Frames:
                 self.skipped.add(base + start, base + end, count + before)
 
     def damages(self) -> Iterator[Damage]:
-        """What was skipped or cut."""
+        """Yield the bytes that were skipped or cut."""
         yield from self.skipped.damages()
         if self.cut is not None:
             start, end = self.cut
@@ -99,7 +102,7 @@ class _Frames:
 
 
 def _begins_frame(data: NDArray[np.uint8]) -> bool:
-    """Whether bytes are a time and the beginning of a frame, or the beginning of a time."""
+    """Tell whether bytes are a time and the beginning of a frame, or the beginning of a time."""
     return len(data) < 18 or int(data[8]) in (0xFE, 0xFD)
 
 
@@ -136,7 +139,7 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
 
 
 def _with_next(blocks: Iterable[Block]) -> Iterator[tuple[Block, Block | None]]:
-    """Each block with the one that follows."""
+    """Yield each block with the one that follows."""
     before = None
     for block in blocks:
         if before is not None:
@@ -147,7 +150,7 @@ def _with_next(blocks: Iterable[Block]) -> Iterator[tuple[Block, Block | None]]:
 
 
 def _survey(frames: Iterable[Block]) -> tuple[int, dict[str, frozenset[str]], Clocks]:
-    """The vehicle, the columns of its messages, and the clocks of all senders.
+    """Find the vehicle, the columns of its messages, and the clocks of all senders.
 
     The vehicle (system x 256 + component) is the one that tells its attitude most often.
     """
@@ -186,7 +189,7 @@ def _part(block: Block, which: Int64Array, message: Message, validity_ns: Int64A
 
 
 def _served(met: Mapping[str, frozenset[str]]) -> dict[str, list[Assignment]]:
-    """What messages with these columns feed, by their names."""
+    """Return, by message name, the canonical topics that messages with these columns feed."""
     names = {INSTANCES.get(name, (name, 0)): name for name in met}
     offers = [Offer(*source, met[name]) for source, name in names.items()]
     served: dict[str, list[Assignment]] = {}
@@ -198,10 +201,10 @@ def _served(met: Mapping[str, frozenset[str]]) -> dict[str, list[Assignment]]:
 def _take(
     canonical: dict[str, list[Part]], part: Part, assignments: Sequence[Assignment], nowhere: Counter[str]
 ) -> None:
-    """Add what a message gives to canonical topics; ``nowhere`` counts positions that are none."""
+    """Add the values of a message to canonical topics; ``nowhere`` counts missing positions."""
     if not assignments:
         return
-    with np.errstate(invalid="ignore"):  # of a NaN that signals
+    with np.errstate(invalid="ignore"):  # a signalling NaN would warn
         numbers = {
             name: one.values.astype(np.float64) for name, one in part.columns.items() if one.values.dtype.kind != "U"
         }
@@ -242,7 +245,7 @@ class _Arming:
 
 
 def _remarks(served: Mapping[str, Sequence[Assignment]], clock_texts: Iterable[str]) -> Iterator[Remark]:
-    """What serves as what, and by which clock."""
+    """Yield remarks on what serves each topic, and by which clock."""
     sources: dict[str, list[str]] = {}
     for name, several in served.items():
         for one in several:

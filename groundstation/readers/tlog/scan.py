@@ -1,4 +1,4 @@
-"""The one loop over the bytes of a telemetry log: where its frames stand, each proved by its checksum. Compiled.
+"""Compiled loop over the bytes of a telemetry log: it finds frames by their checksum.
 
 Source: MAVLink developer guide, packet serialization; the checksum is CRC-16/MCRF4XX over all but the first byte, then
 over one byte that the message's definition gives.
@@ -30,7 +30,10 @@ def _checksum(data: Any, start: int, end: int, extra: int) -> int:
 
 @in_place
 def _frame_end(data: Any, at: int, limit: int) -> int:
-    """Where the frame behind the time at ``at`` ends; 0 when none begins, -1 when it ends behind the data."""
+    """Return the end of the frame behind the time at ``at``.
+
+    0 when no frame begins there, -1 when it ends behind the data.
+    """
     if at + 10 > limit:
         return -1
     start = at + 8
@@ -47,7 +50,7 @@ def _frame_end(data: Any, at: int, limit: int) -> int:
 
 @in_place
 def scan(data: Any, is_last: bool, extras: Any, frames: Any, skipped: Any, told: Any) -> int:
-    """Find frames; returns how many.
+    """Find frames and return their number.
 
     ``frames`` (m, 5) receives time, number of message, system x 256 + component, place and bytes of the payload;
     ``skipped`` (k, 3) first byte, the first behind, and the frames before; ``told`` (3,) how many stretches were
@@ -107,5 +110,5 @@ def scan(data: Any, is_last: bool, extras: Any, frames: Any, skipped: Any, told:
 
 
 def room(size: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Arrays for the frames and skipped stretches of so many bytes, and for what is told of them."""
+    """Return arrays for the frames and skipped stretches of so many bytes, and the state."""
     return np.empty((size // 16 + 1, COLUMNS), np.int64), np.empty((4_096, 3), np.int64), np.empty(3, np.int64)

@@ -1,4 +1,7 @@
-"""When the values in the frames of a telemetry log were true, block by block, by the clocks of their senders."""
+"""Times of validity of the frames of a telemetry log, block by block.
+
+They follow from the clocks of the senders.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -11,11 +14,11 @@ from groundstation.readers.tlog.clock import NS_PER_US, Clocks, TimeReader, time
 from groundstation.readers.tlog.frames import Block
 
 MOST_LATE_S = 600.0
-ASTRAY_S = 2.0  # of the time of a message from those of its sender's clock around it
+ASTRAY_S = 2.0  # largest difference of a message's time from its sender's clock around it
 
 
 class Timer:
-    """Tells when the values of frames were true, block by block.
+    """Times of validity of the values in frames, computed block by block.
 
     Attributes
     ----------
@@ -29,11 +32,14 @@ class Timer:
         self._readers: dict[tuple[int, int], TimeReader] = {}
         self._before: dict[int, NDArray[np.int64]] = {}  # the last reference of each sender: record, receipt, its clock
         self._last: dict[int, NDArray[np.int64]] = {}  # the last frame whose time is known: record, receipt, UTC
-        self._references: dict[int, NDArray[np.int64]] = {}  # of the block that follows
+        self._references: dict[int, NDArray[np.int64]] = {}  # references of the block that follows
         self._device_ns: Int64Array = np.zeros(0, dtype=np.int64)  # when the last frame before the block was received
 
     def validity_ns(self, block: Block, following: Block | None) -> Int64Array | None:
-        """Times of validity of a block's frames by the ground station's clock, shape (n,); None without any clock."""
+        """Return the times of validity of a block's frames, shape (n,).
+
+        They are by the ground station's clock; None without any clock.
+        """
         if not self._clocks.senders:
             return None
         own = self._references or self._read_references(block)
@@ -68,7 +74,7 @@ class Timer:
         return np.where(has_own | is_known, validity_ns, device_ns)
 
     def _is_repeated(self, device_ns: Int64Array, following: Block | None) -> BoolArray:
-        """Frames of a block that were received together with the one before or behind, shape (n,)."""
+        """Tell which frames were received together with a neighbour, shape (n,)."""
         behind_ns = np.zeros(0, dtype=np.int64) if following is None else following.received.values[:1]
         around_ns = np.concatenate((self._device_ns, device_ns, behind_ns))
         is_same = np.concatenate(([False], around_ns[1:] == around_ns[:-1], [False]))
@@ -79,12 +85,15 @@ class Timer:
         return np.asarray(block.received.values + self._clocks.offsets.at(block.record_index))
 
     def _read(self, block: Block, sender: int, number: int, which: Int64Array) -> Int64Array:
-        """Times of frames by the clock of their sender, -1 where there is none."""
+        """Read times of frames by the clock of their sender, -1 where there is none."""
         reader = self._readers.setdefault((sender, number), TimeReader(number))
         return self._clocks.senders[sender].by_its_clock(*reader.read(block, which))
 
     def _read_references(self, block: Block) -> dict[int, NDArray[np.int64]]:
-        """The frames of each sender that are read for its clock: record, receipt, clock; those that can be true."""
+        """Read the frames of each sender that serve its clock: record, receipt, clock.
+
+        Only those that can be true.
+        """
         found = {}
         received_ns = self._received_ns(block)
         for sender, number, which in block.groups:
@@ -101,7 +110,7 @@ class Timer:
     def _around(
         self, sender: int, own: Mapping[int, NDArray[np.int64]], behind: Mapping[int, NDArray[np.int64]]
     ) -> NDArray[np.int64]:
-        """References of a sender in the block, with the last before it and the first behind it."""
+        """Return references of a sender in the block, and the nearest on either side of it."""
         nothing = np.zeros((3, 0), dtype=np.int64)
         parts = self._before.get(sender, nothing), own.get(sender, nothing), behind.get(sender, nothing)[:, :1]
         return np.concatenate(parts, axis=1)
@@ -115,7 +124,7 @@ class Timer:
         utc_ns: Int64Array,
         is_known: BoolArray,
     ) -> None:
-        """UTC of the frames of a sender whose own times can be true."""
+        """Set the UTC of the frames of a sender whose own times can be true."""
         clock = self._clocks.senders[sender]
         if not around.shape[1]:
             return
@@ -141,7 +150,10 @@ class Timer:
     def _of_sender(
         self, sender: int, rows: Int64Array, known: NDArray[np.int64], is_known: BoolArray
     ) -> NDArray[np.int64]:
-        """Frames of a sender whose time is known, with the last before the block and the first behind it."""
+        """Return the frames of a sender whose time is known.
+
+        The last one before the block and the first one behind it are included.
+        """
         nothing = np.zeros((3, 0), dtype=np.int64)
         behind = self._references.get(sender, nothing)[:, :1]
         if behind.shape[1]:
@@ -150,7 +162,7 @@ class Timer:
         return np.concatenate((self._last.get(sender, nothing), known[:, rows[is_known[rows]]], behind), axis=1)
 
     def _known(self, system: int, rows: Int64Array, known: NDArray[np.int64], is_known: BoolArray) -> NDArray[np.int64]:
-        """The same of all senders of a system."""
+        """Return frames of all senders of a system with known time, and the last before."""
         last = [one for sender, one in self._last.items() if sender >> 8 == system]
         before = max(last, key=lambda one: int(one[0, -1]), default=np.zeros((3, 0), dtype=np.int64))
         return np.concatenate((before, known[:, rows[is_known[rows]]]), axis=1)
@@ -172,13 +184,16 @@ class Timer:
 
 
 def _near(short_ns: Int64Array, clock_ns: Int64Array) -> Int64Array:
-    """Times of which 32 bits in microseconds were sent, next to others."""
+    """Complete times of which only 32 bits in microseconds were sent, close to others."""
     wrap_ns = (1 << 32) * NS_PER_US
     return np.asarray(clock_ns + (short_ns - clock_ns + wrap_ns // 2) % wrap_ns - wrap_ns // 2)
 
 
 def _between(index: Int64Array, received_ns: Int64Array, known: NDArray[np.int64]) -> Int64Array:
-    """UTC of frames between others, by the time of receipt, or by their order where that is one."""
+    """Return the UTC of frames between others by the time of receipt.
+
+    Where the receipt is the same, the order of the frames counts.
+    """
     at = np.searchsorted(known[0], index)
     low, high = np.maximum(at - 1, 0), np.minimum(at, known.shape[1] - 1)
     records, times, utc = known

@@ -1,4 +1,7 @@
-"""PX4 ULog: every topic under its own definition, the canonical ones in their units, and what was lost on the way."""
+"""PX4 ULog: every topic under its own definition, canonical ones in their units.
+
+Loss on the way is reported as damage.
+"""
 
 import re
 from collections.abc import Iterator
@@ -16,7 +19,9 @@ _ENCRYPTED_NAMES = (".ulge", ".ulgc")
 
 
 def sniff(source: Source) -> Claim | None:
-    """Claim what begins with the seven bytes of a ULog, or (where its start is damaged) holds several formats of it.
+    """Claim a file that begins with the seven magic bytes of a ULog.
+
+    Where the start of the file is damaged, several ULog formats in the head are enough.
 
     Raises
     ------
@@ -33,7 +38,10 @@ def sniff(source: Source) -> Claim | None:
 
 
 def _refuse_encrypted(source: Source) -> None:
-    """Say how to decrypt what PX4 encrypted; before 1.16 data are told by their name."""
+    """Refuse a log that PX4 encrypted and say how to decrypt it.
+
+    Before PX4 1.16 encrypted data are recognised by the file's name.
+    """
     if source.head.startswith(_KEY):
         found, next_step = "the key of an encrypted PX4 ULog, no log", "decrypt the .ulgc beside it"
         raise UnclaimedLogError(source.name, found, "", f"{next_step} with PX4's Tools/decrypt_ulog.py")
@@ -77,7 +85,7 @@ def read(source: Source) -> Iterator[Item]:
 
 
 def _headless(source: Source) -> Iterator[Item]:
-    """Items of a log whose first bytes are damaged; when logging began is not known."""
+    """Yield the items of a log whose first bytes are damaged; its start is not known."""
     from groundstation.readers.ulog.reader import items
 
     yield from items(source, NAME, 0)

@@ -1,4 +1,7 @@
-"""Cuts a ULog into blocks of messages, each under the definitions in force; what belongs to no message is counted."""
+"""Cut a ULog into blocks of messages, each under the definitions in force.
+
+Bytes that belong to no message are counted.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,7 +19,7 @@ from groundstation.readers.ulog.formats import Flattener, Format, Layout, parse_
 from groundstation.readers.ulog.messages import FILE_HEADER_BYTES, FLAGS_BYTES, MAGIC, FlagBits, flag_bits, text_of
 
 BLOCK_BYTES = 8 << 20
-KEPT_BYTES = 32 << 20  # of a log whose blocks may all be kept, for a second pass
+KEPT_BYTES = 32 << 20  # size of a log whose blocks may all be kept for the second pass
 MAX_TOPICS = 30_000  # numbers of topics have 16 bits
 DEFINITIONS_SHOWN = 20  # bad definitions told one by one; the others are told together
 SLACK = 7  # bytes behind the data, so that a row may be rounded up to a multiple of eight
@@ -26,7 +29,10 @@ NOT_SUBSCRIBED = -scan.DATA  # topic number of data messages whose subscription 
 
 @dataclass(frozen=True, eq=False)
 class Topic:
-    """A subscription: a topic's instance and the layout of its messages; None when the log does not define it."""
+    """Subscription: a topic's instance and the layout of its messages.
+
+    ``layout`` is None when the log does not define it.
+    """
 
     number: int
     name: str
@@ -36,7 +42,9 @@ class Topic:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Messages of one stretch of the file, in its order; to be used before the next one is asked for.
+    """Messages of one stretch of the file, in file order.
+
+    Use a block before the next one is asked for.
 
     Parameters
     ----------
@@ -59,7 +67,7 @@ class Block:
     topics: list[Topic]
 
     def groups(self) -> Iterator[tuple[Topic, Int64Array]]:
-        """Each topic that occurs, and which messages (numbered from 0) are of it, increasing."""
+        """Yield each topic that occurs, and the numbers (from 0) of its messages, increasing."""
         order = np.argsort(self.topic.astype(np.int16), kind="stable")  # 16 bits: sorted by radix
         numbers = self.topic[order]
         starts = np.flatnonzero(np.diff(numbers, prepend=-(1 << 20)))
@@ -68,13 +76,16 @@ class Block:
                 yield self.topics[int(numbers[start])], order[start:end].astype(np.int64)
 
     def rows(self, layout: Layout, which: Int64Array) -> NDArray[Any]:
-        """Data of some messages of one topic as a structured array, shape (n,), copied from the block."""
+        """Return the data of some messages of one topic as a structured array, shape (n,).
+
+        The array is a copy.
+        """
         width = layout.row_bytes
         windows = np.ndarray((len(self.data) - width + 1,), f"V{width}", self.data, strides=(1,))
         return windows[self.at[which] + (scan.HEADER + 2)].view(layout.dtype)
 
     def controls(self) -> Iterator[tuple[int, str, bytes]]:
-        """Messages that are not data: number, type and body."""
+        """Yield number, type and body of the messages that are not data."""
         for number in np.flatnonzero(self.topic < 0).tolist():
             yield number, chr(-int(self.topic[number])), self.body(number)
 
@@ -86,7 +97,7 @@ class Block:
 
 
 class Definitions:
-    """Formats and subscriptions in force, and what was wrong with them.
+    """Formats and subscriptions in force, and the damage found in them.
 
     Attributes
     ----------
@@ -144,7 +155,11 @@ class Definitions:
 
 
 def flags_of(source: Source) -> FlagBits | None:
-    """Flags of a log; None where it has none, or where no message follows them: bytes of them are gone, or too many."""
+    """Return the flags of a log, or None.
+
+    None where the log has no flags, and where no message follows them: bytes of the flags are then missing, or there
+    are too many.
+    """
     flags = flag_bits(source.head)
     if flags is None or flags.is_plain:
         return flags
@@ -175,7 +190,10 @@ class Walk:
 
     @property
     def may_be_kept(self) -> bool:
-        """Whether blocks stay as they are when those behind them are read; else each is good until the next."""
+        """Tell whether blocks stay valid while later ones are read.
+
+        If not, each block is valid until the next one is read.
+        """
         return self._source.size <= KEPT_BYTES
 
     def __iter__(self) -> Iterator[Block]:
@@ -191,7 +209,10 @@ class Walk:
                 start = end
 
     def _section_ends(self, start: int, appended: tuple[int, ...]) -> list[int]:
-        """Where sections end: a message that was cut when data was appended does not reach into the next section."""
+        """Return the places where sections of the file end.
+
+        A message that was cut when data was appended does not reach into the next section.
+        """
         size = self._source.size
         offsets = sorted(appended)
         beyond = [offset for offset in offsets if offset > size]
@@ -201,7 +222,7 @@ class Walk:
         return [*(offset for offset in dict.fromkeys(offsets) if start < offset < size), size]
 
     def _section(self, stream: BinaryIO, start: int, end: int) -> Iterator[Block]:
-        """Messages of the bytes from ``start`` to ``end``."""
+        """Yield blocks of the messages in the bytes from ``start`` to ``end``."""
         state = scan.new_state()
         room = min(BLOCK_BYTES + 2 * scan.LOOKAHEAD, end - start)
         buffer = np.zeros(room + SLACK, dtype=np.uint8)
@@ -222,7 +243,10 @@ class Walk:
         self._close(stream, state, base, base + filled)
 
     def _messages(self, data: NDArray[np.uint8], is_end: bool, base: int, state: Int64Array) -> Iterator[Block]:
-        """Blocks of the messages in ``data`` (and slack), which begins at byte ``base`` of the file."""
+        """Yield blocks of the messages in ``data``, which begins at byte ``base`` of the file.
+
+        ``data`` includes the slack.
+        """
         definitions = self.definitions
         spans = np.zeros((4096, 3), dtype=np.int64)
         reason = scan.FULL
@@ -249,7 +273,7 @@ class Walk:
                 self._index += count
 
     def _note_skipped(self, data: NDArray[np.uint8], start: int, behind: int) -> None:
-        """Count bytes of no message; the header of a further log is none of them."""
+        """Count bytes of no message; the header of a further log does not count."""
         bytes_, end = data.tobytes(), start + len(data)
         at = bytes_.find(MAGIC)
         if at < 0:
@@ -264,7 +288,7 @@ class Walk:
                 self._skipped.add(first, last, behind)
 
     def _read(self, stream: BinaryIO, place: int, into: NDArray[np.uint8]) -> int:
-        """Fill ``into`` with bytes of the file from ``place`` on; returns how many there were."""
+        """Fill ``into`` with bytes from ``place`` on and return their number."""
         try:
             stream.seek(place)
             count: int = stream.readinto(into.data)  # type: ignore[attr-defined]
@@ -291,13 +315,13 @@ class Walk:
             self._ends.append(Damage("truncated", f"byte {stop}", end - stop, what, between_records=between))
 
     def _is_filler(self, stream: BinaryIO, start: int, end: int) -> bool:
-        """Whether all bytes are zero: a file that was made longer than its data."""
+        """Tell whether all bytes of a stretch are zero, as in a file made longer than its data."""
         piece = np.empty(min(1 << 20, end - start), dtype=np.uint8)
         counts = ((at, self._read(stream, at, piece[: end - at])) for at in range(start, end, len(piece)))
         return not any(piece[:count].any() for _at, count in counts)
 
     def damages(self) -> Iterator[Damage]:
-        """What was lost, once all blocks were gone through."""
+        """Yield the damage found, once all blocks have been read."""
         listed = self.definitions.damages
         yield from listed[:DEFINITIONS_SHOWN]
         if len(listed) > DEFINITIONS_SHOWN:

@@ -1,4 +1,4 @@
-"""PX4 topics as canonical signals: which message gives which field, in which unit.
+"""Canonical signals from PX4 topics: the message, field and unit of each.
 
 Field names changed between versions of PX4; of the rules of a role the first whose topic has data with the fields it
 needs is taken. Units and senses are those of the message definitions (PX4-Autopilot, msg/*.msg, versions 1.4 to 1.16).
@@ -59,9 +59,10 @@ def _rule(source: str, fields: Mapping[str, tuple[str, float]], **derived: str) 
 
 
 def attitude_from_quaternion(rows: Numbers) -> Columns:
-    """Roll, pitch and heading of ``q`` (w, x, y, z), which turns body forward-right-down into north-east-down.
+    """Return roll, pitch and heading of the quaternion ``q`` (w, x, y, z).
 
-    A quaternion whose length is not one is none: PX4 writes zeros before the filter has started.
+    ``q`` turns body forward-right-down into north-east-down. A quaternion whose length is not one counts as missing:
+    PX4 writes zeros before the filter has started.
     """
     w, x, y, z = (rows[f"q[{k}]"] for k in range(4))
     with np.errstate(invalid="ignore", over="ignore"):
@@ -130,7 +131,7 @@ def gnss(rows: Numbers) -> Columns:
 
 
 def _filled(ellipsoid: Column, msl: Column) -> Column:
-    """Height above the ellipsoid where a driver filled it in: else it leaves 0."""
+    """Return the height above the ellipsoid where a driver filled it in; else it is 0."""
     return Column(ellipsoid.values, ellipsoid.mask & ((ellipsoid.values != 0.0) | (msl.values == 0.0)))
 
 
@@ -203,7 +204,10 @@ def _vector_rule(source: str, name: str, fields: tuple[str, str, str], factor: f
 
 
 def _while_there(sensor: str, rule: Rule) -> Rule:
-    """A rule of ``sensor_combined``, whose values are absent where it says that the sensor is."""
+    """Return a rule of ``sensor_combined``: values are absent where the sensor is.
+
+    The message itself says where.
+    """
     mark = f"{sensor}_timestamp_relative"
 
     def columns(rows: Numbers) -> Columns:

@@ -1,4 +1,4 @@
-"""The log's own definitions: formats of messages, flattened to columns with their place in a message."""
+"""Message formats that the log defines, as flat lists of columns with their offsets."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -15,9 +15,9 @@ DTYPES: Mapping[str, str] = {
     "int64_t": "<i8", "uint64_t": "<u8", "float": "<f4", "double": "<f8", "bool": "u1", "char": "i1",
 }  # fmt: skip
 MAX_DATA_BYTES = 0xFFFF - 2
-MAX_COLUMNS = 9_000  # of one topic; the store reads no more
+MAX_COLUMNS = 9_000  # columns of one topic; the store reads no more
 MAX_DEPTH = 20
-MAX_STEPS = 2_000_000  # of flattening all formats of a log
+MAX_STEPS = 2_000_000  # steps of flattening all formats of a log
 TIMESTAMP = "timestamp"
 _FIELD = re.compile(r"([A-Za-z0-9_\-/]+)(?:\[(\d{1,6})\])? +(\S{1,200})")
 
@@ -41,7 +41,10 @@ class Format:
 
 @dataclass(frozen=True)
 class LayoutColumn:
-    """One number of a message: name (``q[0]``, ``a.b``), type of the log, and offset in the message's data."""
+    """Number in a message: its name (``q[0]``, ``a.b``), the log's type, and its offset.
+
+    The offset counts from the start of the message's data.
+    """
 
     name: str
     type: str
@@ -50,7 +53,7 @@ class LayoutColumn:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the columns of a topic stand in a message's data.
+    """Columns of a topic and their places in a message's data.
 
     Parameters
     ----------
@@ -66,7 +69,7 @@ class Layout:
 
     @cached_property
     def row_bytes(self) -> int:
-        """Bytes of a row of gathered data: a multiple of eight keeps aligned what the log aligned."""
+        """Bytes of a row of gathered data, a multiple of eight so that numbers stay aligned."""
         return (self.least_bytes + 7) // 8 * 8
 
     @cached_property
@@ -94,7 +97,7 @@ class Layout:
 
     @cached_property
     def timestamp_offset(self) -> int | None:
-        """Where the time of publication stands; None in a format without one."""
+        """Offset of the time of publication; None in a format without one."""
         return next((c.offset for c in self.columns if c.name == TIMESTAMP and c.type == "uint64_t"), None)
 
 
@@ -127,7 +130,7 @@ def parse_format(text: str) -> Format:
 
 
 class Flattener:
-    """Makes layouts of formats, within a bound on the work that one log may cause.
+    """Builder of layouts from formats, within a bound on the work of one log.
 
     Examples
     --------
@@ -186,7 +189,7 @@ def _is_padding(column: LayoutColumn) -> bool:
 
 
 def _unique(columns: list[LayoutColumn]) -> Iterator[LayoutColumn]:
-    """Columns with a number behind names that occur again."""
+    """Yield columns with a number behind names that occur again."""
     taken: set[str] = set()
     for column in columns:
         name, copy = column.name, 1

@@ -1,4 +1,4 @@
-"""Messages other than data: what their bytes say."""
+"""Messages other than data, parsed from their bytes."""
 
 import struct
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ _CODES = dict(zip(DTYPES, "bBhHiIqQfdBb", strict=True))
 
 @dataclass(frozen=True)
 class FlagBits:
-    """Flags of the log: what a reader must understand, where data was appended, and where the message ends.
+    """Flags of the log: features a reader must understand, offsets of appended data, own end.
 
-    ``is_plain``: none is set, and nothing was appended.
+    ``end`` is the place where the flag message ends. ``is_plain``: no flag is set, and nothing was appended.
     """
 
     incompatible: bytes
@@ -29,18 +29,24 @@ class FlagBits:
 
     @property
     def has_unknown(self) -> bool:
-        """Whether the log says that a reader of today cannot read it."""
+        """Tell whether the log uses features that this reader does not know."""
         return bool(self.incompatible[0] & ~APPENDED_BIT) and not self.is_damaged
 
     @property
     def is_damaged(self) -> bool:
-        """Whether flags are set that no version has: they are given from the lowest bit on, and one is so far."""
+        """Tell whether flags are set that no ULog version has.
+
+        Flags are assigned from the lowest bit on, and one is assigned so far.
+        """
         return any(self.incompatible[1:]) or self.incompatible[0] == 0xFF
 
 
 @dataclass(frozen=True)
 class Keyed:
-    """A key, the type of its value, and the value: a number, a text, or bytes that are neither."""
+    """Key, type of its value, and the value.
+
+    The value is a number, a text, or bytes where it is neither.
+    """
 
     key: str
     type: str
@@ -49,7 +55,10 @@ class Keyed:
 
 @dataclass(frozen=True)
 class LoggedText:
-    """A line of text with severity and time of the device clock; ``tag`` names its process, None without one."""
+    """Line of text with its severity and the time of the device clock.
+
+    ``tag`` names the process that wrote it, None without one.
+    """
 
     severity: str
     timestamp_us: int
@@ -58,7 +67,7 @@ class LoggedText:
 
 
 def flag_bits(head: bytes) -> FlagBits | None:
-    """Flags of a log, None when its first message is another one."""
+    """Return the flags of a log, None when its first message is another one."""
     at = FILE_HEADER_BYTES
     if len(head) < at + 3 + FLAG_BITS_BYTES or head[at + 2 : at + 3] != b"B":
         return None

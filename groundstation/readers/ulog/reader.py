@@ -1,4 +1,7 @@
-"""The second pass over a ULog: batches of every topic, raw and canonical, then remarks and damages."""
+"""Second pass over a ULog: batches of every topic, then remarks and damage.
+
+Each topic comes raw, and canonical where a rule serves it.
+"""
 
 import re
 from collections import Counter, deque
@@ -52,7 +55,7 @@ class _Losses:
             self.refused[topic, what] = self.refused.get((topic, what), 0) + count
 
     def damages(self) -> Iterator[Damage]:
-        """One for each topic."""
+        """Yield one damage for each topic."""
         for name, count in self.unreadable.items():
             yield Damage("dropped_channel", "the whole log", count, f"messages of {name} without a usable definition")
         for topic, count in self.beyond.items():
@@ -64,7 +67,7 @@ class _Losses:
 
 
 def items(source: Source, reader_name: str, start_us: int) -> Iterator[Item]:
-    """Items of a log; ``start_us`` is when its header says that logging began."""
+    """Yield the items of a log; ``start_us`` is when its header says that logging began."""
     walk = Walk(source)
     kept = deque(walk) if walk.may_be_kept else None
     found = overview(walk if kept is None else kept, walk.definitions)
@@ -105,13 +108,16 @@ def items(source: Source, reader_name: str, start_us: int) -> Iterator[Item]:
 
 
 def _let_go(blocks: deque[Block]) -> Iterator[Block]:
-    """Blocks, each free once it is done with."""
+    """Yield blocks; each is freed once it is done."""
     while blocks:
         yield blocks.popleft()
 
 
 def _newest_before(places: Int64Array, messages_us: NDArray[np.uint64], newest_us: int) -> Int64Array:
-    """Time of the last data message before each place, microseconds; what is no time counts as none."""
+    """Return the time of the last data message before each place, in microseconds.
+
+    A data message whose time is zero or out of range is passed over.
+    """
     has_time = np.flatnonzero((messages_us > 0) & (messages_us <= MAX_TIME_US))
     if not len(has_time):
         return np.full(len(places), newest_us, dtype=np.int64)
@@ -121,7 +127,10 @@ def _newest_before(places: Int64Array, messages_us: NDArray[np.uint64], newest_u
 
 
 class _RawTopics:
-    """Batches of the log's own topics: ``raw.<topic>``, and ``raw.<topic>.<instance>`` of all instances but 0."""
+    """Batches of the log's own topics: ``raw.<topic>``, ``raw.<topic>.<instance>``.
+
+    Instance 0 has no number in its name.
+    """
 
     def __init__(self, losses: _Losses, odd_flags: set[tuple[int, str]]) -> None:
         self._losses, self._odd_flags = losses, odd_flags
@@ -159,7 +168,7 @@ class _RawTopics:
 
 
 class _CanonicalTopics:
-    """Gathers canonical columns of a block, and puts those of several sources in the order of the log."""
+    """Canonical columns of a block; rows of several sources are put in the order of the log."""
 
     def __init__(self, losses: _Losses, found: Overview) -> None:
         self._losses, self._found = losses, found
@@ -169,7 +178,7 @@ class _CanonicalTopics:
         self._mode = "gnss_aided" if found.fixed else "attitude"
 
     def take(self, topic: Topic, index: Int64Array, time: Column, rows: NDArray[Any]) -> None:
-        """Convert what a block has of a PX4 topic."""
+        """Convert the data that a block has of a PX4 topic."""
         values = Rows(rows)
         of_topic: dict[str, dict[str, Column]] = {}
         for assignment in self._found.assignments.get((topic.name, topic.instance), ()):
@@ -221,14 +230,14 @@ class _CanonicalTopics:
             self._parts.setdefault("event", []).append(part)
 
     def batches(self) -> Iterator[RecordBatch]:
-        """Batches of what was taken since the last call."""
+        """Yield batches of what was taken since the last call."""
         parts, self._parts = self._parts, {}
         for topic, several in parts.items():
             batch = merged(topic, several)
             yield from bounded(_one_row_each(batch) if topic == "event" else batch)
 
     def remarks(self) -> Iterator[Remark]:
-        """What serves as what."""
+        """Yield remarks that tell which PX4 topics serve each canonical topic."""
         sources: dict[str, list[str]] = {}
         for (source, instance), assignments in sorted(self._found.assignments.items()):
             for assignment in assignments:
@@ -242,7 +251,10 @@ class _CanonicalTopics:
 
 
 def _one_row_each(events: RecordBatch) -> RecordBatch:
-    """Events of one message as one row, their names joined: a message may both arm and change the mode."""
+    """Merge the events of one message into one row, with their names joined.
+
+    One message may both arm and change the mode.
+    """
     first = np.flatnonzero(np.diff(events.record_index, prepend=-1) > 0)
     if len(first) == len(events):
         return events

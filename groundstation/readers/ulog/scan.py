@@ -1,12 +1,16 @@
-"""The loops over the bytes of a ULog: where its messages stand, and which bytes belong to none. Compiled.
+"""Compiled loops over the bytes of a ULog: they find its messages and the bytes of none.
 
-A message is a size (two bytes), a type (one byte) and as many bytes as the size says; there is no checksum. What can be
-checked is strong for most messages: a data message must have a known id and the size of its format, texts must be
-texts, the sync message is eleven fixed bytes. Such a message is believed by itself, so that an intact one between two
-damaged ones is kept. One with little to check is believed when a strong one follows within four, and none stands
-inside it: among damaged bytes every letter is the type of a message, and its size leads anywhere. Texts, and data with
-padding that may be left out, have a size that nothing confirms: where no message follows, one that begins inside tells
-that the size is damaged. Where none follows a data message, one that begins in its end tells that bytes of it are gone.
+A message is a size (two bytes), a type (one byte) and as many bytes as the size says; there is no checksum. Most
+messages can be checked strongly: a data message must have a known id and the size of its format, texts must be texts,
+the sync message is eleven fixed bytes. Such a message is believed by itself, so an intact one between two damaged ones
+is kept.
+
+A message with little to check is believed when a strong one follows within four and none stands inside it: among
+damaged bytes every letter is the type of a message, and its size may lead anywhere.
+
+Nothing confirms the size of texts, and of data whose padding may be left out. Where no message follows one of them and
+another begins inside it, its size is damaged. Where no message follows a data message and another begins in its end,
+bytes of the data message are missing.
 """
 
 from typing import Any
@@ -22,7 +26,7 @@ LOOKAHEAD = 6 * MAX_MESSAGE  # bytes that must follow the message that is judged
 LOOKED_AT = 256  # characters of a text or a name: bounds the work that a file made of letters causes
 LONGEST_WEAK = 4_096  # bytes of a message with little to check: one that is longer has a damaged size
 LONGEST_STEP = 512  # bytes of one on the way to a strong message
-NOT_SUBSCRIBED = -1  # of a message id, as its largest size
+NOT_SUBSCRIBED = -1  # largest size of a message id without subscription
 
 DATA, SYNC = 0x44, 0x53
 NONE, WEAK, STRONG = 0, 1, 2
@@ -48,7 +52,10 @@ def _u16(data: Any, at: int) -> Any:
 
 @in_place
 def _is_text(data: Any, start: int, end: int, is_name: bool) -> bool:
-    """Whether bytes are text: a name (letters, digits and ``_-/``), or anything but control characters."""
+    """Tell whether bytes are text.
+
+    A name has letters, digits and ``_-/`` only; any other text has no control characters.
+    """
     for at in range(start, end):
         byte = data[at]
         if is_name:
@@ -62,7 +69,10 @@ def _is_text(data: Any, start: int, end: int, is_name: bool) -> bool:
 
 @in_place
 def _value_bytes(data: Any, start: Any, stop: Any) -> Any:
-    """Size of the value of a key ``type[count] name``, by the letters and digits that tell the types apart."""
+    """Return the size in bytes of the value of a key ``type[count] name``.
+
+    Only the letters and digits that tell the types apart are looked at.
+    """
     first = data[start]
     width, count, is_array = 8 if first == 0x64 else 4 if first == 0x66 else 1, np.int64(0), False
     if first == 0x69 or first == 0x75:  # int, uint: 8, 16, 32, 64
@@ -80,7 +90,10 @@ def _value_bytes(data: Any, start: Any, stop: Any) -> Any:
 
 @in_place
 def _keyed_strength(data: Any, start: int, end: int) -> int:
-    """How much speaks for a body that is a length, a key ``type name`` of that length, and a value of that type."""
+    """Grade a body as a key with its value: NONE, WEAK or STRONG.
+
+    Such a body is a length, a key ``type name`` of that length, and a value of that type.
+    """
     if start >= end:
         return NONE
     stop = start + 1 + np.int64(data[start])
@@ -102,7 +115,10 @@ def _keyed_strength(data: Any, start: int, end: int) -> int:
 
 @in_place
 def _format_strength(data: Any, start: int, end: int) -> int:
-    """How much speaks for a name that is not empty, a colon, and printable characters, a semicolon the last of them."""
+    """Grade a body as a format definition: NONE, WEAK or STRONG.
+
+    Such a body is a name that is not empty, a colon, and printable characters of which the last is a semicolon.
+    """
     colons = 0
     for at in range(start, end):
         byte = data[at]
@@ -116,7 +132,10 @@ def _format_strength(data: Any, start: int, end: int) -> int:
 
 @in_place
 def _text_strength(data: Any, start: int, end: int, time_at: int) -> int:
-    """How much speaks for a level (a digit), a time (at ``time_at``) with nothing in its highest byte, and a text."""
+    """Grade a body as a logged text: NONE, WEAK or STRONG.
+
+    Such a body is a level (a digit), a time at ``time_at`` whose highest byte is zero, and a text.
+    """
     if time_at + 8 > end or data[start] < 0x30 or data[start] > 0x37 or data[time_at + 7] != 0:
         return NONE
     looked_at = time_at + 8 + LOOKED_AT
@@ -141,7 +160,7 @@ def _is_sync(data: Any, start: int) -> Any:
 
 @in_place
 def _strength(data: Any, at: int, end: int, least: Any, most: Any) -> int:
-    """How much speaks for a whole message at a place: NONE, WEAK or STRONG."""
+    """Grade the evidence for a whole message at a place: NONE, WEAK or STRONG."""
     if at + 3 > end:
         return NONE
     size = _u16(data, at)
@@ -177,7 +196,10 @@ def _strength(data: Any, at: int, end: int, least: Any, most: Any) -> int:
 
 @in_place
 def _swallows(data: Any, at: int, stop: int, least: Any, most: Any) -> bool:
-    """Whether a definition or information, or two strong messages one behind the other, stand inside a stretch."""
+    """Tell whether a stretch contains other messages.
+
+    A definition, an information message, or two strong messages in a row are enough.
+    """
     while at + 3 <= stop:
         place, found = at, 0
         while found < 2 and place + 3 <= stop and 0x41 <= data[place + 2] <= 0x53:
@@ -199,7 +221,7 @@ def _is_known_type(kind: Any) -> bool:
 
 @in_place
 def _is_cut(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
-    """Whether a data message begins at a place and is cut by the end."""
+    """Tell whether a data message begins at a place and is cut by the end of the data."""
     if at + 5 > end or data[at + 2] != 0x44:
         return False
     size = _u16(data, at)
@@ -209,7 +231,10 @@ def _is_cut(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
 
 @scanner
 def leads_on(data: Any, at: int, end: int, least: Any, most: Any) -> bool:
-    """Whether a strong message begins at a place, or behind at most three weak ones; the end of the data is as good."""
+    """Tell whether a strong message begins at a place, or after at most three weak ones.
+
+    Reaching the end of the data is as good.
+    """
     for _ in range(4):
         if at + 3 > end:
             return True
@@ -227,7 +252,10 @@ def leads_on(data: Any, at: int, end: int, least: Any, most: Any) -> bool:
 
 @in_place
 def _find(data: Any, at: int, limit: int, end: int, least: Any, most: Any) -> int:
-    """First place from ``at`` up to ``limit`` where a believable message begins; ``limit`` when there is none."""
+    """Return the first place from ``at`` on where a believable message begins.
+
+    ``limit`` when there is none before it.
+    """
     while at < limit and at + 3 <= end:
         kind = data[at + 2]
         if 0x41 <= kind <= 0x53:
@@ -243,7 +271,7 @@ def _find(data: Any, at: int, limit: int, end: int, least: Any, most: Any) -> in
 
 @in_place
 def _is_data(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
-    """Whether the header of a data message of a known id and size stands at a place."""
+    """Tell whether the header of a data message of known id and size stands at a place."""
     if at + 5 > end or data[at + 2] != 0x44:
         return False
     message_id = _u16(data, at + 3)
@@ -252,14 +280,20 @@ def _is_data(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
 
 @in_place
 def _has_one_size(data: Any, at: int, least: Any, most: Any) -> Any:
-    """Whether the data of a message's id has one size only: no padding at its end that may be left out."""
+    """Tell whether the data of a message's id has a single size.
+
+    If not, the padding at its end may be left out.
+    """
     message_id = _u16(data, at + 3)
     return least[message_id] == most[message_id]
 
 
 @in_place
 def _is_believed(data: Any, at: int, end: int, least: Any, most: Any, is_next: bool) -> Any:
-    """Whether a message at a place is one; ``end`` is that of the data, ``is_next`` that another ends right before."""
+    """Tell whether the bytes at a place are taken for a message.
+
+    ``end`` is the end of the data; ``is_next`` says that another message ends right before the place.
+    """
     strength = _strength(data, at, end, least, most)
     if strength == NONE:
         return False
@@ -278,9 +312,10 @@ def _is_believed(data: Any, at: int, end: int, least: Any, most: Any, is_next: b
 
 @in_place
 def _next_inside(data: Any, last: int, at: int, end: int, least: Any, most: Any) -> Any:
-    """Where a message begins inside the data message ``last``, which ends at ``at``, and leads on; else ``at``.
+    """Return the place where a message begins inside the data message ``last``, else ``at``.
 
-    Bytes of that message are gone then: it ends too late.
+    ``last`` ends at ``at``. The message inside must lead on to others; then bytes of ``last`` are missing, and its
+    stated end is too late.
     """
     if data[last + 2] != 0x44 or last + 3 + _u16(data, last) != at:
         return at
@@ -329,7 +364,7 @@ def scan(
         if count == len(out_at) or state[SPANS] == len(spans):
             reason = FULL
             break
-        if at + 5 <= end and data[at + 2] == 0x44 and state[SKIP_START] == NOWHERE:  # what nearly all messages are
+        if at + 5 <= end and data[at + 2] == 0x44 and state[SKIP_START] == NOWHERE:  # nearly all messages are data
             size = _u16(data, at)
             message_id = _u16(data, at + 3)
             low, high, stop = least[message_id], most[message_id], at + 3 + size
@@ -357,7 +392,7 @@ def scan(
             spans[state[SPANS], 0], spans[state[SPANS], 1], spans[state[SPANS], 2] = state[SKIP_START], at, count
             state[SPANS] += 1
             state[SKIP_START] = NOWHERE
-            continue  # there is room for the message only if the outputs are looked at again
+            continue  # the outputs must be checked for room again
         kind = data[at + 2]
         out_at[count] = at
         out_topic[count] = topic[_u16(data, at + 3)] if kind == 0x44 else -np.int32(kind)
@@ -372,7 +407,10 @@ def scan(
 
 @in_place
 def _is_cut_off(data: Any, at: int, end: int, least: Any, most: Any) -> Any:
-    """Whether a message of any type begins at a place, is cut by the end, and no other begins inside what is there."""
+    """Tell whether a message of any type begins at a place and is cut by the end of the data.
+
+    No other message may begin inside the bytes that are there.
+    """
     if at + 3 <= end:
         kind = data[at + 2]
         size = _u16(data, at)

@@ -1,4 +1,7 @@
-"""The first pass over a ULog: what the header must tell before the first batch, and which rule serves which signal."""
+"""First pass over a ULog: facts for the header, and which rule serves which signal.
+
+The header must be known before the first batch.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -21,7 +24,7 @@ _KEPT_PREFIXES = ("sys_", "ver_", "time_ref_utc", "log_type", "replay")
 
 @dataclass
 class Overview:
-    """What the first pass found.
+    """Findings of the first pass.
 
     Attributes
     ----------
@@ -67,7 +70,10 @@ def overview(blocks: Iterable[Block], definitions: Definitions) -> Overview:
 
 
 def _note_odd_flags(block: Block, topic: Topic, odd: set[tuple[int, str]]) -> None:
-    """Note columns of type bool with other values than 0 and 1: they are kept as the numbers they are."""
+    """Note columns of type bool that hold other values than 0 and 1.
+
+    They are kept as the numbers they are.
+    """
     if topic.layout is None or not topic.layout.flags:
         return
     rows = block.rows(topic.layout, np.flatnonzero(block.topic == topic.number))
@@ -75,7 +81,7 @@ def _note_odd_flags(block: Block, topic: Topic, odd: set[tuple[int, str]]) -> No
 
 
 def _has_fix(block: Block, topic: Topic) -> bool:
-    """Check for a receiver with a fix in a block."""
+    """Tell whether a block has a receiver with a fix."""
     if topic.name not in _RECEIVERS or topic.layout is None or "fix_type" not in topic.layout.names:
         return False
     rows = block.rows(topic.layout, np.flatnonzero(block.topic == topic.number))
@@ -126,7 +132,10 @@ def _fact_text(fact: Keyed) -> str:
 
 
 def _name_aircraft(metadata: dict[str, str]) -> None:
-    """The autopilot's own number names the aircraft; its last twelve digits tell apart two of one batch."""
+    """Name the aircraft by the last twelve digits of the autopilot's own number.
+
+    These digits tell two autopilots of one batch apart.
+    """
     number = metadata.get("sys_uuid", "")
     if number:
         metadata["aircraft"] = f"PX4-{number[-12:]}"

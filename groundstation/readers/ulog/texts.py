@@ -1,4 +1,4 @@
-"""Messages that are not data as topics of their own: logged text, parameters, information, drop-outs."""
+"""Topics of the messages that are not data: text, parameters, information, drop-outs."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -42,7 +42,7 @@ class _Rows:
     width: int = 0
 
     def add(self, row: _Row) -> bool:
-        """Take in a row; whether it is time for a batch."""
+        """Take in a row and tell whether it is time for a batch."""
         self.rows.append(row)
         self.width = max(self.width, row.width)
         return len(self.rows) == ROWS_A_BATCH or len(self.rows) * self.width > CHARACTERS_A_BATCH
@@ -50,7 +50,7 @@ class _Rows:
 
 @dataclass
 class TextTopics:
-    """Makes rows of the text topics block by block; counts drop-outs and what cannot be read.
+    """Maker of the rows of text topics; counts drop-outs and unreadable messages.
 
     Parameters
     ----------
@@ -65,7 +65,10 @@ class TextTopics:
     _has_data: bool = False
 
     def batches(self, block: Block, newest_us: Int64Array) -> Iterator[RecordBatch]:
-        """Rows of a block's text topics; ``newest_us`` is the time of the newest data before each message of them."""
+        """Yield the rows of a block's text topics.
+
+        ``newest_us`` is the time of the newest data before each text message.
+        """
         waiting: dict[str, _Rows] = {}
         for (number, kind, body), newest in zip(block.controls(), newest_us.tolist(), strict=True):
             self._has_data |= kind in "ALC"  # the first of them ends the definitions
@@ -122,7 +125,7 @@ def _parameter(fact: Keyed, kind: str, time_us: int) -> tuple[str, int, dict[str
 
 
 def _value_text(fact: Keyed) -> str:
-    """A value as text: bytes that are no text in hexadecimal."""
+    """Return a value as text: bytes that are no text in hexadecimal."""
     return fact.value.hex() if isinstance(fact.value, bytes) else str(fact.value)
 
 
@@ -141,7 +144,10 @@ def _column(values: list[Any]) -> Column:
 
 
 def device_time(times_us: Any) -> Column:
-    """Device time in nanoseconds of times in microseconds; zero means none, and so does what is past any clock."""
+    """Convert device times from microseconds to nanoseconds.
+
+    Zero means no time, and so does a time past the largest that any clock has.
+    """
     times = np.asarray(times_us, dtype=np.uint64)
     present = (times > 0) & (times <= MAX_TIME_US)
     values = np.where(present, times, 0).astype(np.int64) * 1_000

@@ -18,13 +18,13 @@ UTC_SOURCES = ("vehicle_gps_position", "sensor_gps", "vehicle_global_position")
 FIX_3D = 3
 _NS_PER_US = 1_000
 _EPOCH_US = GPS_EPOCH_NS // _NS_PER_US
-_EARLIEST_US = iso_to_utc_ns("1980-01-08T00:00:00Z")[0] // _NS_PER_US  # before it a clock was not set
+_EARLIEST_US = iso_to_utc_ns("1980-01-08T00:00:00Z")[0] // _NS_PER_US  # an earlier clock was not set
 _OWN_EARLIEST_US = 1_234_567_890_000_000  # 2009: PX4 takes its own clock for one that was not set before it
 _LATEST_US = iso_to_utc_ns("2100-01-01T00:00:00Z")[0] // _NS_PER_US
 _BOOT_TIME, _OFFSET = "boot_time_utc_us", "time_ref_utc"
 _LOG_NAME = re.compile(r"/(\d{4})-(\d\d)-(\d\d)/(\d\d)_(\d\d)_(\d\d)\w*\.ulg")
 _MOST_OFFSET_S = 86_400
-_FEW = 0.1  # of the readings of another receiver: too few to be taken before it
+_FEW = 0.1  # share of another receiver's readings that is too few to be preferred to it
 _FEWEST = 3  # readings of a date that cannot be true, as a receiver tells that missed a rollover
 _APART_NS = 2 * NS_PER_S
 # Minor version of PX4 1.x -> the year its development began. Source: releases of PX4-Autopilot on GitHub.
@@ -35,7 +35,7 @@ _FORMAT_NS = iso_to_utc_ns("2016-01-01T00:00:00Z")[0]
 
 @dataclass(frozen=True)
 class _OwnClock:
-    """UTC of power-up by the autopilot's clock, a moment told by it, its name, a remark."""
+    """UTC of power-up by the autopilot's clock, a moment by it, its name, a remark."""
 
     zero_ns: int
     moment_ns: int
@@ -45,7 +45,7 @@ class _OwnClock:
 
 @dataclass(frozen=True)
 class PowerUp:
-    """UTC of power-up in nanoseconds, None where nothing tells it, and remarks."""
+    """UTC of power-up in nanoseconds, None where nothing states it, and remarks."""
 
     utc_ns: int | None = None
     remarks: tuple[Remark, ...] = ()
@@ -53,7 +53,7 @@ class PowerUp:
 
 @dataclass
 class Clocks:
-    """Gathers what tells UTC, block by block."""
+    """Collector of what states UTC, block by block."""
 
     _told: dict[str, list[Int64Array]] = field(default_factory=dict)  # UTC and device time of fixes, microseconds
     _boot_us: int = 0
@@ -95,7 +95,7 @@ class Clocks:
             self._line = (line.text, line.timestamp_us) if _LOG_NAME.search(line.text) else None
 
     def power_up(self, release: str) -> PowerUp:
-        """UTC of power-up by the surest clock; ``release`` is the firmware's version, as text."""
+        """Return UTC of power-up by the surest clock; ``release`` is the firmware's version."""
         own = self._own()
         told = {name: np.concatenate(self._told[name], axis=1) for name in sorted(self._told, key=_rank)}
         told = {name: one for name, one in told.items() if _is_dated(one[0])}
@@ -116,7 +116,7 @@ class Clocks:
         return PowerUp(start.utc_ns, (*start.remarks, *_apart(own, name, start.utc_ns)))
 
     def _own(self) -> _OwnClock | None:
-        """The autopilot's own clock: when it began, or else the name that it gave its log."""
+        """Return the autopilot's own clock: its start, or else the name of its log."""
         if self._boot_us:
             began_ns = self._boot_us * _NS_PER_US
             text = (
@@ -141,13 +141,13 @@ class Clocks:
 
 
 def _rank(name: str) -> tuple[int, str]:
-    """Place of a receiver among those of a log: by its topic, then by its instance."""
+    """Return the sort key of a receiver: its topic, then its instance."""
     topic, _point, instance = name.partition(".")
     return UTC_SOURCES.index(topic), instance.zfill(3)
 
 
 def _utc_of_name(text: str, offset_s: int) -> int | None:
-    """UTC of the date and time in the name of a log, which are local by ``offset_s``.
+    """Return UTC of the date and time in a log's name, which are local by ``offset_s``.
 
     Examples
     --------
@@ -166,12 +166,12 @@ def _utc_of_name(text: str, offset_s: int) -> int | None:
 
 
 def _is_dated(utc_ns: Int64Array) -> bool:
-    """Check that a receiver knew a date, be it one that cannot be true."""
+    """Tell whether a receiver knew a date, even one that cannot be true."""
     return bool(utc_ns[-1] >= _FORMAT_NS or (utc_ns >= _EARLIEST_US * _NS_PER_US).sum() >= _FEWEST)
 
 
 def _chosen(receivers: dict[str, ToldZero]) -> tuple[str, ToldZero]:
-    """The first receiver that did not fall silent after a few readings."""
+    """Return the first receiver that did not fall silent after a few readings."""
     most = max(len(one.zeros_ns) for one in receivers.values())
     return next((name, one) for name, one in receivers.items() if len(one.zeros_ns) >= _FEW * most)
 
@@ -179,13 +179,13 @@ def _chosen(receivers: dict[str, ToldZero]) -> tuple[str, ToldZero]:
 def _dated(
     zero_ns: int, moment_ns: int, remarks: tuple[Remark, ...], release: str, others: tuple[OtherDate, ...]
 ) -> PowerUp:
-    """UTC of power-up on the date that the moment told can have, as far as the log shows it."""
+    """Return UTC of power-up on a date that it can have, as far as the log shows it."""
     found = rollovers(moment_ns, earliest=_earliest(release), others=others)
     return PowerUp(zero_ns + found.shift_ns(moment_ns, is_gps_time=False), (*remarks, *found.remarks))
 
 
 def _earliest(release: str) -> Earliest:
-    """Year before which a version of PX4 did not fly; of others that of the format.
+    """Return the year before which a version of PX4, or else the format, did not exist.
 
     Examples
     --------
@@ -199,7 +199,7 @@ def _earliest(release: str) -> Earliest:
 
 
 def _apart(own: _OwnClock | None, receiver: str, utc_ns: int | None) -> list[Remark]:
-    """Remark that the autopilot's clock and a receiver disagree."""
+    """Return a remark that the autopilot's clock and a receiver disagree."""
     if own is None or utc_ns is None or abs(own.zero_ns - utc_ns) <= _APART_NS:
         return []
     away_s = (own.zero_ns - utc_ns) / NS_PER_S
