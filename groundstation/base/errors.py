@@ -50,7 +50,7 @@ class GroundstationError(Exception):
 
 
 def _shown(part: str) -> str:
-    """As much of a part as a person reads, in characters that a terminal shows."""
+    """Cut a part of a message to what a person reads, in characters that a terminal shows."""
     return in_a_line(part if len(part) <= MOST_SHOWN else f"{part[:MOST_SHOWN]} ... ({len(part)} characters)")
 
 
@@ -59,7 +59,10 @@ class UnreadableLogError(GroundstationError):
 
 
 class UnclaimedLogError(UnreadableLogError):
-    """No reader claims the file: in a folder it is skipped, named on the command line it is an error."""
+    """Error: no reader claims the file.
+
+    In a folder such a file is skipped; named on the command line it is an error.
+    """
 
 
 class UsageError(GroundstationError):
@@ -67,7 +70,7 @@ class UsageError(GroundstationError):
 
 
 class UnknownNameError(UsageError, KeyError):
-    """Nothing has that name; those that are near to it are told, or all where none is near.
+    """Error: no such name; the message lists similar names, or all where none is similar.
 
     Parameters
     ----------
@@ -95,7 +98,9 @@ class UnknownNameError(UsageError, KeyError):
 
 
 def near_names(name: str, known: Iterable[str], most: int = 5) -> tuple[str, ...]:
-    """Names that begin with or hold the one asked for, else those spelled alike; at most ``most``.
+    """Return names that begin with or hold the one asked for, else names spelled alike.
+
+    At most ``most`` of them.
 
     Examples
     --------

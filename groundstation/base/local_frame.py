@@ -1,4 +1,7 @@
-"""A local north-east-down frame: the plane that touches the ellipsoid at an origin, the same axes for everybody."""
+"""Local north-east-down frame: the plane that touches the ellipsoid at an origin.
+
+All aircraft of a session share its axes.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +19,7 @@ MOST_LATITUDE_DEG = 90.0 - 1e-7  # of an origin: 1 cm from the pole there is a n
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """Where the origin of a local frame is; its axes are north, east and down there.
+    """Origin of a local frame; the axes are north, east and down at that point.
 
     Distances in it are those in ECEF. Down is the vertical of the origin alone: 60 km away the ellipsoid lies 280 m
     below the plane, and north differs by the convergence of the meridians.
@@ -60,7 +63,7 @@ class LocalFrame:
         return np.asarray(np.einsum("nij,ni->nj", there, np.asarray(vector) @ self._axes.T))
 
     def turned_from(self, latitude_deg: ArrayLike, longitude_deg: ArrayLike, vector: ArrayLike) -> FloatArray:
-        """Vectors (n, 3) along north, east and down of the places (n,), along the axes of this frame."""
+        """Turn vectors (n, 3) from north, east and down of places (n,) to the axes of this frame."""
         there = ecef_from_n(latitude_deg, longitude_deg)
         return np.asarray(np.einsum("nij,nj->ni", there, np.asarray(vector, dtype=np.float64)) @ self._axes)
 
@@ -77,7 +80,9 @@ def level_direction(heading_deg: ArrayLike) -> FloatArray:
 
 
 def plane_through(position_m: FloatArray) -> LocalFrame:
-    """The frame whose origin lies on the ellipsoid below the middle of ECEF positions (n, 3), NaN rows left out.
+    """Return the frame whose origin is below the mean of ECEF positions (n, 3).
+
+    The origin lies on the ellipsoid. NaN rows are left out.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Compiled loops kept as machine code, so that a process that needs one loads it without loading its compiler.
+"""Compiled loops kept as machine code, so that a process loads one without the compiler.
 
 numba itself takes half a second to start and as long again for its first function, though both were compiled before.
 What is kept here is an object file of this processor and the name of its entry, which takes plain C values: a
@@ -46,8 +46,9 @@ Form = str | tuple[str, int] | Group  # of an argument: INTEGER, NUMBER, dtype a
 
 
 def forms_of(arguments: Sequence[Any]) -> tuple[Form, ...] | None:
-    """Forms of what a loop is handed; None where it is more than numbers of 64 bits, arrays without gaps in the byte
-    order of this machine, and tuples of those.
+    """Return the forms of the arguments of a loop; None for arguments that are not supported.
+
+    Supported are numbers of 64 bits, arrays without gaps in the byte order of this machine, and tuples of those.
 
     Examples
     --------
@@ -78,12 +79,12 @@ def forms_of(arguments: Sequence[Any]) -> tuple[Form, ...] | None:
 
 
 def can_answer(function: Callable[..., Any]) -> bool:
-    """Whether a loop answers with a number or nothing, by its annotation."""
+    """Tell whether a loop answers with a number or nothing, by its annotation."""
     return _annotation(function) in _RESULTS
 
 
 def answers_with_integer(function: Callable[..., Any]) -> bool:
-    """Whether what :func:`entry_source` leaves is an integer, else a float64."""
+    """Tell whether the entry of :func:`entry_source` returns an integer, else a float64."""
     return _RESULTS[_annotation(function)] is ctypes.c_int64
 
 
@@ -92,7 +93,9 @@ def _annotation(function: Callable[..., Any]) -> Any:
 
 
 def entry_source(function: Callable[..., Any], forms: Sequence[Form]) -> tuple[str, dict[str, type]]:
-    """Source of the entry of a loop, to be compiled beside ``kernel`` and ``array``, and the tuples that it names.
+    """Return the source of the entry of a loop, and the tuples that it names.
+
+    It is compiled beside ``kernel`` and ``array``.
 
     Examples
     --------
@@ -129,7 +132,10 @@ def plain_forms(forms: Sequence[Form]) -> Iterator[str | tuple[str, int]]:
 
 
 def digest_of(function: Callable[..., Any], forms: Sequence[Form]) -> bytes:
-    """Digest of all that the machine code of a loop depends on: its code and constants, and of all that it calls."""
+    """Return a digest of all that the machine code of a loop depends on.
+
+    That is its code and constants, and those of all that it calls.
+    """
     from importlib.metadata import version
 
     from llvmlite import __version__, binding
@@ -162,7 +168,7 @@ def digest_of(function: Callable[..., Any], forms: Sequence[Form]) -> bytes:
 
 
 class KeptCode:
-    """Machine code of one loop for arguments of one form, in a file of the folder of compiled code."""
+    """Machine code of one loop for arguments of one form, in a file beside the others."""
 
     def __init__(self, folder: Path, function: Callable[..., Any], forms: Sequence[Form]) -> None:
         short = hashlib.sha256(repr(forms).encode()).hexdigest()[:8]
@@ -170,7 +176,10 @@ class KeptCode:
         self._of = function, forms
 
     def read(self) -> bytes | None:
-        """The object file; None where there is none, one of other code or processor, or one that others may write."""
+        """Read the object file; None where there is no usable one.
+
+        Not usable is a file of other code or of another processor, and one that others may write.
+        """
         content = read_own(self._path)
         if content is None:
             return None
@@ -201,7 +210,9 @@ def _linker() -> Any:
 
 
 def object_file(text: str, entry: str, forms: Sequence[Form]) -> bytes | None:
-    """What is kept of a module of LLVM; None where its entry may call what only numba's process has.
+    """Return the bytes to keep of an LLVM module.
+
+    None where its entry may call a function that only numba's process has.
 
     It is a byte for each number and array that the entry takes, 1 for an array that it may write to, and an object
     file.
@@ -229,7 +240,10 @@ def object_file(text: str, entry: str, forms: Sequence[Form]) -> bytes | None:
 
 
 def _written(module: Any, forms: Sequence[Form]) -> bytes:
-    """Which arrays LLVM could not prove to be left as they are, in the order of :func:`plain_forms`."""
+    """Return a byte for each plain form: 1 for an array that the code may write to.
+
+    That is one which LLVM cannot prove to be left unchanged. The order is that of :func:`plain_forms`.
+    """
     arguments = list(module.get_function(ENTRY).arguments)
     may_write = []
     for form in plain_forms(forms):
@@ -240,13 +254,16 @@ def _written(module: Any, forms: Sequence[Form]) -> bytes:
 
 
 def _calls_out(module: Any) -> bool:
-    """Whether a module, which is what its entry needs alone, needs a function that is not of LLVM or of C."""
+    """Tell whether a module needs a function that is neither of LLVM nor of C.
+
+    The module holds only what its entry needs.
+    """
     outside = {one.name for one in module.functions if one.is_declaration and not one.name.startswith("llvm.")}
     return bool(outside - _HARMLESS)
 
 
 def linked(kept: bytes, function: Callable[..., Any], forms: Sequence[Form]) -> "Linked | None":
-    """Machine code, as :func:`object_file` gives it, ready to be called; None where it cannot be linked here."""
+    """Link machine code of :func:`object_file` so that it can be called; None if that fails."""
     from llvmlite import binding
 
     plain = tuple(plain_forms(forms))
@@ -289,7 +306,7 @@ class Linked:
         self._annotation = _annotation(function)
 
     def would_write(self, arguments: Sequence[Any]) -> bool:
-        """Whether so much that is read-only may be written to that it is not copied for a call."""
+        """Tell whether a call may write to read-only arrays that are too large to copy for it."""
         plain = _plain(arguments)
         return bool(sum(plain[at].nbytes for at in self._written if not plain[at].flags.writeable) > MOST_COPIED_BYTES)
 
@@ -319,7 +336,10 @@ class Linked:
 
 
 def _address(array: Any) -> int:
-    """Where an array's values begin; ``array.ctypes.data`` takes two to three times as long."""
+    """Return the address of an array's first value.
+
+    ``array.ctypes.data`` takes two to three times as long.
+    """
     if array.flags.writeable:
         return ctypes.addressof(_NO_BYTES.from_buffer(array))
     address: int = array.__array_interface__["data"][0]

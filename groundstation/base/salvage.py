@@ -1,4 +1,7 @@
-"""Dataclasses from JSON that may be damaged or written by anyone: what is sound is kept, the rest is left out."""
+"""Dataclasses from JSON that may be damaged or written by anyone.
+
+What is sound is kept, the rest is left out.
+"""
 
 import dataclasses
 import typing
@@ -23,7 +26,9 @@ LARGEST = 1 << 62  # of a number in such a file
 
 
 def salvaged(cls: type[Document], document: Any) -> Document:
-    """Read what is sound of a document that may be damaged or written by anyone; the rest is left out.
+    """Read the sound part of a document that may be damaged or written by anyone.
+
+    The rest is left out.
 
     A value of another kind gives its field's default, or drops the entry of a list or mapping it stands in. Whole
     numbers are counts: not negative.

@@ -1,4 +1,6 @@
-"""Frozen dataclasses to JSON values and back, by their types: the rules of every file that is written and read.
+"""Frozen dataclasses to JSON values and back, by their types.
+
+These are the rules of every file that is written and read.
 
 Floats are rounded by the name of their field, NaN is null, tuples are lists. A field with ``left_out_when_default``
 in its metadata is absent while it has its default; a class with ``is_kept_apart = True`` (arrays, which have files of
@@ -49,7 +51,9 @@ class MismatchError(Exception):
 
 
 def to_json(value: Any, name: str = "") -> Any:
-    """Turn a value into JSON: floats rounded by their name, NaN and infinities null, dataclasses and arrays opened.
+    """Turn a value into JSON: floats rounded by their name, NaN and infinities null.
+
+    Dataclasses and arrays are opened.
 
     Parameters
     ----------
@@ -72,7 +76,9 @@ def to_json_exactly(value: Any) -> Any:
 
 @cache
 def _writer(digits: int | None) -> cattrs.Converter:
-    """Writes what stands under a name with so many decimals; what has names of its own goes by these.
+    """Return a converter that rounds the values of one name to so many decimals.
+
+    Values with names of their own are rounded by these. With ``digits`` None nothing is rounded, whatever its name.
 
     None rounds nothing, of any name.
     """
@@ -121,7 +127,7 @@ def _object_writer(cls: type, writer: cattrs.Converter, digits: int | None) -> C
 
 
 def is_kept_apart(hint: Any) -> bool:
-    """Whether a type holds what has files of its own."""
+    """Tell whether a type holds arrays that have files of their own."""
     return getattr(hint, "is_kept_apart", False) is True or any(map(is_kept_apart, typing.get_args(hint)))
 
 
@@ -129,7 +135,9 @@ def is_kept_apart(hint: Any) -> bool:
 
 
 def from_json(cls: type[Document], document: Any) -> Document:
-    """Read a dataclass back from the JSON values of :func:`to_json`; null where a number is meant is NaN.
+    """Read a dataclass back from the JSON values of :func:`to_json`.
+
+    Null is NaN where a number is meant.
 
     Keys that the class does not know are passed over: a later version may have written them.
 
@@ -154,7 +162,7 @@ def from_json(cls: type[Document], document: Any) -> Document:
 
 
 def structured(reader: cattrs.Converter, cls: type[Document], document: Any) -> Document:
-    """What a converter makes of a document, its first complaint as a :class:`MismatchError`."""
+    """Convert a document to a dataclass; raise the first fault as a :class:`MismatchError`."""
     try:
         return reader.structure(document, cls)
     except (cattrs.BaseValidationError, MismatchError) as error:
@@ -249,7 +257,7 @@ def new_reader(
 
 
 def origin_of(hint: Any) -> Any:
-    """What a generic type is made of (``tuple`` of ``tuple[int, ...]``); None of a plain one."""
+    """Return the origin of a generic type (``tuple`` of ``tuple[int, ...]``), else None."""
     return typing.get_origin(hint)
 
 
@@ -319,7 +327,10 @@ def _items(values: Sequence[Any], hints: Sequence[Any], reader: cattrs.Converter
 
 
 def _union_reader(hint: Any, reader: cattrs.Converter) -> Hook:
-    """Reads one of several kinds: nothing, a dataclass named by ``kind``, a list, or the plain kind that fits."""
+    """Return a reader of a value that may be of several types.
+
+    It reads nothing, a dataclass named by ``kind``, a list, or the plain type that fits.
+    """
     members = [member for member in typing.get_args(hint) if member is not type(None)]
     may_be_absent = len(members) < len(typing.get_args(hint))
     kinds = {member.kind: member for member in members if hasattr(member, "kind")}
@@ -340,7 +351,7 @@ def _union_reader(hint: Any, reader: cattrs.Converter) -> Hook:
 
 
 def _fits(value: Any, hint: Any) -> bool:
-    """Whether a value looks like one of a kind, among the members of a union."""
+    """Tell whether a value looks like one of a type, among the members of a union."""
     origin = origin_of(hint)
     if origin is tuple:
         return isinstance(value, list | tuple)

@@ -1,4 +1,6 @@
-"""Units of fields that are not ours, as the log itself tells them: kept with the flight's metadata, topic by topic.
+"""Units of fields that are not canonical, as the log itself states them.
+
+They are kept with the flight's metadata, topic by topic.
 
 ``units.raw.IMU`` = ``"GyrX rad/s, MagX Gauss x 0.001"``: field, unit, and the factor that is left in the values.
 """
@@ -20,7 +22,9 @@ def units_entry(units: Mapping[str, str]) -> str:
 
 
 def source_units(metadata: Mapping[str, str], topic: str, fields: Iterable[str]) -> dict[str, str]:
-    """Units of the fields of a topic, those that the log tells; an instance (``raw.IMU.1``) has those of its type.
+    """Return the units that the log states for fields of a topic.
+
+    An instance (``raw.IMU.1``) has the units of its type.
 
     Examples
     --------

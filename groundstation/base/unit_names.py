@@ -1,4 +1,4 @@
-"""How units are written and rounded: the suffix of a name, the sign in text, plain letters, decimals. One table."""
+"""Table of units: suffix in names, sign in text, spelling in plain letters, decimals."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class UnitName(NamedTuple):
-    """A unit as text prints it (``sign``), as labels without special signs spell it, and decimals of its numbers."""
+    """Unit as text prints it (``sign``), its spelling without special signs, and its decimals."""
 
     sign: str
     plain: str = ""

@@ -1,4 +1,6 @@
-"""Factors to SI and degrees. Each is exact by definition; readers multiply in the line that renames.
+"""Factors to SI units and degrees, each exact by definition.
+
+Readers multiply in the line that renames.
 
 Sources: The International System of Units (BIPM, 9th ed. 2019); international foot and nautical mile (1959, 1929).
 """

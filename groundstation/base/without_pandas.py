@@ -16,7 +16,10 @@ from types import ModuleType
 
 @cache
 def _has_readers_of_others() -> bool:
-    """Whether somebody added a format: such a reader may hand pyarrow what it has from pandas."""
+    """Tell whether somebody added a log format.
+
+    Its reader may hand pyarrow data from pandas.
+    """
     from importlib.metadata import entry_points
 
     return any(not one.value.startswith("groundstation.") for one in entry_points(group="groundstation.readers"))
@@ -32,7 +35,10 @@ class _NoPandas:
 
 
 def spare_pandas() -> None:
-    """From now on pyarrow of this process does without pandas; one that is loaded, or asked for already, stays."""
+    """Stop pyarrow in this process from importing pandas from now on.
+
+    A pandas that is loaded or asked for already stays.
+    """
     if "pandas" in sys.modules or _has_readers_of_others():
         return
     import pyarrow as pa
