@@ -1,4 +1,4 @@
-"""The clock model: corrected time of every record, from its device time and its place in the log.
+"""Clock model: corrected time of each record, from its device time and place in the log.
 
 Corrected time = device time + an offset that is constant between clock steps. A recorder whose clock is set during
 the log (GNSS time arrives) writes a step; what comes after the last step is believed, and what comes before is moved so
@@ -113,7 +113,7 @@ class ClockModel:
         return np.asarray(time, dtype=np.int64)
 
     def _offset_ns(self, record_index: Int64Array) -> Any:
-        """What is added to device times of records."""
+        """Return the offset to add to the device times of records."""
         if len(self.starts) == 1:
             return self.offsets_ns[0]
         return ClockOffsets(self.starts, self.offsets_ns).at(record_index)
@@ -121,7 +121,9 @@ class ClockModel:
     def valid_ns(
         self, record_index: Int64Array, device_time_ns: Column, validity_ns: Int64Array, time_ns: Int64Array
     ) -> Int64Array:
-        """Times of validity on the corrected clock: readers give them by the device's clock, they are moved as that is.
+        """Correct times of validity, which readers give by the device's clock.
+
+        They are moved as that clock is.
 
         Values that were true when their record was written, or in a record without a device time, are valid at the
         record's corrected time ``time_ns``, wherever it was placed.
@@ -157,7 +159,7 @@ class ClockModel:
         return f"{'-' if seconds < 0 else '+'}{duration_text(abs(seconds))}"
 
     def document(self) -> Clock:
-        """What is kept of it: seconds to the millisecond."""
+        """Return the form to keep: seconds to the millisecond."""
         own_zero = f"{self.first_device_ns / NS_PER_S:.3f} s"
         return Clock(
             is_absolute=self.is_absolute,
@@ -193,7 +195,7 @@ class ClockModel:
 
 @dataclass(frozen=True)
 class ClockOffsets:
-    """What is added to device times from some records on, by another clock of the log."""
+    """Offsets to add to device times from certain records on, by another clock of the log."""
 
     starts: Int64Array
     offsets_ns: Int64Array
@@ -207,7 +209,7 @@ class ClockOffsets:
         return cls(starts, added)
 
     def at(self, record_index: Int64Array) -> Int64Array:
-        """What is added to the device times of records."""
+        """Return the offset to add to the device time of each record."""
         return np.asarray(self.offsets_ns[np.maximum(np.searchsorted(self.starts, record_index, side="right") - 1, 0)])
 
     def moved(self, record_index: Int64Array, device_time_ns: Column) -> Column:
@@ -288,14 +290,14 @@ _END_NS = iso_to_utc_ns("2262-01-01T00:00:00Z")[0]
 
 
 class Zero(NamedTuple):
-    """What is added to all times, and whether they then are UTC."""
+    """Offset to add to all times, and whether they are UTC with it."""
 
     is_absolute: bool
     ns: int
 
 
 def zero_of(earliest_ns: int, latest_ns: int, utc_of_zero_ns: int | None) -> Zero:
-    """What to add to all times: UTC of zero, or as much as leaves none negative.
+    """Return the offset to add to all times: UTC of zero, or as much as leaves none negative.
 
     Nothing is recorded before 1970, nor after 2261, the last whole year that 64 bits hold; a clock that stays before
     1980 was never set.
@@ -307,7 +309,7 @@ def zero_of(earliest_ns: int, latest_ns: int, utc_of_zero_ns: int | None) -> Zer
 
 
 def start_of(first_device_ns: int, utc_of_zero_ns: int | None) -> Start:
-    """Where the clock of a device began.
+    """Tell how the clock of a device began.
 
     Examples
     --------
@@ -320,7 +322,9 @@ def start_of(first_device_ns: int, utc_of_zero_ns: int | None) -> Start:
 
 
 def interpolated(wanted: Int64Array, index: Int64Array, time: Int64Array, period_ns: float) -> Int64Array:
-    """Times of places between known ones by place, outside them by the nominal period; integers throughout.
+    """Interpolate times of records by their place in the log, in integers throughout.
+
+    Outside the known places the nominal period is used.
 
     None is placed further than :data:`LARGEST_NS` from zero.
     """

@@ -1,4 +1,6 @@
-"""How a clock runs against another: a line with its uncertainty, broken where one of them was set or changed its rate.
+"""Line fitted to the difference of two clocks, with its uncertainty.
+
+The line is broken where one of the clocks was set or changed its rate.
 
 The difference of the two is fitted by a line through the medians of blocks of samples, which late messages do not move.
 Steps are found where the medians of a few samples before and after differ; changes of rate where two lines explain the
@@ -35,7 +37,10 @@ _MAD = 1.4826
 
 @dataclass(frozen=True)
 class Fitted:
-    """Segments with the breaks between them, and how samples scatter about the lines (1.4826 x median, seconds)."""
+    """Segments, the breaks between them, and the scatter of samples about the lines.
+
+    The scatter is 1.4826 x the median, in seconds.
+    """
 
     segments: tuple[ClockSegment, ...] = ()
     breaks: tuple[ClockBreak, ...] = ()
@@ -43,7 +48,10 @@ class Fitted:
 
 
 class _Line(NamedTuple):
-    """offset + slope (t - middle_s), standard errors; a slope of infinite standard error is not known."""
+    """Line offset + slope (t - middle_s), with standard errors.
+
+    A slope with an infinite standard error is not known.
+    """
 
     middle_s: float
     offset_s: float
@@ -161,7 +169,7 @@ def _scatter(residual_s: FloatArray) -> float:
 
 
 def _median(values: FloatArray) -> float:
-    """As numpy's of values that are there, without its checks."""
+    """Return the median of finite values, as numpy's but without its checks."""
     middle = len(values) // 2
     if len(values) % 2:
         return float(np.partition(values, middle)[middle])
@@ -211,7 +219,9 @@ def _student(freedom: float) -> float:
 
 
 def _correlation(residual: FloatArray) -> float:
-    """Correlation of neighbours in [0, 0.95] of what a line leaves, corrected for its bias, -(2 + 4 r) / n.
+    """Return the correlation of neighbouring residuals of a line, in [0, 0.95].
+
+    It is corrected for its bias, -(2 + 4 r) / n.
 
     Source: Stine and Shaman, A fixed point characterization for bias of autoregressive estimators, Annals of Statistics
     17 (1989) 1275; tests/test_clock_fit.py.
@@ -261,7 +271,9 @@ def _line(time_s: FloatArray, offset_s: FloatArray, bound_s: float) -> _Line:
 
 
 def _standard_errors(residual: FloatArray, lever: FloatArray) -> tuple[float, float]:
-    """Of the level and the slope of a line, by what it leaves: noise that is correlated from neighbour to neighbour.
+    """Return the standard errors of level and slope of a line, from its residuals.
+
+    The noise is taken to be correlated from neighbour to neighbour.
 
     The more it is, the fewer the degrees of freedom: (n - 2) (1 - r) / (1 + r).
     """
@@ -277,7 +289,10 @@ def _standard_errors(residual: FloatArray, lever: FloatArray) -> tuple[float, fl
 
 
 def _steps(time_s: FloatArray, offset_s: FloatArray, step_s: float, bound_s: float) -> list[int]:
-    """First samples after steps: the medians of a few samples before and after differ by more than their jitter."""
+    """Find the first samples after steps.
+
+    At a step the medians of a few samples before and after differ by more than their jitter.
+    """
     count, side = len(time_s), SIDE_SAMPLES
     if count < 2 * side:
         return []

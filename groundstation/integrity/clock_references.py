@@ -1,4 +1,4 @@
-"""Other clocks that a log carries, GNSS time or the INS's own: which fields tell them, how the recorder runs by them.
+"""Other clocks in a log (GNSS time, the INS's own), and the recorder's rate against them.
 
 A field of a raw topic is a clock when the thresholds say so, ``[[clock_relation.references]]``. Some thousand readings
 of each are kept, evenly spread. Corrected time is never changed by what is found.
@@ -80,14 +80,14 @@ class ReferenceField:
     earliest_year: int = number(1980, 1980, 2261)
 
     def serves(self, batch: RecordBatch) -> bool:
-        """Whether the batch has the fields."""
+        """Tell whether the batch has the fields."""
         wanted = {name for name in (self.field, self.week) if name}
         return fnmatchcase(batch.topic, self.topic) and wanted.issubset(batch.columns)
 
 
 @dataclass(frozen=True)
 class RelationSettings:
-    """What is said of a clock by another; the file explains each number."""
+    """Settings of the comparison of two clocks; the file explains each number."""
 
     references: tuple[ReferenceField, ...]
     fewest_samples: int = required_number(10)
@@ -144,7 +144,10 @@ class _Readings:
 
     @property
     def is_held(self) -> bool:
-        """Whether a time is usually told several times: it may be older than its first reading by one of them."""
+        """Tell whether a time is usually repeated.
+
+        Such a time may be older than its first reading by one of them.
+        """
         return self.times < 0.75 * self.rows
 
 
@@ -156,7 +159,7 @@ class ClockReferences:
         self._readings: dict[str, list[_Readings]] = {}
 
     def add(self, batch: RecordBatch) -> None:
-        """Take what a batch holds of them; which fields do is settled by the first batch of a topic."""
+        """Add the readings of a batch; the first batch of a topic settles which fields are used."""
         found = self._readings.get(batch.topic)
         if found is None:
             found = [_Readings(batch.topic, one) for one in self._settings.references if one.serves(batch)]
@@ -166,7 +169,9 @@ class ClockReferences:
                 readings.add(batch)
 
     def zeros_ns(self, first: int, end: int) -> Int64Array:
-        """UTC of device time zero by the readings from record ``first`` on and before ``end``, in rising order.
+        """Return UTC of device time zero by the readings between two records, in rising order.
+
+        From record ``first`` on and before ``end``.
 
         Of the first clock, in the order of the topics, that tells UTC with its date there; none without any.
         """
@@ -181,7 +186,7 @@ class ClockReferences:
         return np.zeros(0, dtype=np.int64)
 
     def relations(self, clock: ClockModel) -> tuple[ClockRelation, ...]:
-        """How the recorder's corrected clock runs by each of them, in the order of their topics."""
+        """Compare the recorder's corrected clock with each of them, in the order of their topics."""
         known = [one for topic in sorted(self._readings) for one in self._readings[topic]]
         return tuple(_relation(one, clock, self._settings) for one in known[:MOST_REFERENCES])
 
@@ -228,7 +233,10 @@ def _relation(readings: _Readings, clock: ClockModel, settings: RelationSettings
 
 
 def _prompt(late_ns: Int64Array) -> BoolArray:
-    """Messages that were written soon after their stamp, shape (n,): all where none waited longer than those around."""
+    """Tell which messages were written soon after their stamp, shape (n,).
+
+    All of them where none waited longer than those around it.
+    """
     window = min(_AROUND, len(late_ns))
     if not window:
         return np.ones(len(late_ns), dtype=bool)
@@ -276,7 +284,10 @@ def _utc_of(text: str) -> int | None:
 
 
 def _unfolded(told_ns: Int64Array, own_ns: Int64Array) -> Int64Array:
-    """Times of day on the days that bring them next to the recorder's clock, all as the first one."""
+    """Place times of day on the days that bring them next to the recorder's clock.
+
+    All follow the choice for the first one.
+    """
     half = _DAY_NS // 2
     first = (int(told_ns[0] - own_ns[0]) + half) % _DAY_NS - half
     return np.asarray(own_ns + first + (told_ns - own_ns - first + half) % _DAY_NS - half, dtype=np.int64)

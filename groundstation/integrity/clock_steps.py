@@ -14,7 +14,7 @@ _DAY_NS = 86_400 * NS_PER_S
 
 @dataclass(frozen=True)
 class ClockSettings:
-    """What counts as a clock step.
+    """Criteria of a clock step.
 
     Parameters
     ----------
@@ -66,7 +66,9 @@ class ClockStep:
 
 
 def middle_of(steps: Int64Array) -> float:
-    """Median of steps, 0 of none: by a sort, as the selection of ``np.median`` is slow on steps that keep repeating.
+    """Return the median of steps, 0 if there are none.
+
+    By a sort, as the selection of ``np.median`` is slow on steps that keep repeating.
 
     Examples
     --------
@@ -91,7 +93,10 @@ def quantile(ordered: Int64Array, share: float) -> float:
 
 
 class Steps:
-    """Clock steps and stray rows among the timed records (positions here count timed records only)."""
+    """Clock steps and stray rows among the timed records.
+
+    Positions here count timed records only.
+    """
 
     def __init__(self, index: Int64Array, time: Int64Array, settings: ClockSettings) -> None:
         self.index, self.time, self.settings = index, time, settings
@@ -181,7 +186,10 @@ class Steps:
         return None
 
     def _strays_from(self, at: int, last: int, size: int) -> tuple[int, int] | None:
-        """Rows from ``at`` on that are out of order, the order being restored after them (or the log ends)."""
+        """Find rows from ``at`` on that are out of order, with order restored after them.
+
+        The end of the log serves as well as restored order.
+        """
         count = len(self.time)
         jump = max(1.5 * self.period_ns, 0.5 * abs(size))
         for stop in range(at + 1, min(count, at + self.settings.stray_rows + 1)):
@@ -191,7 +199,10 @@ class Steps:
         return (at, count) if count - at < self.settings.rows_after_step else None
 
     def _judge_strays(self, first: int, stop: int) -> None:
-        """A stray row for which the log has a hole where it stands has a wrong time, not a wrong place."""
+        """Mark stray rows whose time is wrong rather than their place.
+
+        The log has a hole where such a row stands.
+        """
         before = first - 1
         rows = stop - first
         away = np.abs(self.time[first:stop] - self.time[before]) > _DAY_NS

@@ -1,4 +1,4 @@
-"""Places where a log contradicts itself: values that cannot all be true, though each is possible.
+"""Contradictions within a log: values that cannot all be true, though each is possible.
 
 A speed that its own positions do not show, a vehicle on wheels or fast in the air whose nose points away from its
 track, a vehicle that drives or flies on its side, a height that pressure does not follow. Mostly it is a unit, a sign
@@ -41,7 +41,7 @@ ROLLS = "rolls"
 
 @dataclass(frozen=True)
 class Contradiction:
-    """Values of a topic that cannot all be true: which, from when (corrected time), for how long."""
+    """Values of a topic that cannot all be true: which, corrected time of the start, length."""
 
     topic: str
     text: str
@@ -51,7 +51,10 @@ class Contradiction:
 
 @dataclass(frozen=True)
 class _Series:
-    """Samples of one topic in order of corrected time: seconds since the first of the log, shape (n,), and columns."""
+    """Samples of one topic in order of corrected time.
+
+    Seconds since the first sample of the log, shape (n,), and columns.
+    """
 
     topic: str
     time_s: FloatArray
@@ -69,7 +72,9 @@ class _Series:
 
 @dataclass(frozen=True)
 class _Windows:
-    """Motion between samples some ten seconds apart: times of both ends, metres per second north and east, shapes (n,).
+    """Motion between samples some ten seconds apart, shapes (n,).
+
+    Times of both ends, and metres per second north and east.
 
     ``first`` and ``last`` are the samples at the ends.
     """

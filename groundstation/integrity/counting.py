@@ -1,4 +1,6 @@
-"""The clock of a log whose device times count up from power-up: nothing sets it, so it has no steps.
+"""Clock of a log whose device times count up from power-up.
+
+Nothing sets it, so it has no steps.
 
 Its records come topic by topic out of many buffers: an order between topics proves nothing, and each record keeps its
 own time. Not believed are times far from those of the records around them: an autopilot that begins a log writes the
@@ -22,7 +24,7 @@ FROZEN_SHARE, FROZEN_LEAST_RECORDS = 0.9, 10
 
 @dataclass(frozen=True)
 class CountingSettings:
-    """What a counting clock believes.
+    """Criteria for believing the times of a counting clock.
 
     Parameters
     ----------
@@ -37,7 +39,7 @@ class CountingSettings:
 
 
 def is_frozen(times: int, repeats: int) -> bool:
-    """Whether a topic repeats one time again and again instead of telling when its values were true.
+    """Tell whether a topic repeats one time instead of telling when its values were true.
 
     Examples
     --------

@@ -9,7 +9,9 @@ from groundstation.integrity.clock import ClockModel
 
 
 def corrected(items: Iterable[Item], clock: ClockModel) -> Iterator[RecordBatch]:
-    """Yield the batches of a log with corrected time, each topic in non-decreasing ``time_ns``.
+    """Yield the batches of a log with corrected time, each topic in time order.
+
+    ``time_ns`` never decreases within a topic.
 
     A record is held back until no earlier one of its topic can follow, which the lateness found by the survey tells:
     memory is bounded by it. Records of equal time keep the order of the source. Damages and remarks are left out: the
@@ -62,7 +64,10 @@ def _bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
 
 
 def joined(batches: Sequence[RecordBatch]) -> RecordBatch:
-    """One batch of several of one topic, in the order given; a field that one of them lacks is absent there."""
+    """Join batches of one topic, in the order given.
+
+    A field that one of them lacks is absent there.
+    """
     names = dict.fromkeys(name for batch in batches for name in batch.columns)
     validity = [batch.validity_time_ns if batch.validity_time_ns is not None else batch.time_ns for batch in batches]
     has_validity = any(batch.validity_time_ns is not None for batch in batches)

@@ -1,4 +1,6 @@
-"""Places and times of a log's records: kept as they came, and beyond a size compactly in a temporary file.
+"""Places and times of a log's records, kept in memory or compactly in a temporary file.
+
+The file is used beyond a certain size.
 
 A survey needs them twice more: for the clock, in the order of the log, and for the ledger, topic by topic. Neither
 needs all at once.
@@ -24,7 +26,7 @@ WINDOW_RECORDS = 500_000  # at least so many records of all topics are laid in o
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Places and times of one batch, or of all of a topic; topics that are sampled together share it.
+    """Places and times of one batch, or of a whole topic; topics sampled together share it.
 
     ``validity_ns`` are times of validity by the device's clock, where they are others.
     """
@@ -46,7 +48,7 @@ class Piece:
         return self.index.nbytes + self.time.values.nbytes + (0 if present is None else present.nbytes) + validity
 
     def holds(self, batch: RecordBatch) -> bool:
-        """Whether it is the places and times of this batch."""
+        """Tell whether these are the places and times of this batch."""
         device, validity = batch.device_time_ns, batch.validity_time_ns
         return (
             len(self.index) == len(batch)
@@ -59,7 +61,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class Kept:
-    """Where a piece is kept, and what is asked of it without a look at it.
+    """Location of a kept piece in the file, with a summary that saves reading it.
 
     Parameters
     ----------
@@ -121,7 +123,7 @@ class Places:
 
     @property
     def is_long(self) -> bool:
-        """Whether there may be several windows."""
+        """Tell whether there may be several windows."""
         return self.records > WINDOW_RECORDS
 
     def of(self, batch: RecordBatch) -> Kept:
@@ -190,7 +192,9 @@ class Places:
         return np.frombuffer(self._file.read(count * np.dtype(dtype).itemsize), dtype)
 
     def in_order(self, topics: Iterable[Sequence[Kept]]) -> Iterator[tuple[Int64Array, Column, BoolArray]]:
-        """Places, device times and frozenness of all records in the order of the log, each place once, in windows.
+        """Yield places, device times and frozenness of all records in log order, in windows.
+
+        Each place comes once.
 
         Where topics tell different times of a place, the topic that is named first is believed.
         """
@@ -222,7 +226,10 @@ def _are_equal(one: Int64Array | None, other: Int64Array | None) -> bool:
 
 
 def _lasting(array: Any) -> Any:
-    """The array, or a copy where it would hold much more memory than its own; arrays of records never change."""
+    """Return the array, or a copy where it would hold much more memory than its own.
+
+    Arrays of records never change.
+    """
     owner = array if array.base is None else array.base
     return array if isinstance(owner, np.ndarray) and owner.nbytes <= 2 * array.nbytes else np.array(array)
 
@@ -232,7 +239,7 @@ def _repeats(times: Int64Array) -> int:
 
 
 def _is_frozen(several: Sequence[Kept]) -> bool:
-    """Whether the times of a topic are."""
+    """Tell whether the times of a topic are frozen."""
     timed = [kept.times for kept in several if kept.times]
     count = sum(times[2] for times in timed)
     repeats = sum(times[3] for times in timed)
@@ -241,7 +248,10 @@ def _is_frozen(several: Sequence[Kept]) -> bool:
 
 
 def _windows(pieces: Collection[Kept]) -> Iterator[list[Kept]]:
-    """Pieces of one stretch of the log after another, none of which reaches into the next; each in the order given."""
+    """Yield the pieces of one stretch of the log after another, none reaching into the next.
+
+    The pieces of a stretch stand in the order given.
+    """
     rank = {kept.number: at for at, kept in enumerate(pieces)}
     window: list[Kept] = []
     count, reached = 0, -1

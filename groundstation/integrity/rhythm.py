@@ -1,4 +1,4 @@
-"""The rhythm of a topic: its usual step in time, whether that is a period, and the gaps by it."""
+"""Rhythm of a topic: its usual step in time, whether that is a period, and its gaps."""
 
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -19,7 +19,7 @@ MOST_SKIPPED = 10.0  # periods: a longer step that is no gap explains nothing
 
 @dataclass(frozen=True)
 class Rhythm:
-    """How a topic's times follow each other.
+    """Steps between the times of a topic.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def _longest_ns(period_ns: float, limits: GapLimits) -> float:
 
 
 def _is_sporadic(topic: str, rhythm: Rhythm, long_ns: float, limits: RhythmLimits) -> bool:
-    """Whether a topic is written when something happens."""
+    """Tell whether a topic is written only when something happens."""
     if any(fnmatchcase(topic, pattern) for pattern in limits.sporadic_topics):
         return True
     if is_canonical(topic):
@@ -96,7 +96,7 @@ def _is_sporadic(topic: str, rhythm: Rhythm, long_ns: float, limits: RhythmLimit
 
 
 def _is_unexplained(rhythm: Rhythm, limits: RhythmLimits) -> bool:
-    """Whether more is missing than gaps explain: then the usual step is not the period."""
+    """Tell whether more is missing than gaps explain: then the usual step is not the period."""
     coverage = rhythm.coverage
     if 1.0 - coverage <= limits.unexplained:
         return False

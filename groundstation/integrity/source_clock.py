@@ -1,4 +1,4 @@
-"""The clock of a source: one model where it holds one power-up; else one of each, side by side in one model."""
+"""Clock of a source: one model, made of one part for each power-up."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -50,7 +50,10 @@ class PowerUpClock:
 
 @dataclass(frozen=True)
 class Found:
-    """What a pass over a source gave: its header, further logs that begin in it, places and times, other clocks."""
+    """Results of a pass over a source.
+
+    Its header, further logs that begin in it, places and times, other clocks.
+    """
 
     header: LogHeader
     new_logs: tuple[NewLog, ...]
@@ -111,7 +114,10 @@ def _whole(found: Found, limits: Thresholds, offsets: ClockOffsets | None = None
 
 
 def _set_by_another(found: Found, limits: Thresholds, offsets: ClockOffsets) -> ClockModel:
-    """The model for times as the device wrote them, from one for times as another clock sets them."""
+    """Return the model for times as the device wrote them, set by another clock of the log.
+
+    It is made from the model for times that the other clock has set.
+    """
     clock = _whole(found, limits, offsets)
     return clock.on(offsets, clock.first_device_ns - int(offsets.offsets_ns[0])) if clock.has_times else clock
 
@@ -119,7 +125,10 @@ def _set_by_another(found: Found, limits: Thresholds, offsets: ClockOffsets) -> 
 def _counting_clock(
     windows: Iterable[Window], is_long: bool, zero_ns: int | None, settings: CountingSettings
 ) -> ClockModel:
-    """The model of a counting clock; of a long log only the records that have a say are laid together."""
+    """Estimate the model of a counting clock.
+
+    Of a long log only the records that have a say are laid together.
+    """
     thinner = Thinner(round(settings.tolerance_s * NS_PER_S), settings.run_records)
     kept_ones: list[Window] = []
     for index, time, frozen in windows:
@@ -159,7 +168,10 @@ def _evidence(found: Found, clock: ClockModel) -> Evidence:
 
 
 def _most_step_back(found: Found, place: int, middle_ns: int) -> bool:
-    """Whether most of the topics that are in the second half of a power-up go back at its end, each by itself."""
+    """Tell whether most topics go back, each by itself, at the end of a power-up.
+
+    Only topics in the second half of the power-up count.
+    """
     back = on = late = 0
     for several in found.topics:
         before_ns, behind_ns = _around(found.places, several, place)
@@ -194,7 +206,10 @@ def _around(places: Places, several: Sequence[Kept], place: int) -> tuple[int | 
 
 
 def _read_zero(found: Found, first: int, end: int) -> int | None:
-    """UTC of device time zero by what the reader, or else another clock of the log, tells between two records."""
+    """Return UTC of device time zero by the readings between two records.
+
+    They are the reader's, or else those of another clock of the log.
+    """
     readings = found.header.utc_readings
     zeros = readings.between(first, end) if readings is not None else found.references.zeros_ns(first, end)
     return int(zeros[len(zeros) // 2]) if len(zeros) else None
@@ -245,7 +260,10 @@ def _ends(clock: ClockModel, window: Window) -> tuple[int, int]:
 
 
 def _with_mixed(clock: ClockModel, part: PowerUp, window: Window) -> ClockModel:
-    """The model with the records placed that stand mixed with those behind a wrap: their place does not tell them."""
+    """Return the model with records placed one by one where both sides of a wrap are mixed.
+
+    Their place in the log does not tell on which side they are.
+    """
     index, time, _frozen = window
     is_mixed = np.zeros(len(index), dtype=bool)
     for wrap in part.wraps:
@@ -304,7 +322,10 @@ def _beside(
 
 
 def _shifts(known: Sequence[PowerUpClock]) -> list[int]:
-    """What each power-up is moved by, so that those without UTC stand behind the one before, or before the first."""
+    """Return the shift of each power-up that brings those without UTC in order.
+
+    Each stands behind the one before it, or before the first.
+    """
     anchor = next((number for number, one in enumerate(known) if one.is_absolute), 0)
     shifts = [0] * len(known)
     for number in range(anchor + 1, len(known)):

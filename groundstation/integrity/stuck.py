@@ -1,4 +1,4 @@
-"""Stuck values: a field that keeps exactly one value while another source says that it must change.
+"""Stuck values: a field keeps one value while another source shows that it must change.
 
 Nothing is called stuck without a witness: a parked aircraft, a held slow channel and a constant are no damage.
 """
@@ -37,7 +37,10 @@ _KINDS = ("ins", "gnss", "baro", "magnetometer")
 
 @dataclass(frozen=True)
 class Stuck:
-    """A stretch in which a field was stuck: place, corrected time, length, samples, value, and what says so."""
+    """Stretch in which a field was stuck.
+
+    Its place, corrected time, length, samples, value, and the evidence.
+    """
 
     record_index: int
     start_ns: int
@@ -48,7 +51,7 @@ class Stuck:
 
 
 def is_watched(topic: str, name: str) -> bool:
-    """Whether a field may be found stuck."""
+    """Tell whether a field may be found stuck."""
     return name in WATCHED and kind_of(topic) in _KINDS
 
 
@@ -69,7 +72,7 @@ class _Seen(NamedTuple):
 
 
 class Motion:
-    """What all sources say of the motion of the aircraft, thinned."""
+    """Motion of the aircraft by all sources, thinned."""
 
     def __init__(self) -> None:
         self._samplers: dict[str, Sampler] = {}
@@ -98,7 +101,10 @@ class Motion:
             yield topic, index, columns[_TIME], {name: one for name, one in columns.items() if name != _TIME}
 
     def sources(self) -> list[_Seen]:
-        """Every source of every quantity; speed and track from velocities where they are not logged."""
+        """Return every source of every quantity.
+
+        Speed and track are made from velocities where they are not logged.
+        """
         found = []
         for topic, sampler in sorted(self._samplers.items()):
             index, columns = sampler.all()
@@ -153,7 +159,7 @@ class Judge:
     def _why(
         self, topic: str, name: str, stretch: Stretch, constancy: Constancy, long: dict[str, list[Stretch]]
     ) -> str:
-        """What says that the value should have changed; empty when nothing does."""
+        """Return the evidence that the value should have changed; empty when there is none."""
         if name in _NOISY:
             return self._why_noisy(stretch, constancy.usual_samples(without=stretch))
         least = self._limits.times_resolution * constancy.resolution
@@ -169,7 +175,10 @@ class Judge:
         return why or self._why_position(topic, name, stretch, enough_m, long)
 
     def _shrinks(self, name: str, stretch: Stretch) -> float:
-        """How much shorter a degree of longitude is than one of latitude."""
+        """Return the length of a degree of longitude over that of one of latitude.
+
+        1 for the latitude itself.
+        """
         if name == "latitude_deg":
             return 1.0
         seen = [one.within(stretch) for one in self._sources if one.name == "latitude_deg"]
@@ -235,7 +244,10 @@ class Judge:
         return ""
 
     def _why_noisy(self, stretch: Stretch, usual: float) -> str:
-        """What is never still stands still, and the aircraft moves or nobody knows whether it does."""
+        """Return the evidence against a noisy value that stands still.
+
+        The aircraft moves, or nobody knows whether it does.
+        """
         speed = self._slowest("", stretch)
         if speed is None:
             return f"a value lasts {usual:.2f} samples otherwise" if usual <= FINE else ""

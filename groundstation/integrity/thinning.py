@@ -1,4 +1,4 @@
-"""Records of a counting clock that say nothing new: a clock that is estimated without them is the same.
+"""Thinning of the records of a counting clock that leaves its estimate the same.
 
 A long log has millions of records, each within the tolerance of the one before. Kept are those that
 :func:`groundstation.integrity.counting.estimate_counting_clock` has to see: without a time or frozen, their neighbours,
@@ -26,7 +26,10 @@ class Thinner:
         self._steps: list[tuple[Int64Array, Int64Array]] = []
 
     def kept(self, time_ns: Int64Array, usable: BoolArray) -> BoolArray:
-        """Which records of a window are needed, shape (n,); ``usable`` are those with a time that is not frozen."""
+        """Tell which records of a window are needed, shape (n,).
+
+        ``usable`` are those with a time that is not frozen.
+        """
         places = np.flatnonzero(usable)
         if not len(places):
             return np.ones(len(usable), dtype=bool)
@@ -46,7 +49,7 @@ class Thinner:
 
     @property
     def period_ns(self) -> int:
-        """Median of the steps ahead between usable records of the windows that were thinned, 0 of none."""
+        """Median of the forward steps between usable records of the thinned windows; 0 of none."""
         if not self._steps:
             return 0
         steps, counts = (np.concatenate(parts) for parts in zip(*self._steps, strict=True))
