@@ -1,4 +1,7 @@
-"""Values of a table at other times: joined on time with a stated largest gap, never by row number."""
+"""Values of a table at other times: joined on time, never by row number.
+
+The largest gap is stated.
+"""
 
 from collections.abc import Callable, Iterable
 from typing import Literal
@@ -73,14 +76,20 @@ def join(
 
 
 def values_at(table: Table, name: str, at_ns: Int64Array, *, largest_gap_s: float) -> FloatArray:
-    """One number field at other times, shape (m,), NaN where not known: :func:`join` of a single field."""
+    """Return one number field at other times, shape (m,), NaN where not known.
+
+    It is :func:`join` of a single field.
+    """
     if name not in table.columns:
         return np.full(len(at_ns), np.nan)
     return join(table, at_ns, [name], largest_gap_s=largest_gap_s).values(name)
 
 
 def _wrap_of(table: Table, name: str) -> Wrap | None:
-    """How the angles of a field that goes all the way round are wrapped; None for plain numbers."""
+    """Return the function that wraps the angles of a field; None for plain numbers.
+
+    Only for a field that goes all the way round.
+    """
     field = field_of(table.topic, name)
     if field is None or field.unit != "deg":
         return None

@@ -1,4 +1,7 @@
-"""The logs of several aircraft become one session on one clock, with what could not be used as findings."""
+"""Logs of several aircraft made into one session on one clock.
+
+What could not be used becomes findings.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -32,7 +35,9 @@ Truth = Mapping[str, tuple[FloatArray, FloatArray]]
 
 @dataclass(frozen=True)
 class ClockRow:
-    """How the clock of one log stood: log time less that of the group, from the times of transmission.
+    """Offset of the clock of one log: log time less that of the group.
+
+    It comes from the times of transmission.
 
     ``offset_s`` is that of its longest stretch between leaps, None without ranges; ``is_corrected`` says whether it
     was taken off.
@@ -76,13 +81,13 @@ class AssembledSession:
 
     @property
     def duration_s(self) -> float:
-        """From the first to the last dead reckoning."""
+        """Seconds from the first to the last dead reckoning."""
         return max((float(one.time_s[-1]) for one in self.session.vehicles if len(one)), default=0.0)
 
 
 @dataclass
 class _Members:
-    """The logs that are still in the session, by the name of their aircraft, and what was found of the others."""
+    """Logs that are still in the session, by aircraft, and findings on the others."""
 
     flights: dict[str, Flight]
     findings: list[Finding] = field(default_factory=list)
@@ -140,7 +145,7 @@ def session_from_flights(
 
 
 def _named(flights: Iterable[Flight]) -> _Members:
-    """Flights by the name of their aircraft, sorted; of several of one aircraft the longest stays."""
+    """Sort flights by the name of their aircraft; of several of one aircraft keep the longest."""
     found: dict[str, list[Flight]] = {}
     for flight in flights:
         found.setdefault(aircraft_named(flight.metadata, flight.source_name), []).append(flight)
@@ -164,7 +169,7 @@ def _on_one_clock(members: _Members, settings: SessionSettings) -> tuple[dict[st
 
 
 def _with_tracks(members: _Members, placed: Mapping[str, PlacedLog], step_s: float) -> dict[str, InsRows]:
-    """What dead reckoning is made of, for every log that has any."""
+    """Return the INS rows for dead reckoning of every log that has any."""
     rows = {}
     for name in list(members.flights):
         try:
@@ -179,7 +184,10 @@ def _with_tracks(members: _Members, placed: Mapping[str, PlacedLog], step_s: flo
 
 
 def _together(members: _Members, spans: Mapping[str, tuple[int, int]]) -> None:
-    """Keep the largest set of logs that overlap, one with another; of equally large ones the first."""
+    """Keep the largest set of logs that overlap, one with another.
+
+    Of equally large sets the first.
+    """
     left = sorted(members.flights, key=lambda name: spans[name])
     groups: list[list[str]] = []
     end = 0

@@ -1,4 +1,6 @@
-"""One clock for the logs of a session: UTC where it can be trusted, the link's times of transmission where not.
+"""One clock for the logs of a session.
+
+UTC where it can be trusted, otherwise the link's times of transmission.
 
 A pseudo-range is the time of arrival on the receiver's clock less the time of transmission on the sender's, in metres.
 So log time - pseudo-range / c - time of transmission is how far the clock of a log stands from that of the link. It is
@@ -25,7 +27,7 @@ MOST_LINK_S = 4e9  # later than that is no time
 
 @dataclass(frozen=True)
 class LogClock:
-    """How the clock of one log stands to that of the link, stretch by stretch between its leaps.
+    """Offset of the clock of one log from that of the link, per stretch between its leaps.
 
     Parameters
     ----------
@@ -54,7 +56,10 @@ class LogClock:
         return np.asarray(np.clip(place, 0, None), dtype=np.int64)
 
     def is_certain(self, record_index: Int64Array) -> BoolArray:
-        """Where rows are not between two stretches: nothing tells on which side of the leap those are."""
+        """Tell which rows are not between two stretches.
+
+        Nothing tells on which side of the leap the others are.
+        """
         if len(self.first_record) < 2:
             return np.ones(len(record_index), dtype=bool)
         stretch = self.stretch_of(record_index)
@@ -69,7 +74,7 @@ class LogClock:
 
 @dataclass(frozen=True)
 class PlacedLog:
-    """What to take off the times of a log so that they are those of the session.
+    """Time to take off the times of a log so that they are those of the session.
 
     Parameters
     ----------
@@ -149,7 +154,9 @@ def _running_median(values: Int64Array) -> Int64Array:
 
 
 def group_offset_ns(clocks: Sequence[LogClock], limit_s: float) -> tuple[int, int]:
-    """Offset that most clocks share, and how many do; of equally many the first. Clocks without ranges do not count.
+    """Return the offset that most clocks share, and how many share it.
+
+    Of equally many the first. Clocks without ranges do not count.
 
     Examples
     --------

@@ -1,4 +1,7 @@
-"""Which source of a kind to use where several logs of one flight have one: an order, and why the first is first."""
+"""Choice among sources of a kind when several logs of one flight have one.
+
+An order, and why the first is first.
+"""
 
 from dataclasses import dataclass
 
@@ -31,12 +34,12 @@ class Ranked:
 
 
 def is_joined(flight: Flight) -> bool:
-    """Whether a flight is of several logs."""
+    """Tell whether a flight is made of several logs."""
     return TOGETHER in flight.metadata
 
 
 def said_of(flight: Flight, topic: str, key: str) -> str:
-    """What the head of the log that a topic is of says under a key; empty where it says nothing.
+    """Return the metadata of a topic's log under a key; empty where there is none.
 
     Of a flight of several logs each speaks for its own topics: those of the second end in ``.b``, as its keys begin.
     """
@@ -58,7 +61,9 @@ def sources_of_kind(flight: Flight, kind: str) -> tuple[str, ...]:
 
 
 def why_without_gnss(flight: Flight, what: str) -> str:
-    """Reason why GNSS has no velocity, or no position: ``no GNSS velocity in the log``, or that it never had a fix.
+    """Explain why GNSS has no velocity or no position.
+
+    ``no GNSS velocity in the log``, or that it never had a fix.
 
     A receiver that logs its satellites or its kind of fix and never a place or a velocity had none.
     """
@@ -96,7 +101,7 @@ def ranked(flight: Flight, kind: str) -> list[Ranked]:
 
 
 def why_first(kind: str, order: list[Ranked]) -> str:
-    """Why the first of several sources is first, by what tells it from the second."""
+    """Explain why the first of several sources is first: how it differs from the second."""
     first, *others = order
     if not others:
         return "the only one"

@@ -1,4 +1,7 @@
-"""Tracks that an estimator made of a flight: a role by which others judge or use them without knowing the estimator."""
+"""Tracks that an estimator made of a flight.
+
+A role: others judge or use the tracks without knowing the estimator.
+"""
 
 from collections.abc import Iterator, Mapping
 from typing import Protocol, runtime_checkable
@@ -15,7 +18,10 @@ class HasTracks(Protocol):
     """Workings of an analysis that hold tracks."""
 
     def tracks(self, start_ns: int) -> Iterator[tuple[str, Table]]:
-        """Name and table of each track, by names of the fields of an INS; ``start_ns`` is the start of the flight."""
+        """Yield name and table of each track, with the field names of an INS.
+
+        ``start_ns`` is the start of the flight.
+        """
 
 
 def ins_table(time_ns: Int64Array, columns: Mapping[str, FloatArray]) -> Table:
