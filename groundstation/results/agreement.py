@@ -1,4 +1,4 @@
-"""Two analyses of one log that answer the same question, beside each other: do they agree within their intervals?"""
+"""Two analyses of one log that answer the same question: agreement within intervals."""
 
 import math
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ class Agreement:
 
     @property
     def sigmas(self) -> float:
-        """By how many sigma they differ.
+        """Difference of the two in sigmas.
 
         Examples
         --------
@@ -63,7 +63,10 @@ class Agreement:
 
 
 def heading_agreement(answers: Answers) -> Agreement | None:
-    """Azimuth error of the platform by taxi (system 1) and by turns in flight (system 2) of the same INS."""
+    """Compare the platform's azimuth error by taxi (system 1) and by turns (system 2).
+
+    Both are of the same INS; the turns are in flight.
+    """
     taxi, inertial = answer_of(answers, HeadingResult), answer_of(answers, InertialResult)
     turns = inertial.azimuth if inertial is not None else None
     if taxi is None or inertial is None or turns is None or taxi.ins_topic != inertial.ins_topic:
@@ -81,7 +84,10 @@ def heading_agreement(answers: Answers) -> Agreement | None:
 
 
 def latency_agreement(answers: Answers) -> Agreement | None:
-    """GNSS latency behind the INS by motion (latency analysis) and by the turns of the taxi (system 1).
+    """Compare the GNSS latency behind the INS by motion and by the turns of the taxi.
+
+    By motion is the latency analysis, by the turns is system 1. Where the former was taken out before the turns were
+    looked at, it was their prior: it is taken off again.
 
     Where the former was taken out before the turns were looked at, it was their prior: it is taken off again.
     """
@@ -104,7 +110,9 @@ def latency_agreement(answers: Answers) -> Agreement | None:
 
 
 def deviation_agreement(answers: Answers) -> Agreement | None:
-    """Error of the magnetic heading in the air, by the recommended method, and on ground runs, at their headings.
+    """Compare the error of the magnetic heading in the air and on ground runs.
+
+    In the air by the recommended method; both at the headings of the runs.
 
     The declination is in both and is counted once, in the air.
     """

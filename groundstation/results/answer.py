@@ -1,4 +1,4 @@
-"""What every analysis answers with: a frozen dataclass that says which analysis it is the answer of."""
+"""Base of the answers of all analyses: a frozen dataclass that names its analysis."""
 
 from collections.abc import Mapping
 from typing import ClassVar, TypeVar

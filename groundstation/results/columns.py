@@ -39,5 +39,5 @@ class AnswerColumn(FlightColumn, Generic[AnswerT]):
     is_indexed: bool = True
 
     def value(self, answer: AnswerT) -> Any:
-        """What stands in it for an answer."""
+        """Return the column's value for an answer."""
         return getattr(answer, self.name) if self.of is None else self.of(answer)

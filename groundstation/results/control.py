@@ -67,7 +67,7 @@ class LawRow:
 
 @dataclass(frozen=True)
 class ControlRow:
-    """One control of one aircraft: its bounds, and its value at the end under the recommended law."""
+    """One control of one aircraft: bounds, and value at the end under the recommended law."""
 
     aircraft: str
     control: str
@@ -81,7 +81,7 @@ class ControlRow:
 
 @dataclass(frozen=True)
 class ControlPlan(PlanAnswer):
-    """How aircraft should move for the accuracy of one of them.
+    """Plan of the motion of aircraft for the accuracy of one of them.
 
     Parameters
     ----------

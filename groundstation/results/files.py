@@ -1,4 +1,7 @@
-"""The files of one flight: summary.json, manifest.json, arrays/*.parquet and its readable copies tables/*.csv."""
+"""Files of one flight: summary.json, manifest.json, arrays/*.parquet, tables/*.csv.
+
+The tables are readable copies of the arrays.
+"""
 
 import json
 import shutil
@@ -53,7 +56,7 @@ PARQUET_LEAST_BYTES = 12  # both, and the length of what describes the file
 
 @dataclass(frozen=True)
 class SavedFlight:
-    """What a flight folder holds, as the report, ``compare`` and the fleet read it.
+    """Contents of a flight folder, as the report, ``compare`` and the fleet read it.
 
     ``results`` are the answers as the run had them; the arrays in ``figures`` are read when they are asked for.
     ``summary`` is the JSON document.
@@ -67,7 +70,9 @@ class SavedFlight:
 
     @cached_property
     def results(self) -> FlightResults:
-        """The answers, rounded as they were written; their arrays are read when they are asked for.
+        """Return the answers, rounded as they were written.
+
+        Their arrays are read when they are asked for.
 
         Raises
         ------
@@ -79,7 +84,9 @@ class SavedFlight:
         return replace(results, figures=figures, chosen=chosen_intervals(self.manifest.configuration))
 
     def rows_of(self, kind: type[T]) -> T | None:
-        """The typed arrays of a figure, None when the flight has none, they are empty or lack a column.
+        """Return the typed arrays of a figure; None when they are missing, empty or incomplete.
+
+        Incomplete means that a column is missing.
 
         Raises
         ------
@@ -120,7 +127,9 @@ def _encoded(text: str) -> bytes:
 
 
 def write_bytes(path: Path, content: bytes, *, is_synced: bool = True) -> None:
-    """Write a file under a temporary name and move it into place: a kill never leaves half a file.
+    """Write a file under a temporary name and move it into place.
+
+    A kill never leaves half a file.
 
     Nor does a loss of power, if ``is_synced``: without, the caller writes it through to the disk.
     """
@@ -142,7 +151,9 @@ def json_text(document: Any) -> str:
 
 
 def save(folder: Path, results: FlightResults, manifest: Manifest) -> None:
-    """Write a flight's answers and arrays into its folder; what an earlier run left of them is replaced.
+    """Write a flight's answers and arrays into its folder.
+
+    What an earlier run left of them is replaced.
 
     They are not yet written through to the disk.
 
@@ -336,7 +347,10 @@ def utf8_text(text: Any) -> str:
 
 
 def csv_text(figure: FigureData, line_end: str = "\n") -> str:
-    """Readable copy of a figure's arrays: rounded, NaN empty, no cell a spreadsheet would run as a formula."""
+    """Return a figure's arrays as readable CSV: rounded, NaN empty.
+
+    No cell holds what a spreadsheet would run as a formula.
+    """
     cells = []
     for name, values in figure.columns.items():
         places = figure.digits.get(name, digits_of(name))

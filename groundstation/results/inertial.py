@@ -1,4 +1,4 @@
-"""Answer of the INS error estimator (system 2): errors of the INS found against GNSS, and what they rest on."""
+"""Answer of the INS error estimator (system 2): INS errors against GNSS, and their basis."""
 
 import math
 from collections.abc import Mapping
@@ -41,7 +41,9 @@ class StateEstimate:
 
 @dataclass(frozen=True)
 class ChannelResult:
-    """One horizontal channel, ``north`` or ``east``. Error = INS - truth, innovation = measured - predicted.
+    """One horizontal channel, ``north`` or ``east``.
+
+    Error = INS - truth, innovation = measured - predicted.
 
     ``nis`` is the mean normalised innovation squared per measurement with its 95 % chi-square limits ``nis_low``,
     ``nis_high`` (None where the measurement noise was inflated for colour: then NIS is below one by design);
@@ -62,7 +64,9 @@ class ChannelResult:
 
 @dataclass(frozen=True)
 class RealOutage:
-    """An interval of the log itself in which nothing could be compared: the filter forecast through it.
+    """Interval of the log in which nothing could be compared.
+
+    The filter forecast through it.
 
     ``jump_m`` is how far the forecast position error was from what GNSS showed at its end, ``sigma_m`` what the
     forecast claimed (both radial); None when the flight ended before. ``missing`` is what was absent: ``"gnss"``,
@@ -79,7 +83,9 @@ class RealOutage:
 
 @dataclass(frozen=True)
 class EarlyAzimuth:
-    """Azimuth error at flight time ``time_s``, from the turns of the first hour of them alone, and its drift.
+    """Azimuth error at flight time ``time_s``, and its drift.
+
+    From the turns of the first hour of them alone.
 
     An azimuth error oscillates over 24 h: what is carried back to the taxi may not come from hours later.
     """
@@ -109,7 +115,9 @@ class EarlyAzimuth:
 
 @dataclass(frozen=True)
 class AzimuthEstimate:
-    """Azimuth (heading) error of the INS from what turns do to its velocity error; offered only where they allow it.
+    """Azimuth (heading) error of the INS, from the effect of turns on its velocity error.
+
+    Offered only where the turns allow it.
 
     ``observable`` says whether ``sigma_deg`` is below the limit of the settings; if not, ``error_deg`` is None. The
     error is that at ``time_s``, flight seconds: the last turn; ``early`` is for the time of the taxi, None where the
@@ -128,7 +136,9 @@ class AzimuthEstimate:
 
 @dataclass(frozen=True)
 class Difference:
-    """INS minus GNSS over the epochs compared: ``north``, ``east``, or ``horizontal``, the length of both.
+    """INS minus GNSS over the epochs compared.
+
+    ``north``, ``east``, or ``horizontal``, the length of both.
 
     ``mean`` has its sign; ``median``, ``p95`` and ``largest`` are of the magnitude.
     """
@@ -145,7 +155,9 @@ class Difference:
 
 @dataclass(frozen=True)
 class OwnInnovation:
-    """What the INS's own filter logged of its innovations against GNSS: innovation = measured - predicted.
+    """Innovations against GNSS that the INS's own filter logged.
+
+    Innovation = measured - predicted.
 
     ``mean`` has its sign; ``median`` and ``p95`` are of the magnitude. ``sigma`` is the root of the filter's median
     variance, ``share_inside95`` that of the innovations inside their 95 % band; None where it logs no variance.
@@ -180,7 +192,9 @@ class NavigationStart:
 
 @dataclass(frozen=True)
 class InertialResult(Answer):
-    """INS errors of one flight; of an INS that GNSS corrects already, what it differs from GNSS by and nothing else.
+    """INS errors of one flight.
+
+    Of an INS that GNSS corrects already, only its difference from GNSS.
 
     Parameters
     ----------
@@ -284,7 +298,9 @@ class InertialResult(Answer):
 
 
 def is_left_alone(name: str, sigma: Any, observability: Any, settings: Mapping[str, Any]) -> bool:
-    """Whether a state is not estimated in this INS class: the data say nothing of it and its sigma is the one it had.
+    """Tell whether a state is not estimated in this INS class.
+
+    The data say nothing of it, and its sigma is the one it had.
 
     A class leaves a state out by a tiny sigma at the start; value and sigma are then no answer of this flight.
 

@@ -1,4 +1,4 @@
-"""What flights teach of an INS's installation, and the heading errors that follow from it."""
+"""Knowledge of an INS's installation from flights, and heading errors that follow from it."""
 
 import json
 from dataclasses import dataclass, field
@@ -18,7 +18,10 @@ POOLED = ("compass_a_deg", "antenna_arm_m", "gnss_latency_s")  # figures of othe
 
 @dataclass(frozen=True)
 class Measured:
-    """A figure of a sensor that one flight measured, in the unit that ends its name, and its sigma."""
+    """Figure of a sensor that one flight measured, and its sigma.
+
+    In the unit that ends its name.
+    """
 
     name: str = field(metadata={"one_of": POOLED})
     value: float
@@ -27,7 +30,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Lesson:
-    """What one flight says of its installation: stored numbers alone.
+    """Contribution of one flight to the knowledge of its installation: stored numbers alone.
 
     Parameters
     ----------
@@ -95,7 +98,7 @@ class Lesson:
 
     @property
     def teaches(self) -> bool:
-        """Whether later flights learn from it."""
+        """Tell whether later flights learn from it."""
         return not self.not_taught
 
     @property
@@ -105,13 +108,15 @@ class Lesson:
 
     @property
     def prior(self) -> tuple[float, ...]:
-        """What is known before the first flight."""
+        """Knowledge before the first flight: factor, steady sideslip, mounting, with sigmas."""
         return (self.factor, self.factor_sigma, self.steady_sigma_deg, self.mounting_deg, self.mounting_sigma_deg)
 
 
 @dataclass(frozen=True)
 class Installed:
-    """Posterior of an installation: mounting of the unit, factor and steady sideslip of the aircraft.
+    """Posterior of an installation.
+
+    Mounting of the unit, factor and steady sideslip of the aircraft.
 
     ``factor`` is in degrees per m/s of crosswind; ``sum_deg`` is mounting + steady sideslip, which the flights see
     together: its sigma is smaller than either's.
@@ -192,7 +197,10 @@ class InstallationResult(Answer):
 
 @dataclass(frozen=True)
 class InstalledFlight:
-    """A flight of an installation: what it says, and its answer by what earlier ones taught (None without a taxi)."""
+    """Flight of an installation: its lesson, and its answer by those of earlier flights.
+
+    The answer is None without a taxi.
+    """
 
     lesson: Lesson
     answer: InstallationResult | None
@@ -200,7 +208,7 @@ class InstalledFlight:
 
 @dataclass(frozen=True)
 class Pooled:
-    """A figure of a sensor from all flights of an installation, in the unit that ends its name.
+    """Figure of a sensor from all flights of an installation, in the unit that ends its name.
 
     ``odd`` and ``changed`` name flights that another sensor seems to have made, and those from which on it is another.
     """
@@ -243,7 +251,7 @@ class Installation:
 
     @property
     def lessons(self) -> tuple[Lesson, ...]:
-        """What its flights say."""
+        """Lessons of its flights."""
         return tuple(one.lesson for one in self.flights)
 
 
@@ -271,7 +279,7 @@ class Installations:
 
     @property
     def lessons(self) -> tuple[Lesson, ...]:
-        """What all flights say."""
+        """Lessons of all flights."""
         return tuple(lesson for one in self.installations for lesson in one.lessons)
 
 
@@ -302,7 +310,10 @@ class InstallationRow:
 
 
 def as_stored(lesson: Lesson) -> Lesson:
-    """A lesson with its numbers rounded as the file has them: whoever reads the file computes the same."""
+    """Round the numbers of a lesson as the file has them.
+
+    Whoever reads the file computes the same.
+    """
     return from_json(Lesson, to_json(lesson))
 
 

@@ -1,4 +1,7 @@
-"""Answer of the magnetic estimator (system 3): the deviation found in flight, how sure it is, what it leaves over."""
+"""Answer of the magnetic estimator (system 3): deviation found in flight, with its sigma.
+
+It also tells what the correction leaves over.
+"""
 
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
@@ -44,7 +47,9 @@ class AlignmentSource:
 
 @dataclass(frozen=True)
 class Alignment:
-    """INS heading error at the time of the figure, taken off the INS heading before anything is compared with it.
+    """INS heading error at the time of the figure.
+
+    It is taken off the INS heading before anything is compared with it.
 
     ``aligned_error_deg`` and ``aligned_sigma_deg`` belong to ``aligned_at_s``, ``error_deg`` and ``sigma_deg`` to
     ``figure_at_s`` (flight seconds), after the drift of the hours between. ``origin`` says whence.
@@ -74,7 +79,10 @@ class Alignment:
 
 @dataclass(frozen=True)
 class DeclinationUsed:
-    """Declination at the figure, east positive, with its sigma, and the model's horizontal and vertical intensity."""
+    """Declination at the figure, east positive, with its sigma.
+
+    And the model's horizontal and vertical intensity.
+    """
 
     value_deg: float
     sigma_deg: float
@@ -85,7 +93,10 @@ class DeclinationUsed:
 
 @dataclass(frozen=True)
 class Turn:
-    """A turn of about constant bank, and why it is not used. Bank right positive; times are flight seconds."""
+    """Turn of about constant bank, and the reason where it is not used.
+
+    Bank is right positive; times are flight seconds.
+    """
 
     start_s: float
     end_s: float
@@ -128,7 +139,7 @@ class SigmaPart:
 
 @dataclass(frozen=True)
 class Coverage:
-    """How much of the circle of magnetic headings both branches cover.
+    """Share of the circle of magnetic headings that both branches cover.
 
     ``share`` counts bins with readings of both, or in a gap no wider than the settings allow; ``measured_bins`` those
     with readings alone, ``interpolated_bins`` the rest of 360; ``widest_gap_deg`` without readings of both.
@@ -142,7 +153,10 @@ class Coverage:
 
 @dataclass(frozen=True)
 class Residual:
-    """RMS error of the magnetic heading on the part of the flight that no fit has seen, its mean included."""
+    """RMS error of the magnetic heading on the part of the flight that no fit has seen.
+
+    Its mean is included.
+    """
 
     before: float
     after: float
@@ -150,7 +164,9 @@ class Residual:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """The level part of the flight that no fit has seen; ``level_share`` is its share of all that none has seen.
+    """Level part of the flight that no fit has seen.
+
+    ``level_share`` is its share of all that none has seen.
 
     ``heading_sectors`` of 30 deg, of 12, were flown in it.
     """
@@ -164,7 +180,9 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class Method:
-    """One way to find the deviation, fitted or refused, and what it leaves on the held-out part.
+    """One method to find the deviation, fitted or refused.
+
+    With the error that it leaves on the held-out part.
 
     Parameters
     ----------
@@ -202,7 +220,9 @@ class Method:
 
 @dataclass(frozen=True)
 class PoissonParameters:
-    """Iron of the aircraft: reading = soft_iron @ field + hard_iron + current_effect x (current - reference).
+    """Iron of the aircraft.
+
+    reading = soft_iron @ field + hard_iron + current_effect x (current - reference).
 
     ``field`` is the earth's along the body axes (forward, right, down). Sigmas have the same shapes;
     ``current_*`` are None where no current was logged, or it did not vary.
@@ -219,7 +239,10 @@ class PoissonParameters:
 
 @dataclass(frozen=True)
 class BankBias:
-    """Forecast from the fitted iron: error that the average of opposite banks has in level flight."""
+    """Error that the average of opposite banks has in level flight.
+
+    Forecast from the fitted iron.
+    """
 
     bank_deg: float
     rms_deg: float
@@ -228,7 +251,7 @@ class BankBias:
 
 @dataclass(frozen=True)
 class OtherCondition:
-    """By how much the deviation is another than the table's under conditions that the figure did not have.
+    """Change of the deviation from the table's under conditions that the figure did not have.
 
     ``pitch``: for each degree of pitch more than the figure's, by the fitted iron. ``ground``: on the ground, by a
     steady field in the body, ``added_nt``, that a current makes that flows only there or only in the air. ``gain``: at
@@ -246,7 +269,9 @@ class OtherCondition:
 
 @dataclass(frozen=True)
 class CardRow:
-    """Steer card: to fly ``magnetic_heading_deg`` steer ``steer_deg`` by the uncorrected magnetic heading.
+    """Row of a steer card: to fly ``magnetic_heading_deg``, steer ``steer_deg``.
+
+    ``steer_deg`` is the uncorrected magnetic heading.
 
     ``deviation_deg`` is added to the reading; ``is_interpolated``: no reading of both branches near it.
     """

@@ -1,4 +1,4 @@
-"""What the answers of a plan have in common: they tell of something that has not been flown."""
+"""Base of the answers of a plan, which tell of something that has not been flown."""
 
 from groundstation.results.answer import Answer
 

@@ -9,7 +9,7 @@ WHAT_HEADING_NEEDS = (
 
 
 def explained(analysis: str, reason: str) -> str:
-    """The reason as it stands, and behind it, where the aircraft did not taxi, what the method would have needed.
+    """Return the reason, with the needs of the method where the aircraft did not taxi.
 
     Examples
     --------

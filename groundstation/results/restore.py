@@ -12,7 +12,9 @@ from groundstation.results.flight import FlightResults
 
 
 def restored(summary: Mapping[str, Any], where: str, answer_types: Mapping[str, type[Answer]]) -> FlightResults:
-    """Results of a flight as the run had them, but for the digits that summary.json leaves out.
+    """Restore the results of a flight from its summary.
+
+    They are those of the run, but for the digits that summary.json leaves out.
 
     Parameters
     ----------

@@ -105,7 +105,10 @@ def definition_name(cls: type) -> str:
 
 
 def _object(cls: type, definitions: dict[str, Schema]) -> Schema:
-    """A dataclass: its fields in order, all of them required but those that are left out when they say nothing."""
+    """Return the schema of a dataclass: its fields in order.
+
+    All are required but those that are left out when they say nothing.
+    """
     hints, told = typing.get_type_hints(cls), _told(cls)
     properties: dict[str, Schema] = {}
     required: list[str] = []
@@ -180,7 +183,7 @@ def _one_of_several(members: list[Schema]) -> Schema:
 
 
 def _narrowed(schema: Schema, metadata: Mapping[str, Any]) -> Schema:
-    """What the metadata of a field adds to its type.
+    """Add the limits in the metadata of a field to the schema of its type.
 
     ``one_of``: texts it may be (of a mapping: its values); ``pattern``: of a text; ``keys``: of a mapping; ``items``:
     how many; ``above``, ``least``: a number is greater, or not less.
@@ -215,7 +218,10 @@ def _bounded(schema: Schema, name: str) -> Schema:
 
 
 def _told(cls: type) -> dict[str, str]:
-    """What the docstring of a class says of its fields, by name (numpydoc, section Parameters)."""
+    """Return the descriptions of a class's fields in its docstring, by name.
+
+    Numpydoc, section Parameters.
+    """
     _, _, listed = (cls.__doc__ or "").partition("Parameters\n    ----------\n")
     told: dict[str, str] = {}
     names: list[str] = []

@@ -1,4 +1,4 @@
-"""How several logs of one flight were put on one clock, and which of their sources the analyses use."""
+"""Clock that several logs of one flight share, and the sources that analyses use of them."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
@@ -101,7 +101,7 @@ class ChosenSource:
 
 @dataclass(frozen=True)
 class MotionAgreement:
-    """How well the motion of a joined log agrees with that of the log whose clock the flight has.
+    """Agreement of a joined log's motion with that of the log whose clock the flight has.
 
     ``residual_rms`` and ``motion_rms`` in ``unit``, of ``signal``, at the samples of the joined log.
     """

@@ -4,7 +4,9 @@ from groundstation.results.arrays.typed import Arrays, Counts, Flags, Floats, Te
 
 
 class FleetTrend(Arrays, figure="trend"):
-    """Control charts: a row per flight, quantity and aircraft with enough flights that have a time, in order of time.
+    """Control charts: a row per flight, quantity and aircraft, in order of time.
+
+    Only aircraft with enough flights that have a time.
 
     ``level`` is the median between change points, ``low`` and ``high`` are the control limits.
     """
@@ -47,7 +49,7 @@ class FleetChecks(Arrays, figure="calibration_checks"):
 
 
 class FleetInstallationFlights(Arrays, figure="installation_flights"):
-    """Flights of every installation: what the flights before each had taught, its answers, its residual."""
+    """Flights of every installation: knowledge from earlier flights, answers, residual."""
 
     place: Counts
     aircraft: Texts

@@ -1,4 +1,7 @@
-"""Arrays of any flight: its course, phases and states, what the ledger counted; times are flight seconds."""
+"""Arrays of any flight: course, phases, states, counts of the ledger.
+
+Times are flight seconds.
+"""
 
 from groundstation.results.arrays.typed import Arrays, Counts, Floats, Texts
 
@@ -44,7 +47,7 @@ class GnssLanes(Arrays, figure="gnss_lanes", digits={"start_s": 2, "end_s": 2}):
 
 
 class StateLanes(Arrays, figure="state_lanes", digits={"start_s": 2, "end_s": 2}):
-    """What the log says of flight mode, arming and ground contact, each a lane."""
+    """Flight mode, arming and ground contact as logged, a lane each."""
 
     lane: Texts
     start_s: Floats
@@ -64,7 +67,7 @@ class LedgerRows(
         "last_s": 2,
     },
 ):
-    """What was counted of each topic."""
+    """Counts of each topic."""
 
     topic: Texts
     rows: Counts

@@ -31,7 +31,10 @@ class HeadingLanes(Arrays, figure="heading_lanes", digits={"start_s": 3, "end_s"
 
 
 class HeadingRunning(Arrays, figure="heading_running", digits={"time_s": 3}):
-    """The paper's running figures, and the honest half width held between the steps it was computed at."""
+    """Running figures of the paper, and the honest half width.
+
+    The half width is held between the steps it was computed at.
+    """
 
     time_s: Floats
     cycles: Counts

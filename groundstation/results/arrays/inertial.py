@@ -24,7 +24,7 @@ class StateSeries:
 
 
 class StatesOfChannel(Part):
-    """Estimated states of one channel with their sigmas, what was measured, and the smoothed errors."""
+    """Estimated states of one channel with sigmas, the measurements, and the smoothed errors."""
 
     measured_position_m: Floats = column("measured_{}_position_m")
     measured_velocity_mps: Floats = column("measured_{}_velocity_mps")
@@ -101,7 +101,10 @@ class InertialObservability(Arrays, figure="inertial_observability", digits=_TIM
 
 
 class InertialTrack(Arrays, figure="inertial_track", digits={**_TIME, "*_deg": 7}):
-    """Track of the INS and of GNSS; where the filter ran, of the INS minus its estimated and its smoothed error."""
+    """Tracks of the INS, of GNSS, and of the INS minus its estimated and its smoothed error.
+
+    The latter two where the filter ran.
+    """
 
     time_s: Floats
     ins_latitude_deg: Floats

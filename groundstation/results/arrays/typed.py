@@ -1,4 +1,7 @@
-"""Typed arrays: a class per figure whose fields are its columns, so that the type checker finds a renamed one."""
+"""Typed arrays: one class per figure, whose fields are its columns.
+
+So the type checker finds a renamed column.
+"""
 
 import re
 import typing
@@ -34,7 +37,10 @@ P = TypeVar("P")
 
 
 def column(name: str) -> Any:
-    """Field whose column has another name; ``{}`` in the name of a :class:`Part`'s stands for that of the part."""
+    """Declare a field whose column has another name.
+
+    ``{}`` in a name of a :class:`Part` stands for the name of the part.
+    """
     return field(metadata={"name": name})
 
 
@@ -56,7 +62,9 @@ class Part:
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(column, family, field))
 class Arrays(FigureData):
-    """Arrays of one figure, each a field; a field that may be None is a column that the figure may lack.
+    """Arrays of one figure, each a field.
+
+    A field that may be None is a column that the figure may lack.
 
     Parameters
     ----------
@@ -152,7 +160,7 @@ def found_in(figures: typing.Iterable[FigureData], kind: type[T]) -> T | None:
 
 
 class MissingColumnError(GroundstationError):
-    """A figure as it was saved lacks a column, which holds numbers, flags or text by its ``kind``."""
+    """Error: a saved figure lacks a column, which holds numbers, flags or text by ``kind``."""
 
     def __init__(self, figure: str, column: str, kind: type[np.generic]) -> None:
         super().__init__(f"arrays/{figure}.parquet", f"no column {column}", next_step="run the log again")
@@ -160,7 +168,10 @@ class MissingColumnError(GroundstationError):
 
 
 def joined(parts: typing.Sequence[P]) -> P:
-    """Figures of one type as one, their rows one behind the other; a column that one of them lacks is left out."""
+    """Join figures of one type, their rows one behind the other.
+
+    A column that one of them lacks is left out.
+    """
     first = parts[0]
     values = {
         name: _joined([getattr(one, name) for one in parts])
@@ -207,7 +218,7 @@ def _make_typed(one: Any) -> None:
 
 @dataclass(frozen=True)
 class _Field:
-    """A field of a figure or part: name, that of its columns, what it holds, and whether it may be None."""
+    """Field of a figure or part: name, name of its columns, type, and whether it may be None."""
 
     name: str
     pattern: str
