@@ -1,4 +1,7 @@
-"""The five classical coefficients, with errors that allow for residuals correlated from sample to sample."""
+"""Five classical deviation coefficients, with errors that allow for correlated residuals.
+
+Residuals are correlated from sample to sample.
+"""
 
 import math
 from collections.abc import Callable
@@ -23,7 +26,9 @@ def design(heading_deg: FloatArray) -> FloatArray:
 def fit(
     heading_deg: FloatArray, error_deg: FloatArray, weight: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Coefficients A to E, shape (5,), by weighted least squares, and their covariance, shape (5, 5).
+    """Fit the coefficients A to E, shape (5,), by weighted least squares.
+
+    Returned with their covariance, shape (5, 5).
 
     Errors must not wrap: they are differences from a middle, not headings. Samples in order of time or of heading.
 
@@ -45,7 +50,10 @@ def fit(
 
 
 def fit_to(heading_deg: FloatArray) -> Callable[[FloatArray], FloatArray]:
-    """What gives the coefficients of :func:`fit` alone, shape (5,), for many errors on the same headings."""
+    """Return a function that gives the coefficients of :func:`fit` alone, shape (5,).
+
+    For many errors on the same headings.
+    """
     columns = design(heading_deg)
     bread = _bread(columns, columns)
     return lambda error_deg: bread @ (columns.T @ error_deg)
@@ -56,7 +64,9 @@ def _bread(columns: FloatArray, weighted: FloatArray) -> FloatArray:
 
 
 def autocorrelation(residual: FloatArray, parameters: int) -> float:
-    """Correlation of neighbours, in [0, 0.995], freed of the bias that fitting so many slow regressors makes.
+    """Return the correlation of neighbours, in [0, 0.995].
+
+    It is freed of the bias that fitting so many slow regressors makes.
 
     Source: M. G. Kendall, Biometrika 41 (1954) 403-404, whose (1 + 3 r) / n is that of a mean; k (1 + r) / n + 2 r / n
     here.
@@ -69,7 +79,9 @@ def autocorrelation(residual: FloatArray, parameters: int) -> float:
 
 
 def inflation(samples: int, parameters: int, correlation: float) -> float:
-    """Factor n / (n - k) on a variance, n the number of independent samples that correlated ones are worth; at most 4.
+    """Return the factor n / (n - k) on a variance, at most 4.
+
+    n is the number of independent samples that correlated ones are worth.
 
     They are worth no more than the windows of :func:`long_run`, among which the parameters take theirs.
 
@@ -84,7 +96,9 @@ def inflation(samples: int, parameters: int, correlation: float) -> float:
 
 
 def long_run(scores: FloatArray, correlation: float) -> FloatArray:
-    """Covariance of the sum of correlated scores, shape (n, k) -> (k, k): prewhitened, then with Bartlett weights.
+    """Return the covariance of the sum of correlated scores, shape (n, k) -> (k, k).
+
+    Prewhitened, then with Bartlett weights.
 
     Scores are whitened by the first-order autocorrelation of the residuals, and the sum is recoloured by
     1 / (1 - correlation)^2. What wanders below white noise does not show in the correlation of neighbours: the weights

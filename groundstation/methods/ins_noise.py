@@ -1,4 +1,4 @@
-"""Noise parameters by INS class (TOML in ins_classes/): what the filter believes of gyros, GNSS and the start."""
+"""Noise parameters by INS class (TOML in ins_classes/): gyros, GNSS, initial errors."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -70,7 +70,7 @@ def _variance(white: float, correlated: float, correlation_s: float, interval_s:
 
 @dataclass(frozen=True)
 class Calibration:
-    """What the filter's forecast sigma must be multiplied by at each horizon, and how sure that is.
+    """Factors on the filter's forecast sigma at each horizon, and their weight.
 
     ``scale`` belongs to ``horizon_min``; found on simulated flights of the class. ``bank_scale`` is that of the bank's
     mixture, ``coupled_scale`` that of the coupled model; left out, they are one. ``weight`` is what it counts against
@@ -139,7 +139,9 @@ class BankFactors:
 
 @dataclass(frozen=True)
 class InsNoise:
-    """Noise parameters of an INS class. Initial sigmas, then what the white noises add per square root of time.
+    """Noise parameters of an INS class.
+
+    Initial sigmas, then what the white noises add per square root of time.
 
     ``random_drift_dph`` and ``random_drift_correlation_s`` are the stationary sigma and correlation time (1 / beta) of
     the random drift. Of the coupled model alone: ``azimuth_deg`` is the initial sigma of the azimuth,
@@ -226,7 +228,9 @@ def load_class(name: str) -> InsNoise:
 
 
 def choose_class(asked_for: str, aircraft_class: str = "", logged_class: str = "") -> tuple[InsNoise, str]:
-    """Noise parameters: of the settings, else of the aircraft file, else of the log, else navigation; and who chose.
+    """Choose the noise parameters, and tell who chose them.
+
+    Those of the settings, else of the aircraft file, else of the log, else navigation.
 
     A log may name any INS: of its names only those of shipped classes are taken.
 

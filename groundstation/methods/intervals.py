@@ -25,7 +25,9 @@ def share_interval(inside: float, checks: float, confidence: float = 0.95) -> tu
 
 
 def nees_limits(freedom: int, independent: int, share: float = 0.95) -> tuple[float, float]:
-    """Limits of the mean of ``independent`` normalised squared errors of ``freedom`` degrees: ``share`` lie inside.
+    """Return the limits of the mean of ``independent`` normalised squared errors.
+
+    Each has ``freedom`` degrees of freedom; ``share`` of the means lie inside.
 
     Examples
     --------
@@ -41,7 +43,9 @@ def nees_limits(freedom: int, independent: int, share: float = 0.95) -> tuple[fl
 
 
 def effective_samples(values: FloatArray, about: float | None = None) -> float:
-    """Number of independent samples that give the mean the same variance: n / (1 + 2 sum of autocorrelations).
+    """Return the number of independent samples that give the mean the same variance.
+
+    n / (1 + 2 sum of autocorrelations).
 
     The sum ends at the first pair of lags whose sum is not positive. ``about`` is the true mean where it is known, else
     that of the samples: errors that are claimed to have none are one another's repetition where they share one.

@@ -1,4 +1,6 @@
-"""Steps of linear error models: transition and noise, and the dynamics of an aircraft in a local frame.
+"""Steps of linear error models: transition and noise.
+
+And the dynamics of an aircraft in a local frame.
 
 Source: Van Loan, Computing integrals involving the matrix exponential, IEEE Transactions on Automatic Control 23(3),
 1978 (the integral of exp(F s) Q exp(F' s); both are summed as power series here: their terms follow from one
@@ -19,7 +21,9 @@ ROOMS = 11  # matrices of n by n that a step works in; the last three keep the l
 def fill_step(
     n: int, F: FloatArray, q: FloatArray, step_s: float, phi: FloatArray, noise: FloatArray, room: FloatArray
 ) -> None:
-    """Transition and covariance of the noise of a step of dx/dt = F x + w; entries of F that are zero cost nothing.
+    """Fill transition and noise covariance of a step of dx/dt = F x + w.
+
+    Entries of F that are zero cost nothing.
 
     Phi = sum (F h)^k / k!; Q = sum L_k h^(k+1) / (k+1)! with L_0 = diag(q), L_(k+1) = F L_k + L_k F'. A step may go
     back; then the noise means nothing.

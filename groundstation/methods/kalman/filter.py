@@ -1,4 +1,6 @@
-"""Kalman filter and smoother of any linear system with scalar measurements, at the cost of its entries.
+"""Kalman filter and smoother of any linear system with scalar measurements.
+
+It costs as much as the matrices have entries.
 
 The frozen types hold arrays; the loops over them are compiled (``runs``, ``smoother_runs``). A compiled loop of another
 folder may call their parts (``kernels``) itself.
@@ -111,7 +113,7 @@ def _place_within(epoch: Int64Array) -> Int64Array:
 
 @dataclass(frozen=True)
 class Gate:
-    """When measurements are rejected and when the filter is opened again.
+    """Rules by which measurements are rejected and the filter is opened again.
 
     Parameters
     ----------
@@ -131,7 +133,7 @@ class Gate:
     is_by_innovation: bool = False
 
     def rules(self, kinds: int, size: int) -> Rules:
-        """As the compiled loops want it."""
+        """Return the rules as the compiled loops want them."""
         patience = np.array(np.broadcast_to(np.asarray(self.patience, dtype=np.int64), kinds))
         opened = np.array(np.broadcast_to(np.asarray(self.opened, dtype=np.float64), (kinds, size)), order="C")
         return Rules(float(self.sigmas) ** 2, frozen(patience), frozen(opened), self.is_by_innovation)
@@ -139,7 +141,10 @@ class Gate:
 
 @dataclass(frozen=True)
 class Start:
-    """State before the first epoch: ``x`` (n,) or (n, c), ``P`` (n, n), and rejections in a row of an earlier run."""
+    """State before the first epoch: ``x`` (n,) or (n, c), ``P`` (n, n).
+
+    And rejections in a row of an earlier run.
+    """
 
     x: FloatArray
     P: FloatArray
@@ -156,7 +161,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Kept:
-    """What a run writes down; smoothing needs all of the first three."""
+    """Choice of the arrays that a run keeps; smoothing needs all of the first three."""
 
     states: bool = True
     covariances: bool = True
@@ -167,7 +172,9 @@ class Kept:
 
 @dataclass(frozen=True)
 class FilterRun:
-    """History of a filter over n epochs and m measurements; arrays that were not kept have no length.
+    """History of a filter over n epochs and m measurements.
+
+    Arrays that were not kept have no length.
 
     Parameters
     ----------
@@ -208,7 +215,7 @@ class FilterRun:
 
     @cached_property
     def rejected(self) -> int:
-        """How many measurements the gate kept out."""
+        """Number of measurements that the gate kept out."""
         return int((self.mark == REJECTED).sum())
 
     @cached_property
@@ -220,7 +227,10 @@ class FilterRun:
 
     @cached_property
     def nis(self) -> FloatArray:
-        """Squared innovation over its variance of every measurement used, shape (used, c): chi-square of 1 each."""
+        """Squared innovation over its variance of every measurement used, shape (used, c).
+
+        Chi-square of 1 each.
+        """
         used = self.mark == USED
         return np.asarray(self.record.y[used] ** 2 / self.record.S[used, None])
 

@@ -1,4 +1,6 @@
-"""Compiled parts of the Kalman filter: predict, innovate, update. Functions on arrays that other compiled loops call.
+"""Compiled parts of the Kalman filter: predict, innovate, update.
+
+Functions on arrays that other compiled loops call.
 
 Letters, the same in all of this folder:
 
@@ -34,7 +36,10 @@ from groundstation.methods.kalman.arrays import FloatArray, Pattern, States
 def predict_covariance(
     states: States, pattern: Pattern, F: FloatArray, step: int, p: FloatArray, w: FloatArray
 ) -> None:
-    """p <- F p F'. Sparse, it costs 1.5 n products for each entry of F. One half is computed and mirrored."""
+    """Predict the covariance: p <- F p F'.
+
+    Sparse, it costs 1.5 n products for each entry of F. One half is computed and mirrored.
+    """
     n = len(states)
     if F.ndim == 3:
         for i in range(n):
@@ -152,7 +157,7 @@ def update_covariance(
     g: FloatArray,
     K: FloatArray,
 ) -> float:
-    """Fill the gain, update p with a scalar measurement, and return the variance S of its innovation.
+    """Update p with a scalar measurement, fill the gain, return the innovation's variance S.
 
     Parameters
     ----------

@@ -1,4 +1,6 @@
-"""Compiled loops of the smoothers, backwards over what the filter wrote down. Letters as in ``kernels``, and
+"""Compiled loops of the smoothers, backwards over the filter's record.
+
+Letters as in ``kernels``, and
 
 ===  =====================================================================================
 a    lambda of the book, shape (c, n): what the later data say about the state, in units 1/x
@@ -40,7 +42,10 @@ def absorb_covariance(
     A: FloatArray,
     u: FloatArray,
 ) -> None:
-    """A <- (I - K h)' A (I - K h) + h' h / S, gain ``K[m]``: only rows and columns of h change. ``u`` (n,) is room."""
+    """Add a measurement to A: A <- (I - K h)' A (I - K h) + h' h / S, gain ``K[m]``.
+
+    Only rows and columns of h change. ``u`` (n,) is room.
+    """
     n = len(states)
     total = 1.0 / s
     for i in range(n):
@@ -74,7 +79,10 @@ def absorb_states(
     s: float,
     a: FloatArray,
 ) -> None:
-    """a <- (I - K h)' a - h' y / S, every right-hand side; of a ``y`` without length: as if it were zero."""
+    """Add a measurement to a: a <- (I - K h)' a - h' y / S, every right-hand side.
+
+    A ``y`` without length counts as zero.
+    """
     for c in range(a.shape[0]):
         total = 0.0
         for i in range(len(states)):
@@ -171,7 +179,9 @@ def run_smoother(
     xs: FloatArray,
     variance: FloatArray,
 ) -> None:
-    """Smooth epochs ``begin`` to ``end`` with all data in between and no later ones (fixed interval).
+    """Smooth epochs ``begin`` to ``end`` with all data in between (fixed interval).
+
+    No later data is used.
 
     Parameters
     ----------
@@ -223,7 +233,10 @@ def run_fixed_lag(
     end: Int64Array,
     past: FloatArray,
 ) -> None:
-    """Smooth epoch ``begin[i]`` with the data up to ``end[i]``, for each i: states alone, ``past`` (s, states, c)."""
+    """Smooth epoch ``begin[i]`` with the data up to ``end[i]``, for each i.
+
+    States alone, ``past`` (s, states, c).
+    """
     n, channels = len(states), record.x.shape[2]
     pattern, F = dynamics.pattern, dynamics.F
     step, bounds, row = schedule.step, schedule.first, schedule.row
@@ -261,7 +274,9 @@ def run_lag_covariance(
     smoothed: FloatArray,
     closed: FloatArray,
 ) -> None:
-    """Covariance of epoch ``begin[i]`` given the data up to ``end[i]``, and how errors travel between, for each i.
+    """Fill the covariance of epoch ``begin[i]`` given the data up to ``end[i]``, for each i.
+
+    And how errors travel from one to the other.
 
     Parameters
     ----------

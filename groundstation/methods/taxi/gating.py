@@ -1,4 +1,4 @@
-"""Why a sample is used or not, and the straight segments."""
+"""Gates that accept or reject each sample, and the straight segments."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -55,7 +55,10 @@ def gate_samples(
 
 
 def _not_taxi(samples: Samples, phases: Phases) -> Iterator[tuple[str, BoolArray]]:
-    """Epochs of take-off runs and landing rolls, with the slow ones beside them in which the speed still changes."""
+    """Yield the epochs of take-off runs and landing rolls.
+
+    With the slow ones beside them in which the speed still changes.
+    """
     phase, speed = phases.at(samples.time_s), samples.speed_mps
     earlier_mps = np.interp(samples.time_s - 0.5, samples.time_s, speed)
     later_mps = np.interp(samples.time_s + 0.5, samples.time_s, speed)
@@ -69,7 +72,9 @@ def _not_taxi(samples: Samples, phases: Phases) -> Iterator[tuple[str, BoolArray
 
 
 def intervals_without_epoch(time_s: NDArray[np.float64], intervals: Sequence[Interval]) -> tuple[Interval, ...]:
-    """Intervals, both ends included, that hold none of the times: outside the flight, or in a gap.
+    """Return the intervals, both ends included, that hold none of the times.
+
+    They lie outside the flight, or in a gap.
 
     Parameters
     ----------
@@ -92,7 +97,9 @@ def is_straight_and_fast(samples: Samples, settings: TaxiLimits) -> BoolArray:
 
 
 def _outliers(samples: Samples, settings: TaxiLimits) -> BoolArray:
-    """Differences far from the running median of 5 s, in robust sigmas of the straight and fast samples.
+    """Find differences far from the running median of 5 s.
+
+    In robust sigmas of the straight and fast samples.
 
     Six robust sigmas and at least a floor: no sample of a normal process is ever touched, so coverage is not.
     """

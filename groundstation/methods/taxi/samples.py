@@ -1,4 +1,7 @@
-"""Pairs of INS heading and GNSS velocity at the GNSS times of validity, and why each is used or not."""
+"""Pairs of INS heading and GNSS velocity at the GNSS times of validity.
+
+With the reason why each is used or not.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -29,7 +32,10 @@ VELOCITY_SIGMA = "velocity sigma"
 
 
 class GroundContact(Protocol):
-    """Ground contact at given times: where it is proven, and by what (empty or ``none...``: by nothing)."""
+    """Ground contact at given times, and the method that proves it.
+
+    An empty method, or ``none...``: nothing proves it.
+    """
 
     @property
     def mask(self) -> BoolArray: ...
@@ -38,7 +44,9 @@ class GroundContact(Protocol):
 
 
 class TrueHeading(Protocol):
-    """True heading of every row of an INS topic, degrees, NaN where unknown, and what it was made from.
+    """True heading of every row of an INS topic, degrees, NaN where unknown.
+
+    And what it was made from.
 
     ``declination_sigma_deg`` is that of an error common to all rows; None for a heading logged as true.
     """
@@ -144,7 +152,10 @@ def logged_heading(flight: Flight, ins_topic: str) -> HeadingValues:
 
 
 def logged_ground(flight: Flight, time_ns: Int64Array) -> Proof:
-    """Ground contact by logged weight on wheels: the last value before each time; without it nothing is proven."""
+    """Return ground contact by logged weight on wheels: the last value before each time.
+
+    Without it nothing is proven.
+    """
     for topic in topics_of_kind("discrete", flight.topics()):
         table = flight[topic]
         known = table.valid("weight_on_wheels")
@@ -156,7 +167,9 @@ def logged_ground(flight: Flight, time_ns: Int64Array) -> Proof:
 
 
 def window_slope(at: FloatArray, time_s: FloatArray, values: FloatArray, window_s: float) -> FloatArray:
-    """Least-squares slope of ``values`` over a window centred at each time, per second, shape as ``at``.
+    """Return the least-squares slope of ``values`` over a window centred at each time.
+
+    Per second, shape as ``at``.
 
     A window with fewer than three samples is widened to the three nearest (raw data: ``window_s`` = 0). NaN where there
     are fewer than two samples.
@@ -180,7 +193,9 @@ def pair_samples(
     with_later_runs: bool = False,
     gnss_latency_s: float = 0.0,
 ) -> Samples:
-    """Pair each distinct GNSS epoch before lift-off with the INS heading interpolated to its time.
+    """Pair each distinct GNSS epoch before lift-off with the INS heading at its time.
+
+    The heading is interpolated.
 
     GNSS times are put back by ``gnss_latency_s``, by which GNSS is later than the INS. ``with_later_runs`` adds
     the epochs after lift-off at which ground contact is proven: landing roll and taxi in.
@@ -226,7 +241,9 @@ def pair_samples(
 
 
 def _geometry(gnss: Table, settings: TaxiLimits) -> tuple[FloatArray, str]:
-    """Dilution of precision of each epoch and its name; without any, in motion, the sigma that the receiver states.
+    """Return the dilution of precision of each epoch, and its name.
+
+    Without any, in motion, the sigma that the receiver states.
 
     That sigma is the dilution of precision times the noise of the ranges' rates. At standstill the noise is measured.
     """
@@ -281,7 +298,10 @@ def _no_ground_reason(settings: TaxiLimits) -> str:
 def _ins_heading(
     flight: Flight, ins_topic: str, heading_deg: FloatArray, time_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Times and continuous headings of the valid INS rows around the epochs; one row for each time."""
+    """Return times and continuous headings of the valid INS rows around the epochs.
+
+    One row for each time.
+    """
     table = flight[ins_topic]
     known = np.isfinite(heading_deg)
     if "valid" in table:

@@ -1,4 +1,6 @@
-"""The honest interval: the heading error averaged over what the noise may be, given standstill and taxi data.
+"""Honest interval: the heading error averaged over the possible noise.
+
+What the noise may be, standstill and taxi data tell.
 
 The width of an interval hangs on the spectral density at zero frequency, which one run shows only dimly. So the
 parameters of the noise model (``noise.py``) are not fixed at a best fit: they have broad priors, their
@@ -32,7 +34,9 @@ WIDEST_GAP_DEG = 210.0  # between the directions of a taxi that goes there and b
 
 @dataclass(frozen=True)
 class StandstillVelocities:
-    """GNSS velocity at standstill, m/s, shapes (n,); ``gap_s`` from its end to the first taxi sample, None: unlinked.
+    """GNSS velocity at standstill, m/s, shapes (n,).
+
+    ``gap_s`` is from its end to the first taxi sample, None: unlinked.
 
     ``restart`` is the index at which the stretch that is linked to taxi begins, the others standing before it.
     """
@@ -93,7 +97,9 @@ class Differences:
 
 
 class _Found(NamedTuple):
-    """Of k draws: log posterior (k,), coefficients (k, c), variances (k, m, c), the error without terms told apart.
+    """Results of k draws: log posterior (k,), coefficients (k, c), variances (k, m, c).
+
+    And the error without terms told apart.
 
     ``alone``: error and variance, shape (k, 2), were the terms told apart known to be zero.
     """
@@ -106,7 +112,9 @@ class _Found(NamedTuple):
 
 @dataclass
 class _Target:
-    """Log posterior density of the noise parameters, with the error and the coefficients integrated out.
+    """Log posterior density of the noise parameters.
+
+    The error and the coefficients are integrated out.
 
     ``apart``: so many regressors at the end are told apart.
     """
@@ -149,7 +157,7 @@ class _Target:
         self.last = np.array([len(data.time_s)], dtype=np.int64)
 
     def evaluate(self, thetas: FloatArray, checkpoints: NDArray[np.int64]) -> _Found:
-        """What is found for draws of the noise parameters, shape (k, 11)."""
+        """Return the results for draws of the noise parameters, shape (k, 11)."""
         count, width = len(thetas), self.taxi[1].shape[1] - 1
         log_likelihood, estimate = np.empty(count), np.empty((count, width))
         variance, alone = np.empty((count, len(checkpoints), width)), np.empty((count, 2))
@@ -246,7 +254,9 @@ def error_posterior(
 
 
 def _target_of(differences: Differences, standstill: StandstillVelocities) -> _Target:
-    """Target of the noise: with the terms told apart, at the end, where they differ along the taxi.
+    """Return the target of the noise.
+
+    The terms told apart are at the end, where they differ along the taxi.
 
     Directions then disagree by what a crosswind does; without these terms that would be taken for errors of the INS.
     """
@@ -258,7 +268,9 @@ def _target_of(differences: Differences, standstill: StandstillVelocities) -> _T
 
 
 def goes_there_and_back(direction_deg: FloatArray) -> bool:
-    """Whether directions of motion leave no wide gap: what turns with the aircraft then shows by itself.
+    """Tell whether directions of motion leave no wide gap.
+
+    What turns with the aircraft then shows by itself.
 
     Examples
     --------
@@ -293,7 +305,9 @@ def without_apart(differences: Differences) -> Differences:
 def fixed_noise_estimate(
     differences: Differences, parameters: FloatArray, standstill: StandstillVelocities = NO_STANDSTILL
 ) -> tuple[FloatArray, FloatArray]:
-    """Coefficients and their standard deviations, shapes (c,), averaged over given draws of the noise parameters.
+    """Return coefficients and their standard deviations, shapes (c,), for given noise.
+
+    Averaged over given draws of the noise parameters.
 
     The error comes first, then the factors of the regressors. For parts of a run (segments, directions) and further
     regressors (drift), with the noise as found from the whole of it.
@@ -307,7 +321,10 @@ def fixed_noise_estimate(
 
 
 def misfit(differences: Differences, parameters: FloatArray) -> float:
-    """Mean square of the whitened residuals: 1 where the differences are as noisy as the parameters say, shape ()."""
+    """Return the mean square of the whitened residuals, shape ().
+
+    1 where the differences are as noisy as the parameters say.
+    """
     target = _Target(NO_STANDSTILL, differences)
     width = int(target.taxi[1].shape[1])
     room = noise.room_for(width)
@@ -320,7 +337,10 @@ def misfit(differences: Differences, parameters: FloatArray) -> float:
 
 
 def sample_weights(differences: Differences, parameters: FloatArray) -> FloatArray:
-    """Weight of every sample in the estimate of the error, shape (n,), sum 1, for given noise parameters."""
+    """Return the weight of every sample in the estimate of the error, shape (n,), sum 1.
+
+    For given noise parameters.
+    """
     target = _Target(NO_STANDSTILL, differences)
     time_s, columns, from_north, from_east, is_start = target.taxi
     history = np.zeros((len(time_s), 1 + noise.STATES))

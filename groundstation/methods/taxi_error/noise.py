@@ -1,4 +1,6 @@
-"""Likelihood of the heading differences and the standstill velocities under one noise model, by a Kalman filter.
+"""Likelihood of heading differences and standstill velocities, by a Kalman filter.
+
+Both under one noise model.
 
 The model, in words. At standstill each component of the GNSS velocity is white noise plus a first-order
 Gauss-Markov process. On taxi the same processes, turned across the track and divided by the speed, stand in the
@@ -50,7 +52,9 @@ _LOG_2PI = math.log(2.0 * math.pi)
 
 
 class Room(NamedTuple):
-    """What the loops work in, made once for many calls: loops that make no array are found again without numba.
+    """Working arrays of the loops, made once for many calls.
+
+    Loops that make no array are found again without numba.
 
     Of ``taxi_filter``: q, P, x, K, H, the sums of products, innovations, decays and F; of ``solve_normal_equations``:
     the matrix beside its inverse and the right side; the others are what ``evaluate`` hands from one to the other.
@@ -108,7 +112,9 @@ def standstill_filter(
     tau: float,
     out: FloatArray,
 ) -> float:
-    """Log likelihood of standstill velocities; leaves mean north, mean east and variance of the last state in ``out``.
+    """Return the log likelihood of standstill velocities.
+
+    Leaves mean north, mean east and variance of the last state in ``out``.
 
     ``restart`` is the index at which the filter starts afresh (a second, unconnected stretch).
     """
@@ -281,7 +287,9 @@ def generalised_weights(
     innovation: FloatArray,
     weights: FloatArray,
 ) -> None:
-    """Weight of every sample in the generalised least-squares mean, into ``weights`` of shape (n,), sum 1.
+    """Fill ``weights``, shape (n,), sum 1, with each sample's weight in the estimated mean.
+
+    The mean is that by generalised least squares.
 
     The weights are the row sums of the inverse covariance: the gradient of half the quadratic form of a constant,
     taken backwards through the filter whose ``history`` (S and K) is given. Letters as in ``taxi_filter``; r is the
@@ -332,7 +340,9 @@ def solve_normal_equations(
     inverse: FloatArray,
     room: Room,
 ) -> float:
-    """Solve the normal equations with normal priors; returns log determinant plus residual sum of squares.
+    """Solve the normal equations with normal priors.
+
+    Returns log determinant plus residual sum of squares.
 
     ``information`` has shape (c, c), column 0 the data; ``mean`` (c - 1,) and ``inverse`` (c - 1, c - 1) are written.
     A prior precision of 0 is a flat prior. Gauss-Jordan: the matrix is positive definite and small.

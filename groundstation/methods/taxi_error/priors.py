@@ -1,4 +1,7 @@
-"""Priors of the parameters of the noise model: log-normal, broader than every family of simulated runs."""
+"""Priors of the parameters of the noise model.
+
+Log-normal, broader than every family of simulated runs.
+"""
 
 import numpy as np
 

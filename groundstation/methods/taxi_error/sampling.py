@@ -37,7 +37,9 @@ def _gradient(log_density: LogDensity, theta: FloatArray, scale: FloatArray) -> 
 def find_mode(
     log_density: LogDensity, start: FloatArray, scale: FloatArray, most_steps: int = 60
 ) -> tuple[FloatArray, bool]:
-    """Maximum of the log density by the BFGS method with step halving, in units of the prior sigmas.
+    """Maximise the log density by the BFGS method with step halving.
+
+    In units of the prior sigmas.
 
     Source: J. Nocedal, S. Wright, Numerical Optimization, second edition, 2006, algorithm 6.1. Letters: H inverse of
     the second derivatives, s step, y change of the gradient.
@@ -94,7 +96,10 @@ def _curvature(log_density: LogDensity, mode: FloatArray) -> FloatArray:
 
 
 def _covariance(hessian: FloatArray, scale: FloatArray) -> FloatArray:
-    """Inverse of the curvature; no direction wider than the prior nor narrower than a thousandth of it."""
+    """Return the inverse of the curvature.
+
+    No direction is wider than the prior nor narrower than a thousandth of it.
+    """
     scaled = hessian * np.outer(scale, scale)
     values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
     inverse = (vectors / np.clip(values, 1.0, 1e6)) @ vectors.T
@@ -121,7 +126,7 @@ class _Proposal:
         return np.asarray(self.center + spread[:, None] * (normal @ self.factor.T))
 
     def log_density(self, points: FloatArray) -> FloatArray:
-        """Up to a constant common to all proposals."""
+        """Return the log density up to a constant common to all proposals."""
         whitened = np.linalg.solve(self.factor, (points - self.center).T)
         size = len(self.center)
         tail = -0.5 * (T_DEGREES + size) * np.log1p(np.sum(whitened**2, axis=0) / T_DEGREES)
@@ -134,7 +139,9 @@ def _root(covariance: FloatArray) -> FloatArray:
 
 
 def _even_places(first: int, count: int, shift: FloatArray) -> FloatArray:
-    """Points ``first`` to ``first + count`` of an additive recurrence in the unit cube, shape (count, d).
+    """Return points of an additive recurrence in the unit cube, shape (count, d).
+
+    Points ``first`` to ``first + count``.
 
     Source: M. Roberts, The unreasonable effectiveness of quasirandom sequences, 2018 (the generalised golden ratio).
     """
@@ -156,7 +163,10 @@ def _weights(log_weight: FloatArray) -> FloatArray:
 
 
 def _next_proposal(first: _Proposal, points: FloatArray, weight: FloatArray) -> _Proposal:
-    """A proposal fitted to weighted draws, with a share of the first one, which is never too narrow."""
+    """Fit a proposal to weighted draws, with a share of the first one.
+
+    The first one is never too narrow.
+    """
     fitted = np.minimum(weight, HEAVIEST_IN_FIT / len(weight))
     fitted = fitted / fitted.sum()
     center = fitted @ points
