@@ -1,4 +1,7 @@
-"""NMEA 0183 sentences GGA, RMC and HDT of one track, as a receiver would have sent them (NMEA 0183 version 4)."""
+"""NMEA 0183 sentences GGA, RMC and HDT of one track, as a receiver would have sent them.
+
+NMEA 0183 version 4.
+"""
 
 import math
 from pathlib import Path

@@ -14,7 +14,10 @@ DECIMALS = 9  # of degrees 0.1 mm; a CSV ends no number earlier
 
 
 def frame_of(tracks: Sequence[Track]) -> "pd.DataFrame":
-    """Rows of every track behind each other, named by ``track``; a column that a track lacks is NaN there."""
+    """Return the rows of all tracks one behind the other, named by ``track``.
+
+    A column that a track lacks is NaN there.
+    """
     import pandas as pd
 
     parts = []
