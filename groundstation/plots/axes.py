@@ -1,4 +1,7 @@
-"""Axes that many plots have: flight time, whole or broken, and lines across a panel at zero."""
+"""Axes that many plots have: flight time, whole or broken, and zero lines.
+
+Zero lines run across a panel.
+"""
 
 from collections.abc import Sequence
 

@@ -91,7 +91,10 @@ def _y_of(mark: AnyMark) -> Floats:
 
 
 def names_of(panel: Panel) -> tuple[tuple[float, str], ...]:
-    """Places of the vertical axis that have a name: the axis' own, else the lanes of what stands on it."""
+    """Return the places of the vertical axis that have a name.
+
+    The axis' own names, else the lanes of what stands on it.
+    """
     lanes = sorted((mark.order for mark in panel.marks if isinstance(mark, Lanes)), key=len)
     return panel.y.names or tuple((float(place), name) for place, name in enumerate(lanes[-1] if lanes else ()))
 
@@ -123,7 +126,10 @@ def y_span(panel: Panel) -> Span:
 
 
 def x_span(panel: Panel, drawn: Floats) -> Span:
-    """Ends of the horizontal axis; ``drawn`` are those of what stands on it and on panels that share it."""
+    """Return the ends of the horizontal axis.
+
+    ``drawn`` are those of what stands on it and on panels that share it.
+    """
     axis = panel.x
     return span_of(
         axis.scale,
@@ -140,7 +146,10 @@ def _is_grid(panel: Panel) -> bool:
 
 
 def windows_of(panel: Panel, span: Span) -> tuple[Span, ...]:
-    """The spans of the horizontal axis that have a frame each: one, or the windows of a broken axis."""
+    """Return the spans of the horizontal axis that have a frame each.
+
+    One, or the windows of a broken axis.
+    """
     known = [(low, high) for low, high in panel.x.windows if np.isfinite([low, high]).all() and high > low]
     if not known:
         return (span,)

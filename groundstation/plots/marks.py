@@ -1,4 +1,4 @@
-"""What stands on a panel: curves, dots, bands, lanes, limits and the rest, each with a role in place of a colour.
+"""Marks on a panel: curves, dots, bands, lanes, limits, each with a role for its colour.
 
 Every array has one dimension unless said otherwise; NaN is a gap. A mark without a name is left out of the legend.
 """
@@ -79,7 +79,10 @@ class Mark:
 
 @dataclass(frozen=True, kw_only=True)
 class Curve(Mark):
-    """A line through samples; it breaks at NaN. ``steps``: each value holds about its place, as of a histogram."""
+    """Line through samples; it breaks at NaN.
+
+    ``steps``: each value holds about its place, as of a histogram.
+    """
 
     x: Floats
     y: Floats
@@ -115,7 +118,9 @@ class Histogram(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Lanes(Mark):
-    """States over time, a lane each, drawn where they hold; ``roles`` of some states, others take ``role``.
+    """States over time, a lane each, drawn where they hold.
+
+    ``roles`` are those of some states, the others take ``role``.
 
     ``order`` names the lanes from the top; what is not in it is not drawn.
     """
@@ -156,7 +161,10 @@ class Limit(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Bars(Mark):
-    """Values with their 95 % intervals, upright; ``half`` is half of each, NaN where it is not known."""
+    """Values with their 95 % intervals, upright.
+
+    ``half`` is half of each interval, NaN where it is not known.
+    """
 
     x: Floats
     y: Floats
@@ -187,7 +195,10 @@ class Intervals(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Points(Mark):
-    """Places with a symbol, and a label where there is one; ``is_hollow`` of those that are not judged."""
+    """Points with a symbol, and a label where there is one.
+
+    ``is_hollow`` marks those that are not judged.
+    """
 
     x: Floats
     y: Floats
@@ -212,7 +223,10 @@ class Outlines(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Cells(Mark):
-    """A grid of values by colour, shape (len(y), len(x)), NaN empty; values beyond ``high`` have its colour."""
+    """Grid of values by colour, shape (len(y), len(x)), NaN empty.
+
+    Values beyond ``high`` have its colour.
+    """
 
     x: Floats
     y: Floats
@@ -225,7 +239,10 @@ class Cells(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Told(Mark):
-    """A value that is told when the cursor is near a place; nothing is drawn. ``title`` says of what."""
+    """Value that is shown when the cursor is near a place; nothing is drawn.
+
+    ``title`` says of what it is.
+    """
 
     x: Floats
     y: Floats

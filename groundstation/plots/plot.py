@@ -1,4 +1,4 @@
-"""A plot: panels in rows, each with two axes and what stands on them; sizes on paper in millimetres."""
+"""Plot: panels in rows, each with two axes and marks; sizes on paper in millimetres."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -78,7 +78,9 @@ class Panel:
 
 @dataclass(frozen=True)
 class Row:
-    """Panels side by side, of one height; ``shares_x``: their axis is that of the row below, where it is written.
+    """Panels side by side, of one height.
+
+    ``shares_x``: their axis is that of the row below, where it is written.
 
     The height is that of the frames; titles, legends and numbers stand around them. ``columns``: each panel is as wide
     as one of so many, where the row holds fewer.

@@ -1,4 +1,4 @@
-"""Scales of axes: where a value lies between the ends, and the ends of what has none of its own."""
+"""Scales of axes: place of a value between the ends, and ends for an axis without any."""
 
 import math
 from dataclasses import dataclass
@@ -58,7 +58,9 @@ def span_of(
     *,
     is_tight: bool = False,
 ) -> Span:
-    """The scale with ends: its own, else those of what is drawn, with a little around them unless ``is_tight``.
+    """Return the scale with ends: its own, else those of what is drawn.
+
+    The latter with a little around them unless ``is_tight``.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The scale of colours of cells: viridis, even to the eye and told apart by colour-blind readers.
+"""Colour scale of cells: viridis, even to the eye, safe for colour-blind readers.
 
 Source: S. van der Walt, N. Smith, viridis, 2015 (CC0), at sixteenths of its length.
 """
