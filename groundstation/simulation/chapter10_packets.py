@@ -1,4 +1,6 @@
-"""Packets of IRIG 106 Chapter 10 as bytes: header, TMATS, time, MIL-STD-1553 and ARINC 429, each with its checksums.
+"""Packets of IRIG 106 Chapter 10 as bytes, each with its checksums.
+
+They are header, TMATS, time, MIL-STD-1553 and ARINC 429.
 
 Source: IRIG 106-17, chapter 10 (file) and chapter 11 (packets): 11.2.1 header, 11.2.7.2 TMATS, 11.2.3.1 time data
 format 1, 11.2.4.1 1553 format 1, 11.2.8.1 ARINC 429 format 0.
@@ -106,7 +108,9 @@ def _digits(number: int) -> int:
 
 
 def body_1553(ticks: Int64Array, command: int, data: NDArray[np.uint16]) -> bytes:
-    """Messages of one terminal that sends 32 words to the bus controller, on bus A and without error.
+    """Return messages of one terminal that sends 32 words to the bus controller.
+
+    They go over bus A and are without error.
 
     Parameters
     ----------
@@ -124,7 +128,9 @@ def body_1553(ticks: Int64Array, command: int, data: NDArray[np.uint16]) -> byte
 
 
 def body_429(ticks: Int64Array, subchannels: NDArray[np.uint8], words: NDArray[np.uint32]) -> bytes:
-    """Words of high-speed buses; their times are told by the gaps between them, each below ``LARGEST_GAP_TICKS``.
+    """Return words of high-speed buses.
+
+    Their times are told by the gaps between them, each below ``LARGEST_GAP_TICKS``.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""A flight as IRIG 106 Chapter 10: TMATS, time, the layout B100 on 1553 and labels on ARINC 429; the ICD beside it."""
+"""Writer of a flight as IRIG 106 Chapter 10, with the ICD beside it.
+
+It writes TMATS, time, the layout B100 on 1553 and labels on ARINC 429.
+"""
 
 from collections.abc import Iterator
 from heapq import merge

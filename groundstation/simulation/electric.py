@@ -1,4 +1,4 @@
-"""Electric current near the magnetometer: a base load and loads that are switched on and off."""
+"""Electric current near the magnetometer: a base load, and loads switched on and off."""
 
 import numpy as np
 
@@ -11,7 +11,9 @@ from groundstation.simulation.trajectory import Trajectory
 
 
 def current_a(time_s: FloatArray, settings: ElectricSettings | None) -> FloatArray:
-    """True current at times in log seconds, shape (n,): base load + the loads that are on; 0 without a system.
+    """Return the true current at times in log seconds, shape (n,).
+
+    It is the base load and the loads that are on; 0 without a system.
 
     Examples
     --------

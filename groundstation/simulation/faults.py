@@ -1,4 +1,4 @@
-"""Damage that a log can have, put into a simulated flight on purpose: rows lost, doubled, a clock set back, bad values.
+"""Damage put into a simulated flight: rows lost, doubled, a clock set back, bad values.
 
 Truth is never damaged but for the rows that a doubled or re-timed log row carries with it.
 """
@@ -57,7 +57,10 @@ class ForwardStep:
 
 @dataclass(frozen=True)
 class ClockDrift:
-    """The recorder's clock runs fast (negative: slow) from a log time on, beside what it did before."""
+    """Drift of the recorder's clock from a log time on: fast, or slow where negative.
+
+    It comes on top of what the clock did before.
+    """
 
     kind: ClassVar[str] = "clock_drift"
     at_s: float = required_number(0.0)
@@ -119,7 +122,9 @@ class Jump:
 
 @dataclass(frozen=True)
 class Reset:
-    """The errors of a navigator step at a log time and stay so: position, and velocity with the position it adds up to.
+    """Step of a navigator's errors at a log time, which lasts.
+
+    The position steps, and the velocity with the position it adds up to.
 
     The Schuler oscillation that such a step starts is left out: 4 % of the added position in 10 min.
     """
@@ -135,7 +140,10 @@ class Reset:
 
 @dataclass(frozen=True)
 class Jitter:
-    """The recorder stamps a topic's samples up to ``spread_s`` early or late, evenly distributed: rows of their own."""
+    """Time stamps of a topic up to ``spread_s`` early or late, evenly distributed.
+
+    Its samples get rows of their own.
+    """
 
     kind: ClassVar[str] = "jitter"
     topic: str
@@ -160,7 +168,9 @@ Fault: TypeAlias = (
 
 
 def apply_faults(flight: Flight, faults: Iterable[Fault]) -> Flight:
-    """Damage a flight, fault after fault in the order given; log times are those of the undamaged clock.
+    """Damage a flight, fault after fault in the order given.
+
+    Log times are those of the undamaged clock.
 
     ``time_ns`` stays the true time of every row; ``device_time_ns`` is what the recorder wrote and ``record_index``
     the row of the log.
@@ -271,7 +281,7 @@ def _duplicate(flight: Flight, fault: Duplicate) -> Flight:
 
 
 def _clock_changed(flight: Flight, at_s: float, *, step_s: float = 0.0, rate: float = 0.0) -> Flight:
-    """From a log time on the recorder's clock shows another time, and counts at another rate."""
+    """Change the recorder's clock from a log time on: another time, another rate."""
     tables = {}
     for topic, table in flight.tables.items():
         since_ns = table.time_ns - flight.start_ns - round(at_s * NS_PER_S)
@@ -335,7 +345,10 @@ def _displace(flight: Flight, fault: Jump | Reset) -> Flight:
 
 
 def _jitter(flight: Flight, fault: Jitter) -> Flight:
-    """Move the recorder's times of one topic; its samples leave the rows they shared with other topics."""
+    """Move the recorder's times of one topic.
+
+    Its samples leave the rows they shared with other topics.
+    """
     table = _table_of(flight, fault, fault.topic)
     closest_s = float(np.min(np.diff(table.time_ns), initial=10**18)) / NS_PER_S
     if 2.0 * fault.spread_s >= closest_s:
@@ -368,7 +381,10 @@ def _remove(flight: Flight, fault: MissingChannel) -> Flight:
 
 
 def all_rows(flight: Flight, topics: Iterable[str] | None = None) -> Int64Array:
-    """Rows of the log that hold a sample of any of the topics (all when not named), increasing, shape (n,)."""
+    """Return the rows of the log that hold a sample of any of the topics, shape (n,).
+
+    They increase. All topics count when none are named.
+    """
     names = flight.topics() if topics is None else tuple(topics)
     last = max((int(flight[name].record_index[-1]) for name in names if len(flight[name])), default=-1)
     holds_sample = np.zeros(last + 1, dtype=bool)  # rows are nearly dense: cheaper than sorting

@@ -1,4 +1,6 @@
-"""Errors of an INS along a true trajectory: the linear phi-angle model in north-east-down, vertical channel damped.
+"""Errors of an INS along a true trajectory, by the linear phi-angle model.
+
+The frame is north-east-down; the vertical channel is damped.
 
 The truth behind the tests of system 2: it holds what the six-state filter leaves out (Earth and transport rate,
 azimuth, turns, body-fixed sensors, deflection of the vertical).
@@ -68,7 +70,7 @@ class TrueMotion:
 
 @dataclass(frozen=True)
 class SensorErrors:
-    """What drives the errors of f flights: sensors, gravity and the state at the start.
+    """Sources of the errors of f flights: sensors, gravity, initial state.
 
     Parameters
     ----------
@@ -248,7 +250,10 @@ def _gravity(sine_squared, altitude_m):  # type: ignore[no-untyped-def]
 
 @compiled
 def _rates(x, c, out):  # type: ignore[no-untyped-def]
-    """Derivative of [d_lat, d_lon, v_N, v_E, phi_N, phi_E, phi_D]; c holds what is constant in a step."""
+    """Fill the derivative of [d_lat, d_lon, v_N, v_E, phi_N, phi_E, phi_D].
+
+    c holds what is constant in a step.
+    """
     sine, cosine, tangent, meridian, normal = c[0], c[1], c[2], c[3], c[4]
     north, east, down = c[5], c[6], c[7]
     f_n, f_e, f_d = c[8], c[9], c[10]

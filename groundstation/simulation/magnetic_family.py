@@ -1,4 +1,6 @@
-"""Family of flights with figure-eights for Monte Carlo: whole flights at 10 Hz as tables, no log on disk.
+"""Family of flights with figure-eights for Monte Carlo.
+
+They are whole flights at 10 Hz as tables, with no log on disk.
 
 A flight is a scenario drawn from its seed, hence the same whatever the other seeds are: stand, two straights of taxi,
 take-off, climb to 1500 m, a figure-eight, straights on several headings, further figure-eights.
@@ -40,7 +42,9 @@ LEAST_BANK_DEG = 2.0
 
 @dataclass(frozen=True)
 class MagneticFamilySettings:
-    """What the flights of a family have in common; a ``sigma`` is that of a normal draw, per axis or matrix element.
+    """Settings that the flights of a family have in common.
+
+    A ``sigma`` is that of a normal draw, per axis or matrix element.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""Logs on disk: one scenario as a flat CSV, and the sample logs of the repository with their README."""
+"""Logs on disk: one scenario as a flat CSV, and the sample logs of the repository.
+
+The sample logs come with their README.
+"""
 
 from pathlib import Path
 
@@ -15,7 +18,9 @@ PAPER_SPEED_MPS = 6.0
 
 
 def write_scenario(name_or_path: str | Path, folder: str | Path, seed: int | None = None) -> Path:
-    """Simulate a scenario and write its log ``<folder>/<scenario>.csv``, damaged as the scenario says.
+    """Simulate a scenario and write its log ``<folder>/<scenario>.csv``.
+
+    The log is damaged as the scenario says.
 
     Returns
     -------
@@ -48,7 +53,9 @@ def write_log(simulated: Simulated, folder: str | Path) -> Path:
 
 
 def make_sample_logs(folder: str | Path) -> tuple[Path, ...]:
-    """Write the sample logs and the README that tells the truth behind them; the same bytes every time.
+    """Write the sample logs and the README that tells the truth behind them.
+
+    The bytes are the same every time.
 
     Returns
     -------

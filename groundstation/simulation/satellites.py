@@ -1,4 +1,6 @@
-"""Positions of navigation satellites from published mean elements: Kepler's ellipse with a turning node and perigee.
+"""Positions of navigation satellites from published mean elements.
+
+They are on Kepler's ellipse with a turning node and perigee.
 
 The elements (orbits/satellites.csv) are real ones of GPS and GLONASS; the file says whose and of what day. A position
 is good to some kilometres within weeks of the epoch, enough for a geometry: simulation and estimator share it.
@@ -29,7 +31,10 @@ KEPLER_STEPS = 12
 
 @dataclass(frozen=True)
 class Orbit:
-    """Mean elements of one satellite at an epoch; angles in degrees, node counted from the equinox."""
+    """Mean elements of one satellite at an epoch.
+
+    Angles are in degrees, the node is counted from the equinox.
+    """
 
     satellite: str
     epoch_utc_ns: int
@@ -113,7 +118,10 @@ def sidereal_angle_rad(start_utc_ns: int, time_s: FloatArray) -> FloatArray:
 
 
 def elevation_deg(satellite_m: FloatArray, place_m: FloatArray, down: FloatArray) -> FloatArray:
-    """Elevation above the horizon, degrees, of positions (..., 3) seen from a place whose down axis is ``down``."""
+    """Return the elevation above the horizon, degrees, of positions (..., 3).
+
+    They are seen from a place whose down axis is ``down``.
+    """
     line = satellite_m - place_m
     return np.asarray(np.rad2deg(np.arcsin(-(line * down).sum(axis=-1) / np.linalg.norm(line, axis=-1))))
 
@@ -121,7 +129,9 @@ def elevation_deg(satellite_m: FloatArray, place_m: FloatArray, down: FloatArray
 def emission_ecef_m(
     orbit: Orbit, start_utc_ns: int, time_s: FloatArray, receiver_m: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Where the satellite was when it sent what is received at ``time_s``, and the distance travelled.
+    """Return the satellite's position at emission, and the distance travelled.
+
+    The signal is received at ``time_s``.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Simulated sessions of several aircraft: what the estimators are given, and the truth to judge them by."""
+"""Simulated sessions of several aircraft: inputs of the estimators, and the truth."""
 
 from dataclasses import dataclass
 
@@ -44,7 +44,10 @@ class VehicleTruth:
 
 @dataclass(frozen=True)
 class SimulatedSession:
-    """A session and its truth, vehicles in the same order; ``point_errors_m`` is believed minus true position."""
+    """Session and its truth, vehicles in the same order.
+
+    ``point_errors_m`` is believed minus true position.
+    """
 
     session: Session
     truth: tuple[VehicleTruth, ...]

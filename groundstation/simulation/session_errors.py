@@ -1,4 +1,6 @@
-"""Errors of INS, barometric altimeter and clocks of the aircraft of a session, drawn without integration error.
+"""Errors of INS, barometric altimeter and clocks of the aircraft of a session.
+
+They are drawn without integration error.
 
 Local frame: position is the integral of a Gauss-Markov velocity error, a clock's offset that of a Gauss-Markov
 frequency offset; both pairs are stepped with the exact transition and covariance. Global frame: the full linear error
@@ -61,7 +63,9 @@ class VehicleErrors:
 def integrated_gauss_markov(
     rng: np.random.Generator, shape: tuple[int, ...], step_s: float, start: float, sigma: float, correlation_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Draw a stationary Gauss-Markov process and its integral, which starts at ``start`` (one sigma).
+    """Draw a stationary Gauss-Markov process and its integral.
+
+    The integral starts at ``start`` (one sigma).
 
     Parameters
     ----------

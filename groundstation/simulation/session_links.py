@@ -1,4 +1,7 @@
-"""What the aircraft of a session measure: pseudo-ranges over the slots of the link, and to satellites."""
+"""Pseudo-ranges that a session's aircraft measure, over the link and to satellites.
+
+The link is shared in slots.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +30,9 @@ class Flown:
 
 
 def draw_ranges(scenario: SessionScenario, flown: Sequence[Flown], rng: np.random.Generator, scale: float) -> Ranges:
-    """Pseudo-ranges over the link: in its slot each transmits, all aircraft that hear it measure.
+    """Draw pseudo-ranges over the link.
+
+    Each aircraft transmits in its slot, and all that hear it measure.
 
     Points transmit in the first slots of a frame, then aircraft in their order. Pseudo-range = distance + clock of the
     receiver - clock of the transmitter + bias of the receiver + noise; points keep the session's time.
@@ -121,7 +126,10 @@ def draw_satellite_ranges(
 def _sight(
     scenario: SessionScenario, aircraft: SessionAircraft, name: str
 ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-    """Places of the grid at which one satellite is received, where it was at emission, and the distance."""
+    """Return the grid places at which one satellite is received, its position, its distance.
+
+    The position is that at emission.
+    """
     motion, settings = fly(scenario, aircraft), scenario.satellite
     per_frame = round(scenario.link.frame_s / scenario.link.slot_s)
     at = np.arange(0, len(motion.time_s), per_frame)

@@ -1,4 +1,7 @@
-"""A simulated session as logs: one flat CSV for each aircraft, the ground stations, and settings that fit."""
+"""Simulated session as logs: a flat CSV for each aircraft, ground stations, settings.
+
+The settings fit the session.
+"""
 
 import json
 import re
@@ -83,7 +86,9 @@ def origin_of(scenario: SessionScenario) -> LocalFrame | None:
 
 
 def session_flights(simulated: SimulatedSession, scenario: SessionScenario, name: str) -> list[Flight]:
-    """The session as the flights that its aircraft recorded, times since ``start_utc`` of the scenario.
+    """Return the session as the flights that its aircraft recorded.
+
+    Times count since ``start_utc`` of the scenario.
 
     A range is recorded when it arrives: time of transmission and the pseudo-range over the speed of light.
     """
@@ -193,7 +198,10 @@ def stations_text(session: Session, origin: LocalFrame | None) -> str:
 
 
 def settings_text(scenario: SessionScenario) -> str:
-    """What a filter may believe of the scenario, as the tables [session] and [cooperative.ins] of a settings file."""
+    """Return what a filter may believe of the scenario, as text of a settings file.
+
+    Its tables are [session] and [cooperative.ins].
+    """
     lines = ["# The sigmas that the scenario draws its errors with.", "[session]"]
     lines += [f"range_sigma_m = {scenario.link.range_sigma_m!r}"]
     lines += [f"satellite_range_sigma_m = {scenario.satellite.range_sigma_m!r}", "", "[cooperative.ins]"]
