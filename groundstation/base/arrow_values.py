@@ -84,9 +84,8 @@ def values(array: Any, filler: float | int) -> NDArray[Any]:
 def column(array: Any) -> NDArray[Any]:
     """Return the values of an array or a chunked array, shape (n,), like ``to_numpy``.
 
-    Numbers and bools keep their type, text becomes objects.
-
-    Arrays with nulls and other types, which our own files do not have, are left to pyarrow.
+    Numbers and bools keep their type, text becomes objects. Arrays with nulls and other types, which our own files do
+    not have, are left to pyarrow.
 
     Examples
     --------

@@ -29,10 +29,8 @@ class StepEntry:
 class SegmentEntry:
     """Stretch over which two clocks run at constant rates.
 
-    ``offset`` and ``drift`` are text, with their sigmas.
-
-    ``offset_s`` is the other clock less the recorder's. Drift is positive where the recorder is fast, None where it
-    cannot be observed.
+    ``offset`` and ``drift`` are text, with their sigmas. ``offset_s`` is the other clock less the recorder's. Drift is
+    positive where the recorder is fast, None where it cannot be observed.
     """
 
     drift: str

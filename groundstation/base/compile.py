@@ -83,7 +83,7 @@ def _cache_folder() -> Path | None:
 def _own_choice() -> Path | None:
     """Return the folder that ``NUMBA_CACHE_DIR`` names, else one in the user's cache.
 
-    None for a user without a home.
+    It is None for a user without a home.
     """
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(chosen)
@@ -186,10 +186,9 @@ class Loop:
     def _part(self) -> Any:
         """Return the function as numba compiles it inside others; a call from Python crashes.
 
-        It is kept with the code of those that call it.
-
-        There is no code that takes its arguments from Python, which takes longer to compile than the function itself
-        when those are tuples of arrays, and no counting of references to what it is handed.
+        It is kept with the code of those that call it. There is no code that takes its arguments from Python, which
+        takes longer to compile than the function itself when those are tuples of arrays, and no counting of references
+        to what it is handed.
         """
         options = _BARE | (_INSIDE_EACH if self._is_inlined else {})
         return _compiled_by_numba(self._calling(lambda loop: loop._part), **options)
@@ -299,7 +298,7 @@ class Loop:
 def compiled(function: Function) -> Function:
     """Compile a scalar loop with numba at its first call.
 
-    No Python objects inside; errors as in numpy.
+    It may hold no Python objects; its errors are those of numpy.
     """
     return cast(Function, Loop(function))
 

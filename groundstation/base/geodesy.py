@@ -159,7 +159,7 @@ def latitude_longitude_deg(
 ) -> tuple[FloatArray, FloatArray]:
     """Return latitude and longitude, degrees, of displacements from an origin.
 
-    The inverse of :func:`north_east_m`.
+    It is the inverse of :func:`north_east_m`.
 
     Examples
     --------

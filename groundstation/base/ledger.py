@@ -1,8 +1,7 @@
 """Integrity ledger of a log as it is kept in the MCAP, in summary.json and in reports.
 
-Times are text for people.
-
-Fields stand in alphabetical order, as the JSON of the MCAP has its keys: what was read back is written equal.
+Times are text for people. Fields stand in alphabetical order, as the JSON of the MCAP has its keys: what was read back
+is written equal.
 """
 
 import dataclasses
@@ -131,10 +130,8 @@ class TopicEntry:
 class DamagedSpan:
     """Span of time with damage.
 
-    ``start_s`` counts from the first record of the log, as flight time does.
-
-    An empty topic is the whole log, an empty field the whole topic. ``is_exact``: everything within is damaged; else
-    the damage lies somewhere within.
+    ``start_s`` counts from the first record of the log, as flight time does. An empty topic is the whole log, an empty
+    field the whole topic. ``is_exact``: everything within is damaged; else the damage lies somewhere within.
     """
 
     cause: str

@@ -212,10 +212,8 @@ def _linker() -> Any:
 def object_file(text: str, entry: str, forms: Sequence[Form]) -> bytes | None:
     """Return the bytes to keep of an LLVM module.
 
-    None where its entry may call a function that only numba's process has.
-
-    It is a byte for each number and array that the entry takes, 1 for an array that it may write to, and an object
-    file.
+    They are None where its entry may call a function that only numba's process has. The bytes are one for each number
+    and array that the entry takes, 1 for an array that it may write to, and then an object file.
     """
     from llvmlite import binding
 

@@ -121,9 +121,8 @@ def nearest_wind(
 ) -> tuple[MetarWind | None, int | None]:
     """Return the wind nearest in time within ``longest_ns``, and its distance in nanoseconds.
 
-    Of one station where one is named.
-
-    The distance is that of the nearest report even where it is too far, None without any.
+    Where a station is named, its reports alone count. The distance is that of the nearest report even where it is too
+    far, None without any.
     """
     near = []
     for wind in winds:

@@ -55,9 +55,7 @@ def share_quantile(probability: float, successes: float, failures: float) -> flo
 def length_quantile(probability: float, length: float, sigma: float) -> float:
     """Return a quantile of the length of a noisy vector in the plane (Rice distribution).
 
-    ``length`` is the length of the vector without noise.
-
-    Both components have the standard deviation ``sigma`` > 0.
+    ``length`` is the length of the vector without noise. Both components have the standard deviation ``sigma`` > 0.
 
     Examples
     --------

@@ -28,10 +28,8 @@ LARGEST = 1 << 62  # of a number in such a file
 def salvaged(cls: type[Document], document: Any) -> Document:
     """Read the sound part of a document that may be damaged or written by anyone.
 
-    The rest is left out.
-
-    A value of another kind gives its field's default, or drops the entry of a list or mapping it stands in. Whole
-    numbers are counts: not negative.
+    The rest is left out. A value of another kind gives its field's default, or drops the entry of a list or mapping it
+    stands in. Whole numbers are counts: not negative.
 
     Raises
     ------

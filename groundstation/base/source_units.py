@@ -1,8 +1,7 @@
 """Units of fields that are not canonical, as the log itself states them.
 
-They are kept with the flight's metadata, topic by topic.
-
-``units.raw.IMU`` = ``"GyrX rad/s, MagX Gauss x 0.001"``: field, unit, and the factor that is left in the values.
+They are kept with the flight's metadata, topic by topic. ``units.raw.IMU`` = ``"GyrX rad/s, MagX Gauss x 0.001"``:
+field, unit, and the factor that is left in the values.
 """
 
 from collections.abc import Iterable, Mapping

@@ -190,9 +190,7 @@ def leap_seconds_late(difference_ns: int) -> int:
 def gps_week_to_utc_ns(week: NDArray[np.int64] | int, week_ms: NDArray[np.int64] | int) -> NDArray[np.int64]:
     """Return UTC nanoseconds since 1970 of GPS week and milliseconds of the week.
 
-    The leap seconds of that day are taken off.
-
-    Weeks count from 6 January 1980 without rolling over at 1024.
+    The leap seconds of that day are taken off. Weeks count from 6 January 1980 without rolling over at 1024.
 
     Examples
     --------

@@ -1,11 +1,10 @@
 """Frozen dataclasses filled strictly from TOML.
 
-An unknown key, a wrong type or a value out of range is an error.
-
-A field states its range in its metadata: ``number(0.5, low=0.0)``; a class that is also built without a file calls
-:func:`check_ranges` in its ``__post_init__``. A SettingsError raised there says the field as its place, and
-:func:`settings_from` puts file and table before it. A field that holds one of several classes (legs,
-faults) is a union whose members carry a class attribute ``kind``; the TOML table names it with the key ``kind``.
+An unknown key, a wrong type or a value out of range is an error. A field states its range in its metadata:
+``number(0.5, low=0.0)``; a class that is also built without a file calls :func:`check_ranges` in its ``__post_init__``.
+A SettingsError raised there says the field as its place, and :func:`settings_from` puts file and table before it. A
+field that holds one of several classes (legs, faults) is a union whose members carry a class attribute ``kind``; the
+TOML table names it with the key ``kind``.
 """
 
 import dataclasses

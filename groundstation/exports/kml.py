@@ -1,6 +1,6 @@
 """KML 2.2 with Google's tracks, for Google Earth and QGIS.
 
-OGC 12-007r2, 2015; Google KML extension ``gx:Track``.
+The formats are OGC 12-007r2, 2015, and the Google KML extension ``gx:Track``.
 """
 
 from collections.abc import Sequence
@@ -114,7 +114,7 @@ def _altitude_mode(track: Track) -> str:
 def _altitude(track: Track) -> str:
     """Return the column of the altitude that most positions have; empty where there is none.
 
-    The best of several.
+    Among columns that are known equally often, it is the best one.
     """
     known = {name: np.count_nonzero(np.isfinite(track.column(name))) for name in ALTITUDES}
     best = max(ALTITUDES, key=lambda name: known[name])  # the first of equals

@@ -1,6 +1,6 @@
 """NMEA 0183 sentences GGA, RMC and HDT of one track, as a receiver would have sent them.
 
-NMEA 0183 version 4.
+The version is NMEA 0183 version 4.
 """
 
 import math

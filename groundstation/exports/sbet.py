@@ -1,6 +1,6 @@
 """SBET records of the track of an INS: 17 doubles, heading from true north.
 
-Applanix, POSPac MMS file formats.
+The format is that of Applanix, POSPac MMS file formats.
 """
 
 from pathlib import Path
@@ -29,11 +29,9 @@ NEEDED = (
 def write_sbet(path: Path, track: Track) -> int:
     """Write the positions whose altitude, attitude and velocity are known.
 
-    Returns how many were left out.
-
-    The wander angle is zero. Accelerations and rates are not in a track and stay zero, as SBET has no mark for what
-    is missing. Seconds of the GPS week go on beyond its end. A file name with the date (sbet_20260504.out) tells the
-    week.
+    The result is how many were left out. The wander angle is zero. Accelerations and rates are not in a track and stay
+    zero, as SBET has no mark for what is missing. Seconds of the GPS week go on beyond its end. A file name with the
+    date (sbet_20260504.out) tells the week.
 
     Raises
     ------

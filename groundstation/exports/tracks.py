@@ -82,9 +82,8 @@ class Track:
 def tracks_of(flight: Flight, results: FlightResults | None, ins_topic: str = "") -> tuple[Track, ...]:
     """Return the tracks of a flight: every receiver's and INS's, then the estimator's.
 
-    Only those that have positions.
-
-    ``ins_topic`` is the INS whose errors were estimated: its altitude stands beside the estimator's positions.
+    They are the tracks that have positions. ``ins_topic`` is the INS whose errors were estimated: its altitude stands
+    beside the estimator's positions.
     """
     topics = [topic for kind in ("gnss", "ins", "truth") for topic in topics_of_kind(kind, flight.topics())]
     logged = [_logged(flight, flight[topic].unique_times()) for topic in topics]
@@ -137,9 +136,8 @@ def _bridged(
 def _made(flight: Flight, results: FlightResults | None, name: str, ins_topic: str) -> Track | None:
     """Return a track of the estimator, at the times its figures have.
 
-    Half of the 95 % ellipse's major axis is its width.
-
-    No error of height is estimated: the altitude is that of the INS, as logged.
+    Half of the 95 % ellipse's major axis is its width. No error of height is estimated: the altitude is that of the
+    INS, as logged.
     """
     data = None if results is None else results.rows_of(InertialTrack)
     if results is None or data is None:

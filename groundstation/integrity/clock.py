@@ -123,10 +123,8 @@ class ClockModel:
     ) -> Int64Array:
         """Correct times of validity, which readers give by the device's clock.
 
-        They are moved as that clock is.
-
-        Values that were true when their record was written, or in a record without a device time, are valid at the
-        record's corrected time ``time_ns``, wherever it was placed.
+        They are moved as that clock is. Values that were true when their record was written, or in a record without a
+        device time, are valid at the record's corrected time ``time_ns``, wherever it was placed.
         """
         has_own = validity_ns != device_time_ns.values
         if device_time_ns.present is not None:
@@ -324,9 +322,7 @@ def start_of(first_device_ns: int, utc_of_zero_ns: int | None) -> Start:
 def interpolated(wanted: Int64Array, index: Int64Array, time: Int64Array, period_ns: float) -> Int64Array:
     """Interpolate times of records by their place in the log, in integers throughout.
 
-    Outside the known places the nominal period is used.
-
-    None is placed further than :data:`LARGEST_NS` from zero.
+    Outside the known places the nominal period is used. None is placed further than :data:`LARGEST_NS` from zero.
     """
     if not len(wanted):
         return np.zeros(0, dtype=np.int64)

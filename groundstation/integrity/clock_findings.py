@@ -22,9 +22,8 @@ _UNIX_SECONDS = (1_000_000_000, 4_000_000_000)  # 2001 to 2096: as a time since 
 def clock_findings(ledger: LedgerCounts) -> Iterator[Finding]:
     """Yield the findings on a clock.
 
-    They are about steps, times that are missing or not believed, order, absolute time, other clocks.
-
-    Codes: ``clock.backward_step``, ``clock.forward_step``, ``clock.unset``, ``clock.missing_times``,
+    They are about steps, times that are missing or not believed, order, absolute time, other clocks. Codes:
+    ``clock.backward_step``, ``clock.forward_step``, ``clock.unset``, ``clock.missing_times``,
     ``clock.implausible_times``, ``clock.stale_times``, ``clock.shifted``, ``clock.no_utc``, ``clock.no_times``,
     ``clock.relation_step``, ``clock.relation_rate``, ``clock.drift``, ``clock.offset``, ``clock.week_number``,
     ``clock.leap_seconds``, ``clock.time_zone``, ``time.unordered``, ``time.stray_rows``, ``data.none``,

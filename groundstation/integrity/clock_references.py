@@ -171,9 +171,8 @@ class ClockReferences:
     def zeros_ns(self, first: int, end: int) -> Int64Array:
         """Return UTC of device time zero by the readings between two records, in rising order.
 
-        From record ``first`` on and before ``end``.
-
-        Of the first clock, in the order of the topics, that tells UTC with its date there; none without any.
+        They are those from record ``first`` on and before ``end``. They are of the first clock, in the order of the
+        topics, that tells UTC with its date there. There are none without such a clock.
         """
         for readings in (one for topic in sorted(self._readings) for one in self._readings[topic]):
             index, columns = readings.sampler.all()
@@ -235,7 +234,7 @@ def _relation(readings: _Readings, clock: ClockModel, settings: RelationSettings
 def _prompt(late_ns: Int64Array) -> BoolArray:
     """Tell which messages were written soon after their stamp, shape (n,).
 
-    All of them where none waited longer than those around it.
+    They are all messages where none waited longer than those around it.
     """
     window = min(_AROUND, len(late_ns))
     if not window:

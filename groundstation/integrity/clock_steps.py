@@ -68,7 +68,7 @@ class ClockStep:
 def middle_of(steps: Int64Array) -> float:
     """Return the median of steps, 0 if there are none.
 
-    By a sort, as the selection of ``np.median`` is slow on steps that keep repeating.
+    The steps are sorted, as the selection of ``np.median`` is slow on steps that keep repeating.
 
     Examples
     --------

@@ -53,7 +53,7 @@ class Contradiction:
 class _Series:
     """Samples of one topic in order of corrected time.
 
-    Seconds since the first sample of the log, shape (n,), and columns.
+    Times are seconds since the first sample of the log, shape (n,).
     """
 
     topic: str
@@ -74,9 +74,8 @@ class _Series:
 class _Windows:
     """Motion between samples some ten seconds apart, shapes (n,).
 
-    Times of both ends, and metres per second north and east.
-
-    ``first`` and ``last`` are the samples at the ends.
+    It has the times of both ends, and metres per second north and east. ``first`` and ``last`` are the samples at the
+    ends.
     """
 
     start_s: FloatArray

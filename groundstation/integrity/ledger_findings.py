@@ -55,7 +55,7 @@ def damage_finding(damage: Damage) -> Finding:
 def _duplicates(topic: TopicCounts, clock: ClockModel, limits: DuplicateLimits) -> Finding:
     """Report records at one time; a warning where there are many.
 
-    Not for the topics of a counting clock, whose sources share times.
+    It is none for the topics of a counting clock, whose sources share times.
     """
     share = topic.duplicates / topic.rows
     text = f"{topic.topic}: {topic.duplicates} of {topic.rows} records repeat the time of the one before"

@@ -11,11 +11,9 @@ from groundstation.integrity.clock import ClockModel
 def corrected(items: Iterable[Item], clock: ClockModel) -> Iterator[RecordBatch]:
     """Yield the batches of a log with corrected time, each topic in time order.
 
-    ``time_ns`` never decreases within a topic.
-
-    A record is held back until no earlier one of its topic can follow, which the lateness found by the survey tells:
-    memory is bounded by it. Records of equal time keep the order of the source. Damages and remarks are left out: the
-    survey has them.
+    ``time_ns`` never decreases within a topic. A record is held back until no earlier one of its topic can follow,
+    which the lateness found by the survey tells: memory is bounded by it. Records of equal time keep the order of the
+    source. Damages and remarks are left out: the survey has them.
 
     Parameters
     ----------

@@ -1,9 +1,7 @@
 """Places and times of a log's records, kept in memory or compactly in a temporary file.
 
-The file is used beyond a certain size.
-
-A survey needs them twice more: for the clock, in the order of the log, and for the ledger, topic by topic. Neither
-needs all at once.
+The file is used beyond a certain size. A survey needs them twice more: for the clock, in the order of the log, and for
+the ledger, topic by topic. Neither needs all at once.
 """
 
 import tempfile
@@ -194,9 +192,7 @@ class Places:
     def in_order(self, topics: Iterable[Sequence[Kept]]) -> Iterator[tuple[Int64Array, Column, BoolArray]]:
         """Yield places, device times and frozenness of all records in log order, in windows.
 
-        Each place comes once.
-
-        Where topics tell different times of a place, the topic that is named first is believed.
+        Each place comes once. Where topics tell different times of a place, the topic that is named first is believed.
         """
         topics = list(topics)
         frozen = {kept.number for several in topics if _is_frozen(several) for kept in several}

@@ -136,7 +136,7 @@ class Evidence:
 def power_ups(windows: Iterable[tuple[Int64Array, Int64Array]], evidence: Evidence) -> tuple[PowerUp, ...]:
     """Find the power-ups of a source, in the order of its records.
 
-    One power-up without wraps where the source holds nothing odd.
+    There is one, without wraps, where the source holds nothing odd.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def _runs(windows: Iterable[tuple[Int64Array, Int64Array]], tolerance_ns: int) -
 class _Level:
     """State of the counter of a power-up.
 
-    Its first time, its last one without wraps, and the time that wraps add.
+    It has its first time, its last one without wraps, and the time that wraps add.
     """
 
     first_ns: int
@@ -233,7 +233,7 @@ class _Walk:
     def _place(self, level: _Level, before: int, number: int) -> int:
         """Return the place where a power-up would begin after a long run.
 
-        That is behind the last run that is not below it.
+        It is behind the last run that is not below it.
         """
         floor_ns = level.top_ns - level.added_ns - TOLERANCE_NS
         lower = (at for at in range(before + 1, number) if self.runs[at].first_ns < floor_ns)
@@ -341,9 +341,9 @@ def _wrap_of(before_ns: int, after_ns: int) -> tuple[int, str] | None:
 
 
 def _week_wrap(before_ns: int, after_ns: int) -> tuple[int, str] | None:
-    """Return the same for UTC that a receiver made from a GPS week of 10 or 13 bits.
+    """Return the wrap of UTC that a receiver made from a GPS week of 10 or 13 bits.
 
-    The leap seconds are those of two days.
+    It has the form of :func:`_wrap_of`. The leap seconds are those of two days.
 
     Examples
     --------

@@ -52,7 +52,7 @@ class PowerUpClock:
 class Found:
     """Results of a pass over a source.
 
-    Its header, further logs that begin in it, places and times, other clocks.
+    They are its header, further logs that begin in it, places and times, other clocks.
     """
 
     header: LogHeader
@@ -127,7 +127,7 @@ def _counting_clock(
 ) -> ClockModel:
     """Estimate the model of a counting clock.
 
-    Of a long log only the records that have a say are laid together.
+    Of a long log only the records that matter are laid together.
     """
     thinner = Thinner(round(settings.tolerance_s * NS_PER_S), settings.run_records)
     kept_ones: list[Window] = []

@@ -22,7 +22,7 @@ _TIMES = re.compile(r", (\d{4}-\S+Z) to (\d{4}-\S+Z): ")
 class Dropout(NamedTuple):
     """Time in which the recorder could not write.
 
-    Corrected time of the newest record before it, and its length.
+    It has the corrected time of the newest record before it, and its length.
     """
 
     start_ns: int
@@ -88,7 +88,7 @@ class Timeline:
     def around(self, first: int, last: int) -> tuple[int, int] | None:
         """Return the times of the row before ``first`` and of the row after ``last``.
 
-        Beyond the ends of the log, the times of these ends.
+        Beyond the ends of the log they are the times of these ends.
         """
         if not len(self.index):
             return None

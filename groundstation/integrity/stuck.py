@@ -39,7 +39,7 @@ _KINDS = ("ins", "gnss", "baro", "magnetometer")
 class Stuck:
     """Stretch in which a field was stuck.
 
-    Its place, corrected time, length, samples, value, and the evidence.
+    It has its place, corrected time, length, samples, value, and the evidence.
     """
 
     record_index: int
@@ -177,7 +177,7 @@ class Judge:
     def _shrinks(self, name: str, stretch: Stretch) -> float:
         """Return the length of a degree of longitude over that of one of latitude.
 
-        1 for the latitude itself.
+        It is 1 for the latitude itself.
         """
         if name == "latitude_deg":
             return 1.0

@@ -65,7 +65,7 @@ class Survey:
 class _Order(NamedTuple):
     """Times of validity of a topic in order, and the disorder of its records.
 
-    The disorder is lateness in nanoseconds, and counts.
+    The disorder is lateness in nanoseconds, and counts of rows.
     """
 
     valid_ns: Int64Array

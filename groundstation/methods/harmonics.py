@@ -1,7 +1,4 @@
-"""Five classical deviation coefficients, with errors that allow for correlated residuals.
-
-Residuals are correlated from sample to sample.
-"""
+"""Five classical deviation coefficients, with errors that allow for correlated residuals."""
 
 import math
 from collections.abc import Callable
@@ -26,11 +23,10 @@ def design(heading_deg: FloatArray) -> FloatArray:
 def fit(
     heading_deg: FloatArray, error_deg: FloatArray, weight: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Fit the coefficients A to E, shape (5,), by weighted least squares.
+    """Fit the coefficients A to E, shape (5,), and their covariance, shape (5, 5).
 
-    Returned with their covariance, shape (5, 5).
-
-    Errors must not wrap: they are differences from a middle, not headings. Samples in order of time or of heading.
+    The fit is by weighted least squares. Errors must not wrap: they are differences from a middle, not headings.
+    Samples come in order of time or of heading.
 
     Examples
     --------
@@ -52,7 +48,7 @@ def fit(
 def fit_to(heading_deg: FloatArray) -> Callable[[FloatArray], FloatArray]:
     """Return a function that gives the coefficients of :func:`fit` alone, shape (5,).
 
-    For many errors on the same headings.
+    It serves many errors on the same headings.
     """
     columns = design(heading_deg)
     bread = _bread(columns, columns)
@@ -81,9 +77,8 @@ def autocorrelation(residual: FloatArray, parameters: int) -> float:
 def inflation(samples: int, parameters: int, correlation: float) -> float:
     """Return the factor n / (n - k) on a variance, at most 4.
 
-    n is the number of independent samples that correlated ones are worth.
-
-    They are worth no more than the windows of :func:`long_run`, among which the parameters take theirs.
+    n is the number of independent samples that correlated ones are worth. They are worth no more than the windows of
+    :func:`long_run`, among which the parameters take theirs.
 
     Examples
     --------
@@ -98,11 +93,10 @@ def inflation(samples: int, parameters: int, correlation: float) -> float:
 def long_run(scores: FloatArray, correlation: float) -> FloatArray:
     """Return the covariance of the sum of correlated scores, shape (n, k) -> (k, k).
 
-    Prewhitened, then with Bartlett weights.
-
-    Scores are whitened by the first-order autocorrelation of the residuals, and the sum is recoloured by
-    1 / (1 - correlation)^2. What wanders below white noise does not show in the correlation of neighbours: the weights
-    reach over ``BANDWIDTH_SHARE`` of the samples at least. With them the covariance is that of sums over windows.
+    The scores are prewhitened, then summed with Bartlett weights. Scores are whitened by the first-order
+    autocorrelation of the residuals, and the sum is recoloured by 1 / (1 - correlation)^2. What wanders below white
+    noise does not show in the correlation of neighbours: the weights reach over ``BANDWIDTH_SHARE`` of the samples at
+    least. With them the covariance is that of sums over windows.
 
     Source: D. W. K. Andrews, J. C. Monahan, Econometrica 60 (1992) 953-966; W. K. Newey, K. D. West, Econometrica 55
     (1987) 703-708.

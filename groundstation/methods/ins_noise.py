@@ -141,11 +141,10 @@ class BankFactors:
 class InsNoise:
     """Noise parameters of an INS class.
 
-    Initial sigmas, then what the white noises add per square root of time.
-
-    ``random_drift_dph`` and ``random_drift_correlation_s`` are the stationary sigma and correlation time (1 / beta) of
-    the random drift. Of the coupled model alone: ``azimuth_deg`` is the initial sigma of the azimuth,
-    ``accelerometer_ug`` that of accelerometer biases, which turn with the body where ``is_strapdown``.
+    They are initial sigmas, then what the white noises add per square root of time. ``random_drift_dph`` and
+    ``random_drift_correlation_s`` are the stationary sigma and correlation time (1 / beta) of the random drift. Of the
+    coupled model alone: ``azimuth_deg`` is the initial sigma of the azimuth, ``accelerometer_ug`` that of accelerometer
+    biases, which turn with the body where ``is_strapdown``.
     """
 
     name: str = DEFAULT_CLASS
@@ -230,9 +229,8 @@ def load_class(name: str) -> InsNoise:
 def choose_class(asked_for: str, aircraft_class: str = "", logged_class: str = "") -> tuple[InsNoise, str]:
     """Choose the noise parameters, and tell who chose them.
 
-    Those of the settings, else of the aircraft file, else of the log, else navigation.
-
-    A log may name any INS: of its names only those of shipped classes are taken.
+    They are those of the settings, else of the aircraft file, else of the log, else navigation. A log may name any INS:
+    of its names only those of shipped classes are taken.
 
     Raises
     ------

@@ -45,10 +45,9 @@ def nees_limits(freedom: int, independent: int, share: float = 0.95) -> tuple[fl
 def effective_samples(values: FloatArray, about: float | None = None) -> float:
     """Return the number of independent samples that give the mean the same variance.
 
-    n / (1 + 2 sum of autocorrelations).
-
-    The sum ends at the first pair of lags whose sum is not positive. ``about`` is the true mean where it is known, else
-    that of the samples: errors that are claimed to have none are one another's repetition where they share one.
+    It is n / (1 + 2 sum of autocorrelations). The sum ends at the first pair of lags whose sum is not positive.
+    ``about`` is the true mean where it is known, else that of the samples: errors that are claimed to have none are one
+    another's repetition where they share one.
 
     Source: C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992), section 3.3 (initial
     positive sequence).

@@ -1,6 +1,6 @@
-"""Steps of linear error models: transition and noise.
+"""Steps of linear error models, and the dynamics of an aircraft in a local frame.
 
-And the dynamics of an aircraft in a local frame.
+A step is a transition and its noise.
 
 Source: Van Loan, Computing integrals involving the matrix exponential, IEEE Transactions on Automatic Control 23(3),
 1978 (the integral of exp(F s) Q exp(F' s); both are summed as power series here: their terms follow from one
@@ -23,10 +23,8 @@ def fill_step(
 ) -> None:
     """Fill transition and noise covariance of a step of dx/dt = F x + w.
 
-    Entries of F that are zero cost nothing.
-
-    Phi = sum (F h)^k / k!; Q = sum L_k h^(k+1) / (k+1)! with L_0 = diag(q), L_(k+1) = F L_k + L_k F'. A step may go
-    back; then the noise means nothing.
+    Entries of F that are zero cost nothing. Phi = sum (F h)^k / k!; Q = sum L_k h^(k+1) / (k+1)! with L_0 = diag(q),
+    L_(k+1) = F L_k + L_k F'. A step may go back; then the noise means nothing.
     """
     term, level, moved = room[0], room[1], room[2]
     for i in range(n):

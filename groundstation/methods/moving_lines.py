@@ -11,7 +11,7 @@ EDGE_S = 1e-6  # a sample at the very edge of a window belongs to it
 def window_bounds(at: FloatArray, time_s: FloatArray, window_s: float) -> tuple[IndexArray, IndexArray]:
     """Return first index and one past the last of the samples around each time.
 
-    Around is within half a window; shapes as ``at``.
+    They lie within half a window of it. The shapes are that of ``at``.
     """
     low = np.searchsorted(time_s, at - 0.5 * window_s - EDGE_S)
     return low, np.searchsorted(time_s, at + 0.5 * window_s + EDGE_S)

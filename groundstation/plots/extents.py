@@ -93,7 +93,7 @@ def _y_of(mark: AnyMark) -> Floats:
 def names_of(panel: Panel) -> tuple[tuple[float, str], ...]:
     """Return the places of the vertical axis that have a name.
 
-    The axis' own names, else the lanes of what stands on it.
+    The names are the axis' own, else the lanes of what stands on it.
     """
     lanes = sorted((mark.order for mark in panel.marks if isinstance(mark, Lanes)), key=len)
     return panel.y.names or tuple((float(place), name) for place, name in enumerate(lanes[-1] if lanes else ()))
@@ -148,7 +148,7 @@ def _is_grid(panel: Panel) -> bool:
 def windows_of(panel: Panel, span: Span) -> tuple[Span, ...]:
     """Return the spans of the horizontal axis that have a frame each.
 
-    One, or the windows of a broken axis.
+    There is one, or the windows of a broken axis.
     """
     known = [(low, high) for low, high in panel.x.windows if np.isfinite([low, high]).all() and high > low]
     if not known:

@@ -120,9 +120,8 @@ class Histogram(Mark):
 class Lanes(Mark):
     """States over time, a lane each, drawn where they hold.
 
-    ``roles`` are those of some states, the others take ``role``.
-
-    ``order`` names the lanes from the top; what is not in it is not drawn.
+    ``roles`` are those of some states, the others take ``role``. ``order`` names the lanes from the top; what is not in
+    it is not drawn.
     """
 
     start: Floats

@@ -80,10 +80,9 @@ class Panel:
 class Row:
     """Panels side by side, of one height.
 
-    ``shares_x``: their axis is that of the row below, where it is written.
-
-    The height is that of the frames; titles, legends and numbers stand around them. ``columns``: each panel is as wide
-    as one of so many, where the row holds fewer.
+    ``shares_x``: their axis is that of the row below, where it is written. The height is that of the frames; titles,
+    legends and numbers stand around them. ``columns``: each panel is as wide as one of so many, where the row holds
+    fewer.
     """
 
     panels: tuple[Panel, ...]

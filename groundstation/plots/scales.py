@@ -60,7 +60,7 @@ def span_of(
 ) -> Span:
     """Return the scale with ends: its own, else those of what is drawn.
 
-    The latter with a little around them unless ``is_tight``.
+    The latter get a little around them unless ``is_tight``.
 
     Examples
     --------

@@ -77,7 +77,7 @@ class Limit:
     def part(self, values: Mapping[str, float]) -> float | None:
         """Return the figures of a flight as a part of the limit, by the worst bound.
 
-        Over one is over the limit. None: not measured.
+        More than one is over the limit; None is not measured.
 
         Examples
         --------

@@ -86,10 +86,8 @@ def heading_agreement(answers: Answers) -> Agreement | None:
 def latency_agreement(answers: Answers) -> Agreement | None:
     """Compare the GNSS latency behind the INS by motion and by the turns of the taxi.
 
-    By motion is the latency analysis, by the turns is system 1. Where the former was taken out before the turns were
-    looked at, it was their prior: it is taken off again.
-
-    Where the former was taken out before the turns were looked at, it was their prior: it is taken off again.
+    The first is the latency analysis, the second system 1. Where the former was taken out before the turns were looked
+    at, it was their prior: it is taken off again.
     """
     taxi, latencies = answer_of(answers, HeadingResult), answer_of(answers, Latencies)
     found = latencies.observed(taxi.ins_topic, taxi.gnss_topic) if latencies and taxi else None
@@ -112,9 +110,8 @@ def latency_agreement(answers: Answers) -> Agreement | None:
 def deviation_agreement(answers: Answers) -> Agreement | None:
     """Compare the error of the magnetic heading in the air and on ground runs.
 
-    In the air by the recommended method; both at the headings of the runs.
-
-    The declination is in both and is counted once, in the air.
+    The error in the air is that by the recommended method, at the headings of the runs. The declination is in both and
+    is counted once, in the air.
     """
     air, ground = answer_of(answers, MagneticResult), answer_of(answers, GroundDeviation)
     runs = [run for run in ground.used if run.error_deg is not None and run.sigma_deg] if ground else []

@@ -95,7 +95,7 @@ class Delta:
 class SettingPair:
     """Setting, or version of a program, that differs.
 
-    None where a flight has none of that name.
+    It is None where a flight has none of that name.
     """
 
     name: str
@@ -145,7 +145,7 @@ class Comparison:
     def cause(self) -> str:
         """Cause of the differences between two flights of one log.
 
-        Empty where they are of two logs.
+        It is empty where they are of two logs.
         """
         if not self.is_same_log:
             return ""

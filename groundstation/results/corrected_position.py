@@ -19,8 +19,6 @@ class CorrectedPosition:
     """INS minus its estimated error, with the sigmas north and east, arrays of shape (n,).
 
     The errors north and east are uncorrelated.
-
-    The errors north and east are independent.
     """
 
     time_s: FloatArray

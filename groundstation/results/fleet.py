@@ -67,9 +67,8 @@ class Densities:
 class FittedNormal:
     """Normal distribution fitted to samples of the heading error.
 
-    ``aircraft`` is empty for the whole fleet.
-
-    Merged from n, mean and M2 of the flights: exactly what all samples in one array would give.
+    ``aircraft`` is empty for the whole fleet. It is merged from n, mean and M2 of the flights, and is exactly what all
+    samples in one array would give.
     """
 
     aircraft: str
@@ -83,7 +82,7 @@ class FittedNormal:
 class AircraftRow:
     """Heading error of one aircraft over its flights.
 
-    Of the whole fleet where ``aircraft`` is :data:`WHOLE_FLEET`.
+    It is that of the whole fleet where ``aircraft`` is :data:`WHOLE_FLEET`.
 
     Parameters
     ----------
@@ -143,12 +142,11 @@ class ChangePoint:
 class FleetSkill:
     """Forecast skill of a method at a horizon over all flights.
 
-    Mean squares and coverage are merged by starts.
-
-    ``rms_m`` is over all starts of all flights; ``median_flight_rms_m``, ``highest_flight_rms_m`` over the flights'
-    own RMS; ``coverage95`` over the ``coverage_starts`` starts that had a band, None without any. Outages of one flight
-    overlap, so a flight's own coverage says little: of the ``flights_judged`` with enough independent starts
-    ``flights_within`` had a NEES within its 95 % limits.
+    Mean squares and coverage are merged by starts. ``rms_m`` is over all starts of all flights;
+    ``median_flight_rms_m``, ``highest_flight_rms_m`` over the flights' own RMS; ``coverage95`` over the
+    ``coverage_starts`` starts that had a band, None without any. Outages of one flight overlap, so a flight's own
+    coverage says little: of the ``flights_judged`` with enough independent starts ``flights_within`` had a NEES within
+    its 95 % limits.
     """
 
     method: str
@@ -398,7 +396,7 @@ class FleetResults:
     def to_dict(self) -> dict[str, Any]:
         """Return every table as plain JSON values, rounded by its names.
 
-        Lists of rows; columns for the densities.
+        Tables are lists of rows, densities are columns.
         """
         out: dict[str, Any] = {}
         for part in fields(self):

@@ -135,9 +135,9 @@ class FlightResults(Tabular):
         return tuple(figure.name for figure in self.figures)
 
     def table_names(self) -> tuple[str, ...]:
-        """Return the names that :meth:`to_frame` takes.
+        """Names that :meth:`to_frame` takes.
 
-        Findings, what was not assessable, the arrays behind the figures.
+        They are findings, what was not assessable, and the arrays behind the figures.
         """
         return (*super().table_names(), *self.figure_names)
 

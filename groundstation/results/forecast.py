@@ -31,10 +31,9 @@ HORIZONS_MIN = (1, 5, 10, 30, 60, 90, 120)
 class SkillRow:
     """Radial position error since the start of the outage, over all starts.
 
-    One method and one horizon.
-
-    ``coverage95`` is the share of the channel errors inside the forecast's own 95 % band, None for a method without
-    one; ``coverage95_model`` the same before the sigma is scaled to what the class and the flight's past show.
+    It is of one method at one horizon. ``coverage95`` is the share of the channel errors inside the forecast's own 95 %
+    band, None for a method without one; ``coverage95_model`` the same before the sigma is scaled to what the class and
+    the flight's past show.
     """
 
     method: str = field(metadata={"one_of": tuple(METHODS)})
@@ -51,7 +50,7 @@ class SkillRow:
 class GapRow:
     """Errors of replayed gaps with GNSS on both sides.
 
-    Root mean square over the gaps of the largest radial error in each.
+    ``max_error_rms_m`` is the root mean square over the gaps of the largest radial error in each.
     """
 
     method: str = field(metadata={"one_of": ("forward", "rts")})
@@ -79,7 +78,7 @@ class PhaseRow:
 class ClassicStart:
     """One of the paper's four starts (1.5, 2, 2.5, 3 h).
 
-    Radial and east error at the end and at equal horizons.
+    It has the radial and the east error at the end and at equal horizons.
     """
 
     start_h: float
@@ -93,11 +92,9 @@ class ClassicStart:
 class CalibrationRow:
     """Honesty of the forecast's sigma at one horizon: shares inside bands, and NEES.
 
-    The bands are those of 50, 68 and 95 %.
-
-    ``nees`` is the mean normalised squared error of the position forecast (two degrees of freedom, divided by two, so 1
-    is honest), ``nees_low``, ``nees_high`` its 95 % limits from the number of independent starts.
-    ``scale`` is what the model's sigma was multiplied by (mean over the starts).
+    The bands are those of 50, 68 and 95 %. ``nees`` is the mean normalised squared error of the position forecast (two
+    degrees of freedom, divided by two, so 1 is honest), ``nees_low``, ``nees_high`` its 95 % limits from the number of
+    independent starts. ``scale`` is what the model's sigma was multiplied by (mean over the starts).
     """
 
     method: str = field(metadata={"one_of": tuple(METHODS)})
@@ -117,9 +114,8 @@ class CalibrationRow:
 class CoupledRow:
     """Gain of the coupled model over two separate channels.
 
-    1 - RMS ratio, last estimate of both.
-
-    The coupled model has sixteen states: six of each channel, the azimuth error, its drift, two accelerometer biases.
+    It is 1 - RMS ratio, of the last estimates of both. The coupled model has sixteen states: six of each channel, the
+    azimuth error, its drift, two accelerometer biases.
     """
 
     horizon_min: float

@@ -19,11 +19,9 @@ KINDS = {
 def grouped(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Join remarks on raw topics by kind.
 
-    Warnings, failures and findings on canonical topics stand alone.
-
-    Nothing is estimated from raw topics, and an autopilot's log has a hundred of them with thousands of fields. Where
-    more than three remarks are of one kind they become one: how many there are, in which topics, and the sum of their
-    counts. ``summary.json`` lists each.
+    Warnings, failures and findings on canonical topics stand alone. Nothing is estimated from raw topics, and an
+    autopilot's log has a hundred of them with thousands of fields. Where more than three remarks are of one kind they
+    become one: how many there are, in which topics, and the sum of their counts. ``summary.json`` lists each.
 
     Examples
     --------

@@ -23,11 +23,9 @@ STORED_STEP = 1e-6  # limits in summary.json are rounded to it
 class Gate:
     """One acceptance gate: figure, limit, unit, state.
 
-    ``value`` is None when it could not be measured.
-
-    ``limit`` is a number that the figure must reach or not exceed, as ``sense`` says, or a pair [low, high];
-    ``required`` gates decide the verdict, others inform.
-    ``reason`` says in a few words why it failed or was not measured.
+    ``value`` is None when it could not be measured. ``limit`` is a number that the figure must reach or not exceed, as
+    ``sense`` says, or a pair [low, high]; ``required`` gates decide the verdict, others inform. ``reason`` says in a
+    few words why it failed or was not measured.
     """
 
     name: str
@@ -148,9 +146,7 @@ class TaxiWind:
 class IntervalPart:
     """One part of the interval of the error: ``taxi``, ``wind`` or ``installation``.
 
-    The squares of the sigmas add up.
-
-    ``half_width_deg`` is what the 95 % interval would be with this part alone.
+    The squares of the sigmas add up. ``half_width_deg`` is what the 95 % interval would be with this part alone.
     """
 
     name: str
@@ -162,7 +158,7 @@ class IntervalPart:
 class RunwayCheck:
     """Check against the runway: its true bearing beside the INS heading there.
 
-    A second reference, on line-up or take-off run.
+    It is a second reference, on line-up or take-off run.
     """
 
     name: str
@@ -316,7 +312,7 @@ class HeadingResult(Answer):
     def azimuth(self) -> tuple[float, float]:
         """Error of the platform's azimuth and its standard error.
 
-        The airframe's in an answer of an older version.
+        In an answer of an older version they are the airframe's.
         """
         if self.platform_error_deg is None or self.platform_standard_error_deg is None:
             return self.error_deg, self.standard_error_deg

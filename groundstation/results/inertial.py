@@ -43,11 +43,10 @@ class StateEstimate:
 class ChannelResult:
     """One horizontal channel, ``north`` or ``east``.
 
-    Error = INS - truth, innovation = measured - predicted.
-
-    ``nis`` is the mean normalised innovation squared per measurement with its 95 % chi-square limits ``nis_low``,
-    ``nis_high`` (None where the measurement noise was inflated for colour: then NIS is below one by design);
-    ``share_inside95`` of the innovations inside their own 95 % band; ``rejected`` of ``innovations`` were gated.
+    Error = INS - truth, innovation = measured - predicted. ``nis`` is the mean normalised innovation squared per
+    measurement with its 95 % chi-square limits ``nis_low``, ``nis_high`` (None where the measurement noise was inflated
+    for colour: then NIS is below one by design); ``share_inside95`` of the innovations inside their own 95 % band;
+    ``rejected`` of ``innovations`` were gated.
     """
 
     name: str = field(metadata={"one_of": CHANNELS})
@@ -66,11 +65,9 @@ class ChannelResult:
 class RealOutage:
     """Interval of the log in which nothing could be compared.
 
-    The filter forecast through it.
-
-    ``jump_m`` is how far the forecast position error was from what GNSS showed at its end, ``sigma_m`` what the
-    forecast claimed (both radial); None when the flight ended before. ``missing`` is what was absent: ``"gnss"``,
-    ``"ins"`` or ``"both"``.
+    The filter forecast through it. ``jump_m`` is how far the forecast position error was from what GNSS showed at its
+    end, ``sigma_m`` what the forecast claimed (both radial); None when the flight ended before. ``missing`` is what was
+    absent: ``"gnss"``, ``"ins"`` or ``"both"``.
     """
 
     start_s: float
@@ -85,9 +82,8 @@ class RealOutage:
 class EarlyAzimuth:
     """Azimuth error at flight time ``time_s``, and its drift.
 
-    From the turns of the first hour of them alone.
-
-    An azimuth error oscillates over 24 h: what is carried back to the taxi may not come from hours later.
+    It rests on the turns of the first hour of turns alone. An azimuth error oscillates over 24 h: what is carried back
+    to the taxi may not come from hours later.
     """
 
     error_deg: float
@@ -117,11 +113,9 @@ class EarlyAzimuth:
 class AzimuthEstimate:
     """Azimuth (heading) error of the INS, from the effect of turns on its velocity error.
 
-    Offered only where the turns allow it.
-
-    ``observable`` says whether ``sigma_deg`` is below the limit of the settings; if not, ``error_deg`` is None. The
-    error is that at ``time_s``, flight seconds: the last turn; ``early`` is for the time of the taxi, None where the
-    first hour shows too little.
+    It is offered only where the turns allow it. ``observable`` says whether ``sigma_deg`` is below the limit of the
+    settings; if not, ``error_deg`` is None. The error is that at ``time_s``, flight seconds: the last turn; ``early``
+    is for the time of the taxi, None where the first hour shows too little.
     """
 
     observable: bool
@@ -138,9 +132,8 @@ class AzimuthEstimate:
 class Difference:
     """INS minus GNSS over the epochs compared.
 
-    ``north``, ``east``, or ``horizontal``, the length of both.
-
-    ``mean`` has its sign; ``median``, ``p95`` and ``largest`` are of the magnitude.
+    ``axis`` is ``north``, ``east``, or ``horizontal``, the length of both. ``mean`` has its sign; ``median``, ``p95``
+    and ``largest`` are of the magnitude.
     """
 
     quantity: str = field(metadata={"one_of": QUANTITIES})
@@ -157,11 +150,10 @@ class Difference:
 class OwnInnovation:
     """Innovations against GNSS that the INS's own filter logged.
 
-    Innovation = measured - predicted.
-
-    ``mean`` has its sign; ``median`` and ``p95`` are of the magnitude. ``sigma`` is the root of the filter's median
-    variance, ``share_inside95`` that of the innovations inside their 95 % band; None where it logs no variance.
-    ``share_rejected`` is that of the samples beyond the filter's own gate, None where it logs no ratio to it.
+    Innovation = measured - predicted. ``mean`` has its sign; ``median`` and ``p95`` are of the magnitude. ``sigma`` is
+    the root of the filter's median variance, ``share_inside95`` that of the innovations inside their 95 % band; None
+    where it logs no variance. ``share_rejected`` is that of the samples beyond the filter's own gate, None where it
+    logs no ratio to it.
     """
 
     quantity: str = field(metadata={"one_of": QUANTITIES})
@@ -194,7 +186,7 @@ class NavigationStart:
 class InertialResult(Answer):
     """INS errors of one flight.
 
-    Of an INS that GNSS corrects already, only its difference from GNSS.
+    Of an INS that GNSS corrects already, it only has the differences from GNSS.
 
     Parameters
     ----------
@@ -300,9 +292,8 @@ class InertialResult(Answer):
 def is_left_alone(name: str, sigma: Any, observability: Any, settings: Mapping[str, Any]) -> bool:
     """Tell whether a state is not estimated in this INS class.
 
-    The data say nothing of it, and its sigma is the one it had.
-
-    A class leaves a state out by a tiny sigma at the start; value and sigma are then no answer of this flight.
+    The data say nothing of it, and its sigma is the one it had. A class leaves a state out by a tiny sigma at the
+    start; value and sigma are then no answer of this flight.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ POOLED = ("compass_a_deg", "antenna_arm_m", "gnss_latency_s")  # figures of othe
 class Measured:
     """Figure of a sensor that one flight measured, and its sigma.
 
-    In the unit that ends its name.
+    Its unit ends its name.
     """
 
     name: str = field(metadata={"one_of": POOLED})
@@ -116,10 +116,9 @@ class Lesson:
 class Installed:
     """Posterior of an installation.
 
-    Mounting of the unit, factor and steady sideslip of the aircraft.
-
-    ``factor`` is in degrees per m/s of crosswind; ``sum_deg`` is mounting + steady sideslip, which the flights see
-    together: its sigma is smaller than either's.
+    It has the mounting of the unit, and the factor and steady sideslip of the aircraft. ``factor`` is in degrees per
+    m/s of crosswind; ``sum_deg`` is mounting + steady sideslip, which the flights see together: its sigma is smaller
+    than either's.
     """
 
     flights: int

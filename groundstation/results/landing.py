@@ -195,9 +195,8 @@ class HeightError:
 class Sensitivity:
     """Ratio of positions across the course to what the localizer shows of them.
 
-    1 where its sense and width fit.
-
-    ``ratio`` is None where the aircraft never was far enough off the course for it.
+    It is 1 where the localizer's sense and width fit. ``ratio`` is None where the aircraft never was far enough off the
+    course for it.
     """
 
     ratio: float | None
@@ -209,7 +208,7 @@ class Sensitivity:
 class Protection:
     """Protection levels of a satellite receiver along a final.
 
-    The error itself is not known: nothing here is one.
+    They are no errors: the error itself is not known.
 
     Parameters
     ----------
@@ -273,7 +272,7 @@ class LeftOutApproach:
 class LandingResult(Answer):
     """Approaches of a flight, each against its runway.
 
-    Accuracy only: integrity and the rest are not shown.
+    They show accuracy only: integrity and the rest are not shown.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ ACCURACY_ONLY = "Accuracy only: integrity, continuity and availability are not s
 def category_met(horizontal_95_m: float, vertical_95_m: float) -> Category | None:
     """Return the most demanding category whose accuracy both figures meet.
 
-    None where they meet none (or are NaN).
+    It is None where they meet none (or are NaN).
 
     Examples
     --------

@@ -64,7 +64,7 @@ class AccuracyRow:
 class CategorySpan:
     """Stretch of the path on which a category's accuracy is met.
 
-    All of it, or along one axis alone.
+    It is met in all, or along one axis alone.
     """
 
     category: str

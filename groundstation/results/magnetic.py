@@ -49,13 +49,12 @@ class AlignmentSource:
 class Alignment:
     """INS heading error at the time of the figure.
 
-    It is taken off the INS heading before anything is compared with it.
-
-    ``aligned_error_deg`` and ``aligned_sigma_deg`` belong to ``aligned_at_s``, ``error_deg`` and ``sigma_deg`` to
-    ``figure_at_s`` (flight seconds), after the drift of the hours between. ``origin`` says whence.
-    ``speed_min_mps`` is the speed from which on the track may align. ``gyro_*`` are the drifts along forward, right,
-    down at the standstill before flight and their sigmas; None where no rates are logged. ``sources`` lists every way
-    in which the flight shows the error. It is the airframe's, less the mounting that the aircraft file states.
+    It is taken off the INS heading before anything is compared with it. ``aligned_error_deg`` and ``aligned_sigma_deg``
+    belong to ``aligned_at_s``, ``error_deg`` and ``sigma_deg`` to ``figure_at_s`` (flight seconds), after the drift of
+    the hours between. ``origin`` says whence. ``speed_min_mps`` is the speed from which on the track may align.
+    ``gyro_*`` are the drifts along forward, right, down at the standstill before flight and their sigmas; None where no
+    rates are logged. ``sources`` lists every way in which the flight shows the error. It is the airframe's, less the
+    mounting that the aircraft file states.
     """
 
     origin: str
@@ -79,9 +78,9 @@ class Alignment:
 
 @dataclass(frozen=True)
 class DeclinationUsed:
-    """Declination at the figure, east positive, with its sigma.
+    """Declination at the figure, east positive, with its sigma and the model's intensities.
 
-    And the model's horizontal and vertical intensity.
+    The intensities are horizontal and vertical.
     """
 
     value_deg: float
@@ -166,9 +165,7 @@ class Residual:
 class HeldOut:
     """Level part of the flight that no fit has seen.
 
-    ``level_share`` is its share of all that none has seen.
-
-    ``heading_sectors`` of 30 deg, of 12, were flown in it.
+    ``level_share`` is its share of all that none has seen. ``heading_sectors`` of 30 deg, of 12, were flown in it.
     """
 
     samples: int
@@ -180,9 +177,9 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class Method:
-    """One method to find the deviation, fitted or refused.
+    """One method to find the deviation, fitted or refused, and its error.
 
-    With the error that it leaves on the held-out part.
+    The error is that on the held-out part.
 
     Parameters
     ----------
@@ -220,12 +217,11 @@ class Method:
 
 @dataclass(frozen=True)
 class PoissonParameters:
-    """Iron of the aircraft.
+    """Iron of the aircraft: hard iron, soft iron, effect of a current.
 
-    reading = soft_iron @ field + hard_iron + current_effect x (current - reference).
-
-    ``field`` is the earth's along the body axes (forward, right, down). Sigmas have the same shapes;
-    ``current_*`` are None where no current was logged, or it did not vary.
+    They make reading = soft_iron @ field + hard_iron + current_effect x (current - reference). ``field`` is the earth's
+    along the body axes (forward, right, down). Sigmas have the same shapes; ``current_*`` are None where no current was
+    logged, or it did not vary.
     """
 
     hard_iron_nt: Vector
@@ -241,7 +237,7 @@ class PoissonParameters:
 class BankBias:
     """Error that the average of opposite banks has in level flight.
 
-    Forecast from the fitted iron.
+    It is forecast from the fitted iron.
     """
 
     bank_deg: float
@@ -271,9 +267,8 @@ class OtherCondition:
 class CardRow:
     """Row of a steer card: to fly ``magnetic_heading_deg``, steer ``steer_deg``.
 
-    ``steer_deg`` is the uncorrected magnetic heading.
-
-    ``deviation_deg`` is added to the reading; ``is_interpolated``: no reading of both branches near it.
+    ``steer_deg`` is the uncorrected magnetic heading. ``deviation_deg`` is added to the reading; ``is_interpolated``:
+    no reading of both branches near it.
     """
 
     magnetic_heading_deg: float

@@ -1,6 +1,6 @@
 """Deviation of the installed heading sensor from straight runs on the ground.
 
-From each run, and from all together.
+It is given by each run, and by all together.
 """
 
 from dataclasses import dataclass, field
@@ -76,7 +76,7 @@ class GroundCoefficient:
 class AlongAxis:
     """Part of B and C that opposite runs show.
 
-    ``value_deg`` x cos(heading - ``axis_deg``), the axis in [0, 180).
+    It is ``value_deg`` x cos(heading - ``axis_deg``), the axis in [0, 180).
     """
 
     axis_deg: float
@@ -88,7 +88,7 @@ class AlongAxis:
 class Repeat:
     """Runs on about one heading: spread of their errors, and the spread to expect.
 
-    Expected by their noise and slip alone.
+    The latter is that by their noise and slip alone.
     """
 
     magnetic_heading_deg: float
@@ -101,7 +101,7 @@ class Repeat:
 class GroundDeviation(Answer):
     """Errors of the installed heading sensor on straight ground runs.
 
-    Advisory, not a release to service.
+    They are advisory, not a release to service.
 
     Parameters
     ----------

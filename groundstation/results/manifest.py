@@ -86,8 +86,6 @@ class Resume:
     """Record that lets a later run skip work: keys of the stages, and what was found.
 
     The findings are in one line; a flag tells whether data was lost.
-
-    Keys of the stages, what was found in one line, whether data was lost.
     """
 
     keys: Keys
@@ -97,9 +95,9 @@ class Resume:
 
 @dataclass(frozen=True)
 class FileOfRun:
-    """File as the run left it: its bytes.
+    """File as the run left it: its size in bytes.
 
-    Of the MCAP its digest and the time of its last change, too.
+    The MCAP has its digest and the time of its last change, too.
     """
 
     size_bytes: int

@@ -74,10 +74,8 @@ class ErrorRow:
 class ClaimRow:
     """Share of the errors inside the 95 % region that is claimed.
 
-    Subject and reference claim it together.
-
-    ``claimed_sigma`` and ``reference_sigma`` are RMS, of a horizontal length those of north and east together;
-    ``confidence95`` is of the share, by the effective number of samples.
+    Subject and reference claim it together. ``claimed_sigma`` and ``reference_sigma`` are RMS, of a horizontal length
+    those of north and east together; ``confidence95`` is of the share, by the effective number of samples.
     """
 
     subject: str
@@ -97,7 +95,7 @@ class ClaimRow:
 class PathRow:
     """Absolute trajectory error: RMS of the horizontal position error after an alignment.
 
-    Yaw in degrees.
+    The yaw is in degrees.
     """
 
     subject: str
@@ -164,10 +162,8 @@ class Placed:
 class HeadingCheck:
     """Heading error that was found, against INS minus reference at the same samples.
 
-    With the intervals of both.
-
-    ``seen95_deg`` allows for errors correlated in time; ``is_inside``: the difference is within the 95 % that both
-    claim together.
+    Both have their intervals. ``seen95_deg`` allows for errors correlated in time; ``is_inside``: the difference is
+    within the 95 % that both claim together.
     """
 
     ins_topic: str

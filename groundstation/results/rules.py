@@ -1,6 +1,6 @@
 """Verdicts judged again by other rules: gates and verdict before and after.
 
-From stored values.
+They are judged from stored values.
 """
 
 from dataclasses import dataclass
@@ -12,9 +12,8 @@ from groundstation.results.heading import Gate
 class Rejudged:
     """Verdict under other limits.
 
-    ``subject`` says what it is on: "heading", "landing 1 from 305 m".
-
-    ``gates_before`` and ``gates_after`` go together, one to one.
+    ``subject`` says what it is on: "heading", "landing 1 from 305 m". ``gates_before`` and ``gates_after`` go together,
+    one to one.
     """
 
     subject: str

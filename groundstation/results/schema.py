@@ -220,7 +220,7 @@ def _bounded(schema: Schema, name: str) -> Schema:
 def _told(cls: type) -> dict[str, str]:
     """Return the descriptions of a class's fields in its docstring, by name.
 
-    Numpydoc, section Parameters.
+    They stand in the numpydoc section Parameters.
     """
     _, _, listed = (cls.__doc__ or "").partition("Parameters\n    ----------\n")
     told: dict[str, str] = {}

@@ -23,10 +23,8 @@ POSITION, VELOCITY, TILT, CONSTANT, TREND, RANDOM = range(6)
 class ChannelTruth:
     """States of c channels at n times in SI units.
 
-    Tilt is positive where it makes the velocity error fall.
-
-    ``states`` has shape (c, n, 6): position error m, velocity error m/s, tilt rad, constant drift rad/s, its first
-    derivative rad/s^2, random drift rad/s.
+    Tilt is positive where it makes the velocity error fall. ``states`` has shape (c, n, 6): position error m, velocity
+    error m/s, tilt rad, constant drift rad/s, its first derivative rad/s^2, random drift rad/s.
     """
 
     states: FloatArray

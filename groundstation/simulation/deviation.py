@@ -121,10 +121,9 @@ def deviation_truth(
 def scenario_deviation(scenario: Scenario, motion: Trajectory) -> DeviationTruth | None:
     """Return the deviation in level flight under the base load; None without magnetometer.
 
-    Without level flight it is that on the ground.
-
-    Constant errors of the INS's roll and pitch are in it: the heading shown is levelled with them on every flight.
-    The field is that of the middle of the flight: over 50 km the declination changes by tenths of a degree.
+    Without level flight it is that on the ground. Constant errors of the INS's roll and pitch are in it: the heading
+    shown is levelled with them on every flight. The field is that of the middle of the flight: over 50 km the
+    declination changes by tenths of a degree.
     """
     if scenario.magnetometer is None:
         return None

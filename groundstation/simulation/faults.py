@@ -124,9 +124,8 @@ class Jump:
 class Reset:
     """Step of a navigator's errors at a log time, which lasts.
 
-    The position steps, and the velocity with the position it adds up to.
-
-    The Schuler oscillation that such a step starts is left out: 4 % of the added position in 10 min.
+    The position steps, and the velocity with the position it adds up to. The Schuler oscillation that such a step
+    starts is left out: 4 % of the added position in 10 min.
     """
 
     kind: ClassVar[str] = "reset"
@@ -170,10 +169,8 @@ Fault: TypeAlias = (
 def apply_faults(flight: Flight, faults: Iterable[Fault]) -> Flight:
     """Damage a flight, fault after fault in the order given.
 
-    Log times are those of the undamaged clock.
-
-    ``time_ns`` stays the true time of every row; ``device_time_ns`` is what the recorder wrote and ``record_index``
-    the row of the log.
+    Log times are those of the undamaged clock. ``time_ns`` stays the true time of every row; ``device_time_ns`` is what
+    the recorder wrote and ``record_index`` the row of the log.
 
     Raises
     ------

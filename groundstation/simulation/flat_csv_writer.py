@@ -45,10 +45,9 @@ def write_flat_csv(
 ) -> None:
     """Write a flight as flat CSV: ``# key: value`` lines, one header, a row per record.
 
-    The rows are numbered by ``record_index``.
-
-    Time is ``time_s``, the recorder's own (``device_time_ns``), printed exactly from the integer. A missing sample is
-    an empty cell; NaN that the device wrote is ``nan``; flags are 0 and 1.
+    The rows are numbered by ``record_index``. Time is ``time_s``, the recorder's own (``device_time_ns``), printed
+    exactly from the integer. A missing sample is an empty cell; NaN that the device wrote is ``nan``; flags are 0 and
+    1.
 
     Parameters
     ----------

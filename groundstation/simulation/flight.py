@@ -96,13 +96,11 @@ def simulate(scenario: Scenario, seed: int | None = None) -> Simulated:
 def scenario_truth(simulated: Simulated) -> dict[str, float]:
     """Return the true values that an analysis of the flight should find, by name.
 
-    They are in degrees and metres.
-
-    ``heading_error_deg`` is INS heading minus nose at log second 0 (azimuth error + mounting); ``taxi_difference_deg``
-    what heading minus track shows there on straights (sideslip added); ``drift_deg_per_h`` its drift, the mean one
-    where the errors are those of an INS class. ``deviation_a_deg`` to ``deviation_e_deg`` are the coefficients A to E
-    of the magnetometer levelled with the INS (heading shown minus magnetic heading) in level flight, NaN where iron
-    outweighs the field.
+    They are in degrees and metres. ``heading_error_deg`` is INS heading minus nose at log second 0 (azimuth error +
+    mounting); ``taxi_difference_deg`` what heading minus track shows there on straights (sideslip added);
+    ``drift_deg_per_h`` its drift, the mean one where the errors are those of an INS class. ``deviation_a_deg`` to
+    ``deviation_e_deg`` are the coefficients A to E of the magnetometer levelled with the INS (heading shown minus
+    magnetic heading) in level flight, NaN where iron outweighs the field.
     """
     scenario = simulated.scenario
     ins, gnss = scenario.ins, scenario.gnss

@@ -64,11 +64,9 @@ def heading_error_deg(time_s: FloatArray, settings: InsSettings) -> FloatArray:
 def schuler_error(time_s: FloatArray, settings: InsSettings, channel: int) -> tuple[FloatArray, FloatArray]:
     """Return position (m) and velocity (m/s) error of one channel under a constant drift.
 
-    Horizontal channel 0 is north, 1 is east.
-
-    Closed solution of dp' = dv, dv' = -g phi, phi' = dv / R + drift, the model of system 2 without its slow states.
-    Ignored: coupling of the channels, curvature of the path. Source: Titterton and Weston, Strapdown Inertial
-    Navigation Technology, 2nd ed. 2004, section 12.3.
+    Horizontal channel 0 is north, 1 is east. Closed solution of dp' = dv, dv' = -g phi, phi' = dv / R + drift, the
+    model of system 2 without its slow states. Ignored: coupling of the channels, curvature of the path. Source:
+    Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed. 2004, section 12.3.
     """
     speed, rate, radius = settings.velocity_error_mps[channel], SCHULER_RADPS, EARTH_RADIUS_M
     tilt_rad = np.deg2rad(settings.tilt_arcsec[channel] / 3600.0)
@@ -90,12 +88,10 @@ def turned_velocity_error(
 ) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
     """Return position (m) and velocity (m/s) errors that an azimuth error causes.
 
-    They are given for north, then east. The azimuth error psi turns each acceleration.
-
-    dv' = -g phi + psi x (-acceleration east, +acceleration north), phi' = dv / R: each change of velocity starts a
-    Schuler oscillation of its own. The mounting turns nothing. Ignored: Earth's rotation seen by the azimuth error,
-    which alignment on the ground balances. Source: Titterton and Weston, Strapdown Inertial Navigation Technology,
-    2nd ed. 2004, section 12.3.
+    They are given for north, then east. The azimuth error psi turns each acceleration. dv' = -g phi + psi x
+    (-acceleration east, +acceleration north), phi' = dv / R: each change of velocity starts a Schuler oscillation of
+    its own. The mounting turns nothing. Ignored: Earth's rotation seen by the azimuth error, which alignment on the
+    ground balances. Source: Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed. 2004, section 12.3.
     """
     azimuth_rad = np.deg2rad(heading_error_deg(time_s, settings) - settings.boresight_deg)
     cosine, sine = np.cos(SCHULER_RADPS * time_s), np.sin(SCHULER_RADPS * time_s)

@@ -1,9 +1,7 @@
 """Families of flights with INS errors and GNSS for Monte Carlo.
 
-They are many flights at 1 Hz, as vectorised arrays without a log.
-
-Run k of a family is the same flight whatever the number of runs; each kind of randomness has its own stream, so that a
-switch changes what it names and nothing else.
+They are many flights at 1 Hz, as vectorised arrays without a log. Run k of a family is the same flight whatever the
+number of runs; each kind of randomness has its own stream, so that a switch changes what it names and nothing else.
 """
 
 from collections.abc import Iterator

@@ -19,10 +19,9 @@ _CLASSES = ShippedToml("groundstation.simulation", "ins_classes", "ins_class")
 class HeadingWander:
     """Error of the heading output beside the azimuth error proper.
 
-    It wanders in straight flight and is pulled back by turns.
-
-    ``offset_deg`` is the sigma of a constant; ``drift_deg_per_sqrt_h`` the size of the random walk; ``turn_deg`` the
-    angle turned (either way) that takes it back by a factor e.
+    It wanders in straight flight and is pulled back by turns. ``offset_deg`` is the sigma of a constant;
+    ``drift_deg_per_sqrt_h`` the size of the random walk; ``turn_deg`` the angle turned (either way) that takes it back
+    by a factor e.
     """
 
     offset_deg: float = number(0.0, 0.0, 5.0)
@@ -34,12 +33,11 @@ class HeadingWander:
 class InsClass:
     """Error budget of one class of INS.
 
-    Every number is a sigma per axis unless it says otherwise.
-
-    ``gyro_random`` and ``accelerometer_random`` are first-order Gauss-Markov processes. ``is_strapdown``: errors are
-    fixed to the body, else to a platform slaved to north. ``is_levelled``: at the start the tilts are those that
-    balance the accelerometer biases, as levelling on the ground leaves them; ``is_gyrocompassed``: the azimuth error
-    balances the east gyro likewise. ``initial_tilt_rad`` and ``initial_azimuth_deg`` come on top.
+    Every number is a sigma per axis unless it says otherwise. ``gyro_random`` and ``accelerometer_random`` are
+    first-order Gauss-Markov processes. ``is_strapdown``: errors are fixed to the body, else to a platform slaved to
+    north. ``is_levelled``: at the start the tilts are those that balance the accelerometer biases, as levelling on the
+    ground leaves them; ``is_gyrocompassed``: the azimuth error balances the east gyro likewise. ``initial_tilt_rad``
+    and ``initial_azimuth_deg`` come on top.
     """
 
     gyro_constant_dph: float = required_number(0.0, 10_000.0)

@@ -137,10 +137,9 @@ def draw_heading_wander(
 ) -> FloatArray:
     """Draw the wander of the heading output, degrees.
 
-    It is a constant and a random walk that turns pull back.
-
-    d' = -|turn rate| / turn_deg d + white noise; ``heading_deg`` need not be continuous. This is an error of the
-    output, not of the platform: 0.1 deg of true azimuth error would drive the north channel with 0.026 deg/h cos(lat).
+    It is a constant and a random walk that turns pull back. d' = -|turn rate| / turn_deg d + white noise;
+    ``heading_deg`` need not be continuous. This is an error of the output, not of the platform: 0.1 deg of true azimuth
+    error would drive the north channel with 0.026 deg/h cos(lat).
 
     Parameters
     ----------

@@ -1,9 +1,8 @@
 """Errors of an INS along a true trajectory, by the linear phi-angle model.
 
-The frame is north-east-down; the vertical channel is damped.
-
-The truth behind the tests of system 2: it holds what the six-state filter leaves out (Earth and transport rate,
-azimuth, turns, body-fixed sensors, deflection of the vertical).
+The frame is north-east-down; the vertical channel is damped. It is the truth behind the tests of system 2 and holds
+what the six-state filter leaves out (Earth and transport rate, azimuth, turns, body-fixed sensors, deflection of the
+vertical).
 
 Signs: error = INS - truth. The computed attitude is (I - [phi x]) n_from_b, so that the heading error is -phi_D; the
 channels' tilt is -phi_E (north) and +phi_N (east), positive where it makes the velocity error fall.

@@ -21,9 +21,8 @@ class SimulatedBeacon:
 class AdfSettings:
     """Automatic direction finder, one channel for each beacon.
 
-    Errors are white + first-order Gauss-Markov.
-
-    ``is_reversed`` is a finder whose bearings run the wrong way round, a fault.
+    Errors are white + first-order Gauss-Markov. ``is_reversed`` is a finder whose bearings run the wrong way round, a
+    fault.
     """
 
     beacons: tuple[SimulatedBeacon, ...]
@@ -40,9 +39,8 @@ class AdfSettings:
 class RadioAltimeterSettings:
     """Radio altimeter: height above the ground, up to ``highest_m``.
 
-    The ground rises ahead of the threshold.
-
-    ``rise_m_per_km`` raises the ground before the threshold with the distance from it.
+    The ground rises ahead of the threshold. ``rise_m_per_km`` raises the ground before the threshold with the distance
+    from it.
     """
 
     rate_hz: float = number(10.0, 0.01, 100.0)

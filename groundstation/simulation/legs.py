@@ -25,7 +25,7 @@ GREAT_CIRCLE_PIECE_S = 60.0  # the turn rate of a great circle is followed linea
 
 @dataclass(frozen=True)
 class Parked:
-    """Stand still at the stand, at a stop or on the runway, after braking if needed."""
+    """Standstill at the stand, at a stop or on the runway, after braking if needed."""
 
     kind: ClassVar[str] = "parked"
     duration_s: float = required_number(0.0)
@@ -33,7 +33,7 @@ class Parked:
 
 @dataclass(frozen=True)
 class Taxi:
-    """Taxi straight on for a length.
+    """Straight taxi over a length.
 
     The change to the leg's speed is made at its start and is part of the length.
     """
@@ -55,7 +55,7 @@ class GroundTurn:
 
 @dataclass(frozen=True)
 class TakeOff:
-    """Accelerate straight on, lift off at a speed, then begin to climb.
+    """Take-off straight on: acceleration, lift-off at a speed, start of the climb.
 
     The aircraft rotates in the last seconds before lift-off.
     """
@@ -68,11 +68,10 @@ class TakeOff:
 
 @dataclass(frozen=True)
 class Fly:
-    """Fly straight for a time.
+    """Straight flight for a time.
 
-    Airspeed and climb rate change smoothly at the start (0 keeps level).
-
-    Straight is along the rhumb line, or with ``great_circle`` along the great circle that starts with the heading.
+    Airspeed and climb rate change smoothly at the start (0 keeps level). Straight is along the rhumb line, or with
+    ``great_circle`` along the great circle that starts with the heading.
     """
 
     kind: ClassVar[str] = "fly"
@@ -84,7 +83,7 @@ class Fly:
 
 @dataclass(frozen=True)
 class ClimbTo:
-    """Climb or descend to an ellipsoid altitude and level off there, exactly."""
+    """Climb or descent to an ellipsoid altitude, levelled off there exactly."""
 
     kind: ClassVar[str] = "climb_to"
     altitude_m: float = required_number(-500.0, 20_000.0)
@@ -96,9 +95,8 @@ class ClimbTo:
 class AirTurn:
     """Coordinated turn (right positive) at constant airspeed and altitude.
 
-    The bank is rolled in and out smoothly.
-
-    ``bank_change_deg`` is how much more bank there is at the end of the turn than at its start, ``bank_deg`` between.
+    The bank is rolled in and out smoothly. ``bank_change_deg`` is how much more bank there is at the end of the turn
+    than at its start, ``bank_deg`` between.
     """
 
     kind: ClassVar[str] = "air_turn"
@@ -114,7 +112,7 @@ class AirTurn:
 
 @dataclass(frozen=True)
 class Landing:
-    """Descend to the runway, flare, touch down at a speed and brake to taxi speed."""
+    """Descent to the runway, flare, touchdown at a speed, braking to taxi speed."""
 
     kind: ClassVar[str] = "landing"
     runway_altitude_m: float = required_number(-500.0, 6_000.0)
@@ -130,9 +128,8 @@ Leg: TypeAlias = Parked | Taxi | GroundTurn | TakeOff | Fly | ClimbTo | AirTurn 
 class Piece:
     """Stretch of motion with smooth changes of speed, turn rate and climb rate.
 
-    They go from their last values to these.
-
-    ``airborne`` is the state during the piece. Durations are rounded up to whole steps by the planner beforehand.
+    They go from their last values to these. ``airborne`` is the state during the piece. Durations are rounded up to
+    whole steps by the planner beforehand.
     """
 
     duration_s: float
@@ -146,9 +143,8 @@ class Piece:
 class MotionState:
     """State of the aircraft between two pieces.
 
-    Its speed and direction are over the ground, or through the air.
-
-    The latitude is good to some kilometres: it serves the turn rate of great circles alone.
+    Its speed and direction are over the ground, or through the air. The latitude is good to some kilometres: it serves
+    the turn rate of great circles alone.
     """
 
     step_s: float
@@ -256,9 +252,8 @@ def _turn(
 ) -> tuple[Piece, ...]:
     """Return the pieces of a turn: rate up, hold, rate down.
 
-    The rate is adjusted so that whole steps give exactly the angle.
-
-    ``growth`` is the share by which the rate at the end of the hold lies above its mean, and below it at the start.
+    The rate is adjusted so that whole steps give exactly the angle. ``growth`` is the share by which the rate at the
+    end of the hold lies above its mean, and below it at the start.
     """
     hold_s = state.whole_steps(max(abs(angle_deg) / rate_dps - ramp_s, 0.0))
     ramp_s = state.whole_steps(ramp_s)

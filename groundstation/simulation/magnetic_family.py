@@ -1,9 +1,8 @@
 """Family of flights with figure-eights for Monte Carlo.
 
-They are whole flights at 10 Hz as tables, with no log on disk.
-
-A flight is a scenario drawn from its seed, hence the same whatever the other seeds are: stand, two straights of taxi,
-take-off, climb to 1500 m, a figure-eight, straights on several headings, further figure-eights.
+They are whole flights at 10 Hz as tables, with no log on disk. A flight is a scenario drawn from its seed, hence the
+same whatever the other seeds are: stand, two straights of taxi, take-off, climb to 1500 m, a figure-eight, straights on
+several headings, further figure-eights.
 """
 
 from collections.abc import Iterable, Iterator

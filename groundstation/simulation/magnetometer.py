@@ -105,10 +105,9 @@ def world_field_nt(motion: Trajectory, scenario: Scenario, settings: Magnetomete
 def anomaly_nt(motion: Trajectory, airport: Airport, anomaly: Anomaly) -> FloatArray:
     """Return the field of a plane wave of the crust along a motion, shape (n, 3).
 
-    It is north, east, down, and free of curl and divergence.
-
-    It is -grad V of V = amplitude / k exp(-k height) cos(k . position + phase), the exponential counted as 1 at the
-    altitude flown: horizontal and vertical parts have one amplitude and are a quarter of a wave apart.
+    It is north, east, down, and free of curl and divergence. It is -grad V of V = amplitude / k exp(-k height) cos(k .
+    position + phase), the exponential counted as 1 at the altitude flown: horizontal and vertical parts have one
+    amplitude and are a quarter of a wave apart.
 
     Source: Blakely, Potential Theory in Gravity and Magnetic Applications, 1995, section 11.1.
     """

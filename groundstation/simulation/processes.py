@@ -44,10 +44,9 @@ def damped_oscillation(
 ) -> FloatArray:
     """Draw a noise-driven damped oscillator: narrow-band sway.
 
-    It has a given natural frequency and damping ratio.
-
-    The state (displacement, rate) obeys x'' + 2 z w x' + w^2 x = white noise; it is started from its stationary
-    distribution and stepped with the exact exponential, so the sample statistics hold at any step.
+    It has a given natural frequency and damping ratio. The state (displacement, rate) obeys x'' + 2 z w x' + w^2 x =
+    white noise; it is started from its stationary distribution and stepped with the exact exponential, so the sample
+    statistics hold at any step.
 
     Parameters
     ----------

@@ -33,9 +33,8 @@ def drifting_reckoning(
 ) -> tuple[DeadReckoning, Poses]:
     """Return dead reckoning of one vehicle, and the poses that it believes in.
 
-    The attitude of these poses has its heading error.
-
-    Position is truth plus the integral of a Gauss-Markov velocity error; error = reading - truth.
+    The attitude of these poses has its heading error. Position is truth plus the integral of a Gauss-Markov velocity
+    error; error = reading - truth.
     """
     errors = errors or ReckoningErrors()
     time_s = np.arange(poses.time_s[0], poses.time_s[-1], errors.step_s)

@@ -1,10 +1,8 @@
 """Routes for Monte Carlo: kinematic flights at the epochs of a log.
 
-They do without the fine grid of a whole simulated flight.
-
-A route is a speed, an altitude and a turn rate in time; the heading follows the geodesic (great circle) between turns
-and the position is integrated on the ellipsoid. No wind: heading = track. Turns are coordinated: tan(bank) =
-speed x turn rate / g.
+They do without the fine grid of a whole simulated flight. A route is a speed, an altitude and a turn rate in time; the
+heading follows the geodesic (great circle) between turns and the position is integrated on the ellipsoid. No wind:
+heading = track. Turns are coordinated: tan(bank) = speed x turn rate / g.
 """
 
 from dataclasses import dataclass

@@ -1,9 +1,8 @@
 """Positions of navigation satellites from published mean elements.
 
-They are on Kepler's ellipse with a turning node and perigee.
-
-The elements (orbits/satellites.csv) are real ones of GPS and GLONASS; the file says whose and of what day. A position
-is good to some kilometres within weeks of the epoch, enough for a geometry: simulation and estimator share it.
+They are on Kepler's ellipse with a turning node and perigee. The elements (orbits/satellites.csv) are real ones of GPS
+and GLONASS; the file says whose and of what day. A position is good to some kilometres within weeks of the epoch,
+enough for a geometry: simulation and estimator share it.
 
 Source: Vallado, Fundamentals of Astrodynamics and Applications, 4th ed. 2013, sections 2.2 (Kepler's equation), 3.5
 (sidereal time, equation 3-45) and 9.6 (secular rates due to J2, equations 9-37 to 9-39).

@@ -125,10 +125,9 @@ class Interval:
 class GnssSettings:
     """GNSS receiver.
 
-    Errors are white + first-order Gauss-Markov per axis; vertical ones are ``vertical_factor`` times larger.
-
-    ``repeat`` rows of the log carry each receiver output (a recorder faster than the receiver); ``latency_s`` delays
-    the record behind the time of validity. Low-integrity intervals clear ``integrity_ok`` and add ``jump_mps`` east.
+    Errors are white + first-order Gauss-Markov per axis; vertical ones are ``vertical_factor`` times larger. ``repeat``
+    rows of the log carry each receiver output (a recorder faster than the receiver); ``latency_s`` delays the record
+    behind the time of validity. Low-integrity intervals clear ``integrity_ok`` and add ``jump_mps`` east.
     """
 
     rate_hz: float = number(10.0, 0.01, 100.0)
@@ -174,14 +173,12 @@ class Anomaly:
 class MagnetometerSettings:
     """Three-axis magnetometer; vectors are of body axes.
 
-    See :func:`groundstation.simulation.magnetometer.sensed_nt`.
-
-    The field is the World Magnetic Model's of the date (``decimal_year``, or that of ``start_utc``) and place, or
-    ``world_field_nt`` (north, east, down) everywhere; ``field_error_nt`` (north, east, down) and ``anomaly`` are what
-    the world has more. ``misalignment_deg`` are roll, pitch, heading of the sensor in
-    the aircraft. ``bank_odd_nt`` and ``bank_even_nt`` move with the bank (control rods, fuel), as sin(roll) and its
-    square. ``latency_s`` delays the record behind the time of validity. Noise per axis: white + first-order
-    Gauss-Markov.
+    See :func:`groundstation.simulation.magnetometer.sensed_nt`. The field is the World Magnetic Model's of the date
+    (``decimal_year``, or that of ``start_utc``) and place, or ``world_field_nt`` (north, east, down) everywhere;
+    ``field_error_nt`` (north, east, down) and ``anomaly`` are what the world has more. ``misalignment_deg`` are roll,
+    pitch, heading of the sensor in the aircraft. ``bank_odd_nt`` and ``bank_even_nt`` move with the bank (control rods,
+    fuel), as sin(roll) and its square. ``latency_s`` delays the record behind the time of validity. Noise per axis:
+    white + first-order Gauss-Markov.
     """
 
     rate_hz: float = number(10.0, 0.01, 1000.0)
@@ -214,7 +211,7 @@ class Load(Interval):
 class ElectricSettings:
     """Electric system: ``base_a`` all the time, ``loads`` on top.
 
-    The magnetometer settings have its magnetic field.
+    Its magnetic field is part of the magnetometer.
     """
 
     rate_hz: float = number(5.0, 0.01, 1000.0)
@@ -259,9 +256,8 @@ class DiscreteSettings:
 class OnboardSettings:
     """Estimate of the aircraft itself: the paper's recursion at its cycle rate.
 
-    It uses the last GNSS and INS outputs.
-
-    Cycles reuse GNSS samples when faster than the receiver; the heading rate is the raw difference between INS outputs.
+    It uses the last GNSS and INS outputs. Cycles reuse GNSS samples when faster than the receiver; the heading rate is
+    the raw difference between INS outputs.
     """
 
     cycle_rate_hz: float = number(20.0, 0.1, 100.0)
@@ -305,11 +301,10 @@ class LogSettings:
 class Scenario:
     """Simulated flight.
 
-    Sensors that a scenario does not name are off, except INS, GNSS and weight on wheels.
-
-    ``start_utc`` is the UTC of log second 0; empty means that the log has no absolute time (NOTIME).
-    ``parking_heading_deg`` is the true heading of the nose at the stand; ``expected_verdict`` what an analysis of the
-    taxi should come to. All rates divide ``internal_rate_hz``.
+    Sensors that a scenario does not name are off, except INS, GNSS and weight on wheels. ``start_utc`` is the UTC of
+    log second 0; empty means that the log has no absolute time (NOTIME). ``parking_heading_deg`` is the true heading of
+    the nose at the stand; ``expected_verdict`` what an analysis of the taxi should come to. All rates divide
+    ``internal_rate_hz``.
     """
 
     name: str

@@ -1,10 +1,9 @@
 """Errors of INS, barometric altimeter and clocks of the aircraft of a session.
 
-They are drawn without integration error.
-
-Local frame: position is the integral of a Gauss-Markov velocity error, a clock's offset that of a Gauss-Markov
-frequency offset; both pairs are stepped with the exact transition and covariance. Global frame: the full linear error
-propagation of :mod:`groundstation.simulation.ins_errors` on a platform slaved to north.
+They are drawn without integration error. Local frame: position is the integral of a Gauss-Markov velocity error, a
+clock's offset that of a Gauss-Markov frequency offset; both pairs are stepped with the exact transition and covariance.
+Global frame: the full linear error propagation of :mod:`groundstation.simulation.ins_errors` on a platform slaved to
+north.
 
 Source: Van Loan, Computing integrals involving the matrix exponential, 1978 (the covariance of a step, here in closed
 form); Gelb, Applied Optimal Estimation, 1974, section 3.8.

@@ -32,10 +32,9 @@ class Flown:
 def draw_ranges(scenario: SessionScenario, flown: Sequence[Flown], rng: np.random.Generator, scale: float) -> Ranges:
     """Draw pseudo-ranges over the link.
 
-    Each aircraft transmits in its slot, and all that hear it measure.
-
-    Points transmit in the first slots of a frame, then aircraft in their order. Pseudo-range = distance + clock of the
-    receiver - clock of the transmitter + bias of the receiver + noise; points keep the session's time.
+    Each aircraft transmits in its slot, and all that hear it measure. Points transmit in the first slots of a frame,
+    then aircraft in their order. Pseudo-range = distance + clock of the receiver - clock of the transmitter + bias of
+    the receiver + noise; points keep the session's time.
     """
     link = scenario.link
     per_frame = round(link.frame_s / link.slot_s)

@@ -88,9 +88,8 @@ def origin_of(scenario: SessionScenario) -> LocalFrame | None:
 def session_flights(simulated: SimulatedSession, scenario: SessionScenario, name: str) -> list[Flight]:
     """Return the session as the flights that its aircraft recorded.
 
-    Times count since ``start_utc`` of the scenario.
-
-    A range is recorded when it arrives: time of transmission and the pseudo-range over the speed of light.
+    Times count since ``start_utc`` of the scenario. A range is recorded when it arrives: time of transmission and the
+    pseudo-range over the speed of light.
     """
     start_ns, _ = iso_to_utc_ns(scenario.satellite.start_utc)
     origin = origin_of(scenario)

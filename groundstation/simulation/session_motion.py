@@ -107,9 +107,8 @@ def _over_the_ellipsoid(
 def place_m(scenario: SessionScenario, one: SessionAircraft | SessionPoint) -> FloatArray:
     """Return the start of an aircraft, or the place of a point, shape (3,).
 
-    It is in the frame of the session.
-
-    In the global frame north and east are counted along the ellipsoid from the origin.
+    It is in the frame of the session. In the global frame north and east are counted along the ellipsoid from the
+    origin.
     """
     if scenario.frame == "local":
         return np.array([one.north_m, one.east_m, -one.height_m])

@@ -41,11 +41,9 @@ START_OF_DAY_NS = 1_777_874_400 * NS_PER_S  # 2026-05-04T06:00:00Z
 class TaxiCase:
     """Parameters of one simulated taxi run.
 
-    docs/heading-family.md tells what each is and how it is drawn.
-
-    Times in seconds, angles in degrees, speeds in m/s, ``drift_deg_per_h`` in degrees an hour. ``segments_s`` are the
-    lengths above 6 m/s, ``turns_deg`` (one fewer) the turns between them, ``curve_dps`` the rate of a gentle 10-s curve
-    in the longest segment (0: none).
+    docs/heading-family.md tells what each is and how it is drawn. Times are in seconds, angles in degrees, speeds in
+    m/s, ``drift_deg_per_h`` in degrees an hour. ``segments_s`` are the lengths above 6 m/s, ``turns_deg`` (one fewer)
+    the turns between them, ``curve_dps`` the rate of a gentle 10-s curve in the longest segment (0: none).
     """
 
     heading_error_deg: float = 0.8
@@ -328,9 +326,8 @@ def table_of(topic: str, time_ns: NDArray[np.int64], columns: Mapping[str, NDArr
 def taxi_flight(run: TaxiRun, *, rng: np.random.Generator | None = None) -> Flight:
     """Make the tables of a simulated run, as a reader would give them.
 
-    Topics are ins, gnss, discrete and truth.
-
-    Positions are the sums of the velocities: good enough to tell one epoch from the next. GDOP is 1.5, or drawn.
+    Topics are ins, gnss, discrete and truth. Positions are the sums of the velocities: good enough to tell one epoch
+    from the next. GDOP is 1.5, or drawn.
     """
     gdop = 1.5 if rng is None else rng.uniform(1.2, 1.8)
     ins_ns = START_OF_DAY_NS + np.round(run.ins_time_s * NS_PER_S).astype(np.int64)

@@ -1,8 +1,7 @@
 """Disturbances of airframe, INS and GNSS on taxi, drawn one kind at a time.
 
-The first family of taxi runs leaves them out.
-
-docs/heading-family.md tells the second family in words; :data:`KINDS` are its cells.
+The first family of taxi runs leaves them out. docs/heading-family.md tells the second family in words; :data:`KINDS`
+are its cells.
 """
 
 from dataclasses import dataclass, replace

@@ -1,11 +1,10 @@
 """True motion of the aircraft on a fixed fine grid: position, velocity and attitude.
 
-They are each other's derivatives.
-
-The reference point is the middle of the main-gear axle at ground level. On the ground its velocity is along the true
-track; the nose is at track + sideslip + sway, and steering turns track and nose together. In the air the nose points
-along the air velocity, the wind makes the drift angle, turns are coordinated. Lift-off and touchdown swing the nose
-smoothly between the two in :data:`TRANSITION_S`. Every rate is the exact derivative of its angle.
+They are each other's derivatives. The reference point is the middle of the main-gear axle at ground level. On the
+ground its velocity is along the true track; the nose is at track + sideslip + sway, and steering turns track and nose
+together. In the air the nose points along the air velocity, the wind makes the drift angle, turns are coordinated.
+Lift-off and touchdown swing the nose smoothly between the two in :data:`TRANSITION_S`. Every rate is the exact
+derivative of its angle.
 
 Not modelled: rotation of the north-east-down frame below the aircraft (0.00005 m/s on a 5 m arm), bouncing, flare.
 """
@@ -72,9 +71,8 @@ class Trajectory:
     def moved_to(self, arm_body_m: tuple[float, float, float]) -> "Trajectory":
         """Return position and velocity of another point fixed in the body.
 
-        It lies ``arm_body_m`` (forward, right, down) from the reference.
-
-        Position is moved by R r, velocity by R (w x r): exact derivatives of one another.
+        It lies ``arm_body_m`` (forward, right, down) from the reference. Position is moved by R r, velocity by R (w x
+        r): exact derivatives of one another.
         """
         if not any(arm_body_m):
             return self

@@ -204,7 +204,7 @@ def _stops(motion: Motion, settings: GroundSettings) -> list[_Stop]:
 def _scatter_about_line(values: FloatArray, half: int) -> FloatArray:
     """Return the standard deviation about the straight line through each centred window.
 
-    Infinite where data lack.
+    It is infinite where data lack.
     """
     known = np.isfinite(values)
     complete = window_sum(known.astype(np.float64), half) == 2 * half + 1
@@ -263,7 +263,7 @@ def _without_hovers(motion: Motion, stops: list[_Stop], settings: GroundSettings
 def _height_above_ground_m(motion: Motion, stops: list[_Stop], settings: GroundSettings) -> FloatArray:
     """Return the height above the highest that ground can be, shape (n,).
 
-    In every source, by the standstill before or after.
+    Every source is compared with the standstill before or after.
     """
     starts = np.array([stop.start for stop in stops])
     row = np.arange(len(motion))
@@ -294,7 +294,7 @@ def lasting(mask: BoolArray, least_s: float) -> BoolArray:
 def _rolls(motion: Motion, limit_mps: float, settings: GroundSettings) -> BoolArray:
     """Tell where the motion could be that of something rolling.
 
-    Slow enough, level, and not swaying on the spot.
+    It is slow enough, level, and does not sway on the spot.
     """
     change, travelled = _altitude_change_m(motion, round(0.5 * settings.climb_window_s * RATE_HZ))
     is_level = change <= settings.climb_m + settings.slope * travelled
@@ -309,7 +309,7 @@ def _extend(
 ) -> None:
     """Mark the rows around a standstill that continue it on the ground.
 
-    Only within its run of allowed rows.
+    They stay within its run of allowed rows.
     """
     row = np.arange(rows.start, rows.stop)
     height = largest_over_sources(np.abs(running_mean(motion.all_altitudes_m[:, rows], 1.0) - stop.altitude_m[:, None]))

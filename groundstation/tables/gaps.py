@@ -32,9 +32,8 @@ class Gap:
 def largest_step_s(time_ns: Int64Array, steps: float = STEPS_OF_A_GAP, at_least_s: float = 0.0) -> float:
     """Return the longest step that is not a gap.
 
-    A gap is a step longer than ``steps`` median steps, and than ``at_least_s``.
-
-    Repeated times do not count as steps. Fewer than two different times have no step: infinity.
+    A gap is a step longer than ``steps`` median steps, and than ``at_least_s``. Repeated times do not count as steps.
+    Fewer than two different times have no step: infinity.
 
     Examples
     --------

@@ -62,7 +62,7 @@ class Motion:
     def distance_m(self, origin: NDArray[np.intp], at: slice | NDArray[np.intp]) -> FloatArray:
         """Return the distance between rows of the grid.
 
-        Straight where positions are known, else along the path.
+        It is straight where positions are known, else along the path.
         """
         straight = np.hypot(self.north_m[at] - self.north_m[origin], self.east_m[at] - self.east_m[origin])
         along = np.abs(self.path_m[at] - self.path_m[origin])
@@ -72,7 +72,7 @@ class Motion:
 def grid_size(flight: Flight) -> int:
     """Return the number of grid times from the start of the flight to its end.
 
-    0 where there are none, or for a span of many days.
+    It is 0 where there are none, or for a span of many days.
     """
     size = int(flight.duration_s * RATE_HZ) + 1
     return size if any(len(table) for table in flight.tables.values()) and size <= LONGEST_GRID else 0
@@ -81,7 +81,7 @@ def grid_size(flight: Flight) -> int:
 def motion_of(flight: Flight) -> Motion:
     """Resample the flight's motion to the grid.
 
-    Means of the samples around each grid time, straight lines in between.
+    It takes means of the samples around each grid time, and straight lines in between.
     """
     size = grid_size(flight)
     ins, gnss = first_of_kind(flight, "ins"), first_of_kind(flight, "gnss")
@@ -111,7 +111,7 @@ def motion_of(flight: Flight) -> Motion:
 def first_of_kind(flight: Flight, kind: str) -> Table:
     """Return the first instance of a topic, in order of preference, that has samples.
 
-    An empty table when there is none.
+    The table is empty when there is none.
     """
     topics = [topic for topic in sources_of_kind(flight, kind) if len(flight[topic])]
     return flight[topics[0]] if topics else Table.empty(kind)
@@ -219,7 +219,7 @@ def _is_frozen(altitude_m: FloatArray, speed_mps: FloatArray) -> BoolArray:
 def _on_grid(flight: Flight, table: Table, values: FloatArray, size: int) -> FloatArray:
     """Average the samples nearest to each grid time.
 
-    Straight lines over gaps of at most LARGEST_GAP_S.
+    Gaps of at most LARGEST_GAP_S are filled by straight lines.
     """
     known = np.isfinite(values)
     out = np.full(size, np.nan)

@@ -75,7 +75,7 @@ class Interval:
 class Phases:
     """Phases of a flight, and the method that found them.
 
-    Intervals without overlap from its first to its last sample.
+    The intervals do not overlap and reach from its first to its last sample.
     """
 
     intervals: tuple[Interval, ...]
@@ -157,9 +157,7 @@ def flight_phases(flight: Flight, *, settings: GroundSettings | None = None) -> 
 def _evidence_of(flight: Flight, settings: GroundSettings | None) -> Iterator["_Evidence"]:
     """Yield the evidence in a flight, kept as long as the flight is.
 
-    Analyses ask for the ground one after the other.
-
-    The motion, which is large, is not.
+    Analyses ask for the ground one after the other. The motion, which is large, is not kept.
     """
     key = id(flight), settings or GroundSettings()
     kept = _KEPT.get(key)
@@ -175,7 +173,7 @@ def _evidence_of(flight: Flight, settings: GroundSettings | None) -> Iterator["_
 class _Evidence:
     """Evidence for ground and for flight, computed once.
 
-    The flag if it can be believed, else the detector.
+    It is the flag if it can be believed, else the detector.
     """
 
     def __init__(self, flight: Flight, settings: GroundSettings) -> None:
@@ -315,9 +313,8 @@ def _up_to_the_ground(denied: BoolArray, ground: BoolArray) -> BoolArray:
 def _between_lift_off_and_touch_down(motion: Motion, ground: BoolArray, detection: Detection) -> BoolArray:
     """Widen sure flight to where its altitude leaves and meets that of the ground.
 
-    The ground is the one proven before and after.
-
-    A little above it, and slower than it ever was in sure flight, it does not fly yet: it is carried to its launch.
+    The ground is the one proven before and after. A little above it, and slower than it ever was in sure flight, it
+    does not fly yet: it is carried to its launch.
     """
     sure, slow = detection.airborne, lasting(motion.speed_mps < detection.speed_limit_mps, CARRIED_S)
     airborne = np.zeros(len(ground), dtype=bool)
@@ -343,7 +340,7 @@ def _between_lift_off_and_touch_down(motion: Motion, ground: BoolArray, detectio
 def _low_rows(altitude_m: FloatArray, ground_m: FloatArray, slow: BoolArray) -> NDArray[np.intp]:
     """Return rows no more than LIFTED_M above the mean altitude of the ground.
 
-    CARRIED_M where they are slow.
+    Slow rows may be CARRIED_M above it.
     """
     height_m = largest_over_sources(altitude_m - known_mean(ground_m)[:, None])
     return np.flatnonzero(height_m <= np.where(slow, CARRIED_M, LIFTED_M))

@@ -88,7 +88,7 @@ def values_at(table: Table, name: str, at_ns: Int64Array, *, largest_gap_s: floa
 def _wrap_of(table: Table, name: str) -> Wrap | None:
     """Return the function that wraps the angles of a field; None for plain numbers.
 
-    Only for a field that goes all the way round.
+    Only the angles of a field that goes all the way round are wrapped.
     """
     field = field_of(table.topic, name)
     if field is None or field.unit != "deg":

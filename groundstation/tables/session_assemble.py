@@ -37,10 +37,8 @@ Truth = Mapping[str, tuple[FloatArray, FloatArray]]
 class ClockRow:
     """Offset of the clock of one log: log time less that of the group.
 
-    It comes from the times of transmission.
-
-    ``offset_s`` is that of its longest stretch between leaps, None without ranges; ``is_corrected`` says whether it
-    was taken off.
+    It comes from the times of transmission. ``offset_s`` is that of its longest stretch between leaps, None without
+    ranges; ``is_corrected`` says whether it was taken off.
     """
 
     aircraft: str
@@ -186,7 +184,7 @@ def _with_tracks(members: _Members, placed: Mapping[str, PlacedLog], step_s: flo
 def _together(members: _Members, spans: Mapping[str, tuple[int, int]]) -> None:
     """Keep the largest set of logs that overlap, one with another.
 
-    Of equally large sets the first.
+    Of equally large sets the first one is kept.
     """
     left = sorted(members.flights, key=lambda name: spans[name])
     groups: list[list[str]] = []

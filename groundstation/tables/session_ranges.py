@@ -22,7 +22,7 @@ LEAST_RESIDUALS = 5  # fewer ranges say nothing of a station's place
 class _Link:
     """One direction of one link.
 
-    Time of transmission in session nanoseconds, pseudo-range, slot.
+    It has times of transmission in session nanoseconds, pseudo-ranges and slots.
     """
 
     receiver: str

@@ -164,7 +164,7 @@ def _first_ns(robot: _Robot) -> int:
 def _pose(robot: _Robot, zero_ns: int) -> tuple[FloatArray, FloatArray]:
     """Return time in seconds, and north, east and unwrapped heading in radians.
 
-    Only rows where all are numbers.
+    Rows are left out where one of them is no number.
     """
     assert robot.truth is not None
     good = robot.truth.valid(*POSE)

@@ -1,6 +1,6 @@
 """Choice among sources of a kind when several logs of one flight have one.
 
-An order, and why the first is first.
+There is an order, and a reason why the first is first.
 """
 
 from dataclasses import dataclass
@@ -63,9 +63,8 @@ def sources_of_kind(flight: Flight, kind: str) -> tuple[str, ...]:
 def why_without_gnss(flight: Flight, what: str) -> str:
     """Explain why GNSS has no velocity or no position.
 
-    ``no GNSS velocity in the log``, or that it never had a fix.
-
-    A receiver that logs its satellites or its kind of fix and never a place or a velocity had none.
+    The reason is ``no GNSS velocity in the log``, or that it never had a fix. A receiver that logs its satellites or
+    its kind of fix and never a place or a velocity had none.
     """
     tables = [flight[topic] for topic in topics_of_kind("gnss", flight.topics()) if len(flight[topic])]
     told = [table for table in tables if table.has("satellites_used") or table.has("fix")]

@@ -90,10 +90,9 @@ class Table:
     def values(self, name: str) -> FloatArray:
         """Return a field as float64, shape (n,), NaN where it is absent.
 
-        It is absent also where the device wrote NaN, and if the log lacks the field.
-
-        NaN also where a measured quantity is further outside its physical range than that range is wide (1e308 m/s,
-        infinity): nothing is computed with it. Quality figures (dilutions, sigmas) are given as they are.
+        It is absent also where the device wrote NaN, and if the log lacks the field. It is NaN also where a measured
+        quantity is further outside its physical range than that range is wide (1e308 m/s, infinity): nothing is
+        computed with it. Quality figures (dilutions, sigmas) are given as they are.
 
         Raises
         ------
@@ -151,9 +150,8 @@ class Table:
     def unique_times(self) -> Self:
         """Return the table without repeated times.
 
-        Of several samples of one time, the first present value of each field stays.
-
-        Two messages of a log may give parts of one topic at the same time.
+        Of several samples of one time, the first present value of each field stays. Two messages of a log may give
+        parts of one topic at the same time.
         """
         keep = np.ones(len(self), dtype=bool)
         keep[1:] = np.diff(self.time_ns) > 0

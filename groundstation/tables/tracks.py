@@ -1,6 +1,6 @@
 """Tracks that an estimator made of a flight.
 
-A role: others judge or use the tracks without knowing the estimator.
+They are a role: others judge or use them without knowing the estimator.
 """
 
 from collections.abc import Iterator, Mapping

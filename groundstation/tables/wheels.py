@@ -58,11 +58,9 @@ def contact_of(flight: Flight) -> Contact | None:
 def held(contact: Contact, time_ns: Int64Array) -> tuple[BoolArray, BoolArray]:
     """Tell where the flag proves contact and where it denies it.
 
-    Two arrays of the shape of ``time_ns``.
-
-    Contact needs a sample on either side that says so, each within the hold (one side only past the ends of the flag):
-    between the last sample on the ground and the first in the air the lift-off may have been anywhere. Denial is the
-    newest sample within the hold.
+    Both masks have the shape of ``time_ns``. Contact needs a sample on either side that says so, each within the hold
+    (one side only past the ends of the flag): between the last sample on the ground and the first in the air the
+    lift-off may have been anywhere. Denial is the newest sample within the hold.
     """
     count = len(contact.time_ns)
     after = np.searchsorted(contact.time_ns, time_ns, side="left")

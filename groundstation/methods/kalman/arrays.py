@@ -1,6 +1,6 @@
 """Named arrays that the compiled loops of the filter take.
 
-Letters as in ``kernels``; no numba here.
+The letters are those of ``kernels``. Nothing here needs numba.
 """
 
 from typing import NamedTuple
@@ -72,13 +72,12 @@ class Schedule(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """Rules by which a measurement is rejected, and by which the filter is opened again.
+    """Rules by which a measurement is rejected and the filter is opened again.
 
-    It is opened when it is the filter that is wrong.
-
-    ``gate``: largest y^2 over (h p h' + believed variance). ``patience`` (kinds,): so many rejections in a row of one
-    kind; then ``opened`` (kinds, n) is added to the variances, and where ``is_by_innovation`` the square of the
-    innovations to those of the states measured.
+    The filter is opened when it is the filter that is wrong, and not the measurements. ``gate``: largest y^2 over (h p
+    h' + believed variance). ``patience`` (kinds,): so many rejections in a row of one kind; then ``opened`` (kinds, n)
+    is added to the variances, and where ``is_by_innovation`` the square of the innovations to those of the states
+    measured.
     """
 
     gate: float
@@ -90,7 +89,8 @@ class Rules(NamedTuple):
 class Drive(NamedTuple):
     """Known motion of one state besides F.
 
-    A share ``mix`` (n, c, c) of itself in the other right-hand sides, and ``push`` (n, c). Both empty: nothing.
+    A share ``mix`` (n, c, c) of the state moves it in the other right-hand sides, and ``push`` (n, c) moves it. Where
+    both are empty there is no such motion.
     """
 
     state: int

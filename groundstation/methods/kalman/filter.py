@@ -1,9 +1,7 @@
 """Kalman filter and smoother of any linear system with scalar measurements.
 
-It costs as much as the matrices have entries.
-
-The frozen types hold arrays; the loops over them are compiled (``runs``, ``smoother_runs``). A compiled loop of another
-folder may call their parts (``kernels``) itself.
+It costs as much as the matrices have entries. The frozen types hold arrays; the loops over them are compiled (``runs``,
+``smoother_runs``). A compiled loop of another folder may call their parts (``kernels``) itself.
 """
 
 from dataclasses import dataclass, field
@@ -143,7 +141,7 @@ class Gate:
 class Start:
     """State before the first epoch: ``x`` (n,) or (n, c), ``P`` (n, n).
 
-    And rejections in a row of an earlier run.
+    It also has the rejections in a row of an earlier run.
     """
 
     x: FloatArray
@@ -229,7 +227,7 @@ class FilterRun:
     def nis(self) -> FloatArray:
         """Squared innovation over its variance of every measurement used, shape (used, c).
 
-        Chi-square of 1 each.
+        Each has a chi-square distribution with one degree of freedom.
         """
         used = self.mark == USED
         return np.asarray(self.record.y[used] ** 2 / self.record.S[used, None])

@@ -1,6 +1,6 @@
 """Compiled parts of the Kalman filter: predict, innovate, update.
 
-Functions on arrays that other compiled loops call.
+They are functions on arrays that other compiled loops call.
 
 Letters, the same in all of this folder:
 
@@ -38,7 +38,7 @@ def predict_covariance(
 ) -> None:
     """Predict the covariance: p <- F p F'.
 
-    Sparse, it costs 1.5 n products for each entry of F. One half is computed and mirrored.
+    A sparse F costs 1.5 n products for each entry. One half is computed and mirrored.
     """
     n = len(states)
     if F.ndim == 3:

@@ -1,6 +1,6 @@
 """Systems given by a sparse matrix of rates, x' = A x + white noise.
 
-Their transitions, and states carried forward.
+Here are their transitions, and states carried forward by them.
 """
 
 from dataclasses import dataclass
@@ -74,7 +74,7 @@ class Rates:
     def carried(self, values: FloatArray, step_s: float, every: int, start: FloatArray) -> FloatArray:
         """Carry a state forward in equal steps.
 
-        Returned as it is after every ``every`` of them, shape (steps // every, n).
+        The result is the state after every ``every`` of them, shape (steps // every, n).
 
         Parameters
         ----------

@@ -1,6 +1,6 @@
 """Compiled loop of the filter over epochs: gates, rejections, reopening, records.
 
-Letters: ``kernels``.
+The letters are those of ``kernels``.
 """
 
 import numpy as np

@@ -1,8 +1,7 @@
 """Compiled exponentials of a sparse matrix of rates, x' = A x.
 
-As transitions of the filter, and applied to a state.
-
-Both to the fourth order of the step: the caller keeps |A| x seconds small ((|A| t)^5 / 120 of the state is left out).
+One function gives them as transitions of the filter, another applies them to a state. Both are good to the fourth order
+of the step: the caller keeps |A| x seconds small ((|A| t)^5 / 120 of the state is left out).
 
 Source: C. Moler, C. Van Loan, Nineteen dubious ways to compute the exponential of a matrix, SIAM Review 45, 2003,
 method 1: good for small steps and nothing else.

@@ -1,6 +1,6 @@
-"""Smoothers over a filter's run: fixed interval and fixed lag.
+"""Smoothers over a filter's run: fixed interval, fixed lag, covariances of a lag.
 
-And the covariance between two epochs of a lag.
+The covariances are those between the two epochs of a lag.
 """
 
 from dataclasses import dataclass, fields
@@ -16,7 +16,7 @@ from groundstation.methods.kalman.filter import FilterRun
 class Smoothed:
     """Smoothed states (n, states, c) and their variances (n, states).
 
-    NaN outside the interval asked for.
+    They are NaN outside the interval asked for.
     """
 
     x: FloatArray
@@ -48,7 +48,7 @@ def smooth(run: FilterRun, begin: int = 0, end: int | None = None) -> Smoothed:
 def smooth_lags(run: FilterRun, begin: Int64Array, end: Int64Array) -> FloatArray:
     """Smooth epoch ``begin[i]`` with the data up to ``end[i]``, for each i.
 
-    States alone, shape (s, states, c).
+    The result is the states alone, shape (s, states, c).
     """
     from groundstation.methods.kalman import smoother_runs
 
@@ -60,7 +60,7 @@ def smooth_lags(run: FilterRun, begin: Int64Array, end: Int64Array) -> FloatArra
 def lag_covariances(run: FilterRun, begin: Int64Array, end: Int64Array) -> tuple[FloatArray, FloatArray]:
     """Return the covariance of epoch ``begin[i]`` given the data up to ``end[i]``, for each i.
 
-    And how errors travel from one to the other.
+    The second result tells how errors travel from one epoch to the other.
 
     Returns
     -------

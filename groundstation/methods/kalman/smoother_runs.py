@@ -1,6 +1,6 @@
 """Compiled loops of the smoothers, backwards over the filter's record.
 
-Letters as in ``kernels``, and
+The letters are those of ``kernels``, and
 
 ===  =====================================================================================
 a    lambda of the book, shape (c, n): what the later data say about the state, in units 1/x
@@ -235,7 +235,7 @@ def run_fixed_lag(
 ) -> None:
     """Smooth epoch ``begin[i]`` with the data up to ``end[i]``, for each i.
 
-    States alone, ``past`` (s, states, c).
+    ``past`` (s, states, c) is filled with the states alone.
     """
     n, channels = len(states), record.x.shape[2]
     pattern, F = dynamics.pattern, dynamics.F
@@ -276,7 +276,7 @@ def run_lag_covariance(
 ) -> None:
     """Fill the covariance of epoch ``begin[i]`` given the data up to ``end[i]``, for each i.
 
-    And how errors travel from one to the other.
+    ``closed`` tells how errors travel from one epoch to the other.
 
     Parameters
     ----------

@@ -90,7 +90,7 @@ class Transition:
     def blocks(cls, F: FloatArray, Q: FloatArray, count: int) -> Self:
         """Make a transition of ``count`` equal systems side by side without ties.
 
-        Blocks F and Q of each step, shape (s, b, b).
+        F and Q are the blocks of each step, shape (s, b, b).
         """
         size, (_, _, each) = F.shape[1] * count, F.shape
         place = [np.nonzero(np.any(part != 0.0, axis=0)) for part in (F, np.triu(Q))]
@@ -106,7 +106,7 @@ class Transition:
     def dense(cls, F: FloatArray, Q: FloatArray) -> Self:
         """Make a transition of full matrices, shape (s, n, n), for a handful of states.
 
-        One pair of each step; all loops are unrolled.
+        F and Q are those of each step. All loops are unrolled.
         """
         nothing = np.zeros(0, dtype=np.int64)
         pattern = Pattern(nothing, np.zeros(1, dtype=np.int64), nothing)

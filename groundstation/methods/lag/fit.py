@@ -169,7 +169,7 @@ def _search(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the delays tried, and the RMS residual at each with the nuisances fitted.
 
-    On some of the windows.
+    Some of the windows are enough for it.
     """
     search_s = np.arange(-settings.search_s, settings.search_s + 1e-9, settings.search_step_s)
     windows = windows.some(WINDOWS_FOR_SEARCH)
@@ -197,7 +197,7 @@ def _iterated(
 ) -> tuple[At, _Step, bool]:
     """Iterate Gauss-Newton from a delay and nuisances until the delay stands.
 
-    With a noise model, weighted after each step.
+    With a noise model the windows are weighted after each step.
     """
     delay, theta = at
     for number in range(MOST_STEPS):
@@ -236,9 +236,8 @@ def _step(reference: Series, windows: Windows, whitened: Whitened, prior: FloatA
 def _variance(step: _Step, prior: FloatArray, number: int) -> tuple[float, float, float]:
     """Return the variance of the delay (0) or a nuisance, and its degrees of freedom.
 
-    From the windows' scores (Satterthwaite).
-
-    The third is the variance that the noise model alone would give.
+    The latter come from the windows' scores (Satterthwaite). The third is the variance that the noise model alone would
+    give.
     """
     inverse = np.linalg.inv(step.normal)
     basis, factor = np.linalg.qr(step.rows)

@@ -1,4 +1,4 @@
-"""Windows of samples where the reference moves, freed of slow errors and whitened.
+"""Windows of samples where the reference moves, without slow errors, whitened.
 
 A noise model whitens them.
 """
@@ -23,10 +23,9 @@ WINDOWS_FOR_NOISE = 8
 class Series:
     """Signals of a reference: times (m,) increasing, values (m, b).
 
-    With a function that makes c components of them.
-
-    ``build`` turns values (..., b) into (..., c, 1 + q), linearly: of the last axis the first is the signal, the others
-    are what a unit of each nuisance adds to it. A step longer than ``gap_max_s`` is not interpolated over.
+    A function makes c components of them. ``build`` turns values (..., b) into (..., c, 1 + q), linearly: of the last
+    axis the first is the signal, the others are what a unit of each nuisance adds to it. A step longer than
+    ``gap_max_s`` is not interpolated over.
     """
 
     time_s: FloatArray
@@ -41,7 +40,7 @@ class Series:
     def covers(self, time_s: FloatArray, reach_s: float) -> BoolArray:
         """Tell where there is no gap from ``reach_s`` before to ``reach_s`` after.
 
-        Shape as ``time_s``.
+        The mask has the shape of ``time_s``.
         """
         start = self.time_s[:-1][np.diff(self.time_s) > self.gap_max_s]
         end = self.time_s[1:][np.diff(self.time_s) > self.gap_max_s]
@@ -52,10 +51,8 @@ class Series:
     def smoothed(self, nodes: int) -> "Series":
         """Return running means over an odd number of samples.
 
-        The ends, and what is near gaps, are not to be used.
-
-        Without it the noise of single samples shows: interpolation is quieter between samples than at them, and pulls
-        the delay there.
+        Their ends and the samples near gaps are not to be used. Without smoothing the noise of single samples shows:
+        interpolation is quieter between samples than at them, and pulls the delay there.
         """
         if nodes < 2 or len(self.time_s) <= nodes:
             return self
@@ -68,7 +65,7 @@ class Series:
     def at(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the built signals and their rates at times (...).
 
-        Cubic between samples (Catmull-Rom).
+        They are cubic between samples (Catmull-Rom).
         """
         after = np.clip(np.searchsorted(self.time_s, time_s), 1, len(self.time_s) - 1)
         step = (self.time_s[after] - self.time_s[after - 1])[..., None]
@@ -101,9 +98,8 @@ class Noise:
 class Windows:
     """Samples of the other sensor in w windows of at most n.
 
-    Times (w, n), values (w, n, c), weights (w, n).
-
-    Weight 0 fills windows up; one below 1 is that of an outlier.
+    Their shapes are (w, n) for times and weights, (w, n, c) for values. Weight 0 fills windows up; one below 1 is that
+    of an outlier.
     """
 
     time_s: FloatArray
@@ -182,10 +178,8 @@ def too_few_windows(settings: LatencySettings) -> str:
 def cut_windows(reference: Series, time_s: FloatArray, values: FloatArray, settings: LatencySettings) -> Windows | None:
     """Cut windows of the other sensor where the reference moves most; None if there are none.
 
-    Samples have times (n,) and values (n, c).
-
-    A sample counts where the reference is known ``search_s`` before and after it, and does not lie farther from the
-    reference than that ranges over the flight (a wild value).
+    Samples have times (n,) and values (n, c). A sample counts where the reference is known ``search_s`` before and
+    after it, and does not lie farther from the reference than that ranges over the flight (a wild value).
     """
     known = reference.covers(time_s, settings.search_s) & np.isfinite(values).all(axis=1)
     time_s, values = time_s[known], values[known]
@@ -228,9 +222,8 @@ def spread_of(left: FloatArray) -> float:
 def noise_of(windows: Windows, left: FloatArray, degree: int) -> Noise:
     """Estimate the most likely noise of the residuals (w, n, c), from some of the windows.
 
-    Polynomials of unknown size are in them.
-
-    Restricted likelihood on a grid: share of correlated noise, its time, and the share again.
+    The residuals also hold polynomials of unknown size. The method is restricted likelihood on a grid: share of
+    correlated noise, its time, and the share again.
     """
     windows, left = windows.some(WINDOWS_FOR_NOISE), left[_even(len(left), WINDOWS_FOR_NOISE)]
     powers = windows.polynomials(degree)

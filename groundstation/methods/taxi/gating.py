@@ -57,7 +57,7 @@ def gate_samples(
 def _not_taxi(samples: Samples, phases: Phases) -> Iterator[tuple[str, BoolArray]]:
     """Yield the epochs of take-off runs and landing rolls.
 
-    With the slow ones beside them in which the speed still changes.
+    The slow epochs beside them in which the speed still changes belong to them.
     """
     phase, speed = phases.at(samples.time_s), samples.speed_mps
     earlier_mps = np.interp(samples.time_s - 0.5, samples.time_s, speed)
@@ -99,9 +99,8 @@ def is_straight_and_fast(samples: Samples, settings: TaxiLimits) -> BoolArray:
 def _outliers(samples: Samples, settings: TaxiLimits) -> BoolArray:
     """Find differences far from the running median of 5 s.
 
-    In robust sigmas of the straight and fast samples.
-
-    Six robust sigmas and at least a floor: no sample of a normal process is ever touched, so coverage is not.
+    The distance is counted in robust sigmas of the straight and fast samples. Six robust sigmas and at least a floor:
+    no sample of a normal process is ever touched, so coverage is not.
     """
     candidate = is_straight_and_fast(samples, settings) & np.isfinite(samples.heading_deg)
     out = np.zeros(len(samples), dtype=bool)

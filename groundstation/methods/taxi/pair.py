@@ -9,7 +9,7 @@ from groundstation.tables.table import Flight
 def choose_pair(flight: Flight, ins_topic: str = "", gnss_topic: str = "") -> tuple[str, str]:
     """Return the INS and GNSS topics to use.
 
-    The ones asked for, else the first that have what is needed.
+    They are the ones asked for, else the first that have what is needed.
 
     Raises
     ------
@@ -41,6 +41,6 @@ def choose_pair(flight: Flight, ins_topic: str = "", gnss_topic: str = "") -> tu
 def _is_track(flight: Flight, topic: str) -> bool:
     """Tell whether the topic's heading is a receiver's own track.
 
-    That is no measurement of where the nose points.
+    A track does not measure where the nose points.
     """
     return f"{HEADING_IS_TRACK}.{topic}.true_heading_deg" in flight.metadata

@@ -1,6 +1,6 @@
 """Pairs of INS heading and GNSS velocity at the GNSS times of validity.
 
-With the reason why each is used or not.
+Each has the reason why it is used or not.
 """
 
 from collections.abc import Callable
@@ -34,7 +34,7 @@ VELOCITY_SIGMA = "velocity sigma"
 class GroundContact(Protocol):
     """Ground contact at given times, and the method that proves it.
 
-    An empty method, or ``none...``: nothing proves it.
+    Where the method is empty or ``none...`` nothing proves it.
     """
 
     @property
@@ -46,9 +46,8 @@ class GroundContact(Protocol):
 class TrueHeading(Protocol):
     """True heading of every row of an INS topic, degrees, NaN where unknown.
 
-    And what it was made from.
-
-    ``declination_sigma_deg`` is that of an error common to all rows; None for a heading logged as true.
+    The description says what it was made from. ``declination_sigma_deg`` is that of an error common to all rows; None
+    for a heading logged as true.
     """
 
     @property
@@ -169,10 +168,8 @@ def logged_ground(flight: Flight, time_ns: Int64Array) -> Proof:
 def window_slope(at: FloatArray, time_s: FloatArray, values: FloatArray, window_s: float) -> FloatArray:
     """Return the least-squares slope of ``values`` over a window centred at each time.
 
-    Per second, shape as ``at``.
-
-    A window with fewer than three samples is widened to the three nearest (raw data: ``window_s`` = 0). NaN where there
-    are fewer than two samples.
+    It is per second and has the shape of ``at``. A window with fewer than three samples is widened to the three nearest
+    (raw data: ``window_s`` = 0). NaN where there are fewer than two samples.
     """
     if len(time_s) < 2:
         return np.full(len(at), np.nan)
@@ -195,10 +192,8 @@ def pair_samples(
 ) -> Samples:
     """Pair each distinct GNSS epoch before lift-off with the INS heading at its time.
 
-    The heading is interpolated.
-
-    GNSS times are put back by ``gnss_latency_s``, by which GNSS is later than the INS. ``with_later_runs`` adds
-    the epochs after lift-off at which ground contact is proven: landing roll and taxi in.
+    The heading is interpolated. GNSS times are put back by ``gnss_latency_s``, by which GNSS is later than the INS.
+    ``with_later_runs`` adds the epochs after lift-off at which ground contact is proven: landing roll and taxi in.
 
     The heading is interpolated along the shorter arc between INS samples no farther apart than
     ``heading_gap_max_s``; elsewhere it is NaN. The part before lift-off ends where ground contact, once proven, is
@@ -243,9 +238,8 @@ def pair_samples(
 def _geometry(gnss: Table, settings: TaxiLimits) -> tuple[FloatArray, str]:
     """Return the dilution of precision of each epoch, and its name.
 
-    Without any, in motion, the sigma that the receiver states.
-
-    That sigma is the dilution of precision times the noise of the ranges' rates. At standstill the noise is measured.
+    Where none is logged it is, in motion, the sigma that the receiver states. That sigma is the dilution of precision
+    times the noise of the ranges' rates. At standstill the noise is measured.
     """
     field = next((name for name in GEOMETRY_FIELDS if gnss.has(name)), "")
     if field:
@@ -300,7 +294,7 @@ def _ins_heading(
 ) -> tuple[FloatArray, FloatArray]:
     """Return times and continuous headings of the valid INS rows around the epochs.
 
-    One row for each time.
+    There is one row for each time.
     """
     table = flight[ins_topic]
     known = np.isfinite(heading_deg)

@@ -1,6 +1,6 @@
 """Limits by which epochs on the ground are paired and gated.
 
-Settings of a system have them among others.
+The settings of a system have them among others.
 """
 
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ class TaxiLimits(Protocol):
 class GroundLimits:
     """Limits of taxi for other headings than that of an INS.
 
-    Those of the paper are speeds, rate and dilution.
+    Speeds, rate and dilution are those of the paper.
 
     Source: Markelov, Kostishin, Shukalov, Heading correction of an INS before take-off by satellite navigation, 2015.
     """

@@ -1,4 +1,4 @@
 """Posterior of the error of a heading on taxi, against the track of GNSS.
 
-Noise, its priors, draws, intervals.
+The modules hold the noise, its priors, draws and intervals.
 """

@@ -1,11 +1,9 @@
 """Honest interval: the heading error averaged over the possible noise.
 
-What the noise may be, standstill and taxi data tell.
-
-The width of an interval hangs on the spectral density at zero frequency, which one run shows only dimly. So the
-parameters of the noise model (``noise.py``) are not fixed at a best fit: they have broad priors, their
-posterior is sampled, and the answer is the mixture of the normal distributions that belong to the draws. Short runs
-and short standstills get heavier tails by themselves.
+Standstill and taxi data tell what noise is possible. The width of an interval hangs on the spectral density at zero
+frequency, which one run shows only dimly. So the parameters of the noise model (``noise.py``) are not fixed at a best
+fit: they have broad priors, their posterior is sampled, and the answer is the mixture of the normal distributions that
+belong to the draws. Short runs and short standstills get heavier tails by themselves.
 
 The sampling itself is in ``sampling.py``.
 """
@@ -36,9 +34,8 @@ WIDEST_GAP_DEG = 210.0  # between the directions of a taxi that goes there and b
 class StandstillVelocities:
     """GNSS velocity at standstill, m/s, shapes (n,).
 
-    ``gap_s`` is from its end to the first taxi sample, None: unlinked.
-
-    ``restart`` is the index at which the stretch that is linked to taxi begins, the others standing before it.
+    ``gap_s`` is the time from its end to the first taxi sample, None where the two are not linked. ``restart`` is the
+    index at which the stretch that is linked to taxi begins, the others standing before it.
     """
 
     time_s: FloatArray
@@ -99,9 +96,7 @@ class Differences:
 class _Found(NamedTuple):
     """Results of k draws: log posterior (k,), coefficients (k, c), variances (k, m, c).
 
-    And the error without terms told apart.
-
-    ``alone``: error and variance, shape (k, 2), were the terms told apart known to be zero.
+    ``alone`` is error and variance, shape (k, 2), as they would be if the terms told apart were known to be zero.
     """
 
     density: FloatArray
@@ -114,9 +109,7 @@ class _Found(NamedTuple):
 class _Target:
     """Log posterior density of the noise parameters.
 
-    The error and the coefficients are integrated out.
-
-    ``apart``: so many regressors at the end are told apart.
+    The error and the coefficients are integrated out. ``apart``: so many regressors at the end are told apart.
     """
 
     standstill: StandstillVelocities
@@ -254,11 +247,10 @@ def error_posterior(
 
 
 def _target_of(differences: Differences, standstill: StandstillVelocities) -> _Target:
-    """Return the target of the noise.
+    """Return the target of the noise parameters.
 
-    The terms told apart are at the end, where they differ along the taxi.
-
-    Directions then disagree by what a crosswind does; without these terms that would be taken for errors of the INS.
+    Where the terms told apart differ along the taxi, they are its last regressors. Directions then disagree by what a
+    crosswind does; without these terms that would be taken for errors of the INS.
     """
     apart = differences.apart
     if all(float(np.ptp(one.values)) * one.prior_sigma < NOTICED_DEG for one in apart):
@@ -270,7 +262,7 @@ def _target_of(differences: Differences, standstill: StandstillVelocities) -> _T
 def goes_there_and_back(direction_deg: FloatArray) -> bool:
     """Tell whether directions of motion leave no wide gap.
 
-    What turns with the aircraft then shows by itself.
+    An error that turns with the aircraft then shows by itself.
 
     Examples
     --------
@@ -307,10 +299,9 @@ def fixed_noise_estimate(
 ) -> tuple[FloatArray, FloatArray]:
     """Return coefficients and their standard deviations, shapes (c,), for given noise.
 
-    Averaged over given draws of the noise parameters.
-
-    The error comes first, then the factors of the regressors. For parts of a run (segments, directions) and further
-    regressors (drift), with the noise as found from the whole of it.
+    They are averaged over given draws of the noise parameters. The error comes first, then the factors of the
+    regressors. It serves parts of a run (segments, directions) and further regressors (drift), with the noise as found
+    from the whole run.
     """
     target = _Target(standstill, differences)
     _log_density, coefficients, variance, _alone = target.evaluate(parameters, target.last)
@@ -323,7 +314,7 @@ def fixed_noise_estimate(
 def misfit(differences: Differences, parameters: FloatArray) -> float:
     """Return the mean square of the whitened residuals, shape ().
 
-    1 where the differences are as noisy as the parameters say.
+    It is 1 where the differences are as noisy as the parameters say.
     """
     target = _Target(NO_STANDSTILL, differences)
     width = int(target.taxi[1].shape[1])
@@ -339,7 +330,7 @@ def misfit(differences: Differences, parameters: FloatArray) -> float:
 def sample_weights(differences: Differences, parameters: FloatArray) -> FloatArray:
     """Return the weight of every sample in the estimate of the error, shape (n,), sum 1.
 
-    For given noise parameters.
+    The noise parameters are given.
     """
     target = _Target(NO_STANDSTILL, differences)
     time_s, columns, from_north, from_east, is_start = target.taxi

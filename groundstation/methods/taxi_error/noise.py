@@ -1,6 +1,6 @@
 """Likelihood of heading differences and standstill velocities, by a Kalman filter.
 
-Both under one noise model.
+One noise model holds for both.
 
 The model, in words. At standstill each component of the GNSS velocity is white noise plus a first-order
 Gauss-Markov process. On taxi the same processes, turned across the track and divided by the speed, stand in the
@@ -54,10 +54,9 @@ _LOG_2PI = math.log(2.0 * math.pi)
 class Room(NamedTuple):
     """Working arrays of the loops, made once for many calls.
 
-    Loops that make no array are found again without numba.
-
-    Of ``taxi_filter``: q, P, x, K, H, the sums of products, innovations, decays and F; of ``solve_normal_equations``:
-    the matrix beside its inverse and the right side; the others are what ``evaluate`` hands from one to the other.
+    So the loops make no array, and are found again without numba. The arrays of ``taxi_filter`` are q, P, x, K, H, the
+    sums of products, innovations, decays and F; those of ``solve_normal_equations`` are the matrix beside its inverse
+    and the right side; the others are what ``evaluate`` hands from one to the other.
     """
 
     q: FloatArray  # (STATES,)
@@ -114,9 +113,8 @@ def standstill_filter(
 ) -> float:
     """Return the log likelihood of standstill velocities.
 
-    Leaves mean north, mean east and variance of the last state in ``out``.
-
-    ``restart`` is the index at which the filter starts afresh (a second, unconnected stretch).
+    Mean north, mean east and variance of the last state are left in ``out``. ``restart`` is the index at which the
+    filter starts afresh (a second, unconnected stretch).
     """
     log_likelihood = 0.0
     p, g_north, g_east = variance, 0.0, 0.0
@@ -289,11 +287,10 @@ def generalised_weights(
 ) -> None:
     """Fill ``weights``, shape (n,), sum 1, with each sample's weight in the estimated mean.
 
-    The mean is that by generalised least squares.
-
-    The weights are the row sums of the inverse covariance: the gradient of half the quadratic form of a constant,
-    taken backwards through the filter whose ``history`` (S and K) is given. Letters as in ``taxi_filter``; r is the
-    gradient with respect to the state. ``innovation`` of shape (n,) is room to work in.
+    The mean is that by generalised least squares. The weights are the row sums of the inverse covariance: the gradient
+    of half the quadratic form of a constant, taken backwards through the filter whose ``history`` (S and K) is given.
+    Letters as in ``taxi_filter``; r is the gradient with respect to the state. ``innovation`` of shape (n,) is room to
+    work in.
     """
     count, motion = len(time_s), math.exp(theta[MOTION])
     H, x, r, keep, F = room.H, room.x[0], room.K, room.keep, room.F
@@ -342,10 +339,9 @@ def solve_normal_equations(
 ) -> float:
     """Solve the normal equations with normal priors.
 
-    Returns log determinant plus residual sum of squares.
-
-    ``information`` has shape (c, c), column 0 the data; ``mean`` (c - 1,) and ``inverse`` (c - 1, c - 1) are written.
-    A prior precision of 0 is a flat prior. Gauss-Jordan: the matrix is positive definite and small.
+    The result is log determinant plus residual sum of squares. ``information`` has shape (c, c), column 0 the data;
+    ``mean`` (c - 1,) and ``inverse`` (c - 1, c - 1) are written. A prior precision of 0 is a flat prior. Gauss-Jordan:
+    the matrix is positive definite and small.
     """
     width = len(prior_mean)
     work, right = room.matrix, room.right

@@ -16,7 +16,7 @@ FloatArray = NDArray[np.float64]
 class ErrorPosterior:
     """Posterior of the heading error: a mixture of normals.
 
-    One for each draw of the noise parameters.
+    There is one for each draw of the noise parameters.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class ErrorPosterior:
     def growth_half_width_deg(self, probability: float = 0.95, extra_sigma_deg: float = 0.0) -> FloatArray:
         """Return the half width of the interval after ``growth_samples``, shape (m,).
 
-        Noise and terms told apart as at the end.
+        The noise and the terms told apart are those at the end.
         """
         extra_deg = np.hypot(self.apart_sigma_deg, extra_sigma_deg)
         upper = 0.5 * (1.0 + probability)
@@ -110,7 +110,7 @@ class ErrorPosterior:
     def draws_of_ordinary_parts(self, count: int = 40) -> FloatArray:
         """Return draws in which parts of a run have no more error of their own than usual.
 
-        What they say beyond that shows.
+        So an unusual error of a part shows.
         """
         draws = self.even_draws(count)
         draws[:, SPREAD] = PRIOR_MEAN[np.array(SPREAD)]

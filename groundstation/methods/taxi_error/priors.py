@@ -1,6 +1,6 @@
 """Priors of the parameters of the noise model.
 
-Log-normal, broader than every family of simulated runs.
+They are log-normal, and broader than every family of simulated runs.
 """
 
 import numpy as np

@@ -39,7 +39,7 @@ def find_mode(
 ) -> tuple[FloatArray, bool]:
     """Maximise the log density by the BFGS method with step halving.
 
-    In units of the prior sigmas.
+    Steps are in units of the prior sigmas.
 
     Source: J. Nocedal, S. Wright, Numerical Optimization, second edition, 2006, algorithm 6.1. Letters: H inverse of
     the second derivatives, s step, y change of the gradient.
@@ -141,7 +141,7 @@ def _root(covariance: FloatArray) -> FloatArray:
 def _even_places(first: int, count: int, shift: FloatArray) -> FloatArray:
     """Return points of an additive recurrence in the unit cube, shape (count, d).
 
-    Points ``first`` to ``first + count``.
+    They are points ``first`` to ``first + count``.
 
     Source: M. Roberts, The unreasonable effectiveness of quasirandom sequences, 2018 (the generalised golden ratio).
     """

@@ -6,9 +6,8 @@ from groundstation.results.arrays.typed import Arrays, Counts, Flags, Floats, Te
 class FleetTrend(Arrays, figure="trend"):
     """Control charts: a row per flight, quantity and aircraft, in order of time.
 
-    Only aircraft with enough flights that have a time.
-
-    ``level`` is the median between change points, ``low`` and ``high`` are the control limits.
+    They hold aircraft with enough flights that have a time. ``level`` is the median between change points, ``low`` and
+    ``high`` are the control limits.
     """
 
     aircraft: Texts

@@ -45,7 +45,7 @@ class ForecastFan(Arrays, figure="forecast_fan", digits=_DIGITS):
 class ForecastClassic(Arrays, figure="forecast_classic", digits=_DIGITS):
     """Error east of the rest of the flight from four starts, measured and forecast.
 
-    The paper's figure 2.
+    It is the paper's figure 2.
     """
 
     start_s: Floats

@@ -103,7 +103,7 @@ class InertialObservability(Arrays, figure="inertial_observability", digits=_TIM
 class InertialTrack(Arrays, figure="inertial_track", digits={**_TIME, "*_deg": 7}):
     """Tracks of the INS, of GNSS, and of the INS minus its estimated and its smoothed error.
 
-    The latter two where the filter ran.
+    The last two are known where the filter ran.
     """
 
     time_s: Floats

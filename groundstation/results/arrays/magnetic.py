@@ -1,6 +1,6 @@
 """Arrays of the magnetic deviation.
 
-Headings and deviations in degrees, fields in nanotesla.
+Headings and deviations are in degrees, fields in nanotesla.
 """
 
 from groundstation.results.arrays.typed import Arrays, ByName, Counts, Flags, Floats, Part, Texts, family
