@@ -68,7 +68,10 @@ class MistakeEntry:
 
 @dataclass(frozen=True, kw_only=True)
 class RelationEntry:
-    """The recorder's clock by another clock of the log; ``reason`` says why nothing is known."""
+    """Comparison of the recorder's clock with another clock of the log.
+
+    ``reason`` says why nothing is known.
+    """
 
     breaks: tuple[BreakEntry, ...] = ()
     clock: str

@@ -199,7 +199,7 @@ class Loop:
         return self._calling(lambda loop: loop._plain)
 
     def _calling(self, instead: Callable[["Loop"], Any]) -> FunctionType:
-        """The function with something else in the place of each loop that it calls."""
+        """Return the function with a replacement for each loop that it calls."""
         function, names = self.py_func, dict(self.py_func.__globals__)
         for step in get_instructions(function):  # its names alone are not enough: np.mean is none of a loop "mean"
             if step.opname == "LOAD_GLOBAL" and isinstance(called := names.get(step.argval), Loop):
@@ -207,7 +207,7 @@ class Loop:
         return FunctionType(function.__code__, names, function.__name__, function.__defaults__, function.__closure__)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Run it: kept machine code where there is any, else what numba compiles."""
+        """Run the loop by kept machine code where there is any, else by what numba compiles."""
         forms = forms_of(arguments) if self._is_kept else None
         if forms is None:
             return self._run_ordinary(arguments)
@@ -223,7 +223,7 @@ class Loop:
         return linked(*arguments)
 
     def _run_ordinary(self, arguments: tuple[Any, ...]) -> Any:
-        """The same by what numba compiled; what it kept and cannot read any more it compiles anew.
+        """Run what numba compiled; compile anew what it kept and can no longer read.
 
         numba pickles what it keeps, with the place of every class in it: an update that moves one makes it fail before
         the loop has begun.
@@ -246,7 +246,7 @@ class Loop:
         return self._is_missing[forms]
 
     def _run_plain(self, arguments: tuple[Any, ...]) -> Any:
-        """The same by Python, and the time that it took."""
+        """Run the loop in plain Python, and measure the time."""
         begin = perf_counter()
         with np.errstate(all="ignore"):  # as compiled code does
             answer = self._plain(*arguments)
@@ -255,7 +255,7 @@ class Loop:
         return None if annotation is None else annotation(answer)
 
     def __reduce__(self) -> str:
-        """A loop is pickled as functions are, by its name in its module."""
+        """Pickle the loop as functions are pickled, by its name in its module."""
         return self.py_func.__qualname__
 
     def _found(self, forms: tuple[Form, ...]) -> Linked | None:

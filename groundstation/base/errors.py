@@ -55,7 +55,7 @@ def _shown(part: str) -> str:
 
 
 class UnreadableLogError(GroundstationError):
-    """No reader claims the file, or nothing in it could be read (exit code 1)."""
+    """Error: no reader claims the file, or nothing in it could be read (exit code 1)."""
 
 
 class UnclaimedLogError(UnreadableLogError):
@@ -66,7 +66,7 @@ class UnclaimedLogError(UnreadableLogError):
 
 
 class UsageError(GroundstationError):
-    """The call cannot be carried out as asked (exit code 2)."""
+    """Error: the call cannot be carried out as asked (exit code 2)."""
 
 
 class UnknownNameError(UsageError, KeyError):
@@ -116,15 +116,15 @@ def near_names(name: str, known: Iterable[str], most: int = 5) -> tuple[str, ...
 
 
 class NotAssessableError(GroundstationError):
-    """An analysis lacks what it needs; the reason is the message. Never fatal to a run."""
+    """Error: an analysis lacks what it needs, as the message says. Never fatal to a run."""
 
 
 class SettingsError(UsageError):
-    """A settings, profile, aircraft or site file has a value that cannot be used."""
+    """Error: a settings, profile, aircraft or site file has a value that cannot be used."""
 
 
 def lack_of_memory(error: BaseException) -> str:
-    """Name what was lacking, memory or processes, in a few words; empty for another error.
+    """Name the missing resource, memory or processes, in a few words; empty for other errors.
 
     Examples
     --------

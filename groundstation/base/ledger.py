@@ -22,7 +22,7 @@ class ThresholdsUsed:
 
 @dataclass(frozen=True, kw_only=True)
 class GapDefinition:
-    """A gap is a step longer than ``periods`` nominal periods and than ``min_s`` seconds."""
+    """Definition of a gap: longer than ``periods`` nominal periods and than ``min_s`` seconds."""
 
     min_s: float = 0.0
     periods: float = 0.0
@@ -39,7 +39,7 @@ class OutOfRange:
 
 @dataclass(frozen=True, kw_only=True)
 class StuckStretch:
-    """A stretch in which a field was stuck at ``value``, and what says so."""
+    """Stretch in which a field was stuck at ``value``, and the evidence."""
 
     length_s: float
     record: int
@@ -112,17 +112,17 @@ class TopicEntry:
 
     @property
     def missing(self) -> int:
-        """Records that its counters miss."""
+        """Number of records that its counters show as missing."""
         return sum(counter.lost for counter in self.sequences)
 
     @property
     def out_of_range(self) -> int:
-        """Values outside their range."""
+        """Number of values outside their range."""
         return sum(one.out_of_range for one in self.fields.values())
 
     @property
     def stuck(self) -> int:
-        """Stretches in which a value was stuck."""
+        """Number of stretches in which a value was stuck."""
         return sum(len(one.stuck) for one in self.fields.values())
 
 

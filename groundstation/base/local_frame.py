@@ -58,7 +58,7 @@ class LocalFrame:
         return np.asarray((np.asarray(position_m, dtype=np.float64) - self._origin_m) @ self._axes)
 
     def turned_to(self, latitude_deg: ArrayLike, longitude_deg: ArrayLike, vector: ArrayLike) -> FloatArray:
-        """Local vectors (n, 3) along north, east and down of the places (n,)."""
+        """Turn local vectors (n, 3) to north, east and down of the places (n,)."""
         there = ecef_from_n(latitude_deg, longitude_deg)
         return np.asarray(np.einsum("nij,ni->nj", there, np.asarray(vector) @ self._axes.T))
 

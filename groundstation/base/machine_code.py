@@ -123,7 +123,7 @@ def entry_source(function: Callable[..., Any], forms: Sequence[Form]) -> tuple[s
 
 
 def plain_forms(forms: Sequence[Form]) -> Iterator[str | tuple[str, int]]:
-    """Forms of numbers and arrays, those in tuples in their place."""
+    """Return the forms of numbers and arrays, with those in tuples in their place."""
     for form in forms:
         if isinstance(form, Group):
             yield from plain_forms(form.parts)
@@ -187,7 +187,7 @@ class KeptCode:
         return code if head == self._head(code) else None
 
     def write(self, code: bytes) -> None:
-        """Keep an object file; a folder that cannot be written keeps none."""
+        """Keep an object file, unless the folder cannot be written."""
         with suppress(OSError):
             self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             write_own(self._path, self._head(code) + code)
@@ -345,7 +345,7 @@ def _address(array: Any) -> int:
 
 
 def _plain(arguments: Sequence[Any]) -> list[Any]:
-    """Arguments, those in tuples in their place."""
+    """Return the arguments, with those in tuples in their place."""
     plain: list[Any] = []
     for one in arguments:
         if isinstance(one, tuple):

@@ -41,7 +41,7 @@ class MetarWind:
 
     @property
     def name(self) -> str:
-        """Station, day and time, as the line has them."""
+        """Station, day and time, as in the line."""
         return f"{self.station} {self.day:02d}{self.hour:02d}{self.minute:02d}Z"
 
     def utc_ns(self, near_ns: int) -> int | None:

@@ -63,7 +63,7 @@ def read_own(path: Path) -> bytes | None:
 
 
 def write_own(path: Path, content: bytes) -> None:
-    """Write a file that only this user may write, in place of what has its name.
+    """Write a file that only this user may write, in place of any file of that name.
 
     Raises
     ------

@@ -27,7 +27,9 @@ def chi_square_quantile(probability: float, freedom: ArrayLike) -> FloatArray:
 
 
 def student_quantile(probability: float, freedom: float) -> float:
-    """Value that Student's t with ``freedom`` degrees stays below with the probability given.
+    """Return the value that Student's t stays below with the given probability.
+
+    ``freedom`` is the degrees of freedom.
 
     Examples
     --------

@@ -34,7 +34,7 @@ def frozen(array: NDArray[Any]) -> NDArray[Any]:
 
 @dataclass(frozen=True, repr=False)
 class Column:
-    """Values of one field and where they are present.
+    """Values of one field, and a mask of where they are present.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Column:
         return np.ones(len(self.values), dtype=bool) if self.present is None else self.present
 
     def take(self, index: Any) -> "Column":
-        """The rows that ``index`` (slice, mask or positions) selects."""
+        """Return the rows that ``index`` (slice, mask or positions) selects."""
         return Column(self.values[index], None if self.present is None else self.present[index])
 
 
@@ -220,7 +220,7 @@ HEADING_IS_TRACK = "heading_is_track"  # code of a remark: the receiver lets the
 
 @dataclass(frozen=True)
 class Remark:
-    """Something the reader derived, converted or assumed that a user must know of.
+    """Something that the reader derived, converted or assumed and a user must know.
 
     ``code`` is stable (``derived``, ``assumed_utc``, :data:`HEADING_IS_TRACK`), ``text`` is for people. ``fields`` are
     those of ``topic`` that the remark is about: what a derived field was derived from is kept with the flight.

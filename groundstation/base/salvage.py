@@ -75,7 +75,7 @@ def _count(value: Any, _hint: Any) -> int:
 
 
 def _sound(reader: cattrs.Converter, value: Any, hint: Any) -> tuple[Any, ...]:
-    """The value in a tuple of one; an empty one where it is not of its kind."""
+    """Return the value in a tuple of one; an empty tuple where it is not of its kind."""
     try:
         return (reader.structure(value, hint),)
     except (MismatchError, cattrs.BaseValidationError, RecursionError):

@@ -29,7 +29,7 @@ WANTED = {str: "text", float: "a number", int: "a whole number", bool: "true or 
 
 
 class MismatchError(Exception):
-    """A value that is not of the kind its place needs.
+    """Error: a value is not of the kind that its place needs.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def to_json(value: Any, name: str = "") -> Any:
 
 
 def to_json_exactly(value: Any) -> Any:
-    """Turn a value into JSON as :func:`to_json` does, no number rounded."""
+    """Turn a value into JSON as :func:`to_json` does, without rounding any number."""
     return _writer(None).unstructure(value)
 
 
@@ -179,7 +179,7 @@ def first_mismatch(error: Exception) -> MismatchError:
 
 
 def _leaf(error: BaseException, place: str) -> tuple[str, BaseException]:
-    """Follow the first complaint of a group down to its leaf: its place and itself."""
+    """Follow the first complaint of a group down to its leaf; return its place and itself."""
     if not isinstance(error, cattrs.BaseValidationError):
         return place, error
     first = error.exceptions[0]
@@ -192,7 +192,7 @@ def _leaf(error: BaseException, place: str) -> tuple[str, BaseException]:
 
 
 def join(place: str, name: str) -> str:
-    """Dotted path of a name within a place.
+    """Return the dotted path of a name within a place.
 
     Examples
     --------
@@ -223,7 +223,7 @@ def _object_reader(cls: type, reader: cattrs.Converter) -> Hook:
 def new_reader(
     wanted: Mapping[type, str], table: str = "an object", *, float_of: Callable[[Any], float]
 ) -> cattrs.Converter:
-    """A strict converter without a rule for dataclasses.
+    """Return a strict converter without a rule for dataclasses.
 
     Parameters
     ----------
@@ -286,7 +286,7 @@ def _literal(value: Any, hint: Any) -> Any:
 
 
 def tuple_reader(hints: tuple[Any, ...], reader: cattrs.Converter) -> Hook:
-    """Reads tuples item by item, from lists alone."""
+    """Return a reader of tuples, item by item, from lists alone."""
     is_fixed = len(hints) != 2 or hints[1] is not Ellipsis
 
     def read(value: Any, _hint: Any) -> Any:
@@ -300,7 +300,7 @@ def tuple_reader(hints: tuple[Any, ...], reader: cattrs.Converter) -> Hook:
 
 
 def _mapping_reader(hint: Any, table: str, reader: cattrs.Converter) -> Hook:
-    """Reads mappings entry by entry."""
+    """Return a reader of mappings, entry by entry."""
     make: Callable[..., Hook] = cattrs.gen.mapping_structure_factory
     entries = make(hint, reader, structure_to=dict)
 

@@ -168,7 +168,7 @@ BUS_PREFIX, BYTES_PREFIX = "raw.bus.", "raw.bytes."  # words and bytes as record
 
 
 def kind_of(topic: str) -> str:
-    """Kind of a topic: what stands before the first dot.
+    """Return the kind of a topic: the part before the first dot.
 
     Examples
     --------

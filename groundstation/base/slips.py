@@ -61,6 +61,6 @@ def is_slip(name: str, known: str) -> bool:
 
 
 def _word_at(text: str, at: int) -> str:
-    """The word that a character stands in; of a character behind the end the last word."""
+    """Return the word that holds a character; the last word for one behind the end."""
     words = [one for one in _WORD.finditer(text) if one.start() <= at]
     return words[-1].group() if words else ""

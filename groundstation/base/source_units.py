@@ -10,7 +10,7 @@ PREFIX = "units."
 
 
 def units_entry(units: Mapping[str, str]) -> str:
-    """The text that metadata keep: each field with its unit; fields without one are left out.
+    """Return the text for the metadata: each field with its unit, fields without one left out.
 
     Examples
     --------

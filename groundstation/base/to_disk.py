@@ -31,7 +31,7 @@ def sync_file(path: Path) -> None:
 
 
 def sync_open(number: int, path: Path) -> None:
-    """The same for an open file."""
+    """Wait until an open file is on the disk."""
     try:
         os.fsync(number)
     except OSError as error:

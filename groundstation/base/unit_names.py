@@ -14,7 +14,7 @@ class UnitName(NamedTuple):
 
     @property
     def spelled(self) -> str:
-        """Plain letters."""
+        """Spelling in plain letters."""
         return self.plain or self.sign
 
 
@@ -59,7 +59,7 @@ UNITS: Mapping[str, UnitName] = MappingProxyType(
 
 
 def split_unit(name: str) -> tuple[str, UnitName | None]:
-    """A name without its unit, and the unit; None where it has none.
+    """Split a name into the name without its unit, and the unit; None where it has none.
 
     Examples
     --------

@@ -97,7 +97,7 @@ def _line(place: ET.Element, track: Track) -> None:
 
 
 def _joint(track: Track, row: int) -> tuple[Spot, Spot]:
-    """Ends of two parts of a line, where it crosses the date line before a row."""
+    """Return the ends of two parts of a line that crosses the date line before a row."""
     longitude = continuous_longitude_deg(track.longitude_deg[row - 1 : row + 1])
     side = 180.0 if track.longitude_deg[row - 1] > 0.0 else -180.0
     share = (180.0 * np.sign(longitude[0]) - longitude[0]) / (longitude[1] - longitude[0])

@@ -57,7 +57,7 @@ def _course(track: Track, row: int) -> str:
 
 
 def _direction(value_deg: float) -> str:
-    """Degrees from 0 to less than 360, as they are written.
+    """Write degrees from 0 to less than 360, after rounding.
 
     Examples
     --------
@@ -68,7 +68,7 @@ def _direction(value_deg: float) -> str:
 
 
 def _angle(value_deg: float, digits: int, signs: str) -> str:
-    """Degrees and minutes with the hemisphere.
+    """Write degrees and minutes with the hemisphere.
 
     Examples
     --------
@@ -82,7 +82,7 @@ def _angle(value_deg: float, digits: int, signs: str) -> str:
 
 
 def _with_checksum(body: str) -> str:
-    """A sentence with its dollar sign, checksum and line end.
+    """Return a sentence with its dollar sign, checksum and line end.
 
     Examples
     --------

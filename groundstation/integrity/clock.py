@@ -132,7 +132,7 @@ class ClockModel:
         return np.where(has_own, validity_ns + self._offset_ns(record_index), time_ns)
 
     def correct(self, batch: RecordBatch) -> RecordBatch:
-        """The batch with ``time_ns`` set, its rows in the order of the source."""
+        """Return the batch with ``time_ns`` set, its rows in the order of the source."""
         index, device_ns, validity_ns = batch.record_index, batch.device_time_ns, batch.validity_time_ns
         time_ns = self.time_ns(index, device_ns)
         if validity_ns is not None:
@@ -140,7 +140,7 @@ class ClockModel:
         return RecordBatch(batch.topic, index, device_ns, batch.columns, time_ns, validity_ns)
 
     def on(self, offsets: "ClockOffsets", first_device_ns: int) -> "ClockModel":
-        """The model of the device's own times, of one that was made of times moved by ``offsets``."""
+        """Return the model of the device's own times, for a model of times moved by ``offsets``."""
         starts = np.union1d(self.starts, offsets.starts)
         return replace(
             self,
@@ -150,7 +150,7 @@ class ClockModel:
         )
 
     def text(self, time_ns: int) -> str:
-        """A time for people: ISO UTC, or ``+mm:ss`` from the log's zero."""
+        """Write a time for people: ISO UTC, or ``+mm:ss`` from the log's zero."""
         if self.is_absolute:
             return utc_ns_to_iso(time_ns)
         seconds = time_ns / NS_PER_S
@@ -187,7 +187,7 @@ class ClockModel:
         )
 
     def mistake(self, step: ClockStep) -> str:
-        """Name of the error that a step put right, empty where it has none."""
+        """Name the error that a step put right; empty where it has no name."""
         return mistake_of_step(step.set_s, step.device_after_ns + int(self.offsets_ns[-1])) if self.is_absolute else ""
 
 
@@ -200,7 +200,7 @@ class ClockOffsets:
 
     @classmethod
     def of(cls, offsets: tuple[tuple[int, int], ...]) -> "ClockOffsets | None":
-        """The offsets that a reader states, None where it states none."""
+        """Make offsets from those that a reader states; None where it states none."""
         if not offsets:
             return None
         starts, added = np.array(sorted(offsets), dtype=np.int64).T
@@ -211,7 +211,7 @@ class ClockOffsets:
         return np.asarray(self.offsets_ns[np.maximum(np.searchsorted(self.starts, record_index, side="right") - 1, 0)])
 
     def moved(self, record_index: Int64Array, device_time_ns: Column) -> Column:
-        """Device times of records with what is added."""
+        """Return the device times of records with the offsets added."""
         return Column(device_time_ns.values + self.at(record_index), device_time_ns.present)
 
 

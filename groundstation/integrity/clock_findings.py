@@ -52,7 +52,7 @@ def clock_findings(ledger: LedgerCounts) -> Iterator[Finding]:
 
 
 def counted(count: int, noun: str, nouns: str = "") -> str:
-    """A number of things.
+    """Write a number of things.
 
     Examples
     --------

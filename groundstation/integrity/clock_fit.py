@@ -136,7 +136,7 @@ def _pieces(starts: list[int], count: int) -> list[tuple[int, int]]:
 
 
 def _with_drift(segment: ClockSegment, line: _Line, observable_ppm: float) -> ClockSegment:
-    """The recorder's rate is 1 / (1 + slope) of the reference's."""
+    """Convert the slope to drift: the recorder's rate is 1 / (1 + slope) of the reference's."""
     if np.isinf(line.slope_sigma) or line.slope <= -1.0:
         return segment
     drift_ppm = 1e6 * (1.0 / (1.0 + line.slope) - 1.0)
@@ -146,7 +146,7 @@ def _with_drift(segment: ClockSegment, line: _Line, observable_ppm: float) -> Cl
 
 
 def _break(time_s: FloatArray, first: int, before: _Line, after: _Line, *, is_step: bool, zero_ns: int) -> ClockBreak:
-    """A step lies between two samples; a change of rate where the two lines meet."""
+    """Place the break: a step between two samples, a change of rate where two lines meet."""
     at_s = 0.5 * float(time_s[first - 1] + time_s[first])
     sigma_s = float(time_s[first] - time_s[first - 1]) / 12**0.5
     step_s = float(after.at(at_s) - before.at(at_s))
@@ -176,7 +176,7 @@ def _median(values: FloatArray) -> float:
 
 
 class _Blocks:
-    """Blocks of equal numbers of samples; what does not go into them is left out between them."""
+    """Blocks of equal numbers of samples; left-over samples lie between the blocks."""
 
     def __init__(self, samples: int, blocks: int) -> None:
         self._shape = blocks, samples // blocks
@@ -192,7 +192,7 @@ class _Blocks:
         return np.asarray(ordered[:, middle] if is_odd else 0.5 * (ordered[:, middle - 1] + ordered[:, middle]))
 
     def medians_in_order(self, values: FloatArray) -> FloatArray:
-        """The same of values that never fall: what stands in the middle."""
+        """Median of each block of values that never fall: the one in the middle."""
         middle, is_odd = divmod(self._shape[1], 2)
         at = self._starts + middle
         return np.asarray(values[at] if is_odd else 0.5 * (values[at - 1] + values[at]))
@@ -345,7 +345,7 @@ def _rate_changes(time_s: FloatArray, offset_s: FloatArray, first: int, stop: in
 
 
 def _best_split(at_s: FloatArray, level: FloatArray, rounding_s: float) -> int:
-    """Block before which a second line begins that explains much; 0 where one line will do."""
+    """Return the block before which a second line explains much; 0 where one line will do."""
     floor = len(at_s) * rounding_s**2 / 12.0
     forward, backward = _left_over(at_s, level), _left_over(at_s[::-1], level[::-1])[::-1]
     whole = forward[-1]

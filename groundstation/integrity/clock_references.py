@@ -43,7 +43,7 @@ _FEWEST = 3
 
 @dataclass(frozen=True)
 class ReferenceField:
-    """A field that tells the time of another clock.
+    """Field of a log that tells the time of another clock.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class RelationSettings:
 
 @dataclass
 class _Readings:
-    """Readings of one reference: each time that it tells once, when it told it first."""
+    """Readings of one reference: each of its times once, at the first record that has it."""
 
     topic: str
     reference: ReferenceField
@@ -152,7 +152,7 @@ class _Readings:
 
 
 class ClockReferences:
-    """Takes readings of other clocks from the batches of a log."""
+    """Collector of the readings of other clocks in the batches of a log."""
 
     def __init__(self, settings: RelationSettings) -> None:
         self._settings = settings
@@ -246,7 +246,7 @@ def _prompt(late_ns: Int64Array) -> BoolArray:
 
 
 def _told(reference: ReferenceField, columns: dict[str, NDArray[Any]]) -> tuple[Int64Array, BoolArray]:
-    """Times that a clock told, nanoseconds, and which of them can be times, shape (n,) each."""
+    """Return the times of a clock, nanoseconds, and a mask of possible ones, shape (n,) each."""
     time_ns, good = _nanoseconds(columns["time"], reference.unit_ns)
     if reference.scale == "gps":
         week, has_week = _nanoseconds(columns["week"], 1)
@@ -259,7 +259,7 @@ def _told(reference: ReferenceField, columns: dict[str, NDArray[Any]]) -> tuple[
 
 
 def _nanoseconds(values: NDArray[Any], unit_ns: int) -> tuple[Int64Array, BoolArray]:
-    """Values of whatever type in nanoseconds, and which of them are numbers that 62 bits hold."""
+    """Return values of any type in nanoseconds, and a mask of numbers that 62 bits hold."""
     if values.dtype.kind == "U":
         texts = [_utc_of(str(value)) for value in values]
         return np.array([text or 0 for text in texts], dtype=np.int64), np.array([text is not None for text in texts])
@@ -315,7 +315,7 @@ def _other_weeks(own_ns: Int64Array, told_ns: Int64Array, is_utc: bool) -> tuple
 
 
 def _last_digit_s(time_ns: Int64Array) -> float:
-    """The largest power of ten, at most a second, that all times are multiples of."""
+    """Return the largest power of ten, at most a second, of which all times are multiples."""
     step = NS_PER_S
     while step > 1 and (time_ns % step).any():
         step //= 10
@@ -323,7 +323,7 @@ def _last_digit_s(time_ns: Int64Array) -> float:
 
 
 def _mistakes(reference: ReferenceField, fitted: Fitted, clock: ClockModel, told_ns: Int64Array) -> tuple[Mistake, ...]:
-    """Errors that have a name, of steps and of what stands at the end."""
+    """Return the errors that have a name, of steps and of the offset at the end."""
     if reference.scale == "free":
         return ()
     last_ns = int(told_ns[-1])

@@ -129,7 +129,7 @@ class Mistake:
 
 @dataclass(frozen=True)
 class ClockRelation:
-    """The recorder's corrected clock by another clock.
+    """Comparison of the recorder's corrected clock with another clock.
 
     Parameters
     ----------

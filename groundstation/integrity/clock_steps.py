@@ -1,4 +1,4 @@
-"""Steps of a recorder's clock, and rows out of order that are none."""
+"""Steps of a recorder's clock, and rows out of order that are no steps."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -79,7 +79,7 @@ def middle_of(steps: Int64Array) -> float:
 
 
 def quantile(ordered: Int64Array, share: float) -> float:
-    """Value below which a share of ordered integers lies, between two of them by proportion.
+    """Return the value below which a share of ordered integers lies, interpolated.
 
     Examples
     --------
@@ -118,7 +118,7 @@ class Steps:
             self._judge(int(at))
 
     def sort(self) -> None:
-        """Take the log as unordered: without steps, each record at its own time."""
+        """Treat the log as unordered: no steps, each record at its own time."""
         self.is_unordered, self.steps = True, []
         self.implausible[:] = self.stray[:] = False
         self.stray[1:] = self.time[1:] < np.maximum.accumulate(self.time)[:-1]
@@ -137,7 +137,7 @@ class Steps:
         return offsets[::-1]
 
     def described(self, offsets: Int64Array) -> tuple[ClockStep, ...]:
-        """The steps as the ledger tells them."""
+        """Return the steps in the form of the ledger."""
         firsts = [0, *(at for at, _last in self.steps)]
         return tuple(
             ClockStep(
@@ -175,7 +175,7 @@ class Steps:
         self._judge_strays(first, stop)
 
     def _strays_before(self, at: int, last: int, size: int) -> tuple[int, int] | None:
-        """Rows just before ``at`` that jumped ahead, the order being restored at ``at``."""
+        """Find rows just before ``at`` that jumped ahead, with order restored at ``at``."""
         if size >= 0:
             return None
         jump = max(1.5 * self.period_ns, 0.5 * -size)

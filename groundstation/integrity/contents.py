@@ -63,7 +63,7 @@ class _FieldTally:
     def _without_odd(
         self, values: FloatArray, rows: Int64Array | None, record_index: Int64Array, device_ns: Int64Array
     ) -> tuple[FloatArray, Int64Array | None]:
-        """Count NaN and what is out of range; gives the values that are no NaN, and their rows."""
+        """Count NaN and values out of range; return the values that are not NaN, and their rows."""
         if self.is_known:
             at = np.flatnonzero((values < self.low) | (values > self.high) | np.isinf(values))
             if len(at):
@@ -103,7 +103,7 @@ class _TopicTally:
 
 
 class Contents:
-    """Counts the batches of a log; what they say is told once the clock is known."""
+    """Counter of the batches of a log; its counts are read once the clock is known."""
 
     def __init__(self, thresholds: Thresholds) -> None:
         self._thresholds = thresholds
@@ -146,7 +146,7 @@ class Contents:
         return found
 
     def _sample(self, batch: RecordBatch, device_ns: Int64Array) -> None:
-        """Keep some rows of canonical topics, to tell the time of a row that was lost."""
+        """Keep some rows of canonical topics, which give the time of a row that was lost."""
         if not is_canonical(batch.topic):
             return
         rows = self._timeline.rows(len(batch))

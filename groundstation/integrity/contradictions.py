@@ -64,7 +64,7 @@ class _Series:
         return all(name in self.columns and bool(np.isfinite(self.columns[name]).any()) for name in names)
 
     def known(self, *names: str) -> "_Series":
-        """The samples in which all of these are known, one at a time."""
+        """Return the samples in which all of these fields are known, one for each time."""
         mask = np.all([np.isfinite(self.columns[name]) for name in names], axis=0)
         mask &= np.concatenate([[True], np.diff(self.time_s) > 0.0]) if len(self.time_s) else mask
         return _Series(self.topic, self.time_s[mask], {name: values[mask] for name, values in self.columns.items()})
@@ -133,7 +133,7 @@ def _series_of(motion: Motion, clock: ClockModel) -> tuple[int, list[_Series]]:
 
 
 def _possible(name: str, values: FloatArray) -> FloatArray:
-    """The values with NaN for what no motion has: the ledger tells of it as out of range."""
+    """Replace by NaN the values that no motion has; the ledger lists them as out of range."""
     return np.where(np.abs(values) <= (90.0 if name == "latitude_deg" else ANY), values, np.nan)
 
 
@@ -163,7 +163,7 @@ def _windows_of(one: _Series) -> _Windows | None:
 
 
 def _speed(one: _Series, windows: _Windows | None, zero_ns: int) -> Contradiction | None:
-    """Velocity, or speed, that the topic's own positions do not show."""
+    """Find velocity, or speed, that the topic's own positions do not show."""
     if windows is None or not len(windows.start_s):
         return None
     names = ("velocity_north_mps", "velocity_east_mps")
@@ -190,7 +190,7 @@ def _speed(one: _Series, windows: _Windows | None, zero_ns: int) -> Contradictio
 
 
 def _side(one: _Series, windows: Mapping[str, _Windows], zero_ns: int) -> Contradiction | None:
-    """Roll of a vehicle on its side, while it moves."""
+    """Find the roll of a vehicle on its side while it moves."""
     if not one.has("roll_deg"):
         return None
     known = one.known("roll_deg")
@@ -206,7 +206,7 @@ def _side(one: _Series, windows: Mapping[str, _Windows], zero_ns: int) -> Contra
 
 
 def _heading(one: _Series, windows: Mapping[str, _Windows], does_roll: bool, zero_ns: int) -> Contradiction | None:
-    """Heading far off the track, of a vehicle that cannot move sideways."""
+    """Find heading far off the track of a vehicle that cannot move sideways."""
     name = next((name for name in HEADINGS if one.has(name)), "")
     track = windows.get(one.topic) or next((found for found in windows.values() if len(found.start_s)), None)
     if not name or track is None:
@@ -229,7 +229,7 @@ def _heading(one: _Series, windows: Mapping[str, _Windows], does_roll: bool, zer
 
 
 def _height(one: _Series, series: list[_Series], zero_ns: int) -> Contradiction | None:
-    """Height that the pressure altitude does not follow."""
+    """Find height that the pressure altitude does not follow."""
     name = next((name for name in ALTITUDES if one.has(name)), "")
     baro = next(
         (other for other in series if kind_of(other.topic) == "baro" and other.has("pressure_altitude_m")), None

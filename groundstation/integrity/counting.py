@@ -130,7 +130,7 @@ class _Judged(NamedTuple):
 
 
 def _judged(time: Int64Array, tolerance_ns: int, run_records: int) -> _Judged:
-    """Records earlier than the runs around them allow, and later than those; shape (n,) each.
+    """Return masks of records earlier, and later, than the runs around them allow, shape (n,).
 
     A run is a stretch of records each within the tolerance of the one before. Long runs are believed; a short one is
     believed when it lies between the end of the long run before it and the start of the one after, both widened by the

@@ -172,7 +172,7 @@ class LedgerCounts:
     power_ups: tuple[PowerUpClock, ...] = ()
 
     def __getitem__(self, topic: str) -> TopicCounts:
-        """The ledger of one topic; KeyError when the log has none of that name."""
+        """Return the ledger of one topic; KeyError when the log has none of that name."""
         for ledger in self.topics:
             if ledger.topic == topic:
                 return ledger

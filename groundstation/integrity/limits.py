@@ -28,7 +28,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class GapLimits:
-    """A gap is a step longer than ``periods`` nominal periods and than ``min_s`` seconds.
+    """Limits of a gap: longer than ``periods`` nominal periods and than ``min_s`` seconds.
 
     A topic breaks off when it ends ``end_s`` seconds and ``end_share`` of the log before the others.
     """
@@ -182,7 +182,7 @@ def thresholds_from(table: Mapping[str, Any], where: str = "thresholds", key: st
 
 
 def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """One table over another, table by table."""
+    """Lay one table over another, table by table."""
     out = dict(base)
     for key, value in over.items():
         below = out.get(key)

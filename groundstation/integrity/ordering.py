@@ -88,7 +88,7 @@ def _column_of(batch: RecordBatch, name: str, batches: Sequence[RecordBatch]) ->
 
 
 def joined_columns(columns: Sequence[Column]) -> Column:
-    """One column of several, in the order given."""
+    """Join columns into one, in the order given."""
     present: BoolArray | None = None
     if any(column.present is not None for column in columns):
         present = np.concatenate([column.mask for column in columns])

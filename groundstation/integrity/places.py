@@ -35,12 +35,12 @@ class Piece:
 
     @property
     def timed(self) -> Int64Array:
-        """The times that are there, in the order of the places."""
+        """Times that are present, in the order of the places."""
         return self.time.values if self.time.present is None else self.time.values[self.time.present]
 
     @property
     def nbytes(self) -> int:
-        """Memory that it takes."""
+        """Memory that the piece takes."""
         present = self.time.present
         validity = 0 if self.validity_ns is None else self.validity_ns.nbytes
         return self.index.nbytes + self.time.values.nbytes + (0 if present is None else present.nbytes) + validity
@@ -91,13 +91,13 @@ class Kept:
 
     @property
     def size(self) -> int:
-        """Bytes that it takes in a file."""
+        """Number of bytes that the piece takes in a file."""
         of_one = (4 if self.is_near else 8) + 8 + (0 if self.is_timed else 1) + (8 if self.has_validity else 0)
         return self.count * of_one
 
 
 class Places:
-    """Keeps pieces, once for batches with the same places and times, and gives them back.
+    """Store of pieces: kept once for batches with the same places and times, and read back.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class Places:
         self._recent: deque[tuple[Piece, Kept]] = deque(maxlen=8)
 
     def close(self) -> None:
-        """Let pieces and file go."""
+        """Release pieces and file."""
         self._held.clear()
         if self._file is not None:
             self._file.close()
@@ -157,7 +157,7 @@ class Places:
         return kept
 
     def _write(self) -> None:
-        """Write what is in memory to the file, and let it go."""
+        """Write the pieces in memory to the file, and release them."""
         try:
             if self._file is None:
                 self._file = tempfile.TemporaryFile()  # noqa: SIM115 -- lives as long as this
@@ -177,7 +177,7 @@ class Places:
         self._held_bytes = 0
 
     def piece(self, kept: Kept) -> Piece:
-        """A piece as it was."""
+        """Read a piece back."""
         if kept.number in self._held:
             return self._held[kept.number][1]
         self._file.seek(kept.at)

@@ -101,7 +101,7 @@ class PowerUp:
     is_ahead: bool = False
 
     def unwrapped_ns(self, record_index: Int64Array, time_ns: Int64Array) -> Int64Array:
-        """Device times of its records as those of a counter without an end, shape (n,)."""
+        """Return the device times of its records as a counter without an end has them, shape (n,)."""
         for wrap in self.wraps:
             time_ns = time_ns + wrap.added_ns(record_index, time_ns)
         return time_ns
@@ -156,7 +156,10 @@ def power_ups(windows: Iterable[tuple[Int64Array, Int64Array]], evidence: Eviden
 
 
 def _runs(windows: Iterable[tuple[Int64Array, Int64Array]], tolerance_ns: int) -> list[Run]:
-    """Runs of the records of all windows, in order; no more than are looked at."""
+    """Return the runs of the records of all windows, in order.
+
+    Where there are more than ``MOST_RUNS``, the list only shows that there are too many.
+    """
     runs: list[Run] = []
     for index, time in windows:
         if not len(time):
@@ -302,14 +305,14 @@ class _Walk:
         return Wrap(run.first_index, *known, middle_ns, *mixed)
 
     def _until(self, number: int, top_ns: int) -> int:
-        """The end of what follows a wrap without another step back."""
+        """Return the end of what follows a wrap without another step back."""
         for one, other in pairwise(self.runs[number:]):
             if other.first_ns < one.last_ns - LEAST_NS and one.last_ns < top_ns - _LATE_NS:
                 return other.first_index
         return LAST_RECORD
 
     def _late_until(self, number: int, top_ns: int) -> int:
-        """The last record of the time before a wrap that stands behind it."""
+        """Return the last record behind a wrap whose time is from before it."""
         until = self.runs[number].first_index
         for run in self.runs[number:]:
             if run.first_ns >= top_ns - _LATE_NS:

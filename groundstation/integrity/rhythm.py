@@ -49,7 +49,7 @@ class Rhythm:
         return min(1.0, (self.ahead + 1) / expected)
 
     def gaps(self, topic: str, time_ns: Int64Array) -> Gaps:
-        """Steps that are too long, by the times that the steps are of."""
+        """Return the steps that are too long, for the times that the steps are of."""
         if not self.has_gaps:
             return Gaps(topic, np.zeros(0, dtype=np.int64), np.zeros(0))
         before = np.flatnonzero(self.steps_ns > _longest_ns(self.period_ns, self.limits))

@@ -57,7 +57,7 @@ class Sequence:
 
 @dataclass
 class Counter:
-    """Follows one field batch by batch."""
+    """Counter in one field, followed batch by batch."""
 
     name: str
     counts_losses: bool
@@ -71,7 +71,7 @@ class Counter:
     places: list[tuple[Place, int]] = field(default_factory=list)
 
     def add(self, column: Column, record_index: Int64Array, device_ns: Int64Array) -> None:
-        """Go on with a batch."""
+        """Continue with a batch."""
         values = column.values
         if values.dtype.kind not in "uif":
             return

@@ -77,7 +77,7 @@ class Found:
 
 
 def clock_of(found: Found, limits: Thresholds) -> tuple[ClockModel, tuple[PowerUpClock, ...]]:
-    """Model the clock of a source; the second value has its power-ups where there are several.
+    """Model the clock of a source; also return its power-ups where there are several.
 
     A source is looked at for them where its clock steps back, is out of order, is silent for an hour, or another log
     begins in it.
@@ -185,7 +185,7 @@ def _most_step_back(found: Found, place: int, middle_ns: int) -> bool:
 
 
 def _around(places: Places, several: Sequence[Kept], place: int) -> tuple[int | None, int | None]:
-    """The last time of a topic before a place, and the first one from there on."""
+    """Return the last time of a topic before a place, and the first one from there on."""
     before_ns = behind_ns = None
     for kept in several:
         if kept.last < place:
@@ -216,10 +216,11 @@ def _read_zero(found: Found, first: int, end: int) -> int | None:
 
 
 def _zero_of(part: PowerUp, found: Found, before_ns: int | None, *, is_alone: bool) -> int | None:
-    """UTC of device time zero of one power-up; of a clock that tells UTC it is zero for all.
+    """Return UTC of device time zero of one power-up.
 
-    What a header says is of the first log in the source; what a reader read of all of a source fits none of several.
-    A counter that is ahead of the one before (whose zero is ``before_ns``) is taken for the same.
+    It is 0 for all power-ups where the device's own time is UTC. What a header says is of the first log in the source;
+    what a reader read of all of a source fits none of several. A counter that is ahead of the one before (whose zero is
+    ``before_ns``) is taken for the same.
     """
     header = found.header
     if header.utc_of_zero_ns == 0:
@@ -235,7 +236,7 @@ def _zero_of(part: PowerUp, found: Found, before_ns: int | None, *, is_alone: bo
 
 
 def _of(part: PowerUp, found: Found, limits: Thresholds, zero_ns: int | None) -> tuple[ClockModel, PowerUpClock]:
-    """The model of one power-up by the device's own times, and what is known of it."""
+    """Model one power-up by the device's own times; also return what is known of it."""
     header = found.header
     if header.has_counting_clock:
         clock = _counting_clock(found.windows(part), found.places.is_long, zero_ns, limits.counting_clock)
@@ -276,7 +277,7 @@ def _with_mixed(clock: ClockModel, part: PowerUp, window: Window) -> ClockModel:
 
 
 def _wrapped(clock: ClockModel, part: PowerUp) -> ClockModel:
-    """The model for times as the device wrote them, from one for a counter without an end."""
+    """Return the model for times as the device wrote them, from that of a counter without end."""
     starts = np.unique(np.concatenate((clock.starts, [wrap.record_index for wrap in part.wraps])).astype(np.int64))
     offsets = ClockOffsets(clock.starts, clock.offsets_ns).at(starts)
     for wrap in part.wraps:
@@ -288,7 +289,7 @@ def _wrapped(clock: ClockModel, part: PowerUp) -> ClockModel:
 def _beside(
     several: Sequence[tuple[ClockModel, PowerUpClock]],
 ) -> tuple[ClockModel, tuple[PowerUpClock, ...]]:
-    """One model of several power-ups: those without UTC are laid behind the one before them."""
+    """Join the models of several power-ups; those without UTC follow the one before them."""
     timed = [(clock, known) for clock, known in several if clock.has_times]
     if len(timed) < 2:
         return (timed or list(several))[0][0], ()

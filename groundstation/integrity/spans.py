@@ -99,7 +99,7 @@ class Timeline:
 
 
 def spans_of(damages: Sequence[Damage], dropouts: Sequence[Dropout], timeline: Timeline, end_ns: int) -> list[Span]:
-    """Spans of what the reader lost, where their place in time is known.
+    """Return the spans of what the reader lost, where their place in time is known.
 
     Rows of a table, and bytes of a binary log that were skipped, lie between the records around them; what the end of a
     file cuts off lies at the end of the log.

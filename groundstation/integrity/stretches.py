@@ -29,7 +29,7 @@ class Place(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """Samples in a row with one value: the first, the last, how many."""
+    """Consecutive samples with one value: the first, the last, their number."""
 
     first: Place
     last: Place
@@ -102,7 +102,7 @@ class Constancy:
             self.resolution = min(self.resolution or smallest, smallest)
 
     def stretches(self) -> list[Stretch]:
-        """The long ones, in the order of the log."""
+        """Return the long stretches, in the order of the log."""
         self._keep(self._open)
         self._open = self._open[:0]
         kept = np.concatenate((self._open, *self._kept))
@@ -138,7 +138,7 @@ def _ends_and_long(differs: BoolArray, changes: int, min_samples: int) -> tuple[
 
 
 class Sampler:
-    """Some rows of a topic, evenly spread however long it is: never more than ``most``."""
+    """Sample of a topic's rows, evenly spread: never more than ``most`` however long it is."""
 
     def __init__(self, most: int = 16_384) -> None:
         self._most, self._every, self._seen = most, 1, 0
@@ -163,7 +163,7 @@ class Sampler:
             self._count, self._every = len(kept_index[::2]), 2 * self._every
 
     def all(self) -> tuple[Int64Array, dict[str, NDArray[Any]]]:
-        """Places and values of what is kept; NaN where a part lacks a field."""
+        """Return places and values of the kept rows; NaN where a part lacks a field."""
         if not self._parts:
             return np.zeros(0, dtype=np.int64), {}
         if len(self._parts) == 1:

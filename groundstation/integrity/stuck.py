@@ -64,7 +64,7 @@ class _Seen(NamedTuple):
     values: FloatArray
 
     def within(self, stretch: Stretch) -> FloatArray:
-        """Finite values of the records inside a stretch."""
+        """Return the finite values of the records inside a stretch."""
         low = np.searchsorted(self.places, stretch.first.record_index)
         high = np.searchsorted(self.places, stretch.last.record_index, side="right")
         values = self.values[low:high]
@@ -95,7 +95,7 @@ class Motion:
         sampler.put(np.array(batch.record_index[rows]), columns)
 
     def samples(self) -> Iterator[tuple[str, Int64Array, Int64Array, dict[str, FloatArray]]]:
-        """Topic by topic: places, device times and values, in the order of the log."""
+        """Yield places, device times and values topic by topic, in the order of the log."""
         for topic, sampler in sorted(self._samplers.items()):
             index, columns = sampler.all()
             yield topic, index, columns[_TIME], {name: one for name, one in columns.items() if name != _TIME}
@@ -121,14 +121,14 @@ class Motion:
 
 
 class Judge:
-    """Tells stuck stretches from innocent ones."""
+    """Judge that tells stuck stretches from innocent ones."""
 
     def __init__(self, motion: Motion, clock: ClockModel, limits: StuckLimits) -> None:
         self._sources = motion.sources()
         self._clock, self._limits = clock, limits
 
     def stuck(self, topic: str, fields: dict[str, Constancy]) -> dict[str, tuple[Stuck, ...]]:
-        """Stuck stretches of a topic, by field."""
+        """Return the stuck stretches of a topic, by field."""
         long = {name: list(self._long(name, constancy)) for name, constancy in fields.items()}
         found = {}
         for name, stretches in long.items():
@@ -139,7 +139,7 @@ class Judge:
         return found
 
     def _long(self, name: str, constancy: Constancy) -> Iterator[Stretch]:
-        """Stretches that last, of a field that is not constant through the whole log."""
+        """Return the stretches that last, of a field that is not constant through the whole log."""
         times = self._limits.noise_times_usual if name in _NOISY else self._limits.times_usual
         for stretch in constancy.stretches() if constancy.changes else ():
             is_long = stretch.samples >= times * constancy.usual_samples(without=stretch)
@@ -188,7 +188,7 @@ class Judge:
     def _why_elsewhere(
         self, topic: str, names: tuple[str, ...], stretch: Stretch, enough: float, unit: str, scale: float = 1.0
     ) -> str:
-        """The same quantity of another topic moves."""
+        """Return the evidence that the same quantity of another topic moves."""
         for seen in self._sources:
             if seen.name not in names or seen.topic == topic:
                 continue
@@ -199,7 +199,7 @@ class Judge:
         return ""
 
     def _slowest(self, topic: str, stretch: Stretch) -> tuple[str, float, float] | None:
-        """Source, least and mean speed meanwhile; of the topic itself where that is named."""
+        """Return source, least and mean speed during a stretch; of one topic where it is named."""
         for seen in self._sources:
             if seen.name == "ground_speed_mps" and topic in ("", seen.topic):
                 values = seen.within(stretch)
@@ -212,7 +212,7 @@ class Judge:
     def _why_position(
         self, topic: str, name: str, stretch: Stretch, enough_m: float, long: dict[str, list[Stretch]]
     ) -> str:
-        """Both coordinates stand still while the speed says that the aircraft moves."""
+        """Return the evidence that the aircraft moves while both coordinates stand still."""
         other = "longitude_deg" if name == "latitude_deg" else "latitude_deg"
         first, last = stretch.first.record_index, stretch.last.record_index
         both = any(one.first.record_index < last and one.last.record_index > first for one in long.get(other, ()))
@@ -223,7 +223,10 @@ class Judge:
         return f"the speed of {speed[0]} covers {moved_m:.0f} m meanwhile" if moved_m > enough_m else ""
 
     def _why_heading(self, topic: str, name: str, stretch: Stretch, least: float) -> str:
-        """Another heading or track turns; a track counts only where the aircraft moves."""
+        """Return the evidence that another heading or track turns.
+
+        A track counts only where the aircraft moves.
+        """
         moving = self._limits.moving_mps
         own = self._slowest(topic, stretch)
         if name == "track_deg" and (own is None or own[1] <= moving):

@@ -100,7 +100,7 @@ def _order_of(places: Places, pieces: Sequence[Kept], clock: ClockModel) -> _Ord
 
 
 def survey(items: Iterable[Item], *, thresholds: Thresholds | None = None) -> Survey:
-    """Read a log once and say what is in it.
+    """Read a log once and report its contents.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def _ledgers(
 
 
 class Census:
-    """Ledger of records whose corrected time is known: what is in a store file."""
+    """Count of the records of a store file, whose corrected time is known."""
 
     def __init__(self, is_absolute: bool, thresholds: Thresholds | None = None, *, is_counting: bool = False) -> None:
         self._clock = ClockModel(is_absolute=is_absolute, is_counting=is_counting)
@@ -198,7 +198,7 @@ class Census:
         self._contents.add(batch, batch.time_ns)
 
     def ledger(self, damages: Sequence[Damage] = ()) -> LedgerCounts:
-        """The ledger of what is in the file; device order and device clock are not in it."""
+        """Return the ledger of the file; device order and device clock are not in it."""
         topics = [
             topic_ledger(
                 topic,

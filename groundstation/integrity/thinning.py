@@ -12,7 +12,7 @@ from groundstation.base.records import BoolArray, Int64Array
 
 
 class Thinner:
-    """Thins the windows of a log, which come in its order.
+    """Thinner of the windows of a log, which come in its order.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Thinner:
         return int(steps[order[middle]].sum()) // 2
 
     def _of_runs(self, time: Int64Array, steps: Int64Array) -> BoolArray:
-        """Beginnings of runs, both ends of the window, and what is late."""
+        """Select beginnings of runs, both ends of the window, and late records."""
         starts = np.concatenate(([0], np.flatnonzero(np.abs(steps) > self._tolerance_ns) + 1))
         lengths = np.diff(starts, append=len(time))
         kept: BoolArray = np.arange(len(time)) - np.repeat(starts, lengths) < self._run_records
@@ -75,7 +75,7 @@ class Thinner:
         return kept
 
     def _ahead(self, time: Int64Array, starts: Int64Array, lengths: Int64Array) -> BoolArray:
-        """Short runs that are later than the long ones around them allow: they make nothing late."""
+        """Select short runs later than the long ones around them allow: they make nothing late."""
         long = np.flatnonzero(lengths >= self._run_records)
         after = np.searchsorted(long, np.arange(len(starts)))
         is_between = (after > 0) & (after < len(long)) & (lengths < self._run_records)

@@ -15,7 +15,7 @@ BANDWIDTH_SHARE = 0.1
 
 
 def design(heading_deg: FloatArray) -> FloatArray:
-    """Columns 1, sin c, cos c, sin 2c, cos 2c, shape (n, 5)."""
+    """Return the columns 1, sin c, cos c, sin 2c, cos 2c, shape (n, 5)."""
     rad = np.deg2rad(np.asarray(heading_deg, dtype=np.float64))
     return np.stack([np.ones_like(rad), np.sin(rad), np.cos(rad), np.sin(2 * rad), np.cos(2 * rad)], axis=-1)
 
@@ -112,6 +112,6 @@ def long_run(scores: FloatArray, correlation: float) -> FloatArray:
 
 
 def _width(samples: int) -> int:
-    """Samples over which the weights reach."""
+    """Return the number of samples over which the weights reach."""
     lags: float = max(BANDWIDTH_FACTOR * samples ** (1.0 / 3.0), BANDWIDTH_SHARE * samples)
     return min(1 + math.ceil(lags), samples)

@@ -38,7 +38,7 @@ class GnssNoise:
     is_inflated: bool = True
 
     def averaged(self, samples: float) -> "GnssNoise":
-        """Noise of means of so many samples: the white part falls, the correlated part stays."""
+        """Return the noise of means of samples: the white part falls, the correlated part stays."""
         root = math.sqrt(samples)
         return replace(
             self,
@@ -100,7 +100,10 @@ class Calibration:
             raise SettingsError("horizon_min", str(list(self.horizon_min)), "growing numbers")
 
     def at(self, lead_s: FloatArray, of: ScaleName = "separate") -> FloatArray:
-        """Scale at other lead times (linear in the logarithm of the lead, held beyond the ends)."""
+        """Return the scale at other lead times.
+
+        It is linear in the logarithm of the lead, and held beyond the ends.
+        """
         scale = {"separate": self.scale, "bank": self.bank_scale, "coupled": self.coupled_scale}[of]
         lead_min = np.maximum(np.asarray(lead_s, dtype=np.float64) / 60.0, 1e-3)
         return np.asarray(np.interp(np.log(lead_min), np.log(self.horizon_min), scale))
@@ -108,7 +111,7 @@ class Calibration:
 
 @dataclass(frozen=True)
 class BankFactors:
-    """Factors of the sets of a bank on the noise of their class; every combination is a set.
+    """Factors on the noise of a class for the sets of a bank; every combination is a set.
 
     ``random_drift`` and ``random_drift_correlation`` go together, one to one.
     """

@@ -7,7 +7,9 @@ from groundstation.base.quantiles import chi_square_quantile, share_quantile
 
 
 def share_interval(inside: float, checks: float, confidence: float = 0.95) -> tuple[float, float]:
-    """Exact interval of a share; of correlated checks both numbers are effective ones.
+    """Return the exact interval of a share.
+
+    Of correlated checks, both numbers are effective ones.
 
     Source: Clopper, Pearson, Biometrika 26 (1934), 404-413.
 
@@ -67,7 +69,7 @@ def effective_samples(values: FloatArray, about: float | None = None) -> float:
 
 
 def slope_through_origin(hours: FloatArray, error: FloatArray, weight: FloatArray) -> float:
-    """Time-position fit: error = slope times hours by least squares.
+    """Fit error = slope times hours by least squares.
 
     Examples
     --------

@@ -55,7 +55,7 @@ def fill_step(
 
 @in_place
 def _times(n: int, F: FloatArray, matrix: FloatArray, product: FloatArray) -> None:
-    """product <- F matrix."""
+    """Multiply: product <- F matrix."""
     for i in range(n):
         for j in range(n):
             product[i, j] = 0.0

@@ -13,7 +13,7 @@ ZERO = Limit(value=0.0, role="faint", dash="", emphasis="faint")
 
 
 def time_axis(low: float, high: float) -> Axis:
-    """Axis of flight time between two moments; a second about one alone.
+    """Return the axis of flight time between two moments; one second about a single moment.
 
     Examples
     --------
@@ -25,7 +25,10 @@ def time_axis(low: float, high: float) -> Axis:
 
 
 def broken_time_axis(windows: Sequence[tuple[float, float]]) -> Axis:
-    """Axis of flight time that shows some spans alone; its title is that of the longest."""
+    """Return an axis of flight time that shows some spans alone.
+
+    Its title is that of the longest span.
+    """
     longest = max(windows, key=lambda span: span[1] - span[0])
     return Axis(_title(longest[1]), "time", windows[0][0], windows[-1][1], windows=tuple(windows))
 

@@ -1,4 +1,4 @@
-"""Ends of the axes of a panel: those of all that is drawn, rows with names, windows."""
+"""Ends of the axes of a panel, from all that is drawn, from named rows, or from windows."""
 
 from collections.abc import Sequence
 
@@ -28,7 +28,9 @@ ABOVE_ROWS, BELOW_ROWS = 0.6, 0.6  # of a row, before the first and behind the l
 
 
 def edges(centres: Floats) -> Floats:
-    """Edges of cells about their places: half way between these; one more than places.
+    """Return the edges of cells about their places, halfway between these.
+
+    There is one more than places.
 
     Examples
     --------
@@ -157,7 +159,7 @@ def windows_of(panel: Panel, span: Span) -> tuple[Span, ...]:
 
 
 def equal(x: Span, y: Span, width_pt: float, height_pt: float) -> tuple[Span, Span]:
-    """Both axes of a map at one scale: the one that has room to spare is shown farther.
+    """Bring both axes of a map to one scale; the one with room to spare shows more.
 
     Examples
     --------

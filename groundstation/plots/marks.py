@@ -45,7 +45,7 @@ Symbol = Literal["dot", "circle", "ring", "triangle", "cross", "star", "diamond"
 
 
 def series(place: int) -> Role:
-    """The role of one of several alike, beginning again behind the seventh.
+    """Return the role of one of several series alike, starting again behind the seventh.
 
     Examples
     --------
@@ -92,7 +92,7 @@ class Curve(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Dots(Mark):
-    """Samples, each by itself."""
+    """Samples as single dots."""
 
     x: Floats
     y: Floats
@@ -100,7 +100,7 @@ class Dots(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Band(Mark):
-    """The area between two curves; with ``steps`` each edge holds about its place."""
+    """Area between two curves; with ``steps`` each edge holds about its place."""
 
     x: Floats
     low: Floats
@@ -133,7 +133,7 @@ class Lanes(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Spans(Mark):
-    """Shaded ground between places of the horizontal axis.
+    """Shaded background between places of the horizontal axis.
 
     A phase of flight as ``kind`` has a shade of its own, any other a faint one of the role. With a name each kind
     stands in the legend once, as itself; where it is empty, by the name.
@@ -146,7 +146,7 @@ class Spans(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Limit(Mark):
-    """A dashed line across the panel at a value; upright at a place of the horizontal axis.
+    """Dashed line across the panel at a value; upright at a place of the horizontal axis.
 
     A ``label`` stands beside the line, where the name stands in the legend.
     """
@@ -172,7 +172,7 @@ class Bars(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Intervals(Mark):
-    """Rows with nested intervals, lying: one row of a forest plot.
+    """Rows with nested horizontal intervals, one row each as in a forest plot.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Panel:
-    """A pair of axes with what stands on it, the first mark behind.
+    """Pair of axes with its marks, the first mark behind.
 
     Parameters
     ----------
@@ -121,5 +121,5 @@ class Plot:
 
 
 def one_panel(panel: Panel, height_mm: float) -> tuple[Row, ...]:
-    """The rows of a plot of one panel."""
+    """Return the rows of a plot of one panel."""
     return (Row((panel,), height_mm),)

@@ -99,7 +99,7 @@ def broken_at_wrap(time: Any, angle_deg: Any) -> tuple[Floats, Floats]:
 
 
 def broken_at_gaps(time: Any, *values: Any) -> tuple[Floats, ...]:
-    """Time and values with a NaN wherever time leaps: the line breaks at the gap.
+    """Return time and values with a NaN at each leap in time: the line breaks at the gap.
 
     Examples
     --------

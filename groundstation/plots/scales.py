@@ -20,7 +20,7 @@ NO_PLACES: Floats = np.zeros(0)
 
 @dataclass(frozen=True)
 class Span:
-    """A scale with its ends; one that runs backwards has the greater first."""
+    """Scale with its ends; one that runs backwards has the greater first."""
 
     scale: Scale
     low: float
@@ -87,14 +87,14 @@ def span_of(
 
 
 def _about(scale: Scale, low: float | None, high: float | None) -> list[float]:
-    """Ends where nothing is drawn, from the one that is known."""
+    """Return ends for an axis where nothing is drawn, from the one end that is known."""
     if scale == "log":
         return [low or 0.1 * (high or 10.0), high or 10.0 * (low or 1.0)]
     return [(1.0 if high is None else high) - 1.0 if low is None else low, (low or 0.0) + 1.0 if high is None else high]
 
 
 def _apart(scale: Scale, first: float, last: float) -> tuple[float, float]:
-    """Ends that are not one, nor so near that no number lies between them."""
+    """Return ends that are apart, so far that numbers lie between them."""
     first, last = min(first, last), max(first, last)
     least = max(LEAST_SPAN * max(abs(first), abs(last)), SMALLEST)
     if scale == "log":
@@ -109,7 +109,7 @@ def _apart(scale: Scale, first: float, last: float) -> tuple[float, float]:
 def _wider(
     scale: Scale, ends: tuple[float, float], is_open: tuple[bool, bool], linear_to: float
 ) -> tuple[float, float]:
-    """Ends with a margin where they are not given."""
+    """Return the ends with a margin where they are not given."""
     span = Span(scale, *ends, linear_to)
     if scale == "log":
         factor = 10.0 ** (MARGIN * (math.log10(ends[1]) - math.log10(ends[0])))

@@ -13,7 +13,7 @@ _STEPS = [[int(text[at : at + 2], 16) for at in (0, 2, 4)] for text in _TEXT.spl
 
 
 def viridis(share: float) -> tuple[int, int, int]:
-    """The colour at a share of the scale from 0 to 1: red, green, blue.
+    """Return the colour at a share of the scale from 0 to 1: red, green, blue.
 
     Examples
     --------

@@ -19,7 +19,7 @@ S_PER_H = 3600.0
 
 @dataclass(frozen=True)
 class OneFinding:
-    """Value that one analysis found, with its sigma and whence it is."""
+    """Value that one analysis found, with its sigma and its origin."""
 
     origin: str
     value: float
@@ -32,7 +32,10 @@ class OneFinding:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Two findings on one question; ``between_sigma``: what may have changed between them."""
+    """Two findings on one question.
+
+    ``between_sigma`` is what may have changed between them.
+    """
 
     question: str
     unit: str
@@ -139,12 +142,12 @@ def deviation_agreement(answers: Answers) -> Agreement | None:
 
 
 def _own_variance(run: GroundRun, declination_sigma_deg: float, place_sigma_deg: float) -> float:
-    """Variance of what a run has of its own: noise, slip and place."""
+    """Return the variance of a run's own error: noise, slip and place."""
     sigma = run.sigma_deg or 0.0
     return max(sigma**2 - declination_sigma_deg**2, (run.noise_sigma_deg or 0.0) ** 2, 1e-6) + place_sigma_deg**2
 
 
 def _columns(heading_deg: float) -> tuple[float, ...]:
-    """1, sin c, cos c, sin 2c, cos 2c."""
+    """Return the columns 1, sin c, cos c, sin 2c, cos 2c."""
     rad = math.radians(heading_deg)
     return (1.0, math.sin(rad), math.cos(rad), math.sin(2.0 * rad), math.cos(2.0 * rad))

@@ -36,5 +36,5 @@ def answer_of(answers: Answers, kind: type[A]) -> A | None:
 
 
 def by_analysis(*answers: Answer | None) -> dict[str, Answer]:
-    """Answers by the name of their analysis; what is None is left out."""
+    """Return the answers by the name of their analysis; None is left out."""
     return {answer.analysis: answer for answer in answers if answer is not None}

@@ -17,7 +17,7 @@ Value: TypeAlias = float | str | bool | None
 
 @dataclass(frozen=True)
 class Side:
-    """One of the two flights: what it is of. ``start_utc`` is None without absolute time."""
+    """One of the two flights, by its names; ``start_utc`` is None without absolute time."""
 
     flight_id: str
     aircraft: str

@@ -1,4 +1,4 @@
-"""Answer of a planned session: how aircraft should move, and the accuracy that follows."""
+"""Answer of a planned session: best motion of aircraft, and the accuracy that follows."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
@@ -12,7 +12,7 @@ UNCONTROLLED = "uncontrolled"
 
 @dataclass(frozen=True)
 class LawRow:
-    """One law of control and where it leads.
+    """One law of control, and its result.
 
     Parameters
     ----------

@@ -103,7 +103,7 @@ class SavedFlight:
 
 
 def mapping(document: Any, *keys: str) -> Mapping[str, Any]:
-    """The object at a path of keys, empty when it is missing or something else."""
+    """Return the object at a path of keys, empty when it is missing or something else."""
     for key in keys:
         document = document.get(key) if isinstance(document, Mapping) else None
     return document if isinstance(document, Mapping) else {}
@@ -118,7 +118,7 @@ def write_text(path: Path, text: str, *, is_synced: bool = True) -> None:
 
 
 def has_text(path: Path, text: str) -> bool:
-    """Tell whether a file holds what :func:`write_text` would write."""
+    """Tell whether a file holds the text that :func:`write_text` would write."""
     return path.is_file() and path.read_bytes() == _encoded(text)
 
 
@@ -182,7 +182,7 @@ def _save_figure(folder: Path, figure: FigureData) -> None:
 
 
 def put_failures(folder: Path, found: Sequence[Failure], made_again: Sequence[str] = ()) -> bool:
-    """Put findings on parts that failed into summary.json; whether it changed.
+    """Add findings on failed parts to summary.json; tell whether it changed.
 
     ``made_again`` are the kinds of parts of which earlier failures no longer hold.
     """
@@ -289,7 +289,7 @@ def load(folder: Path, answer_types: Mapping[str, type[Answer]]) -> SavedFlight:
 
 
 def _require_whole(path: Path) -> None:
-    """Refuse a Parquet file that is cut, by its ends alone."""
+    """Refuse a Parquet file that is cut, by looking at its ends alone."""
     try:
         with path.open("rb") as file:
             begin = file.read(len(PARQUET_MAGIC))
@@ -339,7 +339,7 @@ def _read_parquet(path: Path) -> FigureData:
 
 
 def utf8_text(text: Any) -> str:
-    """Text as Parquet takes it: a lone surrogate becomes its escape."""
+    """Return text as Parquet takes it: a lone surrogate becomes its escape."""
     return str(text).encode("utf-8", "backslashreplace").decode("utf-8")
 
 

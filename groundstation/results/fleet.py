@@ -121,7 +121,7 @@ class AircraftRow:
 
 @dataclass(frozen=True)
 class ChangePoint:
-    """A flight from which on a quantity of an aircraft has another level.
+    """Flight from which on a quantity of an aircraft has another level.
 
     ``flight_id`` is the first flight of the new level; ``level_before`` and ``level_after`` are medians, in the unit of
     ``quantity``; ``p_value`` the chance of so large a step anywhere in a steady series.
@@ -257,7 +257,7 @@ class NotInFleet:
 
 @dataclass(frozen=True)
 class SessionRow:
-    """A session of several aircraft: the algorithm to trust, and what it is worth.
+    """Session of several aircraft: the algorithm to trust, and its accuracy.
 
     ``two_sigma_r_m`` is that of the worst aircraft at the end, as computed; ``reckoned_two_sigma_r_m`` that of dead
     reckoning alone; ``rms_m``, ``is_consistent`` and ``diverges`` are None without a truth. ``reason`` says why there

@@ -129,7 +129,7 @@ class FlightResults(Tabular):
 
     @property
     def figure_names(self) -> tuple[str, ...]:
-        """Names of the figure data, none of which is read for it."""
+        """Names of the figure data; none of them is read for it."""
         if isinstance(self.figures, FigureSet):
             return self.figures.names
         return tuple(figure.name for figure in self.figures)

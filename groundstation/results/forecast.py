@@ -161,7 +161,7 @@ class ForecastResult(Answer):
 
 
 def honesty(independent_starts: int, nees: float, nees_low: float, nees_high: float) -> str:
-    """Say in words what NEES of a :class:`CalibrationRow` shows of the forecast's sigma.
+    """Say in words what the NEES of a :class:`CalibrationRow` tells of the forecast's sigma.
 
     Examples
     --------

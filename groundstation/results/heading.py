@@ -39,7 +39,7 @@ class Gate:
     sense: Sense = "at_most"
 
     def under(self, bound: Bound) -> "Gate":
-        """The same value against another limit; the gate itself where the limit is the one it has.
+        """Return the gate judged against another limit; itself where the limit is the same.
 
         Examples
         --------

@@ -170,7 +170,7 @@ class OwnInnovation:
 
 @dataclass(frozen=True)
 class NavigationStart:
-    """Moment from which an INS navigates, and what proves it.
+    """Moment from which an INS navigates, and the evidence for it.
 
     ``time_s`` is in flight seconds, negative before the log, None where nothing proves it. ``basis`` is ``stated``,
     ``mode`` (a logged change from alignment), ``standstill`` (the log begins parked, with INS and GNSS together) or
@@ -278,7 +278,10 @@ class InertialResult(Answer):
         return ("states", "channels", *super().table_names())
 
     def to_frame(self, table: str = "states") -> "pd.DataFrame":
-        """A list of rows as a frame (see :class:`Tabular`); ``states`` are those of both channels."""
+        """Return a list of rows as a frame (see :class:`Tabular`).
+
+        ``states`` are those of both channels.
+        """
         if table == "channels":
             return rows_frame(ChannelResult, self.channels)
         if table != "states":

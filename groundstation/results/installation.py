@@ -103,7 +103,7 @@ class Lesson:
 
     @property
     def place(self) -> tuple[str, str]:
-        """Orders flights by time."""
+        """Key that orders flights by time."""
         return self.start_utc.removesuffix("Z"), self.flight_id
 
     @property
@@ -134,7 +134,7 @@ class Installed:
 
 @dataclass(frozen=True)
 class InstallationResult(Answer):
-    """The heading error with what earlier flights taught (error = INS heading - true heading).
+    """Heading error with the knowledge from earlier flights (INS heading - true heading).
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ class Pooled:
 
 @dataclass(frozen=True)
 class Installation:
-    """One unit in one aircraft, until it flies in another: what its flights say together.
+    """One unit in one aircraft, until it flies in another, and the results of its flights.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ class Installation:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A flight with a serial that is in no installation, and why."""
+    """Flight with a serial that is in no installation, and the reason."""
 
     flight_id: str
     reason: str
@@ -284,7 +284,7 @@ class Installations:
 
 @dataclass(frozen=True)
 class InstallationRow:
-    """One unit in one aircraft: what its flights say together; :class:`Installed`.
+    """One unit in one aircraft and the results of its flights together; :class:`Installed`.
 
     ``place`` counts the installations of the fleet from 1. ``odd`` and ``changed`` name flights taken for another
     unit's, and those from which on it sits otherwise, joined by ", ". ``pooled`` are figures of other sensors.

@@ -98,7 +98,7 @@ StabilisedVerdict = Literal["stabilised", "not stabilised", "not measured"]
 
 @dataclass(frozen=True)
 class StabilisedAt:
-    """The criteria of a stabilised approach from a height down to where the flare begins."""
+    """Criteria of a stabilised approach, from a height down to the start of the flare."""
 
     height_m: float
     verdict: StabilisedVerdict
@@ -262,7 +262,7 @@ class Approach:
 
 @dataclass(frozen=True)
 class LeftOutApproach:
-    """A descent that is not told as an approach, and why."""
+    """Descent that is not listed as an approach, and the reason."""
 
     time_s: float
     reason: str

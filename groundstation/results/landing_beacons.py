@@ -12,7 +12,7 @@ from groundstation.results.figures import FigureData
 
 @dataclass(frozen=True)
 class BeaconRow:
-    """A beacon: where it stands and how many bearings of it were used."""
+    """Beacon: its place, and how many bearings of it were used."""
 
     name: str
     before_threshold_m: float

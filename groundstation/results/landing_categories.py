@@ -54,7 +54,7 @@ class Category:
 
     @property
     def label(self) -> str:
-        """Name with what the row is."""
+        """Name, with the kind of the row."""
         return f"{self.name} (ILS look-alike)" if self.is_ils_look_alike else self.name
 
 

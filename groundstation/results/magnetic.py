@@ -341,6 +341,6 @@ class MagneticResult(Answer):
     figures: tuple[FigureData, ...] = ()
 
     def method(self, name: MethodName) -> Method:
-        """The row of a method; refused where it was never tried."""
+        """Return the row of a method; refused where it was never tried."""
         found = (row for row in self.methods if row.name == name)
         return next(found, Method(name, "refused", "not tried"))

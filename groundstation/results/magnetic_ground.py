@@ -16,7 +16,7 @@ CoefficientState = Literal["found", "not observable"]
 
 @dataclass(frozen=True)
 class GroundRun:
-    """A straight run on the ground, and why it is not used. Times are flight seconds.
+    """Straight run on the ground, and the reason where it is not used. Times: flight seconds.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class GroundRun:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """GNSS epochs that belong to no run, and why."""
+    """GNSS epochs that belong to no run, and the reason."""
 
     reason: str
     epochs: int

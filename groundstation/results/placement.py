@@ -1,4 +1,4 @@
-"""Answer of a planned session: where ground points should stand."""
+"""Answer of a planned session: best places of ground points."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -11,7 +11,7 @@ GIVEN = "given"
 
 @dataclass(frozen=True)
 class DesignRow:
-    """One set of places and the accuracy it leads to.
+    """One set of places, and the accuracy it gives.
 
     Parameters
     ----------

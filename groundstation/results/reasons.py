@@ -23,7 +23,7 @@ def explained(analysis: str, reason: str) -> str:
 
 
 def in_plain_words(reason: str) -> str:
-    """The reason as it stands, but for names of gates.
+    """Return the reason with the names of gates in plain words.
 
     Examples
     --------

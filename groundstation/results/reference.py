@@ -106,7 +106,7 @@ class PathRow:
 
 @dataclass(frozen=True)
 class RelativeRow:
-    """Relative error: how much the horizontal position error changes over a time or a way.
+    """Relative error: change of the horizontal position error over a time or a distance.
 
     ``length`` is in ``unit`` (s or m), errors in metres; ``effective_pairs`` of the overlapping ``pairs`` are
     independent. ``share_of_way`` is the RMS over the mean way between the two ends.

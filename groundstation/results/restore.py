@@ -1,4 +1,4 @@
-"""Saved answers as dataclasses again: what summary.json tells, rounded as it was written."""
+"""Saved answers as dataclasses again: the contents of summary.json, rounded as written."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -58,7 +58,7 @@ def restored(summary: Mapping[str, Any], where: str, answer_types: Mapping[str, 
 
 
 def restored_answer(summary: Mapping[str, Any], answer_type: type[A]) -> A:
-    """One answer of a summary, whatever the rest of it is, without figures.
+    """Restore one answer of a summary, whatever the rest of it is, without figures.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The JSON Schema of summary.json, made from the dataclasses that are written to it.
+"""JSON Schema of summary.json, made from the dataclasses that are written to it.
 
 ``make schemas`` writes it. What a type alone does not say stands in the metadata of a
 field (``one_of``, ``pattern``, ``keys``, ``items``: see :func:`_narrowed`) or follows from its name: shares lie within
@@ -132,7 +132,7 @@ def _object(cls: type, definitions: dict[str, Schema]) -> Schema:
 
 
 def _of(hint: Any, definitions: dict[str, Schema], is_known: bool = False) -> Schema:
-    """Schema of a type; ``is_known``: a float is never NaN."""
+    """Return the schema of a type; ``is_known``: a float is never NaN."""
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if dataclasses.is_dataclass(hint):
         name = definition_name(typing.cast(type, hint))
@@ -170,7 +170,7 @@ def _array(arguments: tuple[Any, ...], definitions: dict[str, Schema], is_known:
 
 
 def _one_of_several(members: list[Schema]) -> Schema:
-    """Any of some schemas; plain types are told in one list."""
+    """Return the schema that allows any of several; plain types go in one list."""
     if not all(member.keys() <= {"type", "minimum"} for member in members):
         return {"anyOf": members}
     kinds: list[str] = []
@@ -206,7 +206,10 @@ def _narrowed(schema: Schema, metadata: Mapping[str, Any]) -> Schema:
 
 
 def _bounded(schema: Schema, name: str) -> Schema:
-    """Bounds that follow from the name of a field, of numbers and of the numbers in an object."""
+    """Add the bounds that follow from the name of a field.
+
+    They hold for numbers, and for the numbers in an object.
+    """
     if name == "completeness" or (schema.get("type") == "object" and NOT_NEGATIVE.fullmatch(name)):
         return {**schema, "additionalProperties": _bounded(schema["additionalProperties"], "sigma")}
     kinds = schema.get("type", ())

@@ -12,7 +12,7 @@ LABELS = "bcdefghijklmnopqrstuvwxyz"  # of the logs behind the first, whose topi
 
 @dataclass(frozen=True)
 class JoinedStretch:
-    """A stretch over which the clock of a log runs evenly by that of the flight.
+    """Stretch over which the clock of a log runs evenly by that of the flight.
 
     Parameters
     ----------
@@ -84,14 +84,14 @@ class JoinedLog:
 
 @dataclass(frozen=True)
 class Joining:
-    """The logs of a flight, in the order in which they were named."""
+    """Logs of a flight, in the order in which they were named."""
 
     logs: tuple[JoinedLog, ...] = ()
 
 
 @dataclass(frozen=True)
 class ChosenSource:
-    """The source of a kind that the analyses use, of those that the logs have, and why."""
+    """Source of a kind that the analyses use, among those of the logs, and the reason."""
 
     kind: str
     topic: str

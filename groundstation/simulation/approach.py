@@ -34,7 +34,7 @@ CAPTURE_M = 2_500.0  # distance over which an offset from the course falls to 37
 
 @dataclass(frozen=True)
 class TrueRunway:
-    """Runway and its aids as they are; what a site file says of them may differ."""
+    """True runway and its aids; what a site file says of them may differ."""
 
     latitude_deg: float = required_number(-80.0, 80.0)
     longitude_deg: float = required_number(-180.0, 180.0)
@@ -259,7 +259,7 @@ def _guidance(
     height_m: FloatArray,
     rng: np.random.Generator,
 ) -> dict[str, FloatArray]:
-    """Deviations in dots as a receiver shows them."""
+    """Return the deviations in dots as a receiver shows them."""
     recorded, runway = scenario.recorded, scenario.runway
     to_antenna = np.maximum(distance_m + runway.localizer_distance_m, 50.0)
     per_dot = 0.5 * runway.localizer_width_m / DOTS_PER_FULL_SCALE * to_antenna / runway.localizer_distance_m

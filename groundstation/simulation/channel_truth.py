@@ -39,7 +39,7 @@ class ChannelTruth:
 
 
 def channel_matrix(beta_per_s: float, gravity_mps2: float = MPS2_PER_G, radius_m: float = RADIUS_M) -> FloatArray:
-    """A of the channel, shape (6, 6). Source: Neusypin et al., Herald of BMSTU, 2003."""
+    """Return A of the channel, shape (6, 6). Source: Neusypin et al., Herald of BMSTU, 2003."""
     out = np.zeros((6, 6))
     out[POSITION, VELOCITY] = 1.0
     out[VELOCITY, TILT] = -gravity_mps2

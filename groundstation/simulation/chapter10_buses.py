@@ -112,7 +112,7 @@ def buses_of(flight: Flight) -> Buses:
 
 
 def _bus_1553(table: Table, channel: int) -> list[Bus1553]:
-    """The bus of one inertial system; none when it has nothing of B100."""
+    """Return the bus of one inertial system; none when it has nothing of B100."""
     (layout,) = shipped("b100").messages_1553
     given = {one.name: _values(table, one) for one in layout.elements if one.signal}
     sent = {name: values for name, values in given.items() if values is not None}

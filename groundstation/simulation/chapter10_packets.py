@@ -47,7 +47,7 @@ WORD_429 = np.dtype([("bus_and_gap", "<u4"), ("word", "<u4")])
 
 @dataclass
 class Packer:
-    """Makes packets, numbered within each channel."""
+    """Maker of packets, numbered within each channel."""
 
     sequences: dict[int, int] = field(default_factory=dict)
 
@@ -103,7 +103,7 @@ def time_body(utc_ns: int) -> bytes:
 
 
 def _digits(number: int) -> int:
-    """Two decimal digits, four bits each."""
+    """Return two decimal digits, four bits each."""
     return number // 10 << 4 | number % 10
 
 

@@ -77,7 +77,7 @@ def _ticks(time_ns: Int64Array, start_ns: int) -> Int64Array:
 
 
 def _time_packets(flight: Flight, buses: Buses) -> Iterator[Draft]:
-    """One at every whole second of UTC, the first before all data."""
+    """Make a time packet at every whole second of UTC, the first before all data."""
     times = [*(bus.time_ns for bus in buses.buses_1553), *(bus.time_ns for bus in buses.buses_429)]
     ends = [one[[0, -1]] for one in times if len(one)]
     if not flight.has_utc or not ends:
@@ -89,7 +89,7 @@ def _time_packets(flight: Flight, buses: Buses) -> Iterator[Draft]:
 
 
 def _blocks(ticks: Int64Array) -> Iterator[slice]:
-    """Rows of each packet."""
+    """Return the rows of each packet."""
     edges = np.flatnonzero(np.diff(ticks // PACKET_TICKS)) + 1
     for first, last in zip([0, *edges], [*edges, len(ticks)], strict=True):
         if last > first:
@@ -104,7 +104,7 @@ def _packets_1553(bus: Bus1553, start_ns: int) -> Iterator[Draft]:
 
 
 def _packets_429(buses: tuple[Bus429, ...], start_ns: int) -> Iterator[Draft]:
-    """Words of all ARINC 429 buses in one channel."""
+    """Make the packets of all ARINC 429 buses in one channel."""
     if not buses:
         return
     ticks = np.concatenate([_ticks(bus.time_ns, start_ns) for bus in buses])
@@ -149,5 +149,5 @@ def _names_429(bus: Bus429) -> list[str]:
 
 
 def _text(text: str) -> str:
-    """A value as TMATS takes it: printable ASCII without semicolons."""
+    """Return a value as TMATS takes it: printable ASCII without semicolons."""
     return "".join(one if " " <= one <= "~" and one != ";" else "_" for one in text)

@@ -31,7 +31,7 @@ def current_a(time_s: FloatArray, settings: ElectricSettings | None) -> FloatArr
 
 
 def electric_readings(trajectory: Trajectory, settings: ElectricSettings, rng: np.random.Generator) -> Readings:
-    """The current as the recorder has it: with noise, rounded."""
+    """Return the current as the recorder has it: with noise, rounded."""
     time_ns = trajectory.time_ns[every(trajectory, settings.rate_hz)]
     noise = settings.noise_a * rng.standard_normal(len(time_ns))
     values = quantised(current_a(time_ns / NS_PER_S, settings) + noise, settings.resolution_a)

@@ -20,7 +20,7 @@ from groundstation.tables.table import Flight, Table
 
 @dataclass(frozen=True)
 class Dropout:
-    """Samples of a topic (empty: of all topics) between two log times are not recorded."""
+    """Samples of a topic (empty: of all topics) missing between two log times."""
 
     kind: ClassVar[str] = "dropout"
     from_s: float = required_number(0.0)
@@ -30,7 +30,7 @@ class Dropout:
 
 @dataclass(frozen=True)
 class Duplicate:
-    """Log rows between two log times are recorded twice in succession."""
+    """Log rows recorded twice in succession between two log times."""
 
     kind: ClassVar[str] = "duplicate"
     from_s: float = required_number(0.0)
@@ -39,7 +39,7 @@ class Duplicate:
 
 @dataclass(frozen=True)
 class BackwardStep:
-    """The recorder's clock is set back by ``step_s`` at a log time and runs on from there."""
+    """Recorder's clock set back by ``step_s`` at a log time, from which it runs on."""
 
     kind: ClassVar[str] = "backward_step"
     at_s: float = required_number(0.0)
@@ -48,7 +48,7 @@ class BackwardStep:
 
 @dataclass(frozen=True)
 class ForwardStep:
-    """The recorder's clock is set ahead by ``step_s`` at a log time and runs on from there."""
+    """Recorder's clock set ahead by ``step_s`` at a log time, from which it runs on."""
 
     kind: ClassVar[str] = "forward_step"
     at_s: float = required_number(0.0)
@@ -69,7 +69,7 @@ class ClockDrift:
 
 @dataclass(frozen=True)
 class Stuck:
-    """A field keeps the value it had at ``from_s``."""
+    """Field that keeps the value it had at ``from_s``."""
 
     kind: ClassVar[str] = "stuck"
     topic: str
@@ -80,7 +80,7 @@ class Stuck:
 
 @dataclass(frozen=True)
 class NotANumber:
-    """The device writes NaN into a numeric field."""
+    """NaN that the device writes into a numeric field."""
 
     kind: ClassVar[str] = "nan"
     topic: str
@@ -91,7 +91,7 @@ class NotANumber:
 
 @dataclass(frozen=True)
 class MissingChannel:
-    """A topic, or one field of it, was not recorded at all."""
+    """Topic, or one field of it, that was not recorded at all."""
 
     kind: ClassVar[str] = "missing_channel"
     topic: str
@@ -100,7 +100,7 @@ class MissingChannel:
 
 @dataclass(frozen=True)
 class Frozen:
-    """A device repeats its last sample, all numbers of it, while the aircraft moves on."""
+    """Device that repeats all numbers of its last sample while the aircraft moves on."""
 
     kind: ClassVar[str] = "frozen"
     topic: str
@@ -110,7 +110,7 @@ class Frozen:
 
 @dataclass(frozen=True)
 class Jump:
-    """The position that a device gives is displaced for a while."""
+    """Position of a device that is displaced for a while."""
 
     kind: ClassVar[str] = "jump"
     topic: str
@@ -203,7 +203,7 @@ def apply_faults(flight: Flight, faults: Iterable[Fault]) -> Flight:
 
 
 def describe(fault: Fault) -> str:
-    """One line for people.
+    """Describe a fault in one line for people.
 
     Examples
     --------
@@ -391,7 +391,7 @@ def all_rows(flight: Flight, topics: Iterable[str] | None = None) -> Int64Array:
 
 
 def _renumbered(flight: Flight) -> Flight:
-    """Rows counted without holes, as a reader of the log would count them."""
+    """Number the rows without holes, as a reader of the log would count them."""
     rows = all_rows(flight)
     tables = {
         topic: replace(table, record_index=np.searchsorted(rows, table.record_index).astype(np.int64))

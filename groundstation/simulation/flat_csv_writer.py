@@ -179,7 +179,7 @@ def _time_cells(time_ns: Int64Array, decimals: int) -> Any:
 
 
 def _spread(cells: Any, place: Int64Array, length: int) -> Any:
-    """Cells put at their rows of the block, the rest empty."""
+    """Put cells at their rows of the block, the rest empty."""
     import pyarrow as pa
     import pyarrow.compute as pc
 

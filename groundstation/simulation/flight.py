@@ -61,7 +61,7 @@ class Simulated:
 
     @property
     def damaged(self) -> Flight:
-        """The flight with the scenario's faults: what the recorder wrote."""
+        """Return the flight with the scenario's faults, as the recorder wrote it."""
         return apply_faults(self.flight, self.scenario.faults)
 
 

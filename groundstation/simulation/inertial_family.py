@@ -166,7 +166,7 @@ def simulate_family(family: FamilySettings, runs: int, seed: int, *, first_run: 
 
 
 def iterate_family(family: FamilySettings, runs: int, seed: int, chunk: int = 20) -> Iterator[ErrorBatch]:
-    """The same flights as :func:`simulate_family`, ``chunk`` at a time, for bounded memory."""
+    """Yield the flights of :func:`simulate_family`, ``chunk`` at a time, for bounded memory."""
     for first in range(0, runs, chunk):
         yield simulate_family(family, min(chunk, runs - first), seed, first_run=first)
 

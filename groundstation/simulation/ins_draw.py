@@ -160,7 +160,7 @@ def draw_heading_wander(
 
 @compiled
 def _first_order(values, keep):  # type: ignore[no-untyped-def]
-    """Unit white noise into a stationary unit process, in place."""
+    """Turn unit white noise into a stationary unit process, in place."""
     n, width = values.shape
     for k in range(1, n):
         drive = np.sqrt(1.0 - keep[k - 1] * keep[k - 1])

@@ -102,7 +102,10 @@ def adf_readings(
 def radio_altimeter_readings(
     trajectory: Trajectory, settings: RadioAltimeterSettings, runway: RunwayOfLanding, rng: np.random.Generator
 ) -> Readings:
-    """Height above the ground: that of the runway, and before the threshold as it rises."""
+    """Return the height above the ground, which rises before the threshold.
+
+    From the threshold on, the ground is the runway.
+    """
     index = every(trajectory, settings.rate_hz)
     places, motion = runway_places(trajectory, runway), trajectory.at(index)
     ground = settings.rise_m_per_km * np.maximum(-places.along_m[index], 0.0) / 1000.0

@@ -202,7 +202,7 @@ def _magnetometer(settings: MagneticFamilySettings, rng: np.random.Generator) ->
 def _in_the_world(
     magnetometer: MagnetometerSettings, settings: MagneticFamilySettings, rng: np.random.Generator
 ) -> MagnetometerSettings:
-    """The same magnetometer in a world that is not the model's."""
+    """Return the same magnetometer in a world that is not the model's."""
     north, east, down = (rng.standard_normal(3) * settings.field_error_sigmas * NORTH_EAST_DOWN_SIGMA_NT).tolist()
     wavelength_m, (direction, phase) = rng.uniform(*settings.anomaly_wavelength_m), rng.uniform(0.0, 360.0, 2)
     anomaly = Anomaly(settings.anomaly_nt, float(wavelength_m), float(direction), float(phase))

@@ -1,4 +1,4 @@
-"""The aircraft's own heading estimate, as its computer made and logged it during taxi."""
+"""Heading estimate of the aircraft's own computer, made and logged during taxi."""
 
 import numpy as np
 
@@ -18,11 +18,10 @@ STANDING_MPS = 0.1
 def onboard_readings(trajectory: Trajectory, ins: Readings, gnss: Readings, settings: OnboardSettings) -> Readings:
     """Run the paper's recursion over computer cycles.
 
-    The last GNSS output is used again until the next one arrives.
-
-    m_i = m_(i-1) - (m_(i-1) - d_i) / i, e_i = 1.96 sqrt(s2_i / (i - 1)), quality = standard deviation of m about its
-    own running mean; a cycle counts above the speed gate and below the gate on the raw heading rate. It ends when the
-    operator enters the correction, standing lined up; an estimate that is not ready is not entered.
+    The last GNSS output is used again until the next one arrives. m_i = m_(i-1) - (m_(i-1) - d_i) / i, e_i = 1.96
+    sqrt(s2_i / (i - 1)), quality = standard deviation of m about its own running mean; a cycle counts above the speed
+    gate and below the gate on the raw heading rate. It ends when the operator enters the correction, standing lined up;
+    an estimate that is not ready is not entered.
 
     Source: Markelov, Kostishin, Shukalov, Information and Control Systems 2015 No 6, pp. 34-38.
     """

@@ -128,7 +128,7 @@ def _rate_dps(bank_deg: float, speed_mps: float) -> float:
 def _climb_out(
     time_s: FloatArray, field_m: float, cruise_m: float, lift_off_mps: float, cruise_mps: float, climb_mps: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Speed and altitude of a stand of 30 s, a take-off run, climb and acceleration to cruise."""
+    """Return speed and altitude of a stand of 30 s, a take-off run, climb and acceleration."""
     climb_s = 1.5 * (cruise_m - field_m) / climb_mps
     speed = lift_off_mps * _ramp(time_s, 30.0, ROLL_S)
     speed += (cruise_mps - lift_off_mps) * _ramp(time_s, 30.0 + ROLL_S, 0.7 * climb_s)
@@ -155,7 +155,7 @@ def _straight(time_s: FloatArray, rng: np.random.Generator) -> Plan:
 
 
 def _highest_deg(latitude_deg: float, course_deg: float, arc_rad: float) -> float:
-    """Largest distance from the equator along a great circle, on the sphere."""
+    """Return the largest distance from the equator along a great circle, on the sphere."""
     arc = np.linspace(0.0, arc_rad, 50)
     start, course = np.deg2rad(latitude_deg), np.deg2rad(course_deg)
     sine = np.sin(start) * np.cos(arc) + np.cos(start) * np.sin(arc) * np.cos(course)
@@ -196,7 +196,7 @@ def _norilsk_moscow(time_s: FloatArray, rng: np.random.Generator) -> Plan:
 
 
 def _manoeuvring(time_s: FloatArray, rng: np.random.Generator) -> Plan:
-    """Survey lines or racetracks: a turn every 5 to 20 min, back and forth or onwards."""
+    """Plan survey lines or racetracks: a turn every 5 to 20 min, back and forth or onwards."""
     cruise = rng.uniform(100.0, 180.0)
     speed, altitude = _climb_out(time_s, rng.uniform(0.0, 600.0), rng.uniform(3e3, 9e3), 70.0, cruise, 8.0)
     turn, at, side = np.zeros(len(time_s)), 150.0, float(rng.choice([-1.0, 1.0]))
@@ -210,7 +210,7 @@ def _manoeuvring(time_s: FloatArray, rng: np.random.Generator) -> Plan:
 
 
 def _out_and_back(time_s: FloatArray, rng: np.random.Generator) -> Plan:
-    """One long leg, one turn of 180 deg near the middle of the flight, the same leg back."""
+    """Plan one long leg, a turn of 180 deg near mid-flight, and the same leg back."""
     return _legs(time_s, rng, [(rng.uniform(0.35, 0.6) * float(time_s[-1]), 180.0 * rng.choice([-1.0, 1.0]))])
 
 
@@ -224,7 +224,7 @@ def _dogleg(time_s: FloatArray, rng: np.random.Generator) -> Plan:
 
 
 def _racetrack(time_s: FloatArray, rng: np.random.Generator) -> Plan:
-    """A patrol: legs of one length, 3 to 25 min, every turn 180 deg to the same side."""
+    """Plan a patrol: legs of one length, 3 to 25 min, every turn 180 deg to the same side."""
     angle, leg_s = 180.0 * rng.choice([-1.0, 1.0]), rng.uniform(180.0, 1500.0)
     return _legs(time_s, rng, [(start, angle) for start in np.arange(600.0 + leg_s, time_s[-1], leg_s + 120.0)])
 
@@ -240,7 +240,7 @@ def _late_survey(time_s: FloatArray, rng: np.random.Generator) -> Plan:
 
 
 def _legs(time_s: FloatArray, rng: np.random.Generator, turns: list[tuple[float, float]]) -> Plan:
-    """Climb out, cruise, and turns (start, angle) at 20 deg of bank."""
+    """Plan a climb out, cruise, and turns (start, angle) at 20 deg of bank."""
     cruise = rng.uniform(120.0, 230.0)
     speed, altitude = _climb_out(time_s, rng.uniform(0.0, 600.0), rng.uniform(5e3, 11e3), 70.0, cruise, 8.0)
     turn = np.zeros(len(time_s))

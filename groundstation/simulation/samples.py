@@ -70,7 +70,7 @@ def make_sample_logs(folder: str | Path) -> tuple[Path, ...]:
 
 
 def readme_text(simulated: list[Simulated]) -> str:
-    """The README of the sample logs: what each holds, the true values, the damage done."""
+    """Return the README of the sample logs: contents, true values and damage of each."""
     logs = [_log_line(one) for one in simulated]
     truths = [_truth_line(one) for one in simulated]
     damage = [f"- `{one.scenario.name}.csv`: {text}." for one in simulated for text in _damage_of(one)]

@@ -47,7 +47,7 @@ class ParkingReference:
 
 @dataclass(frozen=True)
 class Wind:
-    """Velocity of the air over the ground, constant (where it blows to)."""
+    """Velocity of the air over the ground, constant, in the direction to which it blows."""
 
     north_mps: float = number(0.0, -60.0, 60.0)
     east_mps: float = number(0.0, -60.0, 60.0)
@@ -202,7 +202,7 @@ class MagnetometerSettings:
 
 @dataclass(frozen=True)
 class Load(Interval):
-    """A consumer that is on for an interval."""
+    """Consumer of current that is on for an interval."""
 
     current_a: float = required_number(-10_000.0, 10_000.0)
 
@@ -270,7 +270,7 @@ class OnboardSettings:
 
 @dataclass(frozen=True)
 class TruthSettings:
-    """Truth in the tables always; in the CSV only when ``written``."""
+    """Settings of the truth: always in the tables, in the CSV only when ``written``."""
 
     rate_hz: float = number(10.0, 0.01, 1000.0)
     written: bool = False
@@ -278,7 +278,7 @@ class TruthSettings:
 
 @dataclass(frozen=True)
 class EventMarker:
-    """A marker of the recorder or an operator's command."""
+    """Marker of the recorder, or an operator's command."""
 
     time_s: float = required_number(0.0)
     name: str = ""

@@ -66,7 +66,7 @@ def draw_ranges(scenario: SessionScenario, flown: Sequence[Flown], rng: np.rando
 def _pseudorange(
     scenario: SessionScenario, transmitter: "SessionPoint | Flown", receiver: Flown, at: "np.ndarray"
 ) -> FloatArray:
-    """True distance with both clocks in it, at places of the grid."""
+    """Return the true distance with both clocks in it, at places of the grid."""
     place, clock = receiver.motion.position_m[at], receiver.errors.clock_m[at]
     if isinstance(transmitter, Flown):
         distance = np.linalg.norm(place - transmitter.motion.position_m[at], axis=1)
@@ -79,7 +79,7 @@ def _is_present(one: SessionAircraft | SessionPoint, time_s: FloatArray) -> Bool
 
 
 def _in_order(rows: list[tuple[FloatArray, ...]], names: list[tuple[str, str]], sigma_m: float) -> Ranges:
-    """One table in order of time; rows of one slot in the order of the receivers."""
+    """Return one table in order of time; rows of one slot in the order of the receivers."""
     if not rows:
         return Ranges.none()
     time_s, read, slot = (np.concatenate(parts) for parts in zip(*rows, strict=True))

@@ -121,7 +121,7 @@ def _ns(time_s: FloatArray) -> Int64Array:
 
 
 def _motion(position_m: FloatArray, velocity_mps: FloatArray, origin: LocalFrame | None) -> dict[str, FloatArray]:
-    """Positions and velocities of the session's frame as an INS tells them."""
+    """Return positions and velocities of the session's frame as an INS has them."""
     ecef = position_m if origin is None else origin.to_ecef_m(position_m)
     latitude, longitude, altitude = geodetic_deg_m(ecef)
     velocity = velocity_mps if origin is None else origin.turned_to(latitude, longitude, velocity_mps)

@@ -114,7 +114,7 @@ class SatelliteSettings:
 
 @dataclass(frozen=True)
 class SessionScenario:
-    """A session: everything that determines it but the seed.
+    """Scenario of a session: everything that determines it but the seed.
 
     Parameters
     ----------

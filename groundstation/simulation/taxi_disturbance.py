@@ -219,7 +219,10 @@ def metar_line(wind_mps: FloatArray) -> str:
 
 
 def turns_of(kind: Kind, rng: np.random.Generator, turns_deg: tuple[float, ...]) -> tuple[float, ...]:
-    """Turns between the segments: those drawn, but for the cells that are about directions."""
+    """Return the turns between the segments.
+
+    They are as drawn, but for the cells that are about directions.
+    """
     if kind == "crab one way":
         return tuple(30.0 * (-1.0) ** number for number in range(len(turns_deg)))
     if kind == "crab back-taxi":

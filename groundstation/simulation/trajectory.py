@@ -205,7 +205,7 @@ def _wander(
 
 
 def _between(low_high: tuple[float, float], profile: Profile) -> tuple[FloatArray, FloatArray]:
-    """A weight growing smoothly from 0 to 1 with the speed, and its derivative in time."""
+    """Return a weight that grows smoothly from 0 to 1 with the speed, and its time derivative."""
     low, high = low_high
     share = (profile.speed_mps - low) / (high - low)
     return smoothstep(share), smoothstep_slope(share) * profile.acceleration_mps2 / (high - low)
@@ -234,7 +234,7 @@ def _taxiing(profile: Profile) -> tuple[FloatArray, FloatArray]:
 def _crosswind_slip(
     scenario: Scenario, profile: Profile, direction_deg: FloatArray, direction_rate_dps: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Angle by which the nose is turned into the wind while taxiing, and its rate."""
+    """Return the angle of the nose into the wind while taxiing, and its rate."""
     wind, factor = scenario.wind, scenario.ground.crosswind_slip_deg_per_mps
     direction_rad = np.deg2rad(direction_deg)
     sine, cosine = np.sin(direction_rad), np.cos(direction_rad)
@@ -250,7 +250,10 @@ def _nose_about_direction(
     crosswind_slip: tuple[FloatArray, FloatArray],
     rng: np.random.Generator,
 ) -> tuple[FloatArray, FloatArray]:
-    """Angle of the nose about the track (ground) or the air velocity (air), and its rate."""
+    """Return the angle of the nose about the track or the air velocity, and its rate.
+
+    On the ground it is the track, in the air the air velocity.
+    """
     ground = scenario.ground
     sway, sway_rate = _wander(rng, profile, ground.sway_sigma_deg, ground.sway_frequency_hz, ground.sway_damping)
     rolling, rolling_rate = _between(ROLLING_MPS, profile)

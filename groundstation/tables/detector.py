@@ -283,7 +283,7 @@ def _height_above_ground_m(motion: Motion, stops: list[_Stop], settings: GroundS
 
 
 def lasting(mask: BoolArray, least_s: float) -> BoolArray:
-    """The runs of a mask that last so long."""
+    """Return the runs of a mask that last so long."""
     out = mask.copy()
     for start, end in runs(mask):
         if end - start < least_s * RATE_HZ:
@@ -329,12 +329,12 @@ def _extend(
 def _kept_end(
     motion: Motion, end: int, standstill: int, step: int, settings: GroundSettings, *, is_learnt: bool
 ) -> int:
-    """Last row that is kept of a stretch from ``standstill`` to ``end`` (``step`` +1 or -1).
+    """Return the last row that is kept of a stretch from ``standstill`` to ``end``.
 
-    Where the motion itself ended it, this may have been a lift-off or touch-down, and the largest speed up to a climb
-    window past it a flying speed: whatever came near it without slowing down in between may have been in the air.
-    Where data ended the same is feared of the speed before, unless flying speeds are learnt from the log and bound it
-    already. A standstill that lasts to the end of data is kept whole.
+    ``step`` is +1 or -1. Where the motion itself ended it, this may have been a lift-off or touch-down, and the largest
+    speed up to a climb window past it a flying speed: whatever came near it without slowing down in between may have
+    been in the air. Where data ended the same is feared of the speed before, unless flying speeds are learnt from the
+    log and bound it already. A standstill that lasts to the end of data is kept whole.
     """
     window = round(settings.climb_window_s * RATE_HZ)
     beyond = [row for row in range(end + step, end + step * (1 + window), step) if 0 <= row < len(motion)]

@@ -178,7 +178,7 @@ def runs(mask: BoolArray) -> list[tuple[int, int]]:
 
 
 def _usable_fixes(gnss: Table) -> BoolArray:
-    """Fixes that the receiver itself trusts; one that says nothing is trusted."""
+    """Tell which fixes the receiver itself trusts; one that says nothing is trusted."""
     is_doubtful = (gnss.values("integrity_ok") == 0.0) | (gnss.values("satellites_used") < FEWEST_SATELLITES)
     return np.asarray(~is_doubtful)
 

@@ -183,7 +183,7 @@ class _Evidence:
 
     @property
     def flight(self) -> Flight:
-        """The flight; whoever asks for evidence holds it."""
+        """Flight that the evidence is of; whoever asks for evidence holds it."""
         flight = self._flight()
         assert flight is not None
         return flight

@@ -241,7 +241,7 @@ class Heights:
 
 @dataclass(frozen=True)
 class Session:
-    """Everything the cooperative estimators are given.
+    """Everything that the cooperative estimators take.
 
     Parameters
     ----------

@@ -245,7 +245,7 @@ def _point(stations: Stations, place: int) -> GroundPoint:
 
 
 def _ranks(flights: Mapping[str, Flight], stations: Stations) -> dict[str, int]:
-    """Ranks as the stations file says, else as the aircraft broadcast them last."""
+    """Return the ranks that the stations file states, else those the aircraft broadcast last."""
     ranks: dict[str, int] = {}
     for flight in flights.values():
         for topic in topics_of_kind("link", flight.topics()):
@@ -259,7 +259,10 @@ def _ranks(flights: Mapping[str, Flight], stations: Stations) -> dict[str, int]:
 def _satellites(
     flights: Mapping[str, Flight], placed: Mapping[str, PlacedLog], start_ns: int, settings: SessionSettings
 ) -> SatelliteRanges:
-    """Pseudo-ranges to satellites; the estimators leave out and count what is no number."""
+    """Return the pseudo-ranges to satellites, invalid ones included.
+
+    The estimators leave out and count what is no number.
+    """
     times: list[Int64Array] = []
     values: list[FloatArray] = []
     names: list[tuple[str, str, int]] = []

@@ -50,7 +50,7 @@ class LogClock:
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     def stretch_of(self, record_index: Int64Array) -> Int64Array:
-        """Stretch of rows of the log; what stands before the first range belongs to the first."""
+        """Return the stretch of rows of the log; rows before the first range belong to the first."""
         place = np.searchsorted(self.first_record, record_index, side="right") - 1
         return np.asarray(np.clip(place, 0, None), dtype=np.int64)
 
@@ -109,7 +109,7 @@ def travel_ns(pseudorange_m: FloatArray) -> Int64Array:
 
 
 def clock_of(flight: Flight, leap_s: float) -> LogClock:
-    """Hold the clock of a log against the link's; see the module.
+    """Compare the clock of a log with the link's; see the module.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def clock_of(flight: Flight, leap_s: float) -> LogClock:
 
 
 def _median(values: Int64Array) -> int:
-    """Median without a float between: UTC in nanoseconds has more digits than float64."""
+    """Return the median without floats: UTC in nanoseconds has more digits than float64."""
     return int(np.sort(values)[len(values) // 2])
 
 

@@ -132,7 +132,7 @@ def _far_stations(
     points: Sequence[GroundPoint],
     settings: SessionSettings,
 ) -> tuple[set[str], list[Finding]]:
-    """Stations that no range agrees with: their place, or their name, is wrong."""
+    """Find stations that no range agrees with: their place, or their name, is wrong."""
     tracks = {vehicle.name: vehicle for vehicle in vehicles}
     far, findings = set(), []
     for point in points:

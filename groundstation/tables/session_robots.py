@@ -42,7 +42,10 @@ class RobotSettings:
 
 @dataclass(frozen=True)
 class RobotSession:
-    """A session of robots with what judges it: vehicle to (time_s (n,), position_m (n, 3))."""
+    """Session of robots, with the truth to judge it by.
+
+    The truth is by vehicle: time_s (n,), position_m (n, 3).
+    """
 
     session: Session
     truth: Mapping[str, tuple[FloatArray, FloatArray]]

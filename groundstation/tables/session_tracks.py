@@ -23,7 +23,7 @@ SAME_EPOCH = 1e-3  # of a step
 
 
 class NoTrackError(Exception):
-    """A log without dead reckoning; the reason."""
+    """Error: a log has no dead reckoning, for the reason given."""
 
 
 def aircraft_named(metadata: Mapping[str, str], source_name: str) -> str:

@@ -23,7 +23,7 @@ NEVER_A_FIX = "GNSS never had a fix"
 
 @dataclass(frozen=True)
 class Ranked:
-    """A source with what its place among the others rests on."""
+    """Source with the facts that its place among the others rests on."""
 
     topic: str
     has_needed: bool
@@ -119,7 +119,7 @@ def why_first(kind: str, order: list[Ranked]) -> str:
 
 
 def _ranked(table: Table, kind: str, said: str) -> Ranked:
-    """``said``: what its log says of the INS in it, where its samples say nothing."""
+    """Rank a source; ``said`` is what its log says of the INS where the samples say nothing."""
     needed = NEEDS.get(kind, ())
     known = table.take(table.valid(*needed)) if table.has(*needed) else table
     time_s = known.time_ns / NS_PER_S

@@ -78,7 +78,7 @@ class Table:
         return f"<{type(self).__name__} {self.topic}: {len(self)} rows of {', '.join(self.columns)}>"
 
     def _absent(self, name: str) -> None:
-        """Refuse a name that no field has; one that this log merely lacks is absent throughout."""
+        """Refuse a name that no signal has; a field that this log merely lacks is absent."""
         if not is_field_name(name):
             names = dict.fromkeys((*self.columns, *(field.name for field in TOPICS.get(kind_of(self.topic), ()))))
             raise UnknownNameError(f"table {self.topic}", name, names)
@@ -300,7 +300,7 @@ class Flight:
         return tuple(sorted(self.tables))
 
     def without(self, kind: str) -> "Flight":
-        """The flight without the topics of a kind; its clock stays as it is."""
+        """Return the flight without the topics of a kind; its clock stays as it is."""
         return replace(self, tables={name: one for name, one in self.tables.items() if kind_of(name) != kind})
 
     def seconds(self, time_ns: Int64Array) -> FloatArray:

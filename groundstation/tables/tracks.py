@@ -15,7 +15,7 @@ from groundstation.tables.table import Table
 
 @runtime_checkable
 class HasTracks(Protocol):
-    """Workings of an analysis that hold tracks."""
+    """Role of the workings of an analysis that hold tracks."""
 
     def tracks(self, start_ns: int) -> Iterator[tuple[str, Table]]:
         """Yield name and table of each track, with the field names of an INS.
@@ -25,7 +25,7 @@ class HasTracks(Protocol):
 
 
 def ins_table(time_ns: Int64Array, columns: Mapping[str, FloatArray]) -> Table:
-    """Fields of an INS, by whose names angles are known as such where they are interpolated."""
+    """Make a table with the fields of an INS, by whose names angles are interpolated as such."""
     order = np.argsort(time_ns, kind="stable")
     found = {name: Column(values[order], np.isfinite(values[order])) for name, values in columns.items()}
     index = np.arange(len(time_ns), dtype=np.int64)

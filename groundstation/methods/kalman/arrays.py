@@ -44,7 +44,7 @@ class Dynamics(NamedTuple):
 
 
 class Lines(NamedTuple):
-    """Rows of the measurement matrix, r of them, and how well each is measured.
+    """Rows of the measurement matrix, r of them, with the noise of each.
 
     ``variance`` as a measurement is weighted, ``believed`` as a single one is believed to err; measurements of one
     epoch that follow each other and whose rows are of one ``kind`` are judged together: all are used or none.

@@ -218,7 +218,7 @@ class FilterRun:
 
     @cached_property
     def rejected_by_kind(self) -> Int64Array:
-        """The same for each kind, shape (kinds,)."""
+        """Number of rejected measurements of each kind, shape (kinds,)."""
         lines = self.measurements.lines
         kind = lines.kind[self.measurements.row[self.mark == REJECTED]]
         return np.bincount(kind, minlength=_kinds(lines)).astype(np.int64)
@@ -250,7 +250,7 @@ def run_filter(
     drive: Drive | None = None,
     kept: Kept | None = None,
 ) -> FilterRun:
-    """Filter measurements over epochs; where none is used the states are forecast.
+    """Filter measurements over epochs; without any the states are forecast.
 
     Parameters
     ----------
@@ -349,7 +349,7 @@ def _room(n: int, m: int, size: int, channels: int, kept: Kept) -> Record:
 def forecast(
     transition: Transition, step: Int64Array, start: FloatArray, known: FloatArray, every: int, drive: Drive
 ) -> FloatArray:
-    """Carry many starts forward together: what one state of each builds up.
+    """Carry many starts forward together, and return what one state of each builds up.
 
     Parameters
     ----------

@@ -86,7 +86,7 @@ def predict_covariance(
 
 @inlined
 def predict_states(states: States, pattern: Pattern, F: FloatArray, step: int, x: FloatArray, w: FloatArray) -> None:
-    """x <- F x, every right-hand side."""
+    """Predict the states: x <- F x, every right-hand side."""
     n = len(states)
     for c in range(x.shape[0]):
         if F.ndim == 3:
@@ -110,7 +110,10 @@ def predict_states(states: States, pattern: Pattern, F: FloatArray, step: int, x
 
 @inlined
 def add_noise(states: States, rows: Int64Array, columns: Int64Array, Q: FloatArray, step: int, p: FloatArray) -> None:
-    """p <- p + Q; of a sparse Q every entry off the diagonal is added on both sides of it."""
+    """Add process noise: p <- p + Q.
+
+    Of a sparse Q every entry off the diagonal is added on both sides of it.
+    """
     if Q.ndim == 3:
         for i in range(len(states)):
             for j in range(len(states)):
@@ -219,6 +222,6 @@ def update_covariance(
 
 @inlined
 def correct_states(states: States, K: FloatArray, y: float, x: FloatArray, c: int) -> None:
-    """x <- x + K y, right-hand side c."""
+    """Correct the states: x <- x + K y, right-hand side c."""
     for i in range(len(states)):
         x[c, i] += K[i] * y

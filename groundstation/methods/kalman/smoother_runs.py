@@ -97,7 +97,7 @@ def absorb_states(
 def carry_covariance_back(
     states: States, pattern: Pattern, F: FloatArray, step: int, A: FloatArray, w: FloatArray
 ) -> None:
-    """A <- F' A F. ``w`` (n, n) is room."""
+    """Carry A back over a step: A <- F' A F. ``w`` (n, n) is room."""
     n = len(states)
     if F.ndim == 3:
         for i in range(n):
@@ -143,7 +143,10 @@ def carry_covariance_back(
 
 @inlined
 def carry_states_back(states: States, pattern: Pattern, F: FloatArray, step: int, a: FloatArray, w: FloatArray) -> None:
-    """a <- F' a, every right-hand side. The first row of ``w`` is room."""
+    """Carry a back over a step: a <- F' a, every right-hand side.
+
+    The first row of ``w`` is room.
+    """
     n = len(states)
     rows, starts, columns = pattern
     for c in range(a.shape[0]):

@@ -138,7 +138,7 @@ def _check_places(which: str, rows: Int64Array, columns: Int64Array, size: int) 
 
 
 def distinct_steps(interval_s: FloatArray, resolution_s: float, most: int) -> tuple[FloatArray, Int64Array]:
-    """Distinct intervals and which of them each is: equal ones share one transition.
+    """Return the distinct intervals, and the number of each: equal ones share a transition.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ LEAST_RATIO = 1e-9  # directions that one window alone determines leave nothing 
 
 @dataclass(frozen=True)
 class DelayFit:
-    """A delay and how well it is known.
+    """Delay, and its uncertainty.
 
     ``sigma_s`` allows for errors correlated within a window and for the priors; ``modelled_sigma_s`` is what the noise
     model would give; ``freedom`` the number of degrees it rests on; ``motion`` the RMS rate of the reference,

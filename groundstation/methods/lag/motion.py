@@ -1,4 +1,4 @@
-"""Motion of an aircraft as records of it are compared."""
+"""Motion of an aircraft, in the form in which records of it are compared."""
 
 import numpy as np
 

@@ -162,7 +162,7 @@ class Whitened:
         return cls(None, np.linalg.qr(windows.polynomials(degree))[0], windows.known)
 
     def rows(self, values: FloatArray) -> FloatArray:
-        """Values (w, n, c, k) whitened and freed of the polynomials: rows (w, n c, k)."""
+        """Return values (w, n, c, k) whitened and freed of the polynomials: rows (w, n c, k)."""
         w, n, c, k = values.shape
         flat = (values * self.known[..., None, None]).reshape(w, n, c * k)
         flat = flat if self.factor is None else self.factor @ flat
@@ -207,14 +207,17 @@ def cut_windows(reference: Series, time_s: FloatArray, values: FloatArray, setti
 
 
 def reweighted(windows: Windows, left: FloatArray, sigma: float, robust_sigmas: float) -> Windows:
-    """Windows with Huber's weights by what is left of each sample, shape (w, n, c)."""
+    """Return windows with Huber's weights by the residual of each sample, shape (w, n, c)."""
     sizes = np.sqrt(np.mean(np.square(left), axis=2))
     weight = np.minimum(1.0, robust_sigmas * sigma / np.maximum(sizes, 1e-300))
     return replace(windows, weight=np.where(windows.known, weight, 0.0))
 
 
 def spread_of(left: FloatArray) -> float:
-    """Sigma of residuals by their median size, never zero; exact zeros fill windows up."""
+    """Return the sigma of residuals by their median size, never zero.
+
+    Exact zeros, which fill windows up, are left out.
+    """
     sizes = np.abs(left[left != 0.0])
     return max(SIGMA_OF_MEDIAN * float(np.median(sizes)), 1e-9) if sizes.size else 1e-9
 

@@ -21,7 +21,7 @@ class KnownDelay:
 def known_delay(
     pair: tuple[str, str], latencies: Latencies | None, stated_s: float | None, stated_sigma_s: float
 ) -> KnownDelay | None:
-    """The latency to take out of a pair of INS and GNSS; None where nothing is known of it.
+    """Return the latency to take out of a pair of INS and GNSS; None where none is known.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ CHANGING_MPS2 = 0.5  # a change of speed that is a run's, and not taxi's
 def gate_samples(
     samples: Samples, settings: TaxiLimits, intervals: Sequence[Interval] = (), phases: Phases | None = None
 ) -> Samples:
-    """Say of every epoch why it is used or not, and number the straight segments.
+    """Tell for every epoch why it is used or not, and number the straight segments.
 
     Later reasons give way to earlier ones: excluded, no heading, ground, geometry, integrity, too fast, too slow,
     turning, take-off run, landing roll, outlier, GNSS gap. A forced interval overrides those from ``too fast`` on.
@@ -90,7 +90,7 @@ def intervals_without_epoch(time_s: NDArray[np.float64], intervals: Sequence[Int
 
 
 def is_straight_and_fast(samples: Samples, settings: TaxiLimits) -> BoolArray:
-    """Epochs of straight taxi by speed and rate of heading alone, shape (n,)."""
+    """Tell which epochs are straight taxi by speed and rate of heading alone, shape (n,)."""
     speed = samples.speed_mps
     is_straight = np.abs(np.nan_to_num(samples.rate_dps, nan=np.inf)) <= settings.turn_rate_max_dps
     return is_straight & (speed > settings.taxi_speed_min_mps) & (speed <= settings.taxi_speed_max_mps)

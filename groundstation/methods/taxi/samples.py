@@ -255,7 +255,7 @@ def _geometry(gnss: Table, settings: TaxiLimits) -> tuple[FloatArray, str]:
 def _ground_part(
     gnss: Table, on_ground: BoolArray, is_proven: bool, settings: TaxiLimits, with_later_runs: bool
 ) -> tuple[NDArray[np.int64], BoolArray]:
-    """Numbers of the epochs to pair, and which of them are later than lift-off."""
+    """Return the numbers of the epochs to pair, and a mask of those later than lift-off."""
     before = _before_lift_off(gnss, on_ground, is_proven, settings)
     index = np.arange(before.start, before.stop)
     later = np.arange(before.stop, len(gnss))
@@ -316,10 +316,10 @@ def _interpolated(at: FloatArray, time_s: FloatArray, heading_deg: FloatArray, g
 
 
 def without_arm(samples: Samples, arm_m: float, error_deg: float = 0.0) -> Samples:
-    """Velocities of the main-gear axle from those of the antenna ``arm_m`` ahead of it.
+    """Return the velocities of the main-gear axle from those of the antenna ahead of it.
 
-    v_axle = v_antenna - omega x arm: a turn to the right moves the antenna to the right of the heading.
-    ``error_deg`` is the rough INS heading error: the arm points along the true heading.
+    The antenna is ``arm_m`` ahead. v_axle = v_antenna - omega x arm: a turn to the right moves the antenna to the right
+    of the heading. ``error_deg`` is the rough INS heading error: the arm points along the true heading.
     """
     if arm_m == 0.0:
         return samples

@@ -50,7 +50,7 @@ NO_STANDSTILL = StandstillVelocities(np.zeros(0), np.zeros(0), np.zeros(0))
 
 @dataclass(frozen=True)
 class Regressor:
-    """A known shape times an unknown factor with a normal prior, beside the constant error.
+    """Known shape times an unknown factor with a normal prior, beside the constant error.
 
     ``is_apart``: what it leaves in the error is told apart from what was measured.
     """
@@ -63,7 +63,7 @@ class Regressor:
 
 @dataclass(frozen=True)
 class Differences:
-    """Heading differences to be averaged, shapes (n,).
+    """Heading differences to average, shapes (n,).
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ class _Target:
         return _Found(log_likelihood - 0.5 * np.sum(scaled**2, axis=1), estimate, variance, alone)
 
     def whole(self, thetas: FloatArray) -> FloatArray:
-        """All parameters, shape (k, 11), from those that are sampled."""
+        """Return all parameters, shape (k, 11), from the sampled ones."""
         out = np.full((len(thetas), len(PRIOR_MEAN)), PRIOR_MEAN)
         out[:, SPREAD] = NO_SPREAD
         out[:, self.free] = thetas
@@ -173,7 +173,7 @@ class _Target:
 
 
 def _start(differences: Differences, standstill: StandstillVelocities) -> FloatArray:
-    """A first guess of the parameters from plain standard deviations."""
+    """Return a first guess of the parameters from plain standard deviations."""
     theta = PRIOR_MEAN.copy()
     if len(standstill.time_s) > 20:
         steps = np.concatenate([np.diff(standstill.north_mps), np.diff(standstill.east_mps)])
@@ -274,7 +274,7 @@ def goes_there_and_back(direction_deg: FloatArray) -> bool:
 
 
 def _left_in_error(differences: Differences, parameters: FloatArray) -> float:
-    """Standard deviation of what the terms told apart leave in the error, degrees.
+    """Return the standard deviation that the terms told apart leave in the error, degrees.
 
     Where a taxi does not go there and back they do not move the number, for they would extrapolate: so all of them that
     the weights of the samples let through is in it, and as the number is linear in the differences, that is what it
@@ -290,7 +290,7 @@ def _left_in_error(differences: Differences, parameters: FloatArray) -> float:
 
 
 def without_apart(differences: Differences) -> Differences:
-    """The same without the regressors that are told apart."""
+    """Return the differences without the regressors that are told apart."""
     return replace(differences, regressors=tuple(one for one in differences.regressors if not one.is_apart))
 
 

@@ -78,7 +78,7 @@ class Room(NamedTuple):
 
 
 def room_for(width: int, checkpoints: int = 1) -> Room:
-    """Room for ``width`` columns, data and regressors."""
+    """Make working arrays for ``width`` columns, data and regressors."""
     rest = width - 1
     return Room(
         q=np.zeros(STATES),
@@ -142,7 +142,7 @@ def standstill_filter(
 
 @inlined
 def _oscillator(theta: FloatArray, step_s: float, f: FloatArray) -> None:
-    """Transition of sway and sway rate over a step, exact, into ``f`` of shape (2, 2)."""
+    """Fill ``f``, shape (2, 2), with the exact transition of sway and sway rate over a step."""
     natural = 2.0 * math.pi * math.exp(theta[FREQUENCY])
     zeta = min(math.exp(theta[DAMPING]), DAMPING_MAX)
     decay, damped = zeta * natural, natural * math.sqrt(1.0 - zeta * zeta)
@@ -391,7 +391,9 @@ def evaluate(
     alone: FloatArray,
     room: Room,
 ) -> None:
-    """Log likelihood, estimate and its variance for every row of ``thetas``, shape (k, 11).
+    """Fill log likelihood, estimate and its variance for every row of ``thetas``.
+
+    ``thetas`` has the shape (k, 11).
 
     Parameters
     ----------

@@ -59,7 +59,7 @@ class ErrorPosterior:
 
     @property
     def apart_sigma_deg(self) -> float:
-        """Standard deviation of what the regressors told apart leave in the error."""
+        """Standard deviation that the regressors told apart leave in the error."""
         return float(np.sqrt(self.weight @ np.maximum(self.sigma_deg**2 - self.measured_sigma_deg**2, 0.0)))
 
     def typical(self) -> FloatArray:

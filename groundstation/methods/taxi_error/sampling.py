@@ -26,7 +26,10 @@ TINIEST = 1e-12  # distance of a point of the sequence from 0 and 1
 
 
 def _gradient(log_density: LogDensity, theta: FloatArray, scale: FloatArray) -> tuple[float, FloatArray]:
-    """Minus the log density and its gradient by central differences, all points in one call."""
+    """Return minus the log density and its gradient by central differences.
+
+    All points are evaluated in one call.
+    """
     step = 1e-4 * scale
     size = len(theta)
     points = theta + np.vstack([np.zeros(size), np.diag(step), -np.diag(step)])
@@ -134,7 +137,10 @@ class _Proposal:
 
 
 def _root(covariance: FloatArray) -> FloatArray:
-    """Upper triangular factor: the last parameter depends on one normal number alone."""
+    """Return the upper triangular factor.
+
+    The last parameter then depends on one normal number alone.
+    """
     return np.asarray(np.linalg.cholesky(covariance[::-1, ::-1])[::-1, ::-1], dtype=np.float64)
 
 
@@ -153,7 +159,7 @@ def _even_places(first: int, count: int, shift: FloatArray) -> FloatArray:
 
 
 def _weights(log_weight: FloatArray) -> FloatArray:
-    """Weights of sum 1, none so large that one draw makes the answer.
+    """Return weights of sum 1, none so large that one draw makes the answer.
 
     Source: E. Ionides, Truncated importance sampling, Journal of Computational and Graphical Statistics 17 (2008).
     """

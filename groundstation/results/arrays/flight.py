@@ -11,7 +11,7 @@ class Overview(
     figure="overview",
     digits={"latitude_deg": 7, "longitude_deg": 7, "altitude_m": 1, "pressure_altitude_m": 1, "*": 2},
 ):
-    """The flight thinned, for the map and profiles; what only some logs have is optional."""
+    """Thinned flight for the map and profiles; fields that only some logs have are optional."""
 
     time_s: Floats
     latitude_deg: Floats

@@ -45,7 +45,7 @@ class StatesOfChannel(Part):
     normalised_innovation: Floats
 
     def state(self, name: str) -> StateSeries:
-        """A state with its sigma; what was not measured or smoothed is NaN throughout."""
+        """Return a state with its sigma; NaN throughout where it was not measured or smoothed."""
         unknown = np.full(len(self.position_m), np.nan)
         measured = {"position": self.measured_position_m, "velocity": self.measured_velocity_mps}
         smoothed = {"position": self.smoothed_position_m, "velocity": self.smoothed_velocity_mps}
