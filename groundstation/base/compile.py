@@ -1,13 +1,13 @@
 """The one wrapper around numba: all compiled loops of the package are compiled here.
 
-A loop is compiled at its first call, and numba imported then. What was compiled goes beside the code when that folder
-can be written, else into the user's cache folder, else it is compiled again in each process; ``numba.njit(cache=True)``
-alone raises at import in a read-only install without a home. It is loaded as code: a folder that another user owns or
-may write serves neither here nor for numba, which pickles what it keeps. Loops over numbers and arrays are kept as
-machine code of their own (``base.machine_code``), and found again without numba; where another version of numba does
-not give that, they are compiled like any others. Where nothing is kept, plain Python goes through the bytes of a small
-log: it has done so before a compiler has started.
-Keep compiled functions scalar: small matrix products inside njit take 7-10 s to compile.
+A loop is compiled at its first call, and numba imported then. Compiled code goes beside the source when that folder can
+be written, else into the user's cache folder, else it is compiled again in each process; ``numba.njit(cache=True)``
+alone raises at import in a read-only install without a home. It is loaded as code, and numba pickles what it keeps: a
+folder that another user owns or may write is used by neither. Loops over numbers and arrays are kept as machine code of
+their own (``base.machine_code``), and found again without numba; where another version of numba does not give that,
+they are compiled like any others. Where nothing is kept, plain Python goes through the bytes of a small log: it has
+done so before a compiler has started. Keep compiled functions scalar: small matrix products inside njit take 7-10 s to
+compile.
 """
 
 import os

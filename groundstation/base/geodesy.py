@@ -106,8 +106,8 @@ def north_east_m(
 ) -> tuple[FloatArray, FloatArray]:
     """Displacements from an origin in metres north and east, good to 0.1 % within 50 km.
 
-    The date line is crossed as if it were not there. What is no position (a latitude beyond 90 deg, a longitude beyond
-    a turn) has no displacement: NaN.
+    The date line is crossed as if it were not there. An impossible position (a latitude beyond 90 deg, a longitude
+    beyond a turn) has NaN.
 
     Examples
     --------

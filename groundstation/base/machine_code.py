@@ -1,8 +1,8 @@
 """Compiled loops kept as machine code, so that a process loads one without the compiler.
 
 numba itself takes half a second to start and as long again for its first function, though both were compiled before.
-What is kept here is an object file of this processor and the name of its entry, which takes plain C values: a
-pointer and a shape for each array. llvmlite, which numba brings, links it in some milliseconds.
+Here an object file of this processor is kept with the name of its entry. The entry takes plain C values: a pointer and
+a shape for each array. llvmlite, which numba brings, links it in some milliseconds.
 """
 
 import ctypes
@@ -178,7 +178,7 @@ class KeptCode:
     def read(self) -> bytes | None:
         """Read the object file; None where there is no usable one.
 
-        Not usable is a file of other code or of another processor, and one that others may write.
+        A file of other code, of another processor, or one that others may write is not usable.
         """
         content = read_own(self._path)
         if content is None:

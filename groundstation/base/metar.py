@@ -47,7 +47,7 @@ class MetarWind:
     def utc_ns(self, near_ns: int) -> int | None:
         """Return the time of the report in the month that puts it nearest to ``near_ns``.
 
-        A METAR gives the day and the time, not the month. None where no such day exists.
+        A METAR gives the day and the time, not the month. It is None where no such day exists.
         """
         near = datetime.fromtimestamp(near_ns / NS_PER_S, UTC)
         middle = near.replace(day=15)

@@ -46,7 +46,7 @@ def _is_own(found: os.stat_result) -> bool:
 def read_own(path: Path) -> bytes | None:
     """Return the content of a file that this user or root owns and no other may write.
 
-    None for any other file, or where there is none.
+    It is None for any other file, or where there is none.
     """
     try:
         number = os.open(path, os.O_RDONLY | _NO_LINK | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0))

@@ -1,6 +1,6 @@
 """Dataclasses from JSON that may be damaged or written by anyone.
 
-What is sound is kept, the rest is left out.
+Sound parts are kept, the rest is left out.
 """
 
 import dataclasses

@@ -2,8 +2,8 @@
 
 These are the rules of every file that is written and read. Floats are rounded by the name of their field, NaN is null,
 tuples are lists. A field with ``left_out_when_default`` in its metadata is absent while it has its default; a class
-with ``is_kept_apart = True`` (arrays, which have files of their own) is left out with the fields that hold it. What is
-read is checked: a value of another kind is a :class:`MismatchError` that names its place. ``base.salvage`` leaves it
+with ``is_kept_apart = True`` (arrays, which have files of their own) is left out with the fields that hold it. Values
+are checked when read: one of another kind is a :class:`MismatchError` that names its place. ``base.salvage`` leaves it
 out instead.
 """
 
@@ -78,7 +78,6 @@ def _writer(digits: int | None) -> cattrs.Converter:
     """Return a converter that rounds the values of one name to so many decimals.
 
     Values with names of their own are rounded by these. With ``digits`` None nothing is rounded, whatever its name.
-    None rounds nothing, of any name.
     """
     writer = cattrs.Converter(unstructure_fallback_factory=lambda _cls: str)
     for kind in (type(None), bool, int):

@@ -1,10 +1,10 @@
 """Clock model: corrected time of each record, from its device time and place in the log.
 
-Corrected time = device time + an offset that is constant between clock steps. A recorder whose clock is set during
-the log (GNSS time arrives) writes a step; what comes after the last step is believed, and what comes before is moved so
-that the step becomes one nominal period. A few rows out of order are no step; they are sorted. Rows without a time get
-one from their neighbours. Nothing here knows the wall clock: without absolute time, time counts from the log's zero.
-How that time runs by other clocks of the log is told (``relations``), and nothing is changed by it.
+Corrected time = device time + an offset that is constant between clock steps. A recorder whose clock is set during the
+log (GNSS time arrives) writes a step. Times after the last step are believed, and those before are moved so that the
+step becomes one nominal period. A few rows out of order are no step; they are sorted. Rows without a time get one from
+their neighbours. Nothing here knows the wall clock: without absolute time, time counts from the log's zero.
+``relations`` compare that time with other clocks of the log; they change nothing.
 """
 
 from collections.abc import Mapping
@@ -322,7 +322,7 @@ def start_of(first_device_ns: int, utc_of_zero_ns: int | None) -> Start:
 def interpolated(wanted: Int64Array, index: Int64Array, time: Int64Array, period_ns: float) -> Int64Array:
     """Interpolate times of records by their place in the log, in integers throughout.
 
-    Outside the known places the nominal period is used. None is placed further than :data:`LARGEST_NS` from zero.
+    Outside the known places the nominal period is used. No record is placed further than :data:`LARGEST_NS` from zero.
     """
     if not len(wanted):
         return np.zeros(0, dtype=np.int64)

@@ -1,7 +1,7 @@
 """Clock of a log whose device times count up from power-up.
 
 Nothing sets it, so it has no steps. Its records come topic by topic out of many buffers: an order between topics proves
-nothing, and each record keeps its own time. Not believed are times far from those of the records around them: an
+nothing, and each record keeps its own time. Times far from those of the records around them are not believed: an
 autopilot that begins a log writes the newest value of every topic with the time at which it was published, minutes
 before, and some topics never advance their time at all. Such records are placed where they stand in the log.
 """

@@ -132,7 +132,7 @@ class Thresholds:
     def range_of(self, topic: str, name: str) -> Range | None:
         """Return the physical range of a field, infinite where it has no end.
 
-        None of a field that nobody knows.
+        It is None for a field that is not known.
         """
         known = field_of(topic, name)
         if known is None:

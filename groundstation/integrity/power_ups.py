@@ -1,7 +1,7 @@
 """Power-ups in one source: where a counter restarts, and where one of n bits wraps.
 
-The source is seen as runs of records whose times follow one another. What one run is to those before it, its first
-time tells: it goes on, it is the same counter behind its wrap, or it is another power-up.
+The source is seen as runs of records whose times follow one another. The first time of a run tells how it belongs to
+those before it: it goes on, it is the same counter behind its wrap, or it is another power-up.
 """
 
 from bisect import bisect_left

@@ -127,7 +127,7 @@ def _counting_clock(
 ) -> ClockModel:
     """Estimate the model of a counting clock.
 
-    Of a long log only the records that matter are laid together.
+    In a long log only the records that matter are laid together.
     """
     thinner = Thinner(round(settings.tolerance_s * NS_PER_S), settings.run_records)
     kept_ones: list[Window] = []
@@ -218,8 +218,8 @@ def _read_zero(found: Found, first: int, end: int) -> int | None:
 def _zero_of(part: PowerUp, found: Found, before_ns: int | None, *, is_alone: bool) -> int | None:
     """Return UTC of device time zero of one power-up.
 
-    It is 0 for all power-ups where the device's own time is UTC. What a header says is of the first log in the source;
-    what a reader read of all of a source fits none of several. A counter that is ahead of the one before (whose zero is
+    It is 0 for all power-ups where the device's own time is UTC. A header speaks for the first log in the source;
+    readings over a whole source fit none of several power-ups. A counter that is ahead of the one before (whose zero is
     ``before_ns``) is taken for the same.
     """
     header = found.header

@@ -94,8 +94,8 @@ def long_run(scores: FloatArray, correlation: float) -> FloatArray:
     """Return the covariance of the sum of correlated scores, shape (n, k) -> (k, k).
 
     The scores are prewhitened, then summed with Bartlett weights. Scores are whitened by the first-order
-    autocorrelation of the residuals, and the sum is recoloured by 1 / (1 - correlation)^2. What wanders below white
-    noise does not show in the correlation of neighbours: the weights reach over ``BANDWIDTH_SHARE`` of the samples at
+    autocorrelation of the residuals, and the sum is recoloured by 1 / (1 - correlation)^2. Wander below white noise
+    does not show in the correlation of neighbours, so the weights reach over ``BANDWIDTH_SHARE`` of the samples at
     least. With them the covariance is that of sums over windows.
 
     Source: D. W. K. Andrews, J. C. Monahan, Econometrica 60 (1992) 953-966; W. K. Newey, K. D. West, Econometrica 55

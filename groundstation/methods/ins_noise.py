@@ -145,9 +145,9 @@ class InsNoise:
     """Noise parameters of an INS class.
 
     They are initial sigmas, then what the white noises add per square root of time. ``random_drift_dph`` and
-    ``random_drift_correlation_s`` are the stationary sigma and correlation time (1 / beta) of the random drift. Of the
-    coupled model alone: ``azimuth_deg`` is the initial sigma of the azimuth, ``accelerometer_ug`` that of accelerometer
-    biases, which turn with the body where ``is_strapdown``.
+    ``random_drift_correlation_s`` are the stationary sigma and correlation time (1 / beta) of the random drift. Two are
+    of the coupled model alone: ``azimuth_deg`` is the initial sigma of the azimuth, ``accelerometer_ug`` that of
+    accelerometer biases, which turn with the body where ``is_strapdown``.
     """
 
     name: str = DEFAULT_CLASS

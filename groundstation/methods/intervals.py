@@ -9,7 +9,7 @@ from groundstation.base.quantiles import chi_square_quantile, share_quantile
 def share_interval(inside: float, checks: float, confidence: float = 0.95) -> tuple[float, float]:
     """Return the exact interval of a share.
 
-    Of correlated checks, both numbers are effective ones.
+    For correlated checks, both numbers are effective ones.
 
     Source: Clopper, Pearson, Biometrika 26 (1934), 404-413.
 

@@ -129,8 +129,8 @@ def _encoded(text: str) -> bytes:
 def write_bytes(path: Path, content: bytes, *, is_synced: bool = True) -> None:
     """Write a file under a temporary name and move it into place.
 
-    A kill never leaves half a file. Nor does a loss of power, if ``is_synced``: without, the caller writes it through
-    to the disk.
+    A kill never leaves half a file. With ``is_synced`` a loss of power does not either; without, the caller writes it
+    through to the disk.
     """
     temporary = path.with_name(f".{path.name}.partial")
     try:
@@ -152,7 +152,7 @@ def json_text(document: Any) -> str:
 def save(folder: Path, results: FlightResults, manifest: Manifest) -> None:
     """Write a flight's answers and arrays into its folder.
 
-    What an earlier run left of them is replaced. They are not yet written through to the disk.
+    Those of an earlier run are replaced. They are not yet written through to the disk.
 
     Parameters
     ----------

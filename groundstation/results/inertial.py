@@ -186,7 +186,7 @@ class NavigationStart:
 class InertialResult(Answer):
     """INS errors of one flight.
 
-    Of an INS that GNSS corrects already, it only has the differences from GNSS.
+    For an INS that GNSS corrects already, it only has the differences from GNSS.
 
     Parameters
     ----------

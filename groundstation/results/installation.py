@@ -311,7 +311,7 @@ class InstallationRow:
 def as_stored(lesson: Lesson) -> Lesson:
     """Round the numbers of a lesson as the file has them.
 
-    Whoever reads the file computes the same.
+    Every reader of the file then computes the same.
     """
     return from_json(Lesson, to_json(lesson))
 

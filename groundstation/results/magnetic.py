@@ -32,7 +32,7 @@ class AlignmentSource:
     """One way in which the flight shows the INS heading error, at the time of the figure.
 
     ``taxi``: the heading analysis; ``ground run``: the run to lift-off; ``turns``: azimuth by turns in flight, the
-    sigma of the mounting included. None where there is no number. ``at_s``: flight seconds at which it was seen.
+    sigma of the mounting included. It is None where there is no number. ``at_s``: flight seconds at which it was seen.
     ``reason``: why it is not used.
     """
 

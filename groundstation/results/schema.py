@@ -1,8 +1,8 @@
 """JSON Schema of summary.json, made from the dataclasses that are written to it.
 
-``make schemas`` writes it. What a type alone does not say stands in the metadata of a
-field (``one_of``, ``pattern``, ``keys``, ``items``: see :func:`_narrowed`) or follows from its name: shares lie within
-[0, 1], sigmas and lengths are not negative, whole numbers are counts.
+``make schemas`` writes it. Limits beyond the type stand in the metadata of a field (``one_of``, ``pattern``, ``keys``,
+``items``: see :func:`_narrowed`) or follows from its name: shares lie within [0, 1], sigmas and lengths are not
+negative, whole numbers are counts.
 """
 
 import dataclasses

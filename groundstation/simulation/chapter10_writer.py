@@ -38,7 +38,7 @@ def write_chapter10(path: Path, flight: Flight, *, cut_bytes: int = 0) -> tuple[
     """Write a flight, and the ICD of its buses beside it: ``x.ch10`` and ``x.icd.yaml``.
 
     The relative time counter follows the flight's corrected time. Time packets, one a second, give UTC where the flight
-    has it. What is sent is told by :func:`groundstation.simulation.chapter10_buses.buses_of`.
+    has it. :func:`groundstation.simulation.chapter10_buses.buses_of` decides what is sent.
 
     Parameters
     ----------

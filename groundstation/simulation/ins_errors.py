@@ -183,8 +183,8 @@ def propagate(
     SettingsError
         When the motion has fewer than two times.
 
-    What it ignores: vertical errors, pitch, the share of Earth and transport rate in scale factor errors, the change
-    of the radii of curvature with the position error.
+    It ignores vertical errors, pitch, the share of Earth and transport rate in scale factor errors, the change of the
+    radii of curvature with the position error.
     """
     shape = motion.latitude_deg.shape
     if shape[1] < 2:

@@ -73,7 +73,7 @@ def orbit_of(name: str) -> Orbit:
 def satellite_ecef_m(orbit: Orbit, start_utc_ns: int, time_s: FloatArray) -> FloatArray:
     """Position in ECEF at seconds after a UTC instant, metres, shape (n, 3).
 
-    What it ignores: periodic perturbations, polar motion, UT1 - UTC.
+    It ignores periodic perturbations, polar motion, UT1 - UTC.
     """
     since_s = (start_utc_ns - orbit.epoch_utc_ns) / NS_PER_S + time_s
     motion = orbit.revolutions_per_day * 2.0 * np.pi / 86_400.0

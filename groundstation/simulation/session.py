@@ -66,7 +66,7 @@ def simulate_session(scenario: SessionScenario, seed: int, run: int = 0, *, scal
     scale : float
         Every error times this: 0 gives a session without errors.
 
-    What it ignores: the motion of an aircraft while a signal of the link travels (2 cm at 30 km).
+    It ignores the motion of an aircraft while a signal of the link travels (2 cm at 30 km).
     """
     time_s = grid_s(scenario)
     seeds = np.random.SeedSequence((seed, run)).spawn(len(scenario.aircraft) + 3)

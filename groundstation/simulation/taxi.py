@@ -74,7 +74,7 @@ class TaxiCase:
 def noiseless(case: TaxiCase) -> TaxiCase:
     """Return the same run without sway, steering, speed wander and sensor noise.
 
-    What is left is exact.
+    The run is then exact.
     """
     return replace(
         case,

@@ -6,7 +6,8 @@ together. In the air the nose points along the air velocity, the wind makes the 
 Lift-off and touchdown swing the nose smoothly between the two in :data:`TRANSITION_S`. Every rate is the exact
 derivative of its angle.
 
-Not modelled: rotation of the north-east-down frame below the aircraft (0.00005 m/s on a 5 m arm), bouncing, flare.
+Rotation of the north-east-down frame below the aircraft (0.00005 m/s on a 5 m arm), bouncing and flare are not
+modelled.
 """
 
 from dataclasses import dataclass, fields

@@ -132,7 +132,7 @@ def detect_ground(motion: Motion, settings: GroundSettings | None = None) -> Det
     complete, slow enough, neither climbing nor sinking nor tilting, and whose altitude stays near that of the
     standstill; before an end by climb or tilt the fast rows are taken off, and ``margin_s`` everywhere.
 
-    What it ignores: rolling that no standstill adjoins, slopes above ``slope``, a vehicle carried steadily by hand.
+    It ignores: rolling that no standstill adjoins, slopes above ``slope``, a vehicle carried steadily by hand.
     """
     settings = settings or GroundSettings()
     nothing = np.zeros(len(motion), dtype=bool)

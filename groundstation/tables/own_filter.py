@@ -82,7 +82,7 @@ class OwnInnovations:
 def own_innovations(flight: Flight) -> OwnInnovations | None:
     """Read the innovations that the autopilot's own filter logged; None where there are none.
 
-    Of several filters the first one is read.
+    Where there are several filters, the first one is read.
     """
     for layout in _LAYOUTS:
         if layout.topic in flight and flight[layout.topic].has(*layout.innovations):

@@ -1,6 +1,6 @@
 """Logs of several aircraft made into one session on one clock.
 
-What could not be used becomes findings.
+Parts that could not be used become findings.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -184,7 +184,7 @@ def _with_tracks(members: _Members, placed: Mapping[str, PlacedLog], step_s: flo
 def _together(members: _Members, spans: Mapping[str, tuple[int, int]]) -> None:
     """Keep the largest set of logs that overlap, one with another.
 
-    Of equally large sets the first one is kept.
+    Among equally large sets the first one is kept.
     """
     left = sorted(members.flights, key=lambda name: spans[name])
     groups: list[list[str]] = []

@@ -5,7 +5,7 @@ on the receiver's clock less the time of transmission on the sender's, in metres
 of transmission is how far the clock of a log stands from that of the link. It is constant while nothing leaps; a leap
 of the log's clock is a step of it.
 
-What it ignores: the drift of a recorder's clock between two leaps (20 ppm are 72 ms in an hour), and a delay that the
+It ignores the drift of a recorder's clock between two leaps (20 ppm are 72 ms in an hour), and a delay that the
 recorder has for the link and not for the INS.
 """
 
@@ -155,7 +155,7 @@ def _running_median(values: Int64Array) -> Int64Array:
 def group_offset_ns(clocks: Sequence[LogClock], limit_s: float) -> tuple[int, int]:
     """Return the offset that most clocks share, and how many share it.
 
-    Of equally many the first counts. Clocks without ranges do not count.
+    In a tie the first one counts. Clocks without ranges do not count.
 
     Examples
     --------

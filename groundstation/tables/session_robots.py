@@ -1,8 +1,8 @@
 """Session of ground robots with odometry and cameras, whose logs are joined by robot.
 
 The frame is local, x of the motion capture north. Every robot starts at its true pose of the first time at which all
-robots have odometry and truth; from then on truth only judges. Odometry is averaged over ``bin_s``. What a camera
-gives as range is the distance along its optical axis: it is divided by the cosine of the bearing.
+robots have odometry and truth; from then on truth only judges. Odometry is averaged over ``bin_s``. The range of a
+camera is the distance along its optical axis: it is divided by the cosine of the bearing.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -41,7 +41,8 @@ def is_joined(flight: Flight) -> bool:
 def said_of(flight: Flight, topic: str, key: str) -> str:
     """Return the metadata of a topic's log under a key; empty where there is none.
 
-    Of a flight of several logs each speaks for its own topics: those of the second end in ``.b``, as its keys begin.
+    In a flight of several logs each log speaks for its own topics: those of the second end in ``.b``, as its keys
+    begin.
     """
     label = topic.rpartition(".")[2] if is_joined(flight) else ""
     return flight.metadata.get(f"{label}.{key}" if len(label) == 1 and label.isalpha() else key, "")
@@ -50,9 +51,9 @@ def said_of(flight: Flight, topic: str, key: str) -> str:
 def sources_of_kind(flight: Flight, kind: str) -> tuple[str, ...]:
     """Topics of a kind, the one to use first.
 
-    Of a flight of one log in the order of their names. Of a flight of several logs: those with velocity (GNSS) or
-    attitude (INS), that cover most of the flight, an INS that GNSS does not correct, the smaller stated sigma, the
-    higher rate up to ``FASTEST_HZ``, the earlier log.
+    In a flight of one log they are in the order of their names. In a flight of several logs the order is: those with
+    velocity (GNSS) or attitude (INS), that cover most of the flight, an INS that GNSS does not correct, the smaller
+    stated sigma, the higher rate up to ``FASTEST_HZ``, the earlier log.
     """
     topics = topics_of_kind(kind, flight.topics())
     if not is_joined(flight) or len(topics) < 2:

@@ -150,7 +150,7 @@ class Table:
     def unique_times(self) -> Self:
         """Return the table without repeated times.
 
-        Of several samples of one time, the first present value of each field stays. Two messages of a log may give
+        Among several samples of one time, the first present value of each field stays. Two messages of a log may give
         parts of one topic at the same time.
         """
         keep = np.ones(len(self), dtype=bool)

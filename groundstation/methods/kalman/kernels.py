@@ -19,7 +19,7 @@ w        room, shape (n, n)
 =======  ==========================================================================================
 
 ``states`` is 0, 1, ... n - 1: as a tuple where the compiler shall know how many there are (a small system: its loops
-are unrolled), as an array where it need not. Whether F and Q are dense is read off their dimensions when a function is
+are unrolled), as an array where it need not. The dimensions of F and Q tell whether they are dense, when a function is
 compiled. Everything is changed in place; room is handed in, nothing is allocated.
 
 Source: R. E. Kalman, A new approach to linear filtering and prediction problems, J. Basic Engineering 82, 1960;
@@ -112,7 +112,7 @@ def predict_states(states: States, pattern: Pattern, F: FloatArray, step: int, x
 def add_noise(states: States, rows: Int64Array, columns: Int64Array, Q: FloatArray, step: int, p: FloatArray) -> None:
     """Add process noise: p <- p + Q.
 
-    Of a sparse Q every entry off the diagonal is added on both sides of it.
+    Every entry of a sparse Q off the diagonal is added on both sides of it.
     """
     if Q.ndim == 3:
         for i in range(len(states)):
