@@ -42,11 +42,11 @@ from groundstation.base.machine_code import (
 from groundstation.base.own_files import hand_of_others
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-SMALL_BYTES = 65_536  # of a log: plain Python takes up to a second for so many, and a compiler several
+SMALL_BYTES = 65_536  # plain Python takes up to a second for so many bytes of a log, and a compiler several
 _BESIDE = Path(__file__).parent / "__pycache__"
-PLAIN_S = 1.0  # of a process for one loop: after that it is compiled, however few bytes come
+PLAIN_S = 1.0  # longest time in plain Python for one loop of a process: then it is compiled, however few bytes come
 _ANEW = "each process compiles its loops anew"
-_UNREADABLE = ImportError, AttributeError, pickle.UnpicklingError  # of a pickle
+_UNREADABLE = ImportError, AttributeError, pickle.UnpicklingError  # raised by an unreadable pickle
 _LOCK = RLock()  # numba and its linker are told one thing at a time
 
 
@@ -138,7 +138,7 @@ def _forget_unreadable() -> None:
         with suppress(OSError):
             try:
                 with listed.open("rb") as file:
-                    pickle.load(file)  # of which numba
+                    pickle.load(file)  # numba's version
                     pickle.load(file)
             except (*_UNREADABLE, EOFError):
                 listed.unlink(missing_ok=True)
@@ -267,7 +267,7 @@ class Loop:
             is_new = code is None
             code = self._machine_code(forms) if code is None else code
             found = None if code is None else linked(code, self.py_func, forms)
-        except Exception as error:  # of a numba or llvmlite other than those known: what they document does, and slower
+        except Exception as error:  # an unknown numba or llvmlite: their documented way serves, but slower
             _refused.append(f"{self.py_func.__qualname__}: {' '.join(str(error).split())[:160]}")
             return None
         if kept and is_new and code is not None and found is not None:

@@ -6,7 +6,7 @@ from groundstation.base.angles import FloatArray
 
 ELLIPSE_95 = float(np.sqrt(-2.0 * np.log(0.05)))  # sigmas of the ellipse that holds 95 % of a normal pair
 ROUND = np.linspace(0.0, 2.0 * np.pi, 49)
-SEEN_SHARE = 0.03  # of a map's side that an ellipse has to be across to be seen
+SEEN_SHARE = 0.03  # least width of an ellipse that is seen, as a share of the map's side
 
 
 def principal_axes(

@@ -14,7 +14,7 @@ from groundstation.base.printable import in_a_line
 if TYPE_CHECKING:
     from groundstation.base.findings import Finding
 
-CODE = "internal"  # what the codes of findings on them begin with
+CODE = "internal"  # first part of the codes of findings on them
 MOST_OF_AN_ERROR = 300  # characters: an error may quote the log
 _ADDRESS = re.compile(r"\b0x[0-9a-f]{4,}\b")  # differs from run to run
 
@@ -119,7 +119,7 @@ def attempt(
     except Exception as error:
         left_out(part, name, error)
     except BaseException as error:
-        if type(error).__name__ != "PanicException":  # of a library in Rust; that of a package in one is no Exception
+        if type(error).__name__ != "PanicException":  # raised by libraries in Rust; no Exception itself
             raise
         left_out(part, name, error)
     return None

@@ -14,7 +14,7 @@ from groundstation.base.ecef import ecef_from_n, ecef_m, geodetic_deg_m
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number, required_number
 
-MOST_LATITUDE_DEG = 90.0 - 1e-7  # of an origin: 1 cm from the pole there is a north
+MOST_LATITUDE_DEG = 90.0 - 1e-7  # highest latitude of an origin: 1 cm from the pole there is a north
 
 
 @dataclass(frozen=True)

@@ -24,12 +24,12 @@ INTEGER, NUMBER = "integer", "number"
 _DTYPES = ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "bool"]
 ARRAY_DTYPES = {np.dtype(name): name for name in _DTYPES}  # in the byte order of this machine
 ENTRY, SUFFIX = "groundstation_entry", ".machine_code"
-LAYOUT = 4  # of what is kept
+LAYOUT = 4  # version of the layout of kept files
 _RESULTS: dict[Any, type] = {int: ctypes.c_int64, bool: ctypes.c_int64, float: ctypes.c_double, None: ctypes.c_int64}
-MOST_COPIED_BYTES = 1 << 25  # of arrays that are read-only and may be written to
+MOST_COPIED_BYTES = 1 << 25  # limit of copying read-only arrays that a call may write to
 _NO_BYTES = ctypes.c_char * 0
 _NUMBERS = count()  # every library has a name of its own
-_NOT_WRITTEN = {b"readonly", b"readnone"}  # what LLVM says of an array that is only read, or not touched at all
+_NOT_WRITTEN = {b"readonly", b"readnone"}  # LLVM's marks on an array that is only read, or not touched
 _HARMLESS = frozenset(("memset", "memcpy", "memmove", "memcmp", "sqrt", "sin", "cos", "exp", "log", "pow", "atan2"))
 
 
@@ -42,7 +42,7 @@ class Group:
     parts: "tuple[Form, ...]"
 
 
-Form = str | tuple[str, int] | Group  # of an argument: INTEGER, NUMBER, dtype and dimensions of an array, a tuple
+Form = str | tuple[str, int] | Group  # form of an argument: INTEGER, NUMBER, dtype and dimensions of an array, a tuple
 
 
 def forms_of(arguments: Sequence[Any]) -> tuple[Form, ...] | None:

@@ -12,7 +12,7 @@ from datetime import UTC, datetime, timedelta
 from groundstation.base.units import NS_PER_S
 
 MPS_PER: dict[str, float] = {"KT": 1852.0 / 3600.0, "MPS": 1.0, "KMH": 1.0 / 3.6}
-REPORT_SIGMA_MPS = 1.5  # of either component: the wind at the mast, minutes away, against the wind at the aircraft
+REPORT_SIGMA_MPS = 1.5  # either component: wind at the mast, minutes away, against the wind at the aircraft
 _HEAD = re.compile(
     r"(?<![A-Z0-9])(?P<station>[A-Z][A-Z0-9]{3})\s+(?P<day>\d\d)(?P<hour>\d\d)(?P<minute>\d\d)Z(?P<rest>.*)"
 )

@@ -22,7 +22,7 @@ from groundstation.base.serial import (
     tuple_reader,
 )
 
-LARGEST = 1 << 62  # of a number in such a file
+LARGEST = 1 << 62  # largest number read from such a file
 
 
 def salvaged(cls: type[Document], document: Any) -> Document:

@@ -159,7 +159,7 @@ def leap_seconds_at(utc_ns: int) -> int:
 
 
 MOST_LEAP_S = 20  # GPS time less UTC, for some years to come
-_NEAR_WEEK_S, _NEAR_SECOND_S = 30, 0.15  # of whole weeks (leap seconds may be wrong too), of whole seconds
+_NEAR_WEEK_S, _NEAR_SECOND_S = 30, 0.15  # tolerance of whole weeks (leap seconds may be wrong too) and whole seconds
 
 
 def whole_weeks(difference_ns: int) -> int:

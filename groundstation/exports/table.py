@@ -10,7 +10,7 @@ from groundstation.exports.tracks import Track
 if TYPE_CHECKING:
     import pandas as pd
 
-DECIMALS = 9  # of degrees 0.1 mm; a CSV ends no number earlier
+DECIMALS = 9  # 0.1 mm in degrees; a CSV ends no number earlier
 
 
 def frame_of(tracks: Sequence[Track]) -> "pd.DataFrame":

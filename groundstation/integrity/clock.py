@@ -21,7 +21,7 @@ from groundstation.integrity.clock_relation import ClockRelation, mistake_of_ste
 from groundstation.integrity.clock_steps import ClockSettings, ClockStep, Steps
 from groundstation.integrity.power_ups import Wrap
 
-LARGEST_NS = 2**62  # of a time and of what is added to it: sums fit 64 bits
+LARGEST_NS = 2**62  # largest time, and largest offset: sums fit 64 bits
 FIRST_NS = iso_to_utc_ns("1980-01-08T00:00:00Z")[0]  # a clock before it was not set: 1970, or the zero of GPS
 
 

@@ -21,10 +21,10 @@ from groundstation.integrity.clock_relation import ClockBreak, ClockSegment
 
 FloatArray = NDArray[np.float64]
 
-BLOCKS, LEAST_IN_BLOCK, FEWEST_BLOCKS = 32, 3, 4  # of a line
+BLOCKS, LEAST_IN_BLOCK, FEWEST_BLOCKS = 32, 3, 4  # blocks of a line, samples in a block, least number of blocks
 SPLIT_BLOCKS, LEAST_IN_SPLIT_BLOCK, SIDE_BLOCKS = 96, 5, 6  # where a change of rate is looked for
-SPLIT_GAIN, SPLIT_RATIO = 16.0, 9.0  # what two lines must gain; both by Monte Carlo, tests/test_clock_fit.py
-SIDE_SAMPLES = 5  # of a step
+SPLIT_GAIN, SPLIT_RATIO = 16.0, 9.0  # least gain of two lines over one; both by Monte Carlo, tests/test_clock_fit.py
+SIDE_SAMPLES = 5  # samples on either side of a step
 MOST_BREAKS = 40
 JITTER_TIMES = 8.0
 SIGNIFICANT = 4.0  # standard errors
@@ -243,7 +243,7 @@ def _line(time_s: FloatArray, offset_s: FloatArray, bound_s: float) -> _Line:
         level_s = _median(offset_s)
         sigma_s = float(np.hypot(_scatter(offset_s - level_s), rounding_s / 12**0.5))
         return _Line(middle_s, level_s, 0.0, sigma_s, float("inf"))
-    lever_s -= lever_s.mean()  # of times that hardly differ the first mean is rounded
+    lever_s -= lever_s.mean()  # the first mean of times that hardly differ is rounded
     power = float(lever_s @ lever_s)
     offset = slope = 0.0
     span_s = float(time_s[-1] - time_s[0])
@@ -300,11 +300,11 @@ def _steps(time_s: FloatArray, offset_s: FloatArray, step_s: float, bound_s: flo
     jitter_s = _scatter(np.diff(level)) / 2**0.5
     least_s = max(step_s, JITTER_TIMES * jitter_s, 1.5 * bound_s)
     middles = _medians_of_five(level)
-    size = np.abs(middles[side:] - middles[:-side])  # of a step before sample side + place
+    size = np.abs(middles[side:] - middles[:-side])  # size of a step before sample side + place
     found: list[int] = []
     for place in np.flatnonzero(size > least_s).tolist():
         at = place + side
-        if found and at - found[-1] < 2 * side:  # of one step
+        if found and at - found[-1] < 2 * side:  # the same step
             continue
         window = slice(at - side, min(at + 3 * side, count))
         before, after = middles[place], _median(level[window][-side:])

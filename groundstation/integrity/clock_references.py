@@ -36,7 +36,7 @@ _FEWEST_ZEROS = 3  # readings that tell when a counter began
 _DAY_NS = 86_400 * NS_PER_S
 STAMPS = "header stamp"  # a clock that is read when a message is made, and written when it reaches the recorder
 _AROUND, _PROMPT_NS, _WAITED_NS = 64, NS_PER_S // 100, NS_PER_S // 2
-_FLOAT_NS = 1_000  # of seconds since 1970 in a float64
+_FLOAT_NS = 1_000  # resolution of seconds since 1970 in a float64
 _FEW, _FEW_READINGS = 0.1, 5  # with the number of another week: so many are set aside, more are a step
 _FEWEST = 3
 

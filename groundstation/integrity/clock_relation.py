@@ -14,7 +14,7 @@ from groundstation.base.timescales import (
 from groundstation.base.units import NS_PER_S
 
 WEEK_S, ROLLOVER_S, QUARTER_S = 604_800, 1_024 * 604_800, 900  # time zones are multiples of a quarter of an hour
-_NEAR_S = 0.35  # of whole seconds: receivers are late by less
+_NEAR_S = 0.35  # largest distance from whole seconds: receivers are late by less
 _LEAP_S = range(13, 21)  # GPS time less UTC since 1999, and for some years to come
 _MISTAKES = {
     "leap_seconds": "{seconds:+.2f} s: equal to the leap seconds between GPS time and UTC",

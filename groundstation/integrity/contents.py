@@ -30,7 +30,7 @@ class _FieldTally:
 
     low: float
     high: float
-    is_known: bool = True  # of a field that nobody knows, infinity may be meant: "no limit"
+    is_known: bool = True  # in an unknown field, infinity may be meant: "no limit"
     constancy: Constancy | None = None
     present: int = 0
     nan: int = 0

@@ -20,13 +20,13 @@ from groundstation.integrity.stuck import METRES_PER_DEG, Motion
 
 FloatArray = NDArray[np.float64]
 CONTRADICTION = "data.contradiction"  # code of the finding
-LASTS_S = 60.0  # what is shorter may be a turn, a slip, a receiver's bad minute
+LASTS_S = 60.0  # a shorter stretch may be a turn, a slip, a receiver's bad minute
 WINDOW_S = 10.0  # speeds and directions are those between the ends of windows
 LONGEST_STEP_S = 5.0  # between samples; across a longer one nothing is compared
 
-SPEED_MPS, SPEED_SHARE = 5.0, 0.3  # of the larger speed: what positions and velocity may differ by
-SIDE_DEG = 75.0  # of roll; no vehicle drives or flies so for a minute
-STEEP_DEG = 60.0  # of pitch, beyond which roll says little
+SPEED_MPS, SPEED_SHARE = 5.0, 0.3  # allowed difference of the speeds by positions and velocity
+SIDE_DEG = 75.0  # roll at which no vehicle drives or flies for a minute
+STEEP_DEG = 60.0  # pitch beyond which roll says little
 MOVES_MPS = 0.5
 OFF_DEG = 60.0  # nose against track
 FAST_MPS = 25.0  # no multirotor flies sideways so fast for a minute

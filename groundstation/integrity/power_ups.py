@@ -18,13 +18,13 @@ from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock_relation import QUARTER_S, ROLLOVER_S, WEEK_S
 
 LAST_RECORD = 1 << 62
-MOST_RUNS = 100_000  # of more, no record follows another: order is lost, and with it where something began
+MOST_RUNS = 100_000  # with more runs no record follows another: order is lost, and so are the starts
 TOLERANCE_NS, PERIODS, MOST_NS = 3 * NS_PER_S, 3, 60 * NS_PER_S  # a record follows another within both, and the last
-SHUFFLED_SHARE = 0.2  # of runs to records: beyond it nothing follows anything
-FEWEST_RECORDS = 20  # of a run that counts; a shorter one is late, early or damaged
+SHUFFLED_SHARE = 0.2  # largest ratio of runs to records: beyond it nothing follows anything
+FEWEST_RECORDS = 20  # least length of a run that counts; a shorter one is late, early or damaged
 LEAST_NS = 10 * NS_PER_S  # a smaller step back is a clock that was set
 SHORT_NS = 20 * NS_PER_S  # a power-up that is shorter is none, unless another log begins behind it
-NEAR_NS, NEAR_SHARE = 5 * NS_PER_S, 0.1  # of the first time, and of the length so far
+NEAR_NS, NEAR_SHARE = 5 * NS_PER_S, 0.1  # distance from the first time, and share of the length so far
 BOOT_NS = 30 * NS_PER_S  # a counter so soon after its zero has just been started
 PART_NS = 10 * NS_PER_S  # a log that begins so soon after the one before is a part of it
 MARKED_NS = 60 * NS_PER_S  # the same of a clock that tells UTC, which may be set where a log begins

@@ -12,7 +12,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock_steps import quantile
 from groundstation.integrity.limits import GapLimits, RhythmLimits, Thresholds
 
-MOST_STEPS = 10_000  # of which a typical step is taken
+MOST_STEPS = 10_000  # steps from which a typical step is taken
 WHOLE = 0.2  # periods that a step may be off a whole number of them
 MOST_SKIPPED = 10.0  # periods: a longer step that is no gap explains nothing
 

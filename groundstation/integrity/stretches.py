@@ -12,7 +12,7 @@ from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.integrity.clock import ClockModel
 
 MOST_STRETCHES = 512  # kept of a field: the longest
-CHANGES_MEASURED = 512  # of a batch
+CHANGES_MEASURED = 512  # number of changes of a batch that are measured
 FloatArray = NDArray[np.float64]
 
 

@@ -17,7 +17,7 @@ from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.limits import StuckLimits
 from groundstation.integrity.stretches import Constancy, FloatArray, Sampler, Stretch
 
-METRES_PER_DEG = 111_195.0  # of latitude, on a sphere: for a comparison with a hundred metres
+METRES_PER_DEG = 111_195.0  # metres per degree of latitude on a sphere: enough for a comparison with a hundred metres
 FINE = 1.05  # samples that a value lasts, on average, where a channel is finer than its noise
 
 _ALTITUDES = ("altitude_ellipsoid_m", "altitude_msl_m", "pressure_altitude_m")

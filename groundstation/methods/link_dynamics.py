@@ -13,7 +13,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.compile import in_place
 
 TERMS, FEWEST_TERMS = 40, 4
-SMALLEST = 1e-16  # of a term of the transition: its largest entry is 1 or more
+SMALLEST = 1e-16  # smallest term of the transition, whose largest entry is 1 or more
 ROOMS = 11  # matrices of n by n that a step works in; the last three keep the last step of aircraft in a local frame
 
 

@@ -24,7 +24,7 @@ from groundstation.plots.plot import Panel
 from groundstation.plots.ranges import finite
 from groundstation.plots.scales import NO_PLACES, Span, span_of
 
-ABOVE_ROWS, BELOW_ROWS = 0.6, 0.6  # of a row, before the first and behind the last
+ABOVE_ROWS, BELOW_ROWS = 0.6, 0.6  # share of a row before the first and behind the last
 
 
 def edges(centres: Floats) -> Floats:

@@ -39,7 +39,7 @@ Role = Literal[
     "series 7",
 ]
 SERIES: tuple[Role, ...] = ("series 1", "series 2", "series 3", "series 4", "series 5", "series 6", "series 7")
-Emphasis = Literal["faint", "thin", "usual", "bold"]  # how heavy a mark is drawn
+Emphasis = Literal["faint", "thin", "usual", "bold"]  # weight of a mark
 Dash = Literal["", "dashed", "dotted"]
 Symbol = Literal["dot", "circle", "ring", "triangle", "cross", "star", "diamond"]
 
@@ -232,7 +232,7 @@ class Cells(Mark):
     values: Floats
     low: float
     high: float
-    title: str  # of the scale, with its unit
+    title: str  # title of the scale, with its unit
     is_log: bool = False
 
 

@@ -9,12 +9,12 @@ from groundstation.plots.marks import Floats
 from groundstation.plots.plot import Scale
 from groundstation.plots.ranges import finite
 
-LINEAR_SHARE = 10.0 / 9.0  # of a decade: the room of a symlog scale from zero to where it becomes logarithmic
-MARGIN = 0.05  # of what is drawn, on either side
-LEAST_SPAN = 1e-9  # of the greater end: ends nearer to each other are moved apart
+LINEAR_SHARE = 10.0 / 9.0  # decades from zero to where a symlog scale becomes logarithmic
+MARGIN = 0.05  # margin on either side, as a share of what is drawn
+LEAST_SPAN = 1e-9  # least span as a share of the greater end: nearer ends are moved apart
 SMALLEST = 1e-200  # ends nearer to each other are one, and nothing smaller stands on a logarithmic scale
 LEAST_LINEAR = 1e-100
-LARGEST = 1e200  # what is beyond is as good as infinite, and its squares are not
+LARGEST = 1e200  # larger numbers count as infinite; squares of smaller ones are finite
 NO_PLACES: Floats = np.zeros(0)
 
 

@@ -11,7 +11,7 @@ from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import LETTERS, MagneticResult
 from groundstation.results.magnetic_ground import GroundDeviation, GroundRun
 
-DRIFT_SIGMA_DEG_PER_H = 0.1  # of the azimuth of an INS between two looks at it
+DRIFT_SIGMA_DEG_PER_H = 0.1  # drift of the azimuth of an INS between two looks at it
 AGREE_SIGMAS, CONTRADICT_SIGMAS = 2.0, 3.0
 NARROWED = 0.95  # a sigma that the turns of a taxi leave of the one known before: above it they show nothing
 S_PER_H = 3600.0

@@ -43,7 +43,7 @@ class Source:
     reader: str
 
 
-NAT_NS = np.iinfo(np.int64).min  # what numpy takes for "not a time"
+NAT_NS = np.iinfo(np.int64).min  # numpy's "not a time"
 UTC_OF = {"time_s": "utc", "start_s": "start_utc", "end_s": "end_utc"}  # columns of flight seconds, and their UTC
 
 

@@ -9,7 +9,7 @@ from typing import ClassVar
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 
-WITHIN, TOO_FEW = "within limits", "too few to judge"  # what NEES says
+WITHIN, TOO_FEW = "within limits", "too few to judge"  # verdicts by NEES
 FEWEST_STARTS = 5  # independent ones: with fewer the limits of NEES are so wide that anything passes
 
 # Names of the contract, in the order they are shown; titles for people.

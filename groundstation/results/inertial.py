@@ -19,7 +19,7 @@ STARTS = ("stated", "mode", "standstill", "unknown")
 STATES = ("position", "velocity", "tilt", "drift", "drift_rate", "random_drift")
 NOT_SEEN = 0.01  # observability below which the data said nothing of a state
 UNMOVED = 0.01  # share of its sigma at the start by which the sigma of such a state may differ
-SUMMARY_ROUNDING = 1e-6  # of a sigma in summary.json
+SUMMARY_ROUNDING = 1e-6  # rounding of a sigma in summary.json
 
 
 @dataclass(frozen=True)

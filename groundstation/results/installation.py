@@ -12,7 +12,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.heading import IntervalPart
 
 FORMAT_VERSION = 1
-METHOD_VERSION = 1  # of the model: another one makes every learned answer again
+METHOD_VERSION = 1  # version of the model: with another one every learned answer is made again
 POOLED = ("compass_a_deg", "antenna_arm_m", "gnss_latency_s")  # figures of other sensors that stay as they are
 
 

@@ -28,7 +28,7 @@ KNOWN_NUMBERS = tuple(
 )
 SHARES = re.compile(r"(share|coverage|observability|inside)\d*(_.*)?|.*_share")
 NOT_NEGATIVE = re.compile(r".*sigma.*|(length|longest|total|span|nominal_period|residual|resolution)_s|completeness")
-NAMES = {  # of definitions, where they are not that of the class
+NAMES = {  # names of definitions that differ from the class name
     "HeadingResult": "heading",
     "TaxiSegment": "segment",
     "RunwayCheck": "runway",

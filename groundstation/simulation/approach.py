@@ -24,7 +24,7 @@ from groundstation.tables.table import Flight, Table
 
 _SCENARIOS = ShippedToml("groundstation.simulation", "approaches", "approach")
 FULL_SCALE_DDM = 0.155
-GLIDE_SLOPE_DOT = 0.12  # of the glide angle
+GLIDE_SLOPE_DOT = 0.12  # one dot as a share of the glide angle
 NEEDLE_STOP_DOTS = 4.5
 FLARE_M = 15.0  # height at which the sink rate begins to fall
 SLOWEST_MPS = 15.0  # the roll-out is recorded down to it

@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
 
-NS_PER_TICK = 100  # of the relative time counter
+NS_PER_TICK = 100  # tick of the relative time counter
 SYNC = 0xEB25
 VERSION_106_17 = 8
 TMATS_106_17 = 0x0C
 TMATS, TIME_F1, BUS_1553_F1, ARINC_429_F0 = 0x01, 0x11, 0x19, 0x38
 CHECKSUM_32 = 3
 LARGEST_GAP_TICKS = 1 << 20  # between two ARINC 429 words of a packet: the field has 20 bits
-FIRST_BIT_OF_FIRST_WORD = 1 << 30  # what the time stamp of a 1553 message marks
-RESPONSE_TICKS = 40  # of a terminal, 4 us
+FIRST_BIT_OF_FIRST_WORD = 1 << 30  # the time stamp of a 1553 message marks this bit
+RESPONSE_TICKS = 40  # response time of a terminal, 4 us
 
 HEADER = np.dtype(
     [

@@ -29,7 +29,7 @@ from groundstation.simulation.chapter10_packets import (
 from groundstation.tables.table import Flight
 
 TIME_CHANNEL, ARINC_CHANNEL = 1, 40
-FIRST_TICK = 100_000_000  # of the counter at the beginning of the flight: the recorder has run for ten seconds
+FIRST_TICK = 100_000_000  # counter at the start of the flight: the recorder has run for ten seconds
 PACKET_TICKS = 1_000_000  # a packet holds what begins within 0.1 s; any gap in it fits the field of ARINC 429
 Draft: TypeAlias = tuple[int, int, int, int, bytes]  # counter at its last and first word, channel, type, body
 

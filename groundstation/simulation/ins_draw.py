@@ -52,7 +52,7 @@ def draw_sensor_errors(
     acceleration = MICRO_G * ins.accelerometer_constant_ug * fixed[6:9, None] + gauss_markov(
         accelerometer, (3, n), step_s, MICRO_G * ins.accelerometer_random_ug, ins.accelerometer_correlation_s
     )
-    settled = acceleration[:, 0].copy()  # what levelling sees: noise is averaged out
+    settled = acceleration[:, 0].copy()  # acceleration that levelling sees: noise is averaged out
     noise = ins.velocity_random_walk_mps_per_sqrt_s / np.sqrt(step_s)
     acceleration += noise * accelerometer.standard_normal((3, n))
     gravity = np.zeros((n, 2))

@@ -352,7 +352,7 @@ def _propagate(  # type: ignore[no-untyped-def]
             right = -f_n * sin_h + f_e * cos_h
             force[0] = f_n * cos_h + f_e * sin_h
             force[1] = right * cos_r + f_d * sin_r
-            force[2] = -right * sin_r + f_d * cos_r + gravity  # what gravity brings in level flight counts as bias
+            force[2] = -right * sin_r + f_d * cos_r + gravity  # the part of gravity in level flight counts as bias
             for i in range(3):
                 y[i], y[i + 3] = gyro[flight, start, i], accelerometer[flight, start, i]
                 for j in range(3):

@@ -22,7 +22,7 @@ from groundstation.simulation.session_scenario import SessionErrors, SessionScen
 
 RAD_PER_ARCSEC = float(np.deg2rad(1.0 / 3600.0))
 SMALL_STEP = (
-    1e-3  # of the correlation time: below, the closed form of the variance loses digits and its series does not
+    1e-3  # share of the correlation time below which the closed form of the variance loses digits, not its series
 )
 
 

@@ -24,7 +24,7 @@ from groundstation.tables.table import Flight, Table
 
 DEFAULT_SEED = 1
 STATIONS_TOML, SETTINGS_TOML = "stations.toml", "settings.toml"
-STEPS = {"deg": 1e-9, "m": 1e-4, "mps": 1e-5, "": 1.0, "s": 1e-9}  # of what is written, by unit
+STEPS = {"deg": 1e-9, "m": 1e-4, "mps": 1e-5, "": 1.0, "s": 1e-9}  # steps of written values, by unit
 HEADING_STEP_DEG = 1e-6
 VELOCITY_AXES = ("north", "east", "down")
 

@@ -32,7 +32,7 @@ Family = Literal["grid", "continuous", "wide"]
 INS_RATE_HZ = 50
 GNSS_EVERY = 5  # INS steps per GNSS epoch: 10 Hz
 FASTEST_GATED_MPS = 6.0
-QUIET_SHARE = 0.5  # of family wide: receivers good enough for the gate at standstill
+QUIET_SHARE = 0.5  # share of family wide with receivers good enough for the gate at standstill
 AIRFIELD_DEG = (59.8, 179.999)  # beside the date line: the wrap is met in every test
 START_OF_DAY_NS = 1_777_874_400 * NS_PER_S  # 2026-05-04T06:00:00Z
 

@@ -5,7 +5,7 @@ import numpy as np
 from groundstation.tables.table import Table
 
 UNAIDED, AIDED, UNKNOWN = "unaided", "gnss_aided", "unknown"
-STATED = (UNAIDED, AIDED)  # what an aircraft file or the head of a log may say
+STATED = (UNAIDED, AIDED)  # kinds that an aircraft file or the head of a log may state
 HALF = 0.5
 
 

@@ -155,7 +155,7 @@ def window_sum(values: FloatArray, half: int) -> FloatArray:
     """Sum over the rows i - half ... i + half along the last axis, cut at the ends."""
     size = values.shape[-1]
     reach = min(half, size)
-    total = np.empty((*values.shape[:-1], size + 1))  # of the values before each row
+    total = np.empty((*values.shape[:-1], size + 1))  # sum of the values before each row
     total[..., 0] = 0.0
     np.cumsum(values, axis=-1, out=total[..., 1:])
     sums = np.empty(values.shape)

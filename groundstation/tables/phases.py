@@ -35,7 +35,7 @@ UNKNOWN, STANDSTILL, TAXI, TAKE_OFF_RUN, AIRBORNE, LANDING_ROLL = range(len(PHAS
 STEP_NS = round(NS_PER_S / RATE_HZ)
 LEAST_COVERAGE = 0.5  # share of the flight for which a flag must speak
 RUN_SHARE = 0.25  # a run begins and a roll ends at this share of the speed at lift-off and touch-down
-SLOWEST_RUN_MPS = 3.0  # what lifts off slower made no run
+SLOWEST_RUN_MPS = 3.0  # an aircraft that lifts off slower made no run
 LIFTED_M = 1.5  # height at which a lift-off is seen, in smoothed altitudes
 CARRIED_M, CARRIED_S = 5.0, 5.0  # up to that height what is too slow to fly for so long is carried
 SHORTEST_STANDSTILL_S = 3.0
@@ -273,7 +273,7 @@ def _labels(evidence: _Evidence) -> NDArray[np.int64]:
     label[evidence.airborne] = AIRBORNE
     flights = runs(label == AIRBORNE)
     gaps = zip([0, *(end for _, end in flights)], [*(start for start, _ in flights), len(label)], strict=True)
-    for start, end in gaps:  # what lies between two flights, before the first and after the last
+    for start, end in gaps:  # the parts between two flights, before the first and after the last
         if end > start and ground[start:end].any():
             _mark_runs(label, speed, start, end)
     return label

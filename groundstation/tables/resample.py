@@ -131,7 +131,7 @@ def _held(table: Table, name: str, at_ns: Int64Array, gap_ns: int, choice: Choic
     if not known.size:
         return Column(np.zeros(len(at_ns), dtype=column.values.dtype), np.zeros(len(at_ns), dtype=bool))
     time_ns = table.time_ns[known]
-    before = np.searchsorted(time_ns, at_ns, side="right") - 1  # of repeated times the last
+    before = np.searchsorted(time_ns, at_ns, side="right") - 1  # the last of repeated times
     row, present = _clipped(before, len(known)), before >= 0
     if choice == "nearest":
         after = _clipped(before + 1, len(known))

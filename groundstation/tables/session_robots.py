@@ -21,7 +21,7 @@ from groundstation.tables.table import Flight, Table
 
 POSE = "position_north_m", "position_east_m", "true_heading_deg"
 LARGEST_BEARING_DEG = 80.0
-LONGEST_HOLD_S = 1.5  # of a reading of the odometry, before it is a gap
+LONGEST_HOLD_S = 1.5  # longest hold of an odometry reading; a longer one is a gap
 SEES, BLIND = 1, 2  # ranks
 
 

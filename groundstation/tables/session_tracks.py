@@ -19,7 +19,7 @@ LEVEL = "latitude_deg", "longitude_deg"
 SPEED = "velocity_north_mps", "velocity_east_mps"
 HEIGHTS = {"altitude_ellipsoid_m": "", "altitude_msl_m": "the height above mean sea level, tens of metres from it"}
 LONGEST_BARO_GAP_S = 10.0
-SAME_EPOCH = 1e-3  # of a step
+SAME_EPOCH = 1e-3  # share of a step
 
 
 class NoTrackError(Exception):

@@ -13,7 +13,7 @@ from groundstation.tables.ins_kind import AIDED, HALF
 from groundstation.tables.table import Flight, Table
 
 TOGETHER = "together"  # key of the metadata of a flight of several logs
-WHOLE_SHARE = 0.8  # of the longest: a source that covers less is for want of a better one
+WHOLE_SHARE = 0.8  # least cover as a share of the longest: a source with less is used for want of a better one
 FASTEST_HZ = 10.0  # a faster source says no more of a motion
 SURER = 1.5  # times: a smaller difference of the stated sigma is none
 NEEDS = {"gnss": ("velocity_north_mps", "velocity_east_mps"), "ins": ("roll_deg", "pitch_deg")}

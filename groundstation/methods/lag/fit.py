@@ -23,7 +23,7 @@ MOST_STEPS, LONGEST_STEP_S, CONVERGED_S = 12, 0.3, 1e-4
 STEPS_WITH_WEIGHTS = 4  # after them the weights stay
 WINDOWS_FOR_SEARCH = 16
 NO_PRIOR = 1e6
-MOVING_SHARE = 0.1  # of the motion of the liveliest component: less may be noise alone
+MOVING_SHARE = 0.1  # least motion as a share of the liveliest component's: less may be noise alone
 At = tuple[float, FloatArray]  # delay, nuisances
 LEAST_RATIO = 1e-9  # directions that one window alone determines leave nothing to be judged by
 

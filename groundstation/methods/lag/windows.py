@@ -13,7 +13,7 @@ from groundstation.base.records import BoolArray
 from groundstation.methods.lag.settings import LatencySettings
 
 FloatArray = NDArray[np.float64]
-SIGMA_OF_MEDIAN = 1.4826  # of normal errors: sigma over the median of their sizes
+SIGMA_OF_MEDIAN = 1.4826  # sigma over the median size of normal errors
 CORRELATED_SHARES = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0)  # variance of the correlated over the white noise
 CORRELATION_TIMES_S = (0.5, 1.0, 2.0, 5.0, 10.0, 30.0)
 WINDOWS_FOR_NOISE = 8

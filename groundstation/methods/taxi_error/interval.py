@@ -23,10 +23,10 @@ from groundstation.methods.taxi_error.sampling import find_mode, sample
 
 FloatArray = NDArray[np.float64]
 
-LEAST_WEIGHT, LEAST_VARIANCE_DEG2 = 1e-5, 1e-18  # of a draw, times the mean; below it there is nothing to add
+LEAST_WEIGHT, LEAST_VARIANCE_DEG2 = 1e-5, 1e-18  # draws below this share of the mean weight add nothing
 DRAWS_OF_GROWTH = 200
 NO_SPREAD = np.log(1e-3 / ARCMIN_PER_DEG)
-NOTICED_DEG = 0.03  # of a term told apart: what it differs by along a taxi before the noise model is told of it
+NOTICED_DEG = 0.03  # least change of a term told apart along a taxi for the noise model to have it
 WIDEST_GAP_DEG = 210.0  # between the directions of a taxi that goes there and back
 
 

@@ -26,4 +26,4 @@ PRIOR: dict[str, tuple[float, float]] = {
 }
 PRIOR_MEAN = np.log([PRIOR[name][0] for name in noise.PARAMETER_NAMES])
 PRIOR_SIGMA = np.array([PRIOR[name][1] for name in noise.PARAMETER_NAMES])
-SPREAD = (noise.SEGMENT, noise.WANDER)  # what parts of a run have of their own
+SPREAD = (noise.SEGMENT, noise.WANDER)  # errors that parts of a run have of their own

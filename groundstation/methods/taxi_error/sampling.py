@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]
 
-T_DEGREES = 6.0  # of the multivariate t that draws: heavier tails than any posterior met
-ROUNDS, LEAST_IN_ROUND = 20, 50  # of draws: each proposal learns from all rounds before it
+T_DEGREES = 6.0  # degrees of freedom of the multivariate t: heavier tails than any posterior met
+ROUNDS, LEAST_IN_ROUND = 20, 50  # rounds of draws: each proposal learns from all rounds before it
 MOST_TIMES, LEAST_EFFECTIVE_DRAWS = 3, 60.0  # so many times the draws asked for, until so many carry the weight
-FIRST_SHARE = 0.1  # of the first proposal's covariance in all that follow
+FIRST_SHARE = 0.1  # share of the first proposal's covariance in all later ones
 HEAVIEST_IN_FIT, HEAVIEST = 100.0, 0.5  # weight of one draw: times the mean; times the mean and the root of all draws
 TINIEST = 1e-12  # distance of a point of the sequence from 0 and 1
 
