@@ -36,7 +36,9 @@ def wrap_180(angle_deg: ArrayLike) -> FloatArray:
 
 
 def unwrap(heading_deg: ArrayLike) -> FloatArray:
-    """Turn headings, shape (n,), into a continuous angle in degrees (no jumps at north). NaN stays NaN.
+    """Turn headings, shape (n,), into a continuous angle in degrees without jumps at north.
+
+    NaN stays NaN.
 
     Examples
     --------
@@ -77,7 +79,9 @@ def interpolate_heading(at: ArrayLike, time: ArrayLike, heading_deg: ArrayLike) 
 
 
 def mean_heading(heading_deg: ArrayLike, weight: ArrayLike | None = None) -> float:
-    """Average headings on the circle, in [0, 360); NaN samples are left out, nothing at all gives NaN.
+    """Average headings on the circle, in [0, 360).
+
+    NaN samples are left out; the answer is NaN where no sample is left.
 
     Examples
     --------
@@ -95,7 +99,9 @@ def mean_heading(heading_deg: ArrayLike, weight: ArrayLike | None = None) -> flo
 
 
 def direction_of(north: ArrayLike, east: ArrayLike) -> FloatArray:
-    """Direction of horizontal vectors, clockwise from north, in [0, 360): the track angle of a velocity.
+    """Return the direction of horizontal vectors, degrees clockwise from north, in [0, 360).
+
+    For a velocity this is the track angle.
 
     Examples
     --------

@@ -60,7 +60,7 @@ def mask(array: Any) -> BoolArray:
 
 
 def is_valid(array: Any) -> BoolArray:
-    """Where an array has values, shape (n,)."""
+    """Return a mask, shape (n,), that is true where an array has a value."""
     return mask(pc.is_valid(array)) if array.null_count else np.ones(len(array), dtype=bool)
 
 
@@ -82,9 +82,10 @@ def values(array: Any, filler: float | int) -> NDArray[Any]:
 
 
 def column(array: Any) -> NDArray[Any]:
-    """What ``to_numpy`` gives of an array or a chunked one, shape (n,): numbers, bools, text as objects.
+    """Return the values of an array or a chunked array, shape (n,), like ``to_numpy``.
 
-    Arrays with nulls and other types, which our own files do not have, are left to pyarrow.
+    Numbers and bools keep their type, text becomes objects. Arrays with nulls and other types, which our own files do
+    not have, are left to pyarrow.
 
     Examples
     --------

@@ -15,7 +15,7 @@ _LAYERS = ((0.0, -0.0065), (11_000.0, 0.0), (20_000.0, 0.0010), (32_000.0, 0.002
 
 
 def _falls_to(height_m: float, base_k: float, lapse_k_per_m: float) -> float:
-    """Pressure at a height above a layer's base, as a share of that at the base."""
+    """Return the pressure at a height above a layer's base, as a share of that at the base."""
     if lapse_k_per_m == 0.0:
         return float(np.exp(-_GRAVITY * height_m / (_GAS_CONSTANT * base_k)))
     top_k = base_k + lapse_k_per_m * height_m
@@ -23,7 +23,7 @@ def _falls_to(height_m: float, base_k: float, lapse_k_per_m: float) -> float:
 
 
 def _climbs(share: FloatArray, base_k: float, lapse_k_per_m: float) -> FloatArray:
-    """Height above a layer's base, m, at which the pressure is a share of that at the base."""
+    """Return the height above a layer's base, m, where the pressure is a share of the base's."""
     if lapse_k_per_m == 0.0:
         return np.asarray(-_GAS_CONSTANT * base_k / _GRAVITY * np.log(share))
     exponent = -_GAS_CONSTANT * lapse_k_per_m / _GRAVITY
@@ -31,7 +31,7 @@ def _climbs(share: FloatArray, base_k: float, lapse_k_per_m: float) -> FloatArra
 
 
 def pressure_altitude_m(pressure_pa: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Return the pressure altitude, and where the pressure is none of the atmosphere's.
+    """Return the pressure altitude, and a mask of the pressures refused.
 
     Each layer has a constant lapse L of the temperature T from its base upwards, and the air rests in it:
     p = p_b (1 + L (H - H_b) / T_b)^(-g / (R L)), or p_b exp(-g (H - H_b) / (R T_b)) where L = 0; solved for H.

@@ -1,4 +1,7 @@
-"""Attitude as a quaternion, for programs that draw: axes east-north-up and forward-left-up, the scalar last."""
+"""Attitude as a quaternion for programs that draw.
+
+Axes are east-north-up and forward-left-up; the scalar is last.
+"""
 
 import numpy as np
 

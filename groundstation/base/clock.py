@@ -1,4 +1,4 @@
-"""The clock of a recorder as it is kept: where it began, how it was set, how it runs by other clocks of the log.
+"""Clock of a recorder as it is kept: start, steps, rate against other clocks of the log.
 
 Times are text for people. Fields stand in alphabetical order, as the JSON of the MCAP has its keys.
 """
@@ -11,7 +11,10 @@ Start = Literal["utc", "unset", "own_zero"]
 
 @dataclass(frozen=True, kw_only=True)
 class StepEntry:
-    """A step of the clock: what came before it was moved by ``shift_of_earlier_s``; ``mistake`` names it if it can."""
+    """One step of the recorder's clock.
+
+    The records before it were moved by ``shift_of_earlier_s``. ``mistake`` names the cause where it is known.
+    """
 
     kind: str = field(metadata={"one_of": ("backward", "forward")})
     mistake: str = field(metadata={"one_of": ("", "week_number", "leap_seconds")})
@@ -24,10 +27,10 @@ class StepEntry:
 
 @dataclass(frozen=True, kw_only=True)
 class SegmentEntry:
-    """A stretch over which two clocks run at constant rates; ``offset`` and ``drift`` in words with their sigmas.
+    """Stretch over which two clocks run at constant rates.
 
-    ``offset_s`` is the other clock less the recorder's. Drift is positive where the recorder is fast, None where it
-    cannot be observed.
+    ``offset`` and ``drift`` are text, with their sigmas. ``offset_s`` is the other clock less the recorder's. Drift is
+    positive where the recorder is fast, None where it cannot be observed.
     """
 
     drift: str
@@ -43,7 +46,7 @@ class SegmentEntry:
 
 @dataclass(frozen=True, kw_only=True)
 class BreakEntry:
-    """Where two clocks part: one was set (``step``), or changed its rate (``rate``)."""
+    """Moment at which two clocks part: one was set (``step``) or changed its rate (``rate``)."""
 
     drift_change_ppm: float | None
     kind: str = field(metadata={"one_of": ("step", "rate")})
@@ -55,7 +58,7 @@ class BreakEntry:
 
 @dataclass(frozen=True, kw_only=True)
 class MistakeEntry:
-    """An error of one of two clocks that has a name; ``time`` is None where it holds throughout."""
+    """Named error of one of two clocks; ``time`` is None where it holds throughout."""
 
     kind: str = field(metadata={"one_of": ("week_number", "leap_seconds", "time_zone")})
     size_s: float
@@ -65,7 +68,10 @@ class MistakeEntry:
 
 @dataclass(frozen=True, kw_only=True)
 class RelationEntry:
-    """The recorder's clock by another clock of the log; ``reason`` says why nothing is known."""
+    """Comparison of the recorder's clock with another clock of the log.
+
+    ``reason`` says why nothing is known.
+    """
 
     breaks: tuple[BreakEntry, ...] = ()
     clock: str

@@ -1,13 +1,13 @@
-"""The one wrapper around numba: loops that must be loops are compiled here and nowhere else.
+"""The one wrapper around numba: all compiled loops of the package are compiled here.
 
-A loop is compiled at its first call, and numba imported then. What was compiled goes beside the code when that folder
-can be written, else into the user's cache folder, else it is compiled again in each process; ``numba.njit(cache=True)``
-alone raises at import in a read-only install without a home. It is loaded as code: a folder that another user owns or
-may write serves neither here nor for numba, which pickles what it keeps. Loops over numbers and arrays are kept as
-machine code of their own (``base.machine_code``), and found again without numba; where another version of numba does
-not give that, they are compiled like any others. Where nothing is kept, plain Python goes through the bytes of a small
-log: it has done so before a compiler has started.
-Keep compiled functions scalar: small matrix products inside njit take 7-10 s to compile.
+A loop is compiled at its first call, and numba imported then. Compiled code goes beside the source when that folder can
+be written, else into the user's cache folder, else it is compiled again in each process; ``numba.njit(cache=True)``
+alone raises at import in a read-only install without a home. It is loaded as code, and numba pickles what it keeps: a
+folder that another user owns or may write is used by neither. Loops over numbers and arrays are kept as machine code of
+their own (``base.machine_code``), and found again without numba; where another version of numba does not give that,
+they are compiled like any others. Where nothing is kept, plain Python goes through the bytes of a small log: it has
+done so before a compiler has started. Keep compiled functions scalar: small matrix products inside njit take 7-10 s to
+compile.
 """
 
 import os
@@ -42,11 +42,11 @@ from groundstation.base.machine_code import (
 from groundstation.base.own_files import hand_of_others
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-SMALL_BYTES = 65_536  # of a log: plain Python takes up to a second for so many, and a compiler several
+SMALL_BYTES = 65_536  # plain Python takes up to a second for so many bytes of a log, and a compiler several
 _BESIDE = Path(__file__).parent / "__pycache__"
-PLAIN_S = 1.0  # of a process for one loop: after that it is compiled, however few bytes come
+PLAIN_S = 1.0  # longest time in plain Python for one loop of a process: then it is compiled, however few bytes come
 _ANEW = "each process compiles its loops anew"
-_UNREADABLE = ImportError, AttributeError, pickle.UnpicklingError  # of a pickle
+_UNREADABLE = ImportError, AttributeError, pickle.UnpicklingError  # raised by an unreadable pickle
 _LOCK = RLock()  # numba and its linker are told one thing at a time
 
 
@@ -60,13 +60,16 @@ def _is_writable(folder: Path) -> bool:
 
 
 def _serves(folder: Path) -> bool:
-    """Whether compiled code may be kept in a folder: it can be written, and not by others."""
+    """Tell whether compiled code may be kept in a folder: we can write to it, others cannot."""
     return _is_writable(folder) and not hand_of_others(folder)
 
 
 @cache
 def _cache_folder() -> Path | None:
-    """Where compiled code is kept; numba is told of it where it is not beside the code."""
+    """Return the folder where compiled code is kept; None where there is none.
+
+    numba is told of the folder when it is not the one beside the code.
+    """
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if not chosen and _serves(_BESIDE):
         return _BESIDE
@@ -78,7 +81,10 @@ def _cache_folder() -> Path | None:
 
 
 def _own_choice() -> Path | None:
-    """The folder that ``NUMBA_CACHE_DIR`` names, else one in the user's cache; None for a user without a home."""
+    """Return the folder that ``NUMBA_CACHE_DIR`` names, else one in the user's cache.
+
+    It is None for a user without a home.
+    """
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(chosen)
     try:
@@ -88,7 +94,10 @@ def _own_choice() -> Path | None:
 
 
 def keeps_nothing() -> bool:
-    """Whether nothing compiled is kept: what a log needs of it (a flat CSV needs nothing) takes some seconds more."""
+    """Tell whether no compiled code is kept yet.
+
+    A log that needs compiled code then takes some seconds more; a flat CSV needs none.
+    """
     folder = _cache_folder()
     return folder is None or not any(folder.glob(f"*{SUFFIX}"))
 
@@ -121,19 +130,22 @@ def _compiled_by_numba(function: Callable[..., Any], **options: bool) -> Any:
 
 
 def _forget_unreadable() -> None:
-    """Remove numba's lists of what it keeps of loops of this process that name a class where it is no longer."""
+    """Remove numba's index files of this process that can no longer be read.
+
+    They name a class that is no longer where it was.
+    """
     for listed in (path for place in _places for path in place.glob("*.nbi")):
         with suppress(OSError):
             try:
                 with listed.open("rb") as file:
-                    pickle.load(file)  # of which numba
+                    pickle.load(file)  # numba's version
                     pickle.load(file)
             except (*_UNREADABLE, EOFError):
                 listed.unlink(missing_ok=True)
 
 
 class Loop:
-    """A function that is compiled when it is first called, by Python or by another one that is compiled.
+    """Function that is compiled at its first call, from Python or from another compiled one.
 
     Parameters
     ----------
@@ -157,7 +169,10 @@ class Loop:
 
     @cached_property
     def _ordinary(self) -> Any:
-        """The function as numba has it for calls from Python, by what it documents alone, kept in its cache."""
+        """Return the function as numba compiles it for calls from Python, kept in numba's cache.
+
+        Only what numba documents is used.
+        """
         function = self._calling(lambda loop: loop._ordinary)
         if _cache_folder() is not None:  # numba reads NUMBA_CACHE_DIR at its import
             kept = _compiled_by_numba(function, cache=True)
@@ -169,10 +184,11 @@ class Loop:
 
     @cached_property
     def _part(self) -> Any:
-        """The function as numba has it inside others, with whose code it is kept; from Python a call crashes.
+        """Return the function as numba compiles it inside others; a call from Python crashes.
 
-        There is no code that takes its arguments from Python, which takes longer to compile than the function itself
-        when those are tuples of arrays, and no counting of references to what it is handed.
+        It is kept with the code of those that call it. There is no code that takes its arguments from Python, which
+        takes longer to compile than the function itself when those are tuples of arrays, and no counting of references
+        to what it is handed.
         """
         options = _BARE | (_INSIDE_EACH if self._is_inlined else {})
         return _compiled_by_numba(self._calling(lambda loop: loop._part), **options)
@@ -183,7 +199,7 @@ class Loop:
         return self._calling(lambda loop: loop._plain)
 
     def _calling(self, instead: Callable[["Loop"], Any]) -> FunctionType:
-        """The function with something else in the place of each loop that it calls."""
+        """Return the function with a replacement for each loop that it calls."""
         function, names = self.py_func, dict(self.py_func.__globals__)
         for step in get_instructions(function):  # its names alone are not enough: np.mean is none of a loop "mean"
             if step.opname == "LOAD_GLOBAL" and isinstance(called := names.get(step.argval), Loop):
@@ -191,7 +207,7 @@ class Loop:
         return FunctionType(function.__code__, names, function.__name__, function.__defaults__, function.__closure__)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Run it: kept machine code where there is any, else what numba compiles."""
+        """Run the loop by kept machine code where there is any, else by what numba compiles."""
         forms = forms_of(arguments) if self._is_kept else None
         if forms is None:
             return self._run_ordinary(arguments)
@@ -207,7 +223,7 @@ class Loop:
         return linked(*arguments)
 
     def _run_ordinary(self, arguments: tuple[Any, ...]) -> Any:
-        """The same by what numba compiled; what it kept and cannot read any more it compiles anew.
+        """Run what numba compiled; compile anew what it kept and can no longer read.
 
         numba pickles what it keeps, with the place of every class in it: an update that moves one makes it fail before
         the loop has begun.
@@ -221,7 +237,7 @@ class Loop:
             return self._ordinary(*arguments)
 
     def _is_soon_done(self, forms: tuple[Form, ...], arguments: tuple[Any, ...]) -> bool:
-        """Whether there is nothing kept, and so little to do that it need not be compiled."""
+        """Tell whether plain Python will do: no machine code is kept and there is little to do."""
         if len(arguments[0]) > self._small_bytes or self._plain_s >= PLAIN_S:
             return False
         if forms not in self._is_missing:
@@ -230,7 +246,7 @@ class Loop:
         return self._is_missing[forms]
 
     def _run_plain(self, arguments: tuple[Any, ...]) -> Any:
-        """The same by Python, and the time that it took."""
+        """Run the loop in plain Python, and measure the time."""
         begin = perf_counter()
         with np.errstate(all="ignore"):  # as compiled code does
             answer = self._plain(*arguments)
@@ -239,11 +255,11 @@ class Loop:
         return None if annotation is None else annotation(answer)
 
     def __reduce__(self) -> str:
-        """A loop is pickled as functions are, by its name in its module."""
+        """Pickle the loop as functions are pickled, by its name in its module."""
         return self.py_func.__qualname__
 
     def _found(self, forms: tuple[Form, ...]) -> Linked | None:
-        """Machine code for such arguments, kept before or compiled now; None where there cannot be any."""
+        """Return machine code for such arguments, kept before or compiled now; None if impossible."""
         folder = _cache_folder()
         kept = None if folder is None else KeptCode(folder, self.py_func, forms)
         try:
@@ -251,7 +267,7 @@ class Loop:
             is_new = code is None
             code = self._machine_code(forms) if code is None else code
             found = None if code is None else linked(code, self.py_func, forms)
-        except Exception as error:  # of a numba or llvmlite other than those known: what they document does, and slower
+        except Exception as error:  # an unknown numba or llvmlite: their documented way serves, but slower
             _refused.append(f"{self.py_func.__qualname__}: {' '.join(str(error).split())[:160]}")
             return None
         if kept and is_new and code is not None and found is not None:
@@ -280,23 +296,34 @@ class Loop:
 
 
 def compiled(function: Function) -> Function:
-    """Compile a scalar-loop function with numba at its first call (no Python objects, errors as in numpy)."""
+    """Compile a scalar loop with numba at its first call.
+
+    It may hold no Python objects; its errors are those of numpy.
+    """
     return cast(Function, Loop(function))
 
 
 def in_place(function: Function) -> Function:
-    """The same for a loop that makes no array: its machine code is kept, without the counting of references to the
-    arrays that it is handed, which took up to 40 % of the time of loops that hand on tuples of them."""
+    """Compile a loop that makes no array, like ``compiled``, and keep its machine code.
+
+    References to the arrays it is handed are not counted: counting took up to 40 % of the time of loops that hand on
+    tuples of arrays.
+    """
     return cast(Function, Loop(function, is_kept=True))
 
 
 def scanner(function: Function) -> Function:
-    """Like ``in_place``, for a loop over the bytes of a log, its first argument: up to SMALL_BYTES of them are gone
-    through in plain Python where no machine code is kept. No number in it may go beyond 64 bits: numpy's and Python's
-    differ there from compiled ones."""
+    """Compile a loop over the bytes of a log, its first argument, like ``in_place``.
+
+    Up to SMALL_BYTES are gone through in plain Python where no machine code is kept. No number in it may go beyond 64
+    bits: there numpy and Python differ from compiled code.
+    """
     return cast(Function, Loop(function, is_kept=True, small_bytes=SMALL_BYTES))
 
 
 def inlined(function: Function) -> Function:
-    """Like ``in_place``, for a small part of other compiled loops: its code is put into each and no call is made."""
+    """Compile a small part of other loops, like ``in_place``, into each loop that uses it.
+
+    No call is made.
+    """
     return cast(Function, Loop(function, is_kept=True, is_inlined=True))

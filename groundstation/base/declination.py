@@ -1,4 +1,7 @@
-"""Magnetic declination along a flight, from the world magnetic model of its date, or the IGRF before there was one."""
+"""Magnetic declination along a flight, from the world magnetic model of its date.
+
+Before the first world magnetic model the IGRF is used.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -119,7 +122,10 @@ def _path_m(latitude_deg: FloatArray, longitude_deg: FloatArray) -> FloatArray:
 
 
 class _Model(NamedTuple):
-    """A model at a date; ``field`` gives declination, horizontal and down intensity at latitude, longitude, km."""
+    """Magnetic model at a date.
+
+    ``field`` takes latitude, longitude and kilometres of height, and gives declination, horizontal and down intensity.
+    """
 
     name: str
     field: Callable[[FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]

@@ -1,4 +1,4 @@
-"""Decimals that a number is rounded to wherever it is written for people and scripts, from its name."""
+"""Decimals that a number is rounded to in text and files, chosen by its name."""
 
 import math
 from collections.abc import Mapping
@@ -44,7 +44,9 @@ def digits_of(name: str) -> int:
 
 
 def rounded(value: float, digits: int | None) -> float | None:
-    """A number as JSON tells it: rounded (None: not), never minus zero; None where it is not finite.
+    """Round a number for JSON, never to minus zero; None where it is not finite.
+
+    With ``digits`` None it is not rounded.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Earth-centred, Earth-fixed positions on the WGS-84 ellipsoid, and the north-east-down axes at a place.
+"""Earth-centred, Earth-fixed positions on WGS-84, and local north-east-down axes.
 
 Source: Groves, Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems, 2nd ed. 2013, equations
 2.112 (to ECEF), 2.150 (axes), 2.113 and appendix C (back, by iteration).
@@ -30,7 +30,9 @@ def ecef_m(latitude_deg: ArrayLike, longitude_deg: ArrayLike, height_m: ArrayLik
 
 
 def geodetic_deg_m(position_m: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Latitude and longitude, degrees, and height above the ellipsoid, metres, of ECEF positions (..., 3).
+    """Return latitude, longitude (degrees) and ellipsoid height (metres) of ECEF positions.
+
+    Positions have the shape (..., 3), in metres.
 
     Examples
     --------
@@ -52,7 +54,9 @@ def geodetic_deg_m(position_m: ArrayLike) -> tuple[FloatArray, FloatArray, Float
 
 
 def ecef_from_n(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> FloatArray:
-    """Rotation from north-east-down to ECEF, shape (..., 3, 3): its columns are north, east and down in ECEF.
+    """Return the rotation from north-east-down to ECEF, shape (..., 3, 3).
+
+    Its columns are north, east and down in ECEF.
 
     Examples
     --------

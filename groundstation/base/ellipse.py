@@ -6,7 +6,7 @@ from groundstation.base.angles import FloatArray
 
 ELLIPSE_95 = float(np.sqrt(-2.0 * np.log(0.05)))  # sigmas of the ellipse that holds 95 % of a normal pair
 ROUND = np.linspace(0.0, 2.0 * np.pi, 49)
-SEEN_SHARE = 0.03  # of a map's side that an ellipse has to be across to be seen
+SEEN_SHARE = 0.03  # least width of an ellipse that is seen, as a share of the map's side
 
 
 def principal_axes(
@@ -40,7 +40,9 @@ def principal_axes(
 
 
 def outlines(sigma_north: FloatArray, sigma_east: FloatArray, correlation: FloatArray, sigmas: float) -> FloatArray:
-    """Outlines of error ellipses of so many sigmas about the origin, north and east, shape (n, 49, 2).
+    """Return outlines of error ellipses about the origin, north and east, shape (n, 49, 2).
+
+    ``sigmas`` says how many standard deviations they have as half axes.
 
     Examples
     --------
@@ -55,7 +57,7 @@ def outlines(sigma_north: FloatArray, sigma_east: FloatArray, correlation: Float
 
 
 def magnified(side_m: float, half_m: float) -> int:
-    """How many times larger an ellipse is drawn on a map to be seen: 1, 2, 5, 10, 20 ... times.
+    """Return the factor by which an ellipse is enlarged on a map: 1, 2, 5, 10, 20 ...
 
     Examples
     --------

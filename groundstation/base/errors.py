@@ -50,24 +50,27 @@ class GroundstationError(Exception):
 
 
 def _shown(part: str) -> str:
-    """As much of a part as a person reads, in characters that a terminal shows."""
+    """Cut a part of a message to what a person reads, in characters that a terminal shows."""
     return in_a_line(part if len(part) <= MOST_SHOWN else f"{part[:MOST_SHOWN]} ... ({len(part)} characters)")
 
 
 class UnreadableLogError(GroundstationError):
-    """No reader claims the file, or nothing in it could be read (exit code 1)."""
+    """Error: no reader claims the file, or nothing in it could be read (exit code 1)."""
 
 
 class UnclaimedLogError(UnreadableLogError):
-    """No reader claims the file: in a folder it is skipped, named on the command line it is an error."""
+    """Error: no reader claims the file.
+
+    In a folder such a file is skipped; named on the command line it is an error.
+    """
 
 
 class UsageError(GroundstationError):
-    """The call cannot be carried out as asked (exit code 2)."""
+    """Error: the call cannot be carried out as asked (exit code 2)."""
 
 
 class UnknownNameError(UsageError, KeyError):
-    """Nothing has that name; those that are near to it are told, or all where none is near.
+    """Error: no such name; the message lists similar names, or all where none is similar.
 
     Parameters
     ----------
@@ -95,7 +98,9 @@ class UnknownNameError(UsageError, KeyError):
 
 
 def near_names(name: str, known: Iterable[str], most: int = 5) -> tuple[str, ...]:
-    """Names that begin with or hold the one asked for, else those spelled alike; at most ``most``.
+    """Return names that begin with or hold the one asked for, else names spelled alike.
+
+    At most ``most`` of them.
 
     Examples
     --------
@@ -111,15 +116,15 @@ def near_names(name: str, known: Iterable[str], most: int = 5) -> tuple[str, ...
 
 
 class NotAssessableError(GroundstationError):
-    """An analysis lacks what it needs; the reason is the message. Never fatal to a run."""
+    """Error: an analysis lacks what it needs, as the message says. Never fatal to a run."""
 
 
 class SettingsError(UsageError):
-    """A settings, profile, aircraft or site file has a value that cannot be used."""
+    """Error: a settings, profile, aircraft or site file has a value that cannot be used."""
 
 
 def lack_of_memory(error: BaseException) -> str:
-    """Name what was lacking, memory or processes, in a few words; empty for another error.
+    """Name the missing resource, memory or processes, in a few words; empty for other errors.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Parts of a result that failed by a defect of ours: left out and told, the rest is made."""
+"""Parts of a result that failed by a defect of ours: they are left out, the rest is made."""
 
 import re
 import traceback
@@ -14,7 +14,7 @@ from groundstation.base.printable import in_a_line
 if TYPE_CHECKING:
     from groundstation.base.findings import Finding
 
-CODE = "internal"  # what the codes of findings on them begin with
+CODE = "internal"  # first part of the codes of findings on them
 MOST_OF_AN_ERROR = 300  # characters: an error may quote the log
 _ADDRESS = re.compile(r"\b0x[0-9a-f]{4,}\b")  # differs from run to run
 
@@ -55,7 +55,7 @@ class Failure:
 
     @property
     def text(self) -> str:
-        """One line: what is left out, and why."""
+        """One line that says what is left out, and why."""
         return in_a_line(f"the {self.part} {self.name} is left out: {self.reason}")
 
     def finding(self) -> "Finding":
@@ -70,7 +70,7 @@ _gathered: ContextVar[list[Failure] | None] = ContextVar("failures", default=Non
 
 @contextmanager
 def gathered_failures() -> Iterator[None]:
-    """Gather failures in place of raising them; :func:`failures` tells those so far."""
+    """Gather failures in place of raising them; :func:`failures` returns those so far."""
     if _gathered.get() is not None:
         yield
         return
@@ -119,14 +119,14 @@ def attempt(
     except Exception as error:
         left_out(part, name, error)
     except BaseException as error:
-        if type(error).__name__ != "PanicException":  # of a library in Rust; that of a package in one is no Exception
+        if type(error).__name__ != "PanicException":  # raised by libraries in Rust; no Exception itself
             raise
         left_out(part, name, error)
     return None
 
 
 def left_out(part: str, name: str, error: BaseException) -> Failure:
-    """Take down that a part failed; where nobody gathers failures the error is raised."""
+    """Record that a part failed; raise the error where nobody gathers failures."""
     gathered = _gathered.get()
     if gathered is None:
         raise error
@@ -161,6 +161,6 @@ def is_incomplete(findings: "Iterable[Finding]") -> bool:
 
 
 def with_failures(findings: "Sequence[Finding]", found: Iterable[Failure]) -> "tuple[Finding, ...]":
-    """Findings with those on failures behind them, each once."""
+    """Append the findings on failures to other findings, each once."""
     told = {finding.code for finding in findings}
     return (*findings, *(failure.finding() for failure in found if failure.code not in told))

@@ -41,7 +41,9 @@ class Finding:
 
 
 def place_time_ns(place: str, start_ns: int, *, has_utc: bool) -> int | None:
-    """Corrected time that a finding's place names, seconds of the flight or UTC; None when it names none.
+    """Return the corrected time that the place of a finding names; None when it names none.
+
+    The place is in seconds of the flight or in UTC.
 
     Examples
     --------

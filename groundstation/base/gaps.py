@@ -10,7 +10,11 @@ from groundstation.base.records import Int64Array, frozen
 
 @dataclass(frozen=True)
 class Gaps:
-    """Gaps of one topic: last sample before each (corrected nanoseconds) and seconds to the next, shape (n,)."""
+    """Gaps of one topic, shape (n,).
+
+    ``start_ns`` is the last sample before each gap (corrected nanoseconds), ``length_s`` the seconds to the next
+    sample.
+    """
 
     topic: str
     start_ns: Int64Array

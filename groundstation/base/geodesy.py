@@ -35,7 +35,9 @@ def curvature_radii_m(latitude_deg: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def on_earth(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Latitude and longitude, degrees, both NaN where the latitude is beyond 90 deg or the longitude beyond a turn.
+    """Return latitude and longitude in degrees, both NaN where one of them is impossible.
+
+    Impossible is a latitude beyond 90 deg or a longitude beyond a turn.
 
     Examples
     --------
@@ -50,7 +52,9 @@ def on_earth(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> tuple[FloatAr
 
 
 def has_position(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> BoolArray:
-    """Rows with a position: both angles are finite, and not both are below ``NO_POSITION_DEG``.
+    """Tell which rows have a position: both angles finite and not both near zero.
+
+    Near zero is below ``NO_POSITION_DEG``.
 
     Parameters
     ----------
@@ -102,8 +106,8 @@ def north_east_m(
 ) -> tuple[FloatArray, FloatArray]:
     """Displacements from an origin in metres north and east, good to 0.1 % within 50 km.
 
-    The date line is crossed as if it were not there. What is no position (a latitude beyond 90 deg, a longitude beyond
-    a turn) has no displacement: NaN.
+    The date line is crossed as if it were not there. An impossible position (a latitude beyond 90 deg, a longitude
+    beyond a turn) has NaN.
 
     Examples
     --------
@@ -153,7 +157,9 @@ def plan_north_east_m(
 def latitude_longitude_deg(
     north_m: ArrayLike, east_m: ArrayLike, origin_latitude_deg: float, origin_longitude_deg: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Latitude and longitude, degrees, of displacements from an origin: the inverse of :func:`north_east_m`.
+    """Return latitude and longitude, degrees, of displacements from an origin.
+
+    It is the inverse of :func:`north_east_m`.
 
     Examples
     --------

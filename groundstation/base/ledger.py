@@ -1,6 +1,7 @@
-"""The integrity ledger of a log as it is kept: in the MCAP, in summary.json, in reports. Times are text for people.
+"""Integrity ledger of a log as it is kept in the MCAP, in summary.json and in reports.
 
-Fields stand in alphabetical order, as the JSON of the MCAP has its keys: what was read back is written equal.
+Times are text for people. Fields stand in alphabetical order, as the JSON of the MCAP has its keys: what was read back
+is written equal.
 """
 
 import dataclasses
@@ -12,7 +13,7 @@ from groundstation.base.serial import LEFT_OUT_WHEN_DEFAULT
 
 @dataclass(frozen=True, kw_only=True)
 class ThresholdsUsed:
-    """Whose thresholds the ledger was made with, their layout's version and the digest of their values."""
+    """Thresholds the ledger was made with: name, version of the layout, digest of the values."""
 
     name: str = ""
     sha256: str = field(default="", metadata={"pattern": "^([0-9a-f]{64})?$"})
@@ -21,7 +22,7 @@ class ThresholdsUsed:
 
 @dataclass(frozen=True, kw_only=True)
 class GapDefinition:
-    """A gap is a step longer than ``periods`` nominal periods and than ``min_s`` seconds."""
+    """Definition of a gap: longer than ``periods`` nominal periods and than ``min_s`` seconds."""
 
     min_s: float = 0.0
     periods: float = 0.0
@@ -29,7 +30,7 @@ class GapDefinition:
 
 @dataclass(frozen=True, kw_only=True)
 class OutOfRange:
-    """The first value outside its range: record, time, and the range (None where it has no end)."""
+    """First value outside its range: record, time, and the range (None where it has no end)."""
 
     range: tuple[float | None, float | None]
     record: int | None
@@ -38,7 +39,7 @@ class OutOfRange:
 
 @dataclass(frozen=True, kw_only=True)
 class StuckStretch:
-    """A stretch in which a field was stuck at ``value``, and what says so."""
+    """Stretch in which a field was stuck at ``value``, and the evidence."""
 
     length_s: float
     record: int
@@ -50,7 +51,7 @@ class StuckStretch:
 
 @dataclass(frozen=True, kw_only=True)
 class FieldEntry:
-    """One field: samples present, NaN the device wrote, values outside the physical range, stuck stretches."""
+    """Counts of one field: samples, NaN of the device, values out of range, stuck stretches."""
 
     first_out_of_range: OutOfRange | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)
     nan: int = 0
@@ -61,7 +62,10 @@ class FieldEntry:
 
 @dataclass(frozen=True, kw_only=True)
 class TopicGaps:
-    """Gaps of a topic; ``listed`` are the first: last sample before it, and seconds to the next."""
+    """Gaps of a topic: number, total and longest.
+
+    ``listed`` are the first ones: time of the last sample before the gap, and seconds to the next sample.
+    """
 
     count: int
     listed: tuple[tuple[str, float], ...] = ()
@@ -71,7 +75,10 @@ class TopicGaps:
 
 @dataclass(frozen=True, kw_only=True)
 class CounterEntry:
-    """What one counter says (``kind``: of ``records`` or of ``losses``); ``listed``: record after a loss, how many."""
+    """Losses that one counter of the log shows; ``kind``: it counts ``records`` or ``losses``.
+
+    ``listed`` holds the record after each loss and how many were lost.
+    """
 
     before: int = 0
     field: str
@@ -83,7 +90,10 @@ class CounterEntry:
 
 @dataclass(frozen=True, kw_only=True)
 class TopicEntry:
-    """One topic; rate and coverage are None where no step is usual. ``losses`` counts by kind what was unreadable."""
+    """Counts of one topic; rate and coverage are None where no step is usual.
+
+    ``losses`` counts by kind what was unreadable.
+    """
 
     actual_rate_hz: float | None
     backward_steps: int
@@ -102,26 +112,26 @@ class TopicEntry:
 
     @property
     def missing(self) -> int:
-        """Records that its counters miss."""
+        """Number of records that its counters show as missing."""
         return sum(counter.lost for counter in self.sequences)
 
     @property
     def out_of_range(self) -> int:
-        """Values outside their range."""
+        """Number of values outside their range."""
         return sum(one.out_of_range for one in self.fields.values())
 
     @property
     def stuck(self) -> int:
-        """Stretches in which a value was stuck."""
+        """Number of stretches in which a value was stuck."""
         return sum(len(one.stuck) for one in self.fields.values())
 
 
 @dataclass(frozen=True, kw_only=True)
 class DamagedSpan:
-    """A span of time with damage; ``start_s`` counts from the first record of the log, as flight time does.
+    """Span of time with damage.
 
-    An empty topic is the whole log, an empty field the whole topic. ``is_exact``: everything within is damaged; else
-    the damage lies somewhere within.
+    ``start_s`` counts from the first record of the log, as flight time does. An empty topic is the whole log, an empty
+    field the whole topic. ``is_exact``: everything within is damaged; else the damage lies somewhere within.
     """
 
     cause: str
@@ -157,7 +167,10 @@ class RemarkEntry:
 
 @dataclass(frozen=True, kw_only=True)
 class Dropouts:
-    """How often, and for how long together, the recorder could not write; a whole 0 where it always could."""
+    """Number and total length of the times the recorder could not write.
+
+    A whole 0 where it always could.
+    """
 
     count: int = 0
     total_s: float | int = 0
@@ -165,7 +178,7 @@ class Dropouts:
 
 @dataclass(frozen=True, kw_only=True)
 class Truncation:
-    """Where a log is cut, and what is lost of it."""
+    """Place where a log is cut, and how much of it is lost."""
 
     count: int
     place: str
@@ -174,7 +187,7 @@ class Truncation:
 
 @dataclass(frozen=True, kw_only=True)
 class Ledger:
-    """What a log holds, topic by topic, and what is odd about it.
+    """Contents of a log topic by topic, with its damage, remarks and oddities.
 
     Parameters
     ----------
@@ -207,5 +220,5 @@ class Ledger:
 
     @property
     def loses_data(self) -> bool:
-        """Whether anything recorded could not be read, or the log is cut."""
+        """Tell whether anything recorded could not be read, or the log is cut."""
         return self.truncated is not None or any(damage.loses_data for damage in self.damages)

@@ -1,4 +1,7 @@
-"""A local north-east-down frame: the plane that touches the ellipsoid at an origin, the same axes for everybody."""
+"""Local north-east-down frame: the plane that touches the ellipsoid at an origin.
+
+All aircraft of a session share its axes.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,12 +14,12 @@ from groundstation.base.ecef import ecef_from_n, ecef_m, geodetic_deg_m
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number, required_number
 
-MOST_LATITUDE_DEG = 90.0 - 1e-7  # of an origin: 1 cm from the pole there is a north
+MOST_LATITUDE_DEG = 90.0 - 1e-7  # highest latitude of an origin: 1 cm from the pole there is a north
 
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """Where the origin of a local frame is; its axes are north, east and down there.
+    """Origin of a local frame; the axes are north, east and down at that point.
 
     Distances in it are those in ECEF. Down is the vertical of the origin alone: 60 km away the ellipsoid lies 280 m
     below the plane, and north differs by the convergence of the meridians.
@@ -55,12 +58,12 @@ class LocalFrame:
         return np.asarray((np.asarray(position_m, dtype=np.float64) - self._origin_m) @ self._axes)
 
     def turned_to(self, latitude_deg: ArrayLike, longitude_deg: ArrayLike, vector: ArrayLike) -> FloatArray:
-        """Local vectors (n, 3) along north, east and down of the places (n,)."""
+        """Turn local vectors (n, 3) to north, east and down of the places (n,)."""
         there = ecef_from_n(latitude_deg, longitude_deg)
         return np.asarray(np.einsum("nij,ni->nj", there, np.asarray(vector) @ self._axes.T))
 
     def turned_from(self, latitude_deg: ArrayLike, longitude_deg: ArrayLike, vector: ArrayLike) -> FloatArray:
-        """Vectors (n, 3) along north, east and down of the places (n,), along the axes of this frame."""
+        """Turn vectors (n, 3) from north, east and down of places (n,) to the axes of this frame."""
         there = ecef_from_n(latitude_deg, longitude_deg)
         return np.asarray(np.einsum("nij,nj->ni", there, np.asarray(vector, dtype=np.float64)) @ self._axes)
 
@@ -77,7 +80,9 @@ def level_direction(heading_deg: ArrayLike) -> FloatArray:
 
 
 def plane_through(position_m: FloatArray) -> LocalFrame:
-    """The frame whose origin lies on the ellipsoid below the middle of ECEF positions (n, 3), NaN rows left out.
+    """Return the frame whose origin is below the mean of ECEF positions (n, 3).
+
+    The origin lies on the ellipsoid. NaN rows are left out.
 
     Examples
     --------

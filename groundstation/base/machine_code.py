@@ -1,8 +1,8 @@
-"""Compiled loops kept as machine code, so that a process that needs one loads it without loading its compiler.
+"""Compiled loops kept as machine code, so that a process loads one without the compiler.
 
 numba itself takes half a second to start and as long again for its first function, though both were compiled before.
-What is kept here is an object file of this processor and the name of its entry, which takes plain C values: a
-pointer and a shape for each array. llvmlite, which numba brings, links it in some milliseconds.
+Here an object file of this processor is kept with the name of its entry. The entry takes plain C values: a pointer and
+a shape for each array. llvmlite, which numba brings, links it in some milliseconds.
 """
 
 import ctypes
@@ -24,12 +24,12 @@ INTEGER, NUMBER = "integer", "number"
 _DTYPES = ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "bool"]
 ARRAY_DTYPES = {np.dtype(name): name for name in _DTYPES}  # in the byte order of this machine
 ENTRY, SUFFIX = "groundstation_entry", ".machine_code"
-LAYOUT = 4  # of what is kept
+LAYOUT = 4  # version of the layout of kept files
 _RESULTS: dict[Any, type] = {int: ctypes.c_int64, bool: ctypes.c_int64, float: ctypes.c_double, None: ctypes.c_int64}
-MOST_COPIED_BYTES = 1 << 25  # of arrays that are read-only and may be written to
+MOST_COPIED_BYTES = 1 << 25  # limit of copying read-only arrays that a call may write to
 _NO_BYTES = ctypes.c_char * 0
 _NUMBERS = count()  # every library has a name of its own
-_NOT_WRITTEN = {b"readonly", b"readnone"}  # what LLVM says of an array that is only read, or not touched at all
+_NOT_WRITTEN = {b"readonly", b"readnone"}  # LLVM's marks on an array that is only read, or not touched
 _HARMLESS = frozenset(("memset", "memcpy", "memmove", "memcmp", "sqrt", "sin", "cos", "exp", "log", "pow", "atan2"))
 
 
@@ -42,12 +42,13 @@ class Group:
     parts: "tuple[Form, ...]"
 
 
-Form = str | tuple[str, int] | Group  # of an argument: INTEGER, NUMBER, dtype and dimensions of an array, a tuple
+Form = str | tuple[str, int] | Group  # form of an argument: INTEGER, NUMBER, dtype and dimensions of an array, a tuple
 
 
 def forms_of(arguments: Sequence[Any]) -> tuple[Form, ...] | None:
-    """Forms of what a loop is handed; None where it is more than numbers of 64 bits, arrays without gaps in the byte
-    order of this machine, and tuples of those.
+    """Return the forms of the arguments of a loop; None for arguments that are not supported.
+
+    Supported are numbers of 64 bits, arrays without gaps in the byte order of this machine, and tuples of those.
 
     Examples
     --------
@@ -78,12 +79,12 @@ def forms_of(arguments: Sequence[Any]) -> tuple[Form, ...] | None:
 
 
 def can_answer(function: Callable[..., Any]) -> bool:
-    """Whether a loop answers with a number or nothing, by its annotation."""
+    """Tell whether a loop answers with a number or nothing, by its annotation."""
     return _annotation(function) in _RESULTS
 
 
 def answers_with_integer(function: Callable[..., Any]) -> bool:
-    """Whether what :func:`entry_source` leaves is an integer, else a float64."""
+    """Tell whether the entry of :func:`entry_source` returns an integer, else a float64."""
     return _RESULTS[_annotation(function)] is ctypes.c_int64
 
 
@@ -92,7 +93,9 @@ def _annotation(function: Callable[..., Any]) -> Any:
 
 
 def entry_source(function: Callable[..., Any], forms: Sequence[Form]) -> tuple[str, dict[str, type]]:
-    """Source of the entry of a loop, to be compiled beside ``kernel`` and ``array``, and the tuples that it names.
+    """Return the source of the entry of a loop, and the tuples that it names.
+
+    It is compiled beside ``kernel`` and ``array``.
 
     Examples
     --------
@@ -120,7 +123,7 @@ def entry_source(function: Callable[..., Any], forms: Sequence[Form]) -> tuple[s
 
 
 def plain_forms(forms: Sequence[Form]) -> Iterator[str | tuple[str, int]]:
-    """Forms of numbers and arrays, those in tuples in their place."""
+    """Return the forms of numbers and arrays, with those in tuples in their place."""
     for form in forms:
         if isinstance(form, Group):
             yield from plain_forms(form.parts)
@@ -129,7 +132,10 @@ def plain_forms(forms: Sequence[Form]) -> Iterator[str | tuple[str, int]]:
 
 
 def digest_of(function: Callable[..., Any], forms: Sequence[Form]) -> bytes:
-    """Digest of all that the machine code of a loop depends on: its code and constants, and of all that it calls."""
+    """Return a digest of all that the machine code of a loop depends on.
+
+    That is its code and constants, and those of all that it calls.
+    """
     from importlib.metadata import version
 
     from llvmlite import __version__, binding
@@ -162,7 +168,7 @@ def digest_of(function: Callable[..., Any], forms: Sequence[Form]) -> bytes:
 
 
 class KeptCode:
-    """Machine code of one loop for arguments of one form, in a file of the folder of compiled code."""
+    """Machine code of one loop for arguments of one form, in a file beside the others."""
 
     def __init__(self, folder: Path, function: Callable[..., Any], forms: Sequence[Form]) -> None:
         short = hashlib.sha256(repr(forms).encode()).hexdigest()[:8]
@@ -170,7 +176,10 @@ class KeptCode:
         self._of = function, forms
 
     def read(self) -> bytes | None:
-        """The object file; None where there is none, one of other code or processor, or one that others may write."""
+        """Read the object file; None where there is no usable one.
+
+        A file of other code, of another processor, or one that others may write is not usable.
+        """
         content = read_own(self._path)
         if content is None:
             return None
@@ -178,7 +187,7 @@ class KeptCode:
         return code if head == self._head(code) else None
 
     def write(self, code: bytes) -> None:
-        """Keep an object file; a folder that cannot be written keeps none."""
+        """Keep an object file, unless the folder cannot be written."""
         with suppress(OSError):
             self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             write_own(self._path, self._head(code) + code)
@@ -201,10 +210,10 @@ def _linker() -> Any:
 
 
 def object_file(text: str, entry: str, forms: Sequence[Form]) -> bytes | None:
-    """What is kept of a module of LLVM; None where its entry may call what only numba's process has.
+    """Return the bytes to keep of an LLVM module.
 
-    It is a byte for each number and array that the entry takes, 1 for an array that it may write to, and an object
-    file.
+    They are None where its entry may call a function that only numba's process has. The bytes are one for each number
+    and array that the entry takes, 1 for an array that it may write to, and then an object file.
     """
     from llvmlite import binding
 
@@ -229,7 +238,10 @@ def object_file(text: str, entry: str, forms: Sequence[Form]) -> bytes | None:
 
 
 def _written(module: Any, forms: Sequence[Form]) -> bytes:
-    """Which arrays LLVM could not prove to be left as they are, in the order of :func:`plain_forms`."""
+    """Return a byte for each plain form: 1 for an array that the code may write to.
+
+    That is one which LLVM cannot prove to be left unchanged. The order is that of :func:`plain_forms`.
+    """
     arguments = list(module.get_function(ENTRY).arguments)
     may_write = []
     for form in plain_forms(forms):
@@ -240,13 +252,16 @@ def _written(module: Any, forms: Sequence[Form]) -> bytes:
 
 
 def _calls_out(module: Any) -> bool:
-    """Whether a module, which is what its entry needs alone, needs a function that is not of LLVM or of C."""
+    """Tell whether a module needs a function that is neither of LLVM nor of C.
+
+    The module holds only what its entry needs.
+    """
     outside = {one.name for one in module.functions if one.is_declaration and not one.name.startswith("llvm.")}
     return bool(outside - _HARMLESS)
 
 
 def linked(kept: bytes, function: Callable[..., Any], forms: Sequence[Form]) -> "Linked | None":
-    """Machine code, as :func:`object_file` gives it, ready to be called; None where it cannot be linked here."""
+    """Link machine code of :func:`object_file` so that it can be called; None if that fails."""
     from llvmlite import binding
 
     plain = tuple(plain_forms(forms))
@@ -289,7 +304,7 @@ class Linked:
         self._annotation = _annotation(function)
 
     def would_write(self, arguments: Sequence[Any]) -> bool:
-        """Whether so much that is read-only may be written to that it is not copied for a call."""
+        """Tell whether a call may write to read-only arrays that are too large to copy for it."""
         plain = _plain(arguments)
         return bool(sum(plain[at].nbytes for at in self._written if not plain[at].flags.writeable) > MOST_COPIED_BYTES)
 
@@ -319,7 +334,10 @@ class Linked:
 
 
 def _address(array: Any) -> int:
-    """Where an array's values begin; ``array.ctypes.data`` takes two to three times as long."""
+    """Return the address of an array's first value.
+
+    ``array.ctypes.data`` takes two to three times as long.
+    """
     if array.flags.writeable:
         return ctypes.addressof(_NO_BYTES.from_buffer(array))
     address: int = array.__array_interface__["data"][0]
@@ -327,7 +345,7 @@ def _address(array: Any) -> int:
 
 
 def _plain(arguments: Sequence[Any]) -> list[Any]:
-    """Arguments, those in tuples in their place."""
+    """Return the arguments, with those in tuples in their place."""
     plain: list[Any] = []
     for one in arguments:
         if isinstance(one, tuple):

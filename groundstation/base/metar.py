@@ -1,4 +1,4 @@
-"""Wind of METAR lines: where it blows from in degrees true, how fast, how much it gusts and turns.
+"""Wind of METAR lines: direction it blows from (degrees true), speed, gusts, variation.
 
 Source: WMO-No. 306, Manual on Codes, volume I.1, FM 15 METAR: CCCC YYGGggZ (AUTO) dddffGfmfm dndndnVdxdxdx.
 """
@@ -12,7 +12,7 @@ from datetime import UTC, datetime, timedelta
 from groundstation.base.units import NS_PER_S
 
 MPS_PER: dict[str, float] = {"KT": 1852.0 / 3600.0, "MPS": 1.0, "KMH": 1.0 / 3.6}
-REPORT_SIGMA_MPS = 1.5  # of either component: the wind at the mast, minutes away, against the wind at the aircraft
+REPORT_SIGMA_MPS = 1.5  # either component: wind at the mast, minutes away, against the wind at the aircraft
 _HEAD = re.compile(
     r"(?<![A-Z0-9])(?P<station>[A-Z][A-Z0-9]{3})\s+(?P<day>\d\d)(?P<hour>\d\d)(?P<minute>\d\d)Z(?P<rest>.*)"
 )
@@ -41,11 +41,14 @@ class MetarWind:
 
     @property
     def name(self) -> str:
-        """Station, day and time, as the line has them."""
+        """Station, day and time, as in the line."""
         return f"{self.station} {self.day:02d}{self.hour:02d}{self.minute:02d}Z"
 
     def utc_ns(self, near_ns: int) -> int | None:
-        """Its time: of the months it may be of, the one nearest to a time. None where no such day exists."""
+        """Return the time of the report in the month that puts it nearest to ``near_ns``.
+
+        A METAR gives the day and the time, not the month. It is None where no such day exists.
+        """
         near = datetime.fromtimestamp(near_ns / NS_PER_S, UTC)
         middle = near.replace(day=15)
         months = [(one.year, one.month) for one in (middle - timedelta(30), middle, middle + timedelta(30))]
@@ -101,7 +104,10 @@ def metar_wind(line: str) -> MetarWind | None:
 
 
 def metar_winds(lines: Iterable[str]) -> tuple[MetarWind, ...]:
-    """The winds of all lines that have one; a later line of the same station and time corrects an earlier one."""
+    """Read the winds of all lines that have one.
+
+    A later line of the same station and time corrects an earlier one.
+    """
     found = {}
     for line in lines:
         wind = metar_wind(line)
@@ -113,9 +119,10 @@ def metar_winds(lines: Iterable[str]) -> tuple[MetarWind, ...]:
 def nearest_wind(
     winds: Iterable[MetarWind], at_ns: int, longest_ns: int, station: str = ""
 ) -> tuple[MetarWind | None, int | None]:
-    """The wind nearest in time within ``longest_ns``, of one station where one is named, and how far it is, ns.
+    """Return the wind nearest in time within ``longest_ns``, and its distance in nanoseconds.
 
-    The distance is that of the nearest report even where it is too far, None without any.
+    Where a station is named, its reports alone count. The distance is that of the nearest report even where it is too
+    far, None without any.
     """
     near = []
     for wind in winds:

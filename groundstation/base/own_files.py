@@ -1,4 +1,4 @@
-"""Files that this user or root alone can have written: what is loaded as code must be of that kind.
+"""Files that only this user or root can have written: only such files are loaded as code.
 
 Another user of the machine may own a folder that was named, may write into it, or may exchange a folder above it for
 one of his own. In a folder with the sticky bit, as ``/tmp``, a user can exchange only what is his. Windows has no such
@@ -18,7 +18,7 @@ _PASSED_BY_OTHERS = stat.S_IXGRP | stat.S_IXOTH
 
 
 def hand_of_others(folder: Path) -> str:
-    """Say which part of a folder's path another user owns or may write to; empty for a folder of our own.
+    """Say which part of a folder's path another user owns or may write to; empty if none.
 
     Below a folder that others may not even pass, what they may do there no longer counts.
     """
@@ -44,7 +44,10 @@ def _is_own(found: os.stat_result) -> bool:
 
 
 def read_own(path: Path) -> bytes | None:
-    """The content of a file that this user or root owns and no other may write; None for any other, or none."""
+    """Return the content of a file that this user or root owns and no other may write.
+
+    It is None for any other file, or where there is none.
+    """
     try:
         number = os.open(path, os.O_RDONLY | _NO_LINK | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0))
     except OSError:
@@ -60,7 +63,7 @@ def read_own(path: Path) -> bytes | None:
 
 
 def write_own(path: Path, content: bytes) -> None:
-    """Write a file that only this user may write, in place of what has its name.
+    """Write a file that only this user may write, in place of any file of that name.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Text of a log made fit for terminals, spreadsheets and pages: it drives nothing.
+"""Text of a log made safe for terminals, spreadsheets and pages.
 
 Control characters move the cursor, set titles and colours of a terminal; marks of direction rearrange the line around
 them; a cell that begins like a formula is one to a spreadsheet. Data stay as they are: this is for what is shown.
@@ -15,7 +15,7 @@ _OTHERS = re.compile("[^\x20-\x7e]")  # than what shows in any program
 
 @cache
 def is_hidden(mark: str) -> bool:
-    """Tell whether a character acts instead of being seen: a control, a mark of direction.
+    """Tell whether a character acts instead of being seen (control, direction mark).
 
     Examples
     --------
@@ -26,7 +26,9 @@ def is_hidden(mark: str) -> bool:
 
 
 def printable(text: str, instead: str = "?") -> str:
-    """Text in one line, ``instead`` for each hidden character, a space for tabs and line ends.
+    """Return text in one line, ``instead`` for each hidden character.
+
+    Tabs and line ends become spaces.
 
     Examples
     --------
@@ -45,7 +47,7 @@ def _shown(mark: str, instead: str) -> str:
 
 
 def in_a_line(text: str) -> str:
-    """Text as :func:`printable` has it, its words one space apart.
+    """Return text as :func:`printable` does, its words one space apart.
 
     Examples
     --------
@@ -56,7 +58,7 @@ def in_a_line(text: str) -> str:
 
 
 def spreadsheet_text(text: str) -> str:
-    """Text of a cell that shows and is not run: an apostrophe stands before a formula.
+    """Return the text of a cell that is shown and not run: a formula gets an apostrophe.
 
     Examples
     --------
@@ -80,7 +82,7 @@ def csv_cell(text: str) -> str:
 
 
 def printable_json(text: str) -> str:
-    """JSON with its hidden characters as escapes: it says the same, and may be printed.
+    """Return JSON with its hidden characters as escapes: equal in meaning and safe to print.
 
     Examples
     --------

@@ -1,4 +1,7 @@
-"""Quantiles and p-values of the usual distributions, from scipy.special alone: importing scipy.stats takes 0.6 s."""
+"""Quantiles and p-values of the usual distributions, from scipy.special alone.
+
+Importing scipy.stats takes 0.6 s.
+"""
 
 import math
 
@@ -9,7 +12,9 @@ FloatArray = NDArray[np.float64]
 
 
 def chi_square_quantile(probability: float, freedom: ArrayLike) -> FloatArray:
-    """Value that chi-square with ``freedom`` degrees stays below with the probability given, shape of ``freedom``.
+    """Return the value that chi-square stays below with the given probability.
+
+    ``freedom`` is the degrees of freedom; the result has its shape.
 
     Examples
     --------
@@ -22,7 +27,9 @@ def chi_square_quantile(probability: float, freedom: ArrayLike) -> FloatArray:
 
 
 def student_quantile(probability: float, freedom: float) -> float:
-    """Value that Student's t with ``freedom`` degrees stays below with the probability given.
+    """Return the value that Student's t stays below with the given probability.
+
+    ``freedom`` is the degrees of freedom.
 
     Examples
     --------
@@ -48,9 +55,9 @@ def share_quantile(probability: float, successes: float, failures: float) -> flo
 
 
 def length_quantile(probability: float, length: float, sigma: float) -> float:
-    """Quantile of the length of a vector in the plane about a vector of that length (Rice distribution).
+    """Return a quantile of the length of a noisy vector in the plane (Rice distribution).
 
-    Both components have the standard deviation ``sigma`` > 0.
+    ``length`` is the length of the vector without noise. Both components have the standard deviation ``sigma`` > 0.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Files opened so that an error of a later read names the file."""
+"""Opening of files so that an error of a later read names the file."""
 
 import io
 from pathlib import Path
@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 class _NamedFile(io.FileIO):
-    """A file whose errors have its name: a broken disk does not tell."""
+    """File whose errors name it, which the system's errors do not."""
 
     def readinto(self, buffer: "WriteableBuffer", /) -> int:
         try:

@@ -21,7 +21,10 @@ MAX_TEXT_CHARACTERS = 1_024
 
 
 def frozen(array: NDArray[Any]) -> NDArray[Any]:
-    """Return a read-only view of ``array``, itself when it is one: arrays inside dataclasses never change."""
+    """Return a read-only view of an array, or the array itself when it is read-only already.
+
+    Arrays inside dataclasses never change.
+    """
     if not array.flags.writeable:
         return array
     view = array.view()
@@ -31,7 +34,7 @@ def frozen(array: NDArray[Any]) -> NDArray[Any]:
 
 @dataclass(frozen=True, repr=False)
 class Column:
-    """Values of one field and where they are present.
+    """Values of one field, and a mask of where they are present.
 
     Parameters
     ----------
@@ -62,7 +65,7 @@ class Column:
         return np.ones(len(self.values), dtype=bool) if self.present is None else self.present
 
     def take(self, index: Any) -> "Column":
-        """The rows that ``index`` (slice, mask or positions) selects."""
+        """Return the rows that ``index`` (slice, mask or positions) selects."""
         return Column(self.values[index], None if self.present is None else self.present[index])
 
 
@@ -98,7 +101,10 @@ class RecordBatch:
         return len(self.record_index)
 
     def take(self, index: Any) -> "RecordBatch":
-        """The rows that ``index`` (slice, mask or positions) selects; columns that share a mask still do."""
+        """Return the rows that ``index`` (slice, mask or positions) selects.
+
+        Columns that share a mask still share one.
+        """
         masks = {id(column.present): column.present for column in self.columns.values() if column.present is not None}
         taken = {identity: frozen(mask[index]) for identity, mask in masks.items()}
         return RecordBatch(
@@ -124,7 +130,7 @@ class UtcReadings:
     zero_ns: Int64Array
 
     def between(self, first: int, end: int) -> Int64Array:
-        """What is read from record ``first`` on and before record ``end``, in rising order."""
+        """Return the readings from record ``first`` on and before record ``end``, in rising order."""
         return np.sort(self.zero_ns[(self.record_index >= first) & (self.record_index < end)])
 
 
@@ -161,7 +167,7 @@ class LogHeader:
 
 @dataclass(frozen=True)
 class NewLog:
-    """A place where a further log begins in the source, by what stands there: a header, definitions, a magic.
+    """Place in the source where a further log begins: a header, definitions or a magic.
 
     Parameters
     ----------
@@ -214,7 +220,7 @@ HEADING_IS_TRACK = "heading_is_track"  # code of a remark: the receiver lets the
 
 @dataclass(frozen=True)
 class Remark:
-    """Something the reader derived, converted or assumed that a user must know of.
+    """Something that the reader derived, converted or assumed and a user must know.
 
     ``code`` is stable (``derived``, ``assumed_utc``, :data:`HEADING_IS_TRACK`), ``text`` is for people. ``fields`` are
     those of ``topic`` that the remark is about: what a derived field was derived from is kept with the flight.

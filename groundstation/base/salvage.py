@@ -1,4 +1,7 @@
-"""Dataclasses from JSON that may be damaged or written by anyone: what is sound is kept, the rest is left out."""
+"""Dataclasses from JSON that may be damaged or written by anyone.
+
+Sound parts are kept, the rest is left out.
+"""
 
 import dataclasses
 import typing
@@ -19,14 +22,14 @@ from groundstation.base.serial import (
     tuple_reader,
 )
 
-LARGEST = 1 << 62  # of a number in such a file
+LARGEST = 1 << 62  # largest number read from such a file
 
 
 def salvaged(cls: type[Document], document: Any) -> Document:
-    """Read what is sound of a document that may be damaged or written by anyone; the rest is left out.
+    """Read the sound part of a document that may be damaged or written by anyone.
 
-    A value of another kind gives its field's default, or drops the entry of a list or mapping it stands in. Whole
-    numbers are counts: not negative.
+    The rest is left out. A value of another kind gives its field's default, or drops the entry of a list or mapping it
+    stands in. Whole numbers are counts: not negative.
 
     Raises
     ------
@@ -72,7 +75,7 @@ def _count(value: Any, _hint: Any) -> int:
 
 
 def _sound(reader: cattrs.Converter, value: Any, hint: Any) -> tuple[Any, ...]:
-    """The value in a tuple of one; an empty one where it is not of its kind."""
+    """Return the value in a tuple of one; an empty tuple where it is not of its kind."""
     try:
         return (reader.structure(value, hint),)
     except (MismatchError, cattrs.BaseValidationError, RecursionError):

@@ -1,9 +1,10 @@
-"""Frozen dataclasses to JSON values and back, by their types: the rules of every file that is written and read.
+"""Frozen dataclasses to JSON values and back, by their types.
 
-Floats are rounded by the name of their field, NaN is null, tuples are lists. A field with ``left_out_when_default``
-in its metadata is absent while it has its default; a class with ``is_kept_apart = True`` (arrays, which have files of
-their own) is left out with the fields that hold it. What is read is checked: a value of another kind is a
-:class:`MismatchError` that names its place. ``base.salvage`` leaves it out instead.
+These are the rules of every file that is written and read. Floats are rounded by the name of their field, NaN is null,
+tuples are lists. A field with ``left_out_when_default`` in its metadata is absent while it has its default; a class
+with ``is_kept_apart = True`` (arrays, which have files of their own) is left out with the fields that hold it. Values
+are checked when read: one of another kind is a :class:`MismatchError` that names its place. ``base.salvage`` leaves it
+out instead.
 """
 
 import dataclasses
@@ -28,7 +29,7 @@ WANTED = {str: "text", float: "a number", int: "a whole number", bool: "true or 
 
 
 class MismatchError(Exception):
-    """A value that is not of the kind its place needs.
+    """Error: a value is not of the kind that its place needs.
 
     Parameters
     ----------
@@ -49,7 +50,9 @@ class MismatchError(Exception):
 
 
 def to_json(value: Any, name: str = "") -> Any:
-    """Turn a value into JSON: floats rounded by their name, NaN and infinities null, dataclasses and arrays opened.
+    """Turn a value into JSON: floats rounded by their name, NaN and infinities null.
+
+    Dataclasses and arrays are opened.
 
     Parameters
     ----------
@@ -66,15 +69,15 @@ def to_json(value: Any, name: str = "") -> Any:
 
 
 def to_json_exactly(value: Any) -> Any:
-    """Turn a value into JSON as :func:`to_json` does, no number rounded."""
+    """Turn a value into JSON as :func:`to_json` does, without rounding any number."""
     return _writer(None).unstructure(value)
 
 
 @cache
 def _writer(digits: int | None) -> cattrs.Converter:
-    """Writes what stands under a name with so many decimals; what has names of its own goes by these.
+    """Return a converter that rounds the values of one name to so many decimals.
 
-    None rounds nothing, of any name.
+    Values with names of their own are rounded by these. With ``digits`` None nothing is rounded, whatever its name.
     """
     writer = cattrs.Converter(unstructure_fallback_factory=lambda _cls: str)
     for kind in (type(None), bool, int):
@@ -121,7 +124,7 @@ def _object_writer(cls: type, writer: cattrs.Converter, digits: int | None) -> C
 
 
 def is_kept_apart(hint: Any) -> bool:
-    """Whether a type holds what has files of its own."""
+    """Tell whether a type holds arrays that have files of their own."""
     return getattr(hint, "is_kept_apart", False) is True or any(map(is_kept_apart, typing.get_args(hint)))
 
 
@@ -129,9 +132,10 @@ def is_kept_apart(hint: Any) -> bool:
 
 
 def from_json(cls: type[Document], document: Any) -> Document:
-    """Read a dataclass back from the JSON values of :func:`to_json`; null where a number is meant is NaN.
+    """Read a dataclass back from the JSON values of :func:`to_json`.
 
-    Keys that the class does not know are passed over: a later version may have written them.
+    Null is NaN where a number is meant. Keys that the class does not know are passed over: a later version may have
+    written them.
 
     Raises
     ------
@@ -154,7 +158,7 @@ def from_json(cls: type[Document], document: Any) -> Document:
 
 
 def structured(reader: cattrs.Converter, cls: type[Document], document: Any) -> Document:
-    """What a converter makes of a document, its first complaint as a :class:`MismatchError`."""
+    """Convert a document to a dataclass; raise the first fault as a :class:`MismatchError`."""
     try:
         return reader.structure(document, cls)
     except (cattrs.BaseValidationError, MismatchError) as error:
@@ -174,7 +178,7 @@ def first_mismatch(error: Exception) -> MismatchError:
 
 
 def _leaf(error: BaseException, place: str) -> tuple[str, BaseException]:
-    """Follow the first complaint of a group down to its leaf: its place and itself."""
+    """Follow the first complaint of a group down to its leaf; return its place and itself."""
     if not isinstance(error, cattrs.BaseValidationError):
         return place, error
     first = error.exceptions[0]
@@ -187,7 +191,7 @@ def _leaf(error: BaseException, place: str) -> tuple[str, BaseException]:
 
 
 def join(place: str, name: str) -> str:
-    """Dotted path of a name within a place.
+    """Return the dotted path of a name within a place.
 
     Examples
     --------
@@ -218,7 +222,7 @@ def _object_reader(cls: type, reader: cattrs.Converter) -> Hook:
 def new_reader(
     wanted: Mapping[type, str], table: str = "an object", *, float_of: Callable[[Any], float]
 ) -> cattrs.Converter:
-    """A strict converter without a rule for dataclasses.
+    """Return a strict converter without a rule for dataclasses.
 
     Parameters
     ----------
@@ -249,7 +253,7 @@ def new_reader(
 
 
 def origin_of(hint: Any) -> Any:
-    """What a generic type is made of (``tuple`` of ``tuple[int, ...]``); None of a plain one."""
+    """Return the origin of a generic type (``tuple`` of ``tuple[int, ...]``), else None."""
     return typing.get_origin(hint)
 
 
@@ -281,7 +285,7 @@ def _literal(value: Any, hint: Any) -> Any:
 
 
 def tuple_reader(hints: tuple[Any, ...], reader: cattrs.Converter) -> Hook:
-    """Reads tuples item by item, from lists alone."""
+    """Return a reader of tuples, item by item, from lists alone."""
     is_fixed = len(hints) != 2 or hints[1] is not Ellipsis
 
     def read(value: Any, _hint: Any) -> Any:
@@ -295,7 +299,7 @@ def tuple_reader(hints: tuple[Any, ...], reader: cattrs.Converter) -> Hook:
 
 
 def _mapping_reader(hint: Any, table: str, reader: cattrs.Converter) -> Hook:
-    """Reads mappings entry by entry."""
+    """Return a reader of mappings, entry by entry."""
     make: Callable[..., Hook] = cattrs.gen.mapping_structure_factory
     entries = make(hint, reader, structure_to=dict)
 
@@ -319,7 +323,10 @@ def _items(values: Sequence[Any], hints: Sequence[Any], reader: cattrs.Converter
 
 
 def _union_reader(hint: Any, reader: cattrs.Converter) -> Hook:
-    """Reads one of several kinds: nothing, a dataclass named by ``kind``, a list, or the plain kind that fits."""
+    """Return a reader of a value that may be of several types.
+
+    It reads nothing, a dataclass named by ``kind``, a list, or the plain type that fits.
+    """
     members = [member for member in typing.get_args(hint) if member is not type(None)]
     may_be_absent = len(members) < len(typing.get_args(hint))
     kinds = {member.kind: member for member in members if hasattr(member, "kind")}
@@ -340,7 +347,7 @@ def _union_reader(hint: Any, reader: cattrs.Converter) -> Hook:
 
 
 def _fits(value: Any, hint: Any) -> bool:
-    """Whether a value looks like one of a kind, among the members of a union."""
+    """Tell whether a value looks like one of a type, among the members of a union."""
     origin = origin_of(hint)
     if origin is tuple:
         return isinstance(value, list | tuple)

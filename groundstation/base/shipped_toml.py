@@ -1,4 +1,7 @@
-"""TOML files that come with the package and are chosen by name; a user's own are chosen by path."""
+"""TOML files that ship with the package and are chosen by name.
+
+A user's own files are chosen by path.
+"""
 
 from dataclasses import dataclass
 from importlib import resources
@@ -13,7 +16,7 @@ SUFFIX = ".toml"
 
 @dataclass(frozen=True)
 class TomlFile:
-    """A file's name without suffix, how errors call it, and its content: as a table and as it stands."""
+    """TOML file: name without suffix, its name in errors, its table and its text."""
 
     name: str
     where: str
@@ -43,7 +46,9 @@ class ShippedToml:
         return tuple(sorted(Path(entry.name).stem for entry in entries if entry.name.endswith(SUFFIX)))
 
     def read(self, name_or_path: str | Path) -> TomlFile:
-        """Read a shipped file by name (upper or lower case), or a user's file by its path, which ends in ``.toml``.
+        """Read a shipped file by name (any case), or a user's file by its path.
+
+        A path ends in ``.toml``.
 
         Raises
         ------

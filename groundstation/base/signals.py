@@ -1,4 +1,7 @@
-"""The canonical topics and fields. schemas/*.proto is the list; a test holds this module against it."""
+"""Canonical topics and fields.
+
+schemas/*.proto is the list; a test holds this module against it.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -165,7 +168,7 @@ BUS_PREFIX, BYTES_PREFIX = "raw.bus.", "raw.bytes."  # words and bytes as record
 
 
 def kind_of(topic: str) -> str:
-    """Kind of a topic: what stands before the first dot.
+    """Return the kind of a topic: the part before the first dot.
 
     Examples
     --------
@@ -176,7 +179,7 @@ def kind_of(topic: str) -> str:
 
 
 def is_canonical(topic: str) -> bool:
-    """Whether a topic is of a canonical kind (``ins``, ``gnss.1``), not ``raw.*`` or unknown.
+    """Tell whether a topic is canonical (``ins``, ``gnss.1``), not ``raw.*`` or unknown.
 
     Examples
     --------
@@ -187,7 +190,9 @@ def is_canonical(topic: str) -> bool:
 
 
 def has_values(topic: str) -> bool:
-    """Whether the columns of a topic are values, not words or bytes that mean something only by an ICD or the like.
+    """Tell whether the columns of a topic are values.
+
+    Otherwise they are words or bytes that mean something only by an ICD or the like.
 
     Examples
     --------
@@ -209,7 +214,7 @@ def field_of(topic: str, name: str) -> Field | None:
 
 
 def is_field_name(name: str) -> bool:
-    """Whether some canonical topic has a field of that name.
+    """Tell whether some canonical topic has a field of that name.
 
     Examples
     --------

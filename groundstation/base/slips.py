@@ -1,4 +1,4 @@
-"""Names that are almost known ones: one character wrong, as damage or a slip of the hand leaves them."""
+"""Names that differ from a known one by one character, through damage or a typing slip."""
 
 import re
 from collections import defaultdict
@@ -11,7 +11,7 @@ _WORD = re.compile(r"[A-Za-z0-9]+")
 
 
 def slips(names: Iterable[str], known: Iterable[str]) -> Mapping[str, str]:
-    """Names that are none of the known ones but almost, each with the one that was perhaps meant.
+    """Find names that are almost known ones, each with the known name that was perhaps meant.
 
     Almost: one character replaced, added or left out, two swapped, or one in six replaced. Known names that are there
     as well were not meant.
@@ -36,7 +36,9 @@ def slips(names: Iterable[str], known: Iterable[str]) -> Mapping[str, str]:
 
 
 def is_slip(name: str, known: str) -> bool:
-    """Whether a name is almost a known one; another letter in a short word may be another word.
+    """Tell whether a name is almost a known one.
+
+    Another letter in a short word does not count: it may be another word.
 
     Examples
     --------
@@ -59,6 +61,6 @@ def is_slip(name: str, known: str) -> bool:
 
 
 def _word_at(text: str, at: int) -> str:
-    """The word that a character stands in; of a character behind the end the last word."""
+    """Return the word that holds a character; the last word for one behind the end."""
     words = [one for one in _WORD.finditer(text) if one.start() <= at]
     return words[-1].group() if words else ""

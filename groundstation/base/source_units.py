@@ -1,6 +1,7 @@
-"""Units of fields that are not ours, as the log itself tells them: kept with the flight's metadata, topic by topic.
+"""Units of fields that are not canonical, as the log itself states them.
 
-``units.raw.IMU`` = ``"GyrX rad/s, MagX Gauss x 0.001"``: field, unit, and the factor that is left in the values.
+They are kept with the flight's metadata, topic by topic. ``units.raw.IMU`` = ``"GyrX rad/s, MagX Gauss x 0.001"``:
+field, unit, and the factor that is left in the values.
 """
 
 from collections.abc import Iterable, Mapping
@@ -9,7 +10,7 @@ PREFIX = "units."
 
 
 def units_entry(units: Mapping[str, str]) -> str:
-    """The text that metadata keep: each field with its unit; fields without one are left out.
+    """Return the text for the metadata: each field with its unit, fields without one left out.
 
     Examples
     --------
@@ -20,7 +21,9 @@ def units_entry(units: Mapping[str, str]) -> str:
 
 
 def source_units(metadata: Mapping[str, str], topic: str, fields: Iterable[str]) -> dict[str, str]:
-    """Units of the fields of a topic, those that the log tells; an instance (``raw.IMU.1``) has those of its type.
+    """Return the units that the log states for fields of a topic.
+
+    An instance (``raw.IMU.1``) has the units of its type.
 
     Examples
     --------

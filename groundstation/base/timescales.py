@@ -1,4 +1,4 @@
-"""Times as integer nanoseconds: decimal seconds, ISO 8601 text and back, never through floating point."""
+"""Times as integer nanoseconds: decimal seconds, ISO 8601 text and back, without floats."""
 
 import re
 from datetime import UTC, datetime, timedelta, timezone
@@ -36,7 +36,9 @@ def seconds_text_to_ns(text: str) -> int:
 
 
 def iso_to_utc_ns(text: str) -> tuple[int, bool]:
-    """UTC nanoseconds since 1970 of an ISO 8601 time, and whether the text named a zone (none is read as UTC).
+    """Return UTC nanoseconds since 1970 of an ISO 8601 time, and whether it names a zone.
+
+    Text without a zone is read as UTC.
 
     Raises
     ------
@@ -100,7 +102,9 @@ def utc_ns_to_stamp(utc_ns: int) -> str:
 
 
 def duration_text(seconds: float) -> str:
-    """Length of time for people: ``+12:34.5`` style without sign, hours only when there are any.
+    """Format a length of time for people, as ``12:34.5``, with hours only when there are any.
+
+    It has no sign.
 
     Examples
     --------
@@ -155,7 +159,7 @@ def leap_seconds_at(utc_ns: int) -> int:
 
 
 MOST_LEAP_S = 20  # GPS time less UTC, for some years to come
-_NEAR_WEEK_S, _NEAR_SECOND_S = 30, 0.15  # of whole weeks (leap seconds may be wrong too), of whole seconds
+_NEAR_WEEK_S, _NEAR_SECOND_S = 30, 0.15  # tolerance of whole weeks (leap seconds may be wrong too) and whole seconds
 
 
 def whole_weeks(difference_ns: int) -> int:
@@ -184,9 +188,9 @@ def leap_seconds_late(difference_ns: int) -> int:
 
 
 def gps_week_to_utc_ns(week: NDArray[np.int64] | int, week_ms: NDArray[np.int64] | int) -> NDArray[np.int64]:
-    """UTC nanoseconds since 1970 of GPS week and milliseconds of the week, less the leap seconds of that day.
+    """Return UTC nanoseconds since 1970 of GPS week and milliseconds of the week.
 
-    Weeks count from 6 January 1980 without rolling over at 1024.
+    The leap seconds of that day are taken off. Weeks count from 6 January 1980 without rolling over at 1024.
 
     Examples
     --------
@@ -232,7 +236,9 @@ def weeks_later_ns(utc_ns: NDArray[np.int64], weeks: NDArray[np.int64] | int) ->
 
 
 def gps_to_utc_ns(gps_ns: NDArray[np.int64]) -> NDArray[np.int64]:
-    """UTC nanoseconds since 1970 of moments that are written as a date and time of GPS time, less its leap seconds.
+    """Return UTC nanoseconds of moments written as date and time of GPS time.
+
+    Both count from 1970; the leap seconds of GPS time are taken off.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Files written through to the disk, so that a loss of power takes none that was put into its place.
+"""Files flushed to the disk, so that a loss of power leaves none of them empty.
 
 The system writes what it was given within some seconds, in whatever order. Where a file is renamed before its content
 is written, a loss of power in between leaves it empty under its name.
@@ -31,7 +31,7 @@ def sync_file(path: Path) -> None:
 
 
 def sync_open(number: int, path: Path) -> None:
-    """The same for an open file."""
+    """Wait until an open file is on the disk."""
     try:
         os.fsync(number)
     except OSError as error:

@@ -1,9 +1,10 @@
-"""Frozen dataclasses filled from TOML, strictly: an unknown key, a wrong type or a value out of range is an error.
+"""Frozen dataclasses filled strictly from TOML.
 
-A field states its range in its metadata: ``number(0.5, low=0.0)``; a class that is also built without a file calls
-:func:`check_ranges` in its ``__post_init__``. A SettingsError raised there says the field as its place, and
-:func:`settings_from` puts file and table before it. A field that holds one of several classes (legs,
-faults) is a union whose members carry a class attribute ``kind``; the TOML table names it with the key ``kind``.
+An unknown key, a wrong type or a value out of range is an error. A field states its range in its metadata:
+``number(0.5, low=0.0)``; a class that is also built without a file calls :func:`check_ranges` in its ``__post_init__``.
+A SettingsError raised there says the field as its place, and :func:`settings_from` puts file and table before it. A
+field that holds one of several classes (legs, faults) is a union whose members carry a class attribute ``kind``; the
+TOML table names it with the key ``kind``.
 """
 
 import dataclasses
@@ -33,12 +34,14 @@ def number(default: float | None, low: float = -math.inf, high: float = math.inf
 
 
 def required_number(low: float = -math.inf, high: float = math.inf) -> Any:
-    """Declare a dataclass field: a number that the file must state, with its range, both ends allowed."""
+    """Declare a field for a number that the file must state, with its range, ends included."""
     return dataclasses.field(metadata={"low": low, "high": high})
 
 
 def check_ranges(settings: Any) -> None:
-    """Refuse numbers of a settings dataclass that are not finite or out of the range their field states.
+    """Refuse numbers of a settings dataclass that are not finite or out of range.
+
+    Each field states its range.
 
     Raises
     ------
@@ -130,7 +133,10 @@ def _finite(value: Any) -> float:
 
 
 def _table_reader(cls: type, reader: "cattrs.Converter") -> Callable[[Any, Any], Any]:
-    """Reads a table of a file: no key that the class does not know, no number out of the range of its field."""
+    """Return a reader of a TOML table.
+
+    It refuses keys that the class does not know, and numbers out of the range of their field.
+    """
     from cattrs.gen import make_dict_structure_fn, override
 
     from groundstation.base.serial import MismatchError
@@ -170,7 +176,7 @@ def _ranged_reader(field: "dataclasses.Field[Any]", hint: Any, reader: "cattrs.C
 
 
 def _out_of_range(value: Any, field: "dataclasses.Field[Any]") -> tuple[str, str] | None:
-    """What was found and what was expected, where a number is out of the range of its field."""
+    """Return what was found and what was expected where a number is out of its field's range."""
     low, high = field.metadata.get("low", -math.inf), field.metadata.get("high", math.inf)
     for item in value if isinstance(value, tuple) else (value,):
         if isinstance(item, int | float) and not low <= item <= high:

@@ -1,4 +1,4 @@
-"""TOML of a user's file: bounded in size and depth, every refusal in one line."""
+"""TOML text of a user's file: bounded in size and depth, refused with one line."""
 
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,7 @@ MAX_BYTES = 16 << 20  # a pipe or a device that never ends is refused there
 
 
 def toml_text(path: Path, where: str, expected: str = "a TOML file", next_step: str = "") -> str:
-    """The text of a file, decoded (UTF-8, with or without its mark).
+    """Read the text of a file (UTF-8, with or without its mark).
 
     ``where`` names the file in errors; ``expected`` and ``next_step`` are what they say of it.
 
@@ -34,7 +34,7 @@ def toml_text(path: Path, where: str, expected: str = "a TOML file", next_step: 
 
 
 def toml_table(text: str, where: str, expected: str = "a TOML file", next_step: str = "") -> dict[str, Any]:
-    """The table that a TOML text holds.
+    """Return the table that a TOML text holds.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""How units are written and rounded: the suffix of a name, the sign in text, plain letters, decimals. One table."""
+"""Table of units: suffix in names, sign in text, spelling in plain letters, decimals."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class UnitName(NamedTuple):
-    """A unit as text prints it (``sign``), as labels without special signs spell it, and decimals of its numbers."""
+    """Unit as text prints it (``sign``), its spelling without special signs, and its decimals."""
 
     sign: str
     plain: str = ""
@@ -14,7 +14,7 @@ class UnitName(NamedTuple):
 
     @property
     def spelled(self) -> str:
-        """Plain letters."""
+        """Spelling in plain letters."""
         return self.plain or self.sign
 
 
@@ -59,7 +59,7 @@ UNITS: Mapping[str, UnitName] = MappingProxyType(
 
 
 def split_unit(name: str) -> tuple[str, UnitName | None]:
-    """A name without its unit, and the unit; None where it has none.
+    """Split a name into the name without its unit, and the unit; None where it has none.
 
     Examples
     --------

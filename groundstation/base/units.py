@@ -1,4 +1,6 @@
-"""Factors to SI and degrees. Each is exact by definition; readers multiply in the line that renames.
+"""Factors to SI units and degrees, each exact by definition.
+
+Readers multiply in the line that renames.
 
 Sources: The International System of Units (BIPM, 9th ed. 2019); international foot and nautical mile (1959, 1929).
 """
@@ -17,7 +19,7 @@ DEG_PER_RAD = 180.0 / math.pi
 ARCMIN_PER_DEG = 60.0
 NT_PER_GAUSS = 1e5
 NS_PER_S = 1_000_000_000
-DOTS_PER_FULL_SCALE = 2.0  # of a course deviation indicator
+DOTS_PER_FULL_SCALE = 2.0  # full scale of a course deviation indicator
 LIGHT_MPS = 299_792_458.0
 
 # Unit names a profile may use -> (unit of the canonical field, factor).

@@ -1,1 +1,1 @@
-"""Tracks of a flight in the files of other programs: Google Earth, GPX, NMEA, SBET, tables."""
+"""Tracks of a flight as files of other programs: Google Earth, GPX, NMEA, SBET, tables."""

@@ -1,4 +1,4 @@
-"""GPX 1.1 (Topografix, 2004): a track each, what else is known of a position as extensions."""
+"""GPX 1.1 (Topografix, 2004): one track each, further data of a position as extensions."""
 
 from collections.abc import Sequence
 from pathlib import Path

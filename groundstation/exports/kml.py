@@ -1,4 +1,7 @@
-"""KML 2.2 with Google's tracks, for Google Earth and QGIS (OGC 12-007r2, 2015; Google KML extension ``gx:Track``)."""
+"""KML 2.2 with Google's tracks, for Google Earth and QGIS.
+
+The formats are OGC 12-007r2, 2015, and the Google KML extension ``gx:Track``.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,7 +24,7 @@ Spot = tuple[str, str, str]  # longitude, latitude, altitude
 
 
 def write_kml(path: Path, title: str, tracks: Sequence[Track]) -> None:
-    """Write a folder with a placemark for each track; what is known of every position goes with it.
+    """Write a folder with a placemark for each track, and all that is known of each position.
 
     With UTC a track moves with the time slider; without, it is a line. KML knows altitudes above sea level alone; where
     it is known of fewer positions another is written, and the description says which. KML has no mark for an altitude
@@ -94,7 +97,7 @@ def _line(place: ET.Element, track: Track) -> None:
 
 
 def _joint(track: Track, row: int) -> tuple[Spot, Spot]:
-    """Ends of two parts of a line, where it crosses the date line before a row."""
+    """Return the ends of two parts of a line that crosses the date line before a row."""
     longitude = continuous_longitude_deg(track.longitude_deg[row - 1 : row + 1])
     side = 180.0 if track.longitude_deg[row - 1] > 0.0 else -180.0
     share = (180.0 * np.sign(longitude[0]) - longitude[0]) / (longitude[1] - longitude[0])
@@ -109,7 +112,10 @@ def _altitude_mode(track: Track) -> str:
 
 
 def _altitude(track: Track) -> str:
-    """Column of the altitude that most positions have, the best of several; empty where there is none."""
+    """Return the column of the altitude that most positions have; empty where there is none.
+
+    Among columns that are known equally often, it is the best one.
+    """
     known = {name: np.count_nonzero(np.isfinite(track.column(name))) for name in ALTITUDES}
     best = max(ALTITUDES, key=lambda name: known[name])  # the first of equals
     return best if known[best] else ""

@@ -1,4 +1,7 @@
-"""NMEA 0183 sentences GGA, RMC and HDT of one track, as a receiver would have sent them (NMEA 0183 version 4)."""
+"""NMEA 0183 sentences GGA, RMC and HDT of one track, as a receiver would have sent them.
+
+The version is NMEA 0183 version 4.
+"""
 
 import math
 from pathlib import Path
@@ -54,7 +57,7 @@ def _course(track: Track, row: int) -> str:
 
 
 def _direction(value_deg: float) -> str:
-    """Degrees from 0 to less than 360, as they are written.
+    """Write degrees from 0 to less than 360, after rounding.
 
     Examples
     --------
@@ -65,7 +68,7 @@ def _direction(value_deg: float) -> str:
 
 
 def _angle(value_deg: float, digits: int, signs: str) -> str:
-    """Degrees and minutes with the hemisphere.
+    """Write degrees and minutes with the hemisphere.
 
     Examples
     --------
@@ -79,7 +82,7 @@ def _angle(value_deg: float, digits: int, signs: str) -> str:
 
 
 def _with_checksum(body: str) -> str:
-    """A sentence with its dollar sign, checksum and line end.
+    """Return a sentence with its dollar sign, checksum and line end.
 
     Examples
     --------

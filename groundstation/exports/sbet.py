@@ -1,4 +1,7 @@
-"""SBET records of the track of an INS (Applanix, POSPac MMS file formats): 17 doubles, heading from true north."""
+"""SBET records of the track of an INS: 17 doubles, heading from true north.
+
+The format is that of Applanix, POSPac MMS file formats.
+"""
 
 from pathlib import Path
 
@@ -24,11 +27,11 @@ NEEDED = (
 
 
 def write_sbet(path: Path, track: Track) -> int:
-    """Write the positions whose altitude, attitude and velocity are known; returns how many were left out.
+    """Write the positions whose altitude, attitude and velocity are known.
 
-    The wander angle is zero. Accelerations and rates are not in a track and stay zero, as SBET has no mark for what
-    is missing. Seconds of the GPS week go on beyond its end. A file name with the date (sbet_20260504.out) tells the
-    week.
+    The result is how many were left out. The wander angle is zero. Accelerations and rates are not in a track and stay
+    zero, as SBET has no mark for what is missing. Seconds of the GPS week go on beyond its end. A file name with the
+    date (sbet_20260504.out) tells the week.
 
     Raises
     ------

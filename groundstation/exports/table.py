@@ -10,11 +10,14 @@ from groundstation.exports.tracks import Track
 if TYPE_CHECKING:
     import pandas as pd
 
-DECIMALS = 9  # of degrees 0.1 mm; a CSV ends no number earlier
+DECIMALS = 9  # 0.1 mm in degrees; a CSV ends no number earlier
 
 
 def frame_of(tracks: Sequence[Track]) -> "pd.DataFrame":
-    """Rows of every track behind each other, named by ``track``; a column that a track lacks is NaN there."""
+    """Return the rows of all tracks one behind the other, named by ``track``.
+
+    A column that a track lacks is NaN there.
+    """
     import pandas as pd
 
     parts = []

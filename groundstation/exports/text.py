@@ -1,4 +1,4 @@
-"""Numbers as the text formats want them."""
+"""Numbers in the form that text formats want."""
 
 import math
 
@@ -6,7 +6,7 @@ from groundstation.base.angles import FloatArray
 
 
 def number(value: float, digits: int) -> str:
-    """A number with so many decimals at most; empty where it is not known.
+    """Write a number with so many decimals at most; empty where it is not known.
 
     Examples
     --------
@@ -20,5 +20,5 @@ def number(value: float, digits: int) -> str:
 
 
 def coordinates(values_deg: FloatArray) -> list[str]:
-    """Degrees with nine decimals, 0.1 mm."""
+    """Write degrees with nine decimals, 0.1 mm."""
     return [number(value, 9) for value in values_deg.tolist()]

@@ -1,4 +1,4 @@
-"""What is exported: the tracks of a flight as logged, and those that the estimator of INS errors made of them."""
+"""Tracks to export: those logged, and those that the estimator of INS errors made."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -80,9 +80,10 @@ class Track:
 
 
 def tracks_of(flight: Flight, results: FlightResults | None, ins_topic: str = "") -> tuple[Track, ...]:
-    """Tracks of a flight: of every receiver and INS that has positions, then those of the estimator.
+    """Return the tracks of a flight: every receiver's and INS's, then the estimator's.
 
-    ``ins_topic`` is the INS whose errors were estimated: its altitude stands beside the estimator's positions.
+    They are the tracks that have positions. ``ins_topic`` is the INS whose errors were estimated: its altitude stands
+    beside the estimator's positions.
     """
     topics = [topic for kind in ("gnss", "ins", "truth") for topic in topics_of_kind(kind, flight.topics())]
     logged = [_logged(flight, flight[topic].unique_times()) for topic in topics]
@@ -117,7 +118,10 @@ def _bridged(
     is_direction: bool = False,
     longest_s: float = BRIDGED_S,
 ) -> FloatArray:
-    """Values at other times of the topic: many logs give position and attitude in rows of their own."""
+    """Return values of a topic at other times of the same topic.
+
+    Many logs give position and attitude in rows of their own.
+    """
     known = np.isfinite(values)
     if not known.any():
         return np.full(len(at_s), np.nan)
@@ -130,9 +134,10 @@ def _bridged(
 
 
 def _made(flight: Flight, results: FlightResults | None, name: str, ins_topic: str) -> Track | None:
-    """A track of the estimator, at the times its figures have; half of the 95 % ellipse's major axis is its width.
+    """Return a track of the estimator, at the times its figures have.
 
-    No error of height is estimated: the altitude is that of the INS, as logged.
+    Half of the 95 % ellipse's major axis is its width. No error of height is estimated: the altitude is that of the
+    INS, as logged.
     """
     data = None if results is None else results.rows_of(InertialTrack)
     if results is None or data is None:

@@ -1,4 +1,4 @@
-"""Integrity: the clock model of a log, its ledger of losses and oddities, and records in order of corrected time."""
+"""Integrity: clock model of a log, ledger of losses and oddities, records in time order."""
 
 from groundstation.base.gaps import Gaps
 from groundstation.integrity.clock import ClockModel

@@ -1,4 +1,4 @@
-"""Topics that end before the others do: records that their rate leads one to expect, and that no log holds."""
+"""Topics that end before the others: records that their rate promises and no log holds."""
 
 from groundstation.base.records import Damage
 from groundstation.base.signals import is_canonical, kind_of
@@ -10,7 +10,7 @@ COME_AND_GO = ("link", "satellite")  # kinds of topics about others, who get out
 
 
 def broken_off(ledger: LedgerCounts) -> tuple[Damage, ...]:
-    """Topics with a rate that are not there any more while others go on: a pause that has no end.
+    """Return damage for topics with a rate that stop while others go on.
 
     Returns
     -------

@@ -1,10 +1,10 @@
-"""The clock model: corrected time of every record, from its device time and its place in the log.
+"""Clock model: corrected time of each record, from its device time and place in the log.
 
-Corrected time = device time + an offset that is constant between clock steps. A recorder whose clock is set during
-the log (GNSS time arrives) writes a step; what comes after the last step is believed, and what comes before is moved so
-that the step becomes one nominal period. A few rows out of order are no step; they are sorted. Rows without a time get
-one from their neighbours. Nothing here knows the wall clock: without absolute time, time counts from the log's zero.
-How that time runs by other clocks of the log is told (``relations``), and nothing is changed by it.
+Corrected time = device time + an offset that is constant between clock steps. A recorder whose clock is set during the
+log (GNSS time arrives) writes a step. Times after the last step are believed, and those before are moved so that the
+step becomes one nominal period. A few rows out of order are no step; they are sorted. Rows without a time get one from
+their neighbours. Nothing here knows the wall clock: without absolute time, time counts from the log's zero.
+``relations`` compare that time with other clocks of the log; they change nothing.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ from groundstation.integrity.clock_relation import ClockRelation, mistake_of_ste
 from groundstation.integrity.clock_steps import ClockSettings, ClockStep, Steps
 from groundstation.integrity.power_ups import Wrap
 
-LARGEST_NS = 2**62  # of a time and of what is added to it: sums fit 64 bits
+LARGEST_NS = 2**62  # largest time, and largest offset: sums fit 64 bits
 FIRST_NS = iso_to_utc_ns("1980-01-08T00:00:00Z")[0]  # a clock before it was not set: 1970, or the zero of GPS
 
 
@@ -113,7 +113,7 @@ class ClockModel:
         return np.asarray(time, dtype=np.int64)
 
     def _offset_ns(self, record_index: Int64Array) -> Any:
-        """What is added to device times of records."""
+        """Return the offset to add to the device times of records."""
         if len(self.starts) == 1:
             return self.offsets_ns[0]
         return ClockOffsets(self.starts, self.offsets_ns).at(record_index)
@@ -121,10 +121,10 @@ class ClockModel:
     def valid_ns(
         self, record_index: Int64Array, device_time_ns: Column, validity_ns: Int64Array, time_ns: Int64Array
     ) -> Int64Array:
-        """Times of validity on the corrected clock: readers give them by the device's clock, they are moved as that is.
+        """Correct times of validity, which readers give by the device's clock.
 
-        Values that were true when their record was written, or in a record without a device time, are valid at the
-        record's corrected time ``time_ns``, wherever it was placed.
+        They are moved as that clock is. Values that were true when their record was written, or in a record without a
+        device time, are valid at the record's corrected time ``time_ns``, wherever it was placed.
         """
         has_own = validity_ns != device_time_ns.values
         if device_time_ns.present is not None:
@@ -132,7 +132,7 @@ class ClockModel:
         return np.where(has_own, validity_ns + self._offset_ns(record_index), time_ns)
 
     def correct(self, batch: RecordBatch) -> RecordBatch:
-        """The batch with ``time_ns`` set, its rows in the order of the source."""
+        """Return the batch with ``time_ns`` set, its rows in the order of the source."""
         index, device_ns, validity_ns = batch.record_index, batch.device_time_ns, batch.validity_time_ns
         time_ns = self.time_ns(index, device_ns)
         if validity_ns is not None:
@@ -140,7 +140,7 @@ class ClockModel:
         return RecordBatch(batch.topic, index, device_ns, batch.columns, time_ns, validity_ns)
 
     def on(self, offsets: "ClockOffsets", first_device_ns: int) -> "ClockModel":
-        """The model of the device's own times, of one that was made of times moved by ``offsets``."""
+        """Return the model of the device's own times, for a model of times moved by ``offsets``."""
         starts = np.union1d(self.starts, offsets.starts)
         return replace(
             self,
@@ -150,14 +150,14 @@ class ClockModel:
         )
 
     def text(self, time_ns: int) -> str:
-        """A time for people: ISO UTC, or ``+mm:ss`` from the log's zero."""
+        """Write a time for people: ISO UTC, or ``+mm:ss`` from the log's zero."""
         if self.is_absolute:
             return utc_ns_to_iso(time_ns)
         seconds = time_ns / NS_PER_S
         return f"{'-' if seconds < 0 else '+'}{duration_text(abs(seconds))}"
 
     def document(self) -> Clock:
-        """What is kept of it: seconds to the millisecond."""
+        """Return the form to keep: seconds to the millisecond."""
         own_zero = f"{self.first_device_ns / NS_PER_S:.3f} s"
         return Clock(
             is_absolute=self.is_absolute,
@@ -187,31 +187,31 @@ class ClockModel:
         )
 
     def mistake(self, step: ClockStep) -> str:
-        """Name of the error that a step put right, empty where it has none."""
+        """Name the error that a step put right; empty where it has no name."""
         return mistake_of_step(step.set_s, step.device_after_ns + int(self.offsets_ns[-1])) if self.is_absolute else ""
 
 
 @dataclass(frozen=True)
 class ClockOffsets:
-    """What is added to device times from some records on, by another clock of the log."""
+    """Offsets to add to device times from certain records on, by another clock of the log."""
 
     starts: Int64Array
     offsets_ns: Int64Array
 
     @classmethod
     def of(cls, offsets: tuple[tuple[int, int], ...]) -> "ClockOffsets | None":
-        """The offsets that a reader states, None where it states none."""
+        """Make offsets from those that a reader states; None where it states none."""
         if not offsets:
             return None
         starts, added = np.array(sorted(offsets), dtype=np.int64).T
         return cls(starts, added)
 
     def at(self, record_index: Int64Array) -> Int64Array:
-        """What is added to the device times of records."""
+        """Return the offset to add to the device time of each record."""
         return np.asarray(self.offsets_ns[np.maximum(np.searchsorted(self.starts, record_index, side="right") - 1, 0)])
 
     def moved(self, record_index: Int64Array, device_time_ns: Column) -> Column:
-        """Device times of records with what is added."""
+        """Return the device times of records with the offsets added."""
         return Column(device_time_ns.values + self.at(record_index), device_time_ns.present)
 
 
@@ -288,14 +288,14 @@ _END_NS = iso_to_utc_ns("2262-01-01T00:00:00Z")[0]
 
 
 class Zero(NamedTuple):
-    """What is added to all times, and whether they then are UTC."""
+    """Offset to add to all times, and whether they are UTC with it."""
 
     is_absolute: bool
     ns: int
 
 
 def zero_of(earliest_ns: int, latest_ns: int, utc_of_zero_ns: int | None) -> Zero:
-    """What to add to all times: UTC of zero, or as much as leaves none negative.
+    """Return the offset to add to all times: UTC of zero, or as much as leaves none negative.
 
     Nothing is recorded before 1970, nor after 2261, the last whole year that 64 bits hold; a clock that stays before
     1980 was never set.
@@ -307,7 +307,7 @@ def zero_of(earliest_ns: int, latest_ns: int, utc_of_zero_ns: int | None) -> Zer
 
 
 def start_of(first_device_ns: int, utc_of_zero_ns: int | None) -> Start:
-    """Where the clock of a device began.
+    """Tell how the clock of a device began.
 
     Examples
     --------
@@ -320,9 +320,9 @@ def start_of(first_device_ns: int, utc_of_zero_ns: int | None) -> Start:
 
 
 def interpolated(wanted: Int64Array, index: Int64Array, time: Int64Array, period_ns: float) -> Int64Array:
-    """Times of places between known ones by place, outside them by the nominal period; integers throughout.
+    """Interpolate times of records by their place in the log, in integers throughout.
 
-    None is placed further than :data:`LARGEST_NS` from zero.
+    Outside the known places the nominal period is used. No record is placed further than :data:`LARGEST_NS` from zero.
     """
     if not len(wanted):
         return np.zeros(0, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Dates that a log cannot have, or hardly: a receiver miscounted its GPS week."""
+"""Dates that a log cannot have, or hardly can: a receiver miscounted its GPS week."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
@@ -27,7 +27,7 @@ _OF_ANY_YEAR = ("flightdata-hdf5", "utias", "miluv", "sbet")  # recorders withou
 def doubtful_dates(
     reader: str, clock: ClockModel, topics: Sequence[TopicCounts], remarks: Sequence[Remark]
 ) -> Iterator[Remark]:
-    """Remark on the date of a log by its clock, where there is one."""
+    """Return the remark on the date of a log by its clock, where there is one."""
     if clock.is_absolute and topics:
         doubt = doubtful_date(reader, min(topic.first_ns for topic in topics), remarks)
         if doubt is not None:
@@ -35,7 +35,7 @@ def doubtful_dates(
 
 
 def doubtful_date(reader: str, utc_ns: int, remarks: Iterable[Remark]) -> Remark | None:
-    """Remark on the date on which a log begins; None where it can be, or the reader told.
+    """Remark on the date on which a log begins; None if it is possible or already remarked on.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a user must know of the clock of a log, one line each, with figures and places."""
+"""Findings on the clock of a log, one line each, with figures and places."""
 
 from collections.abc import Iterator, Sequence
 
@@ -20,9 +20,10 @@ _UNIX_SECONDS = (1_000_000_000, 4_000_000_000)  # 2001 to 2096: as a time since 
 
 
 def clock_findings(ledger: LedgerCounts) -> Iterator[Finding]:
-    """Findings of a clock: steps, times that are missing or not believed, order, absolute time, other clocks.
+    """Yield the findings on a clock.
 
-    Codes: ``clock.backward_step``, ``clock.forward_step``, ``clock.unset``, ``clock.missing_times``,
+    They are about steps, times that are missing or not believed, order, absolute time, other clocks. Codes:
+    ``clock.backward_step``, ``clock.forward_step``, ``clock.unset``, ``clock.missing_times``,
     ``clock.implausible_times``, ``clock.stale_times``, ``clock.shifted``, ``clock.no_utc``, ``clock.no_times``,
     ``clock.relation_step``, ``clock.relation_rate``, ``clock.drift``, ``clock.offset``, ``clock.week_number``,
     ``clock.leap_seconds``, ``clock.time_zone``, ``time.unordered``, ``time.stray_rows``, ``data.none``,
@@ -51,7 +52,7 @@ def clock_findings(ledger: LedgerCounts) -> Iterator[Finding]:
 
 
 def counted(count: int, noun: str, nouns: str = "") -> str:
-    """A number of things.
+    """Write a number of things.
 
     Examples
     --------
@@ -62,7 +63,7 @@ def counted(count: int, noun: str, nouns: str = "") -> str:
 
 
 def _power_ups(several: Sequence[PowerUpClock], clock: ClockModel) -> Finding:
-    """That the source is of several flights, and when each was."""
+    """Return the finding that the source holds several flights, with their times."""
     _first, second = several[:2]
     spans = [
         f"{clock.text(one.start_ns)} to {clock.text(one.end_ns)}" if one.is_absolute else "one without UTC"
@@ -75,7 +76,10 @@ def _power_ups(several: Sequence[PowerUpClock], clock: ClockModel) -> Finding:
 
 
 def _zero_at(step: ClockStep, ledger: LedgerCounts) -> int:
-    """What is added to device times at the end of the power-up of a step: what comes last is believed."""
+    """Return the offset of device times at the end of the power-up that holds a step.
+
+    The last offset is the one believed.
+    """
     clock = ledger.clock
     ends = (one.records.end for one in ledger.power_ups if step.record_index < one.records.end)
     last = int(np.searchsorted(clock.starts, next(ends, LAST_RECORD))) - 1
@@ -128,7 +132,7 @@ def _order(clock: ClockModel) -> Iterator[Finding]:
 
 
 def _absolute(clock: ClockModel) -> Iterator[Finding]:
-    """Whether the time is UTC, and where the clock began."""
+    """Yield findings on whether the time is UTC, and on how the clock began."""
     if clock.start == "unset":
         began = f"the clock began at {utc_ns_to_iso(clock.first_device_ns)}: it was not set"
         yield Finding("warn", "clock.unset", began + ("" if clock.is_absolute else ", not even later in the log"))

@@ -1,10 +1,10 @@
-"""How a clock runs against another: a line with its uncertainty, broken where one of them was set or changed its rate.
+"""Line fitted to the difference of two clocks, with its uncertainty.
 
-The difference of the two is fitted by a line through the medians of blocks of samples, which late messages do not move.
-Steps are found where the medians of a few samples before and after differ; changes of rate where two lines explain the
-blocks much better than one. Standard errors allow for noise that is correlated from block to block, for the few blocks
-(Student) and for readings that are rounded: 1.96 of them hold the truth in 95 of 100 logs, in 92 when noise is
-correlated over a tenth of the log.
+The line is broken where one of the clocks was set or changed its rate. The difference of the two is fitted by a line
+through the medians of blocks of samples, which late messages do not move. Steps are found where the medians of a few
+samples before and after differ; changes of rate where two lines explain the blocks much better than one. Standard
+errors allow for noise that is correlated from block to block, for the few blocks (Student) and for readings that are
+rounded: 1.96 of them hold the truth in 95 of 100 logs, in 92 when noise is correlated over a tenth of the log.
 """
 
 from dataclasses import dataclass, replace
@@ -21,10 +21,10 @@ from groundstation.integrity.clock_relation import ClockBreak, ClockSegment
 
 FloatArray = NDArray[np.float64]
 
-BLOCKS, LEAST_IN_BLOCK, FEWEST_BLOCKS = 32, 3, 4  # of a line
+BLOCKS, LEAST_IN_BLOCK, FEWEST_BLOCKS = 32, 3, 4  # blocks of a line, samples in a block, least number of blocks
 SPLIT_BLOCKS, LEAST_IN_SPLIT_BLOCK, SIDE_BLOCKS = 96, 5, 6  # where a change of rate is looked for
-SPLIT_GAIN, SPLIT_RATIO = 16.0, 9.0  # what two lines must gain; both by Monte Carlo, tests/test_clock_fit.py
-SIDE_SAMPLES = 5  # of a step
+SPLIT_GAIN, SPLIT_RATIO = 16.0, 9.0  # least gain of two lines over one; both by Monte Carlo, tests/test_clock_fit.py
+SIDE_SAMPLES = 5  # samples on either side of a step
 MOST_BREAKS = 40
 JITTER_TIMES = 8.0
 SIGNIFICANT = 4.0  # standard errors
@@ -35,7 +35,10 @@ _MAD = 1.4826
 
 @dataclass(frozen=True)
 class Fitted:
-    """Segments with the breaks between them, and how samples scatter about the lines (1.4826 x median, seconds)."""
+    """Segments, the breaks between them, and the scatter of samples about the lines.
+
+    The scatter is 1.4826 x the median, in seconds.
+    """
 
     segments: tuple[ClockSegment, ...] = ()
     breaks: tuple[ClockBreak, ...] = ()
@@ -43,7 +46,10 @@ class Fitted:
 
 
 class _Line(NamedTuple):
-    """offset + slope (t - middle_s), standard errors; a slope of infinite standard error is not known."""
+    """Line offset + slope (t - middle_s), with standard errors.
+
+    A slope with an infinite standard error is not known.
+    """
 
     middle_s: float
     offset_s: float
@@ -130,7 +136,7 @@ def _pieces(starts: list[int], count: int) -> list[tuple[int, int]]:
 
 
 def _with_drift(segment: ClockSegment, line: _Line, observable_ppm: float) -> ClockSegment:
-    """The recorder's rate is 1 / (1 + slope) of the reference's."""
+    """Convert the slope to drift: the recorder's rate is 1 / (1 + slope) of the reference's."""
     if np.isinf(line.slope_sigma) or line.slope <= -1.0:
         return segment
     drift_ppm = 1e6 * (1.0 / (1.0 + line.slope) - 1.0)
@@ -140,7 +146,7 @@ def _with_drift(segment: ClockSegment, line: _Line, observable_ppm: float) -> Cl
 
 
 def _break(time_s: FloatArray, first: int, before: _Line, after: _Line, *, is_step: bool, zero_ns: int) -> ClockBreak:
-    """A step lies between two samples; a change of rate where the two lines meet."""
+    """Place the break: a step between two samples, a change of rate where two lines meet."""
     at_s = 0.5 * float(time_s[first - 1] + time_s[first])
     sigma_s = float(time_s[first] - time_s[first - 1]) / 12**0.5
     step_s = float(after.at(at_s) - before.at(at_s))
@@ -161,7 +167,7 @@ def _scatter(residual_s: FloatArray) -> float:
 
 
 def _median(values: FloatArray) -> float:
-    """As numpy's of values that are there, without its checks."""
+    """Return the median of finite values, as numpy's but without its checks."""
     middle = len(values) // 2
     if len(values) % 2:
         return float(np.partition(values, middle)[middle])
@@ -170,7 +176,7 @@ def _median(values: FloatArray) -> float:
 
 
 class _Blocks:
-    """Blocks of equal numbers of samples; what does not go into them is left out between them."""
+    """Blocks of equal numbers of samples; left-over samples lie between the blocks."""
 
     def __init__(self, samples: int, blocks: int) -> None:
         self._shape = blocks, samples // blocks
@@ -186,7 +192,7 @@ class _Blocks:
         return np.asarray(ordered[:, middle] if is_odd else 0.5 * (ordered[:, middle - 1] + ordered[:, middle]))
 
     def medians_in_order(self, values: FloatArray) -> FloatArray:
-        """The same of values that never fall: what stands in the middle."""
+        """Median of each block of values that never fall: the one in the middle."""
         middle, is_odd = divmod(self._shape[1], 2)
         at = self._starts + middle
         return np.asarray(values[at] if is_odd else 0.5 * (values[at - 1] + values[at]))
@@ -211,7 +217,9 @@ def _student(freedom: float) -> float:
 
 
 def _correlation(residual: FloatArray) -> float:
-    """Correlation of neighbours in [0, 0.95] of what a line leaves, corrected for its bias, -(2 + 4 r) / n.
+    """Return the correlation of neighbouring residuals of a line, in [0, 0.95].
+
+    It is corrected for its bias, -(2 + 4 r) / n.
 
     Source: Stine and Shaman, A fixed point characterization for bias of autoregressive estimators, Annals of Statistics
     17 (1989) 1275; tests/test_clock_fit.py.
@@ -235,7 +243,7 @@ def _line(time_s: FloatArray, offset_s: FloatArray, bound_s: float) -> _Line:
         level_s = _median(offset_s)
         sigma_s = float(np.hypot(_scatter(offset_s - level_s), rounding_s / 12**0.5))
         return _Line(middle_s, level_s, 0.0, sigma_s, float("inf"))
-    lever_s -= lever_s.mean()  # of times that hardly differ the first mean is rounded
+    lever_s -= lever_s.mean()  # the first mean of times that hardly differ is rounded
     power = float(lever_s @ lever_s)
     offset = slope = 0.0
     span_s = float(time_s[-1] - time_s[0])
@@ -261,9 +269,10 @@ def _line(time_s: FloatArray, offset_s: FloatArray, bound_s: float) -> _Line:
 
 
 def _standard_errors(residual: FloatArray, lever: FloatArray) -> tuple[float, float]:
-    """Of the level and the slope of a line, by what it leaves: noise that is correlated from neighbour to neighbour.
+    """Return the standard errors of level and slope of a line, from its residuals.
 
-    The more it is, the fewer the degrees of freedom: (n - 2) (1 - r) / (1 + r).
+    The noise is taken to be correlated from neighbour to neighbour. The more it is, the fewer the degrees of freedom:
+    (n - 2) (1 - r) / (1 + r).
     """
     count, power, correlation = len(residual), float(lever @ lever), _correlation(residual)
     places = np.arange(count)
@@ -277,7 +286,10 @@ def _standard_errors(residual: FloatArray, lever: FloatArray) -> tuple[float, fl
 
 
 def _steps(time_s: FloatArray, offset_s: FloatArray, step_s: float, bound_s: float) -> list[int]:
-    """First samples after steps: the medians of a few samples before and after differ by more than their jitter."""
+    """Find the first samples after steps.
+
+    At a step the medians of a few samples before and after differ by more than their jitter.
+    """
     count, side = len(time_s), SIDE_SAMPLES
     if count < 2 * side:
         return []
@@ -288,11 +300,11 @@ def _steps(time_s: FloatArray, offset_s: FloatArray, step_s: float, bound_s: flo
     jitter_s = _scatter(np.diff(level)) / 2**0.5
     least_s = max(step_s, JITTER_TIMES * jitter_s, 1.5 * bound_s)
     middles = _medians_of_five(level)
-    size = np.abs(middles[side:] - middles[:-side])  # of a step before sample side + place
+    size = np.abs(middles[side:] - middles[:-side])  # size of a step before sample side + place
     found: list[int] = []
     for place in np.flatnonzero(size > least_s).tolist():
         at = place + side
-        if found and at - found[-1] < 2 * side:  # of one step
+        if found and at - found[-1] < 2 * side:  # the same step
             continue
         window = slice(at - side, min(at + 3 * side, count))
         before, after = middles[place], _median(level[window][-side:])
@@ -333,7 +345,7 @@ def _rate_changes(time_s: FloatArray, offset_s: FloatArray, first: int, stop: in
 
 
 def _best_split(at_s: FloatArray, level: FloatArray, rounding_s: float) -> int:
-    """Block before which a second line begins that explains much; 0 where one line will do."""
+    """Return the block before which a second line explains much; 0 where one line will do."""
     floor = len(at_s) * rounding_s**2 / 12.0
     forward, backward = _left_over(at_s, level), _left_over(at_s[::-1], level[::-1])[::-1]
     whole = forward[-1]

@@ -1,4 +1,4 @@
-"""Other clocks that a log carries, GNSS time or the INS's own: which fields tell them, how the recorder runs by them.
+"""Other clocks in a log (GNSS time, the INS's own), and the recorder's rate against them.
 
 A field of a raw topic is a clock when the thresholds say so, ``[[clock_relation.references]]``. Some thousand readings
 of each are kept, evenly spread. Corrected time is never changed by what is found.
@@ -36,14 +36,14 @@ _FEWEST_ZEROS = 3  # readings that tell when a counter began
 _DAY_NS = 86_400 * NS_PER_S
 STAMPS = "header stamp"  # a clock that is read when a message is made, and written when it reaches the recorder
 _AROUND, _PROMPT_NS, _WAITED_NS = 64, NS_PER_S // 100, NS_PER_S // 2
-_FLOAT_NS = 1_000  # of seconds since 1970 in a float64
+_FLOAT_NS = 1_000  # resolution of seconds since 1970 in a float64
 _FEW, _FEW_READINGS = 0.1, 5  # with the number of another week: so many are set aside, more are a step
 _FEWEST = 3
 
 
 @dataclass(frozen=True)
 class ReferenceField:
-    """A field that tells the time of another clock.
+    """Field of a log that tells the time of another clock.
 
     Parameters
     ----------
@@ -80,14 +80,14 @@ class ReferenceField:
     earliest_year: int = number(1980, 1980, 2261)
 
     def serves(self, batch: RecordBatch) -> bool:
-        """Whether the batch has the fields."""
+        """Tell whether the batch has the fields."""
         wanted = {name for name in (self.field, self.week) if name}
         return fnmatchcase(batch.topic, self.topic) and wanted.issubset(batch.columns)
 
 
 @dataclass(frozen=True)
 class RelationSettings:
-    """What is said of a clock by another; the file explains each number."""
+    """Settings of the comparison of two clocks; the file explains each number."""
 
     references: tuple[ReferenceField, ...]
     fewest_samples: int = required_number(10)
@@ -98,7 +98,7 @@ class RelationSettings:
 
 @dataclass
 class _Readings:
-    """Readings of one reference: each time that it tells once, when it told it first."""
+    """Readings of one reference: each of its times once, at the first record that has it."""
 
     topic: str
     reference: ReferenceField
@@ -144,19 +144,22 @@ class _Readings:
 
     @property
     def is_held(self) -> bool:
-        """Whether a time is usually told several times: it may be older than its first reading by one of them."""
+        """Tell whether a time is usually repeated.
+
+        Such a time may be older than its first reading by one of them.
+        """
         return self.times < 0.75 * self.rows
 
 
 class ClockReferences:
-    """Takes readings of other clocks from the batches of a log."""
+    """Collector of the readings of other clocks in the batches of a log."""
 
     def __init__(self, settings: RelationSettings) -> None:
         self._settings = settings
         self._readings: dict[str, list[_Readings]] = {}
 
     def add(self, batch: RecordBatch) -> None:
-        """Take what a batch holds of them; which fields do is settled by the first batch of a topic."""
+        """Add the readings of a batch; the first batch of a topic settles which fields are used."""
         found = self._readings.get(batch.topic)
         if found is None:
             found = [_Readings(batch.topic, one) for one in self._settings.references if one.serves(batch)]
@@ -166,9 +169,10 @@ class ClockReferences:
                 readings.add(batch)
 
     def zeros_ns(self, first: int, end: int) -> Int64Array:
-        """UTC of device time zero by the readings from record ``first`` on and before ``end``, in rising order.
+        """Return UTC of device time zero by the readings between two records, in rising order.
 
-        Of the first clock, in the order of the topics, that tells UTC with its date there; none without any.
+        They are those from record ``first`` on and before ``end``. They are of the first clock, in the order of the
+        topics, that tells UTC with its date there. There are none without such a clock.
         """
         for readings in (one for topic in sorted(self._readings) for one in self._readings[topic]):
             index, columns = readings.sampler.all()
@@ -181,7 +185,7 @@ class ClockReferences:
         return np.zeros(0, dtype=np.int64)
 
     def relations(self, clock: ClockModel) -> tuple[ClockRelation, ...]:
-        """How the recorder's corrected clock runs by each of them, in the order of their topics."""
+        """Compare the recorder's corrected clock with each of them, in the order of their topics."""
         known = [one for topic in sorted(self._readings) for one in self._readings[topic]]
         return tuple(_relation(one, clock, self._settings) for one in known[:MOST_REFERENCES])
 
@@ -228,7 +232,10 @@ def _relation(readings: _Readings, clock: ClockModel, settings: RelationSettings
 
 
 def _prompt(late_ns: Int64Array) -> BoolArray:
-    """Messages that were written soon after their stamp, shape (n,): all where none waited longer than those around."""
+    """Tell which messages were written soon after their stamp, shape (n,).
+
+    They are all messages where none waited longer than those around it.
+    """
     window = min(_AROUND, len(late_ns))
     if not window:
         return np.ones(len(late_ns), dtype=bool)
@@ -239,7 +246,7 @@ def _prompt(late_ns: Int64Array) -> BoolArray:
 
 
 def _told(reference: ReferenceField, columns: dict[str, NDArray[Any]]) -> tuple[Int64Array, BoolArray]:
-    """Times that a clock told, nanoseconds, and which of them can be times, shape (n,) each."""
+    """Return the times of a clock, nanoseconds, and a mask of possible ones, shape (n,) each."""
     time_ns, good = _nanoseconds(columns["time"], reference.unit_ns)
     if reference.scale == "gps":
         week, has_week = _nanoseconds(columns["week"], 1)
@@ -252,7 +259,7 @@ def _told(reference: ReferenceField, columns: dict[str, NDArray[Any]]) -> tuple[
 
 
 def _nanoseconds(values: NDArray[Any], unit_ns: int) -> tuple[Int64Array, BoolArray]:
-    """Values of whatever type in nanoseconds, and which of them are numbers that 62 bits hold."""
+    """Return values of any type in nanoseconds, and a mask of numbers that 62 bits hold."""
     if values.dtype.kind == "U":
         texts = [_utc_of(str(value)) for value in values]
         return np.array([text or 0 for text in texts], dtype=np.int64), np.array([text is not None for text in texts])
@@ -276,7 +283,10 @@ def _utc_of(text: str) -> int | None:
 
 
 def _unfolded(told_ns: Int64Array, own_ns: Int64Array) -> Int64Array:
-    """Times of day on the days that bring them next to the recorder's clock, all as the first one."""
+    """Place times of day on the days that bring them next to the recorder's clock.
+
+    All follow the choice for the first one.
+    """
     half = _DAY_NS // 2
     first = (int(told_ns[0] - own_ns[0]) + half) % _DAY_NS - half
     return np.asarray(own_ns + first + (told_ns - own_ns - first + half) % _DAY_NS - half, dtype=np.int64)
@@ -305,7 +315,7 @@ def _other_weeks(own_ns: Int64Array, told_ns: Int64Array, is_utc: bool) -> tuple
 
 
 def _last_digit_s(time_ns: Int64Array) -> float:
-    """The largest power of ten, at most a second, that all times are multiples of."""
+    """Return the largest power of ten, at most a second, of which all times are multiples."""
     step = NS_PER_S
     while step > 1 and (time_ns % step).any():
         step //= 10
@@ -313,7 +323,7 @@ def _last_digit_s(time_ns: Int64Array) -> float:
 
 
 def _mistakes(reference: ReferenceField, fitted: Fitted, clock: ClockModel, told_ns: Int64Array) -> tuple[Mistake, ...]:
-    """Errors that have a name, of steps and of what stands at the end."""
+    """Return the errors that have a name, of steps and of the offset at the end."""
     if reference.scale == "free":
         return ()
     last_ns = int(told_ns[-1])

@@ -1,4 +1,4 @@
-"""What is known of a recorder's clock by another clock of the log, in figures and in words."""
+"""Relation of a recorder's clock to another clock of the log, in figures and in words."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from groundstation.base.timescales import (
 from groundstation.base.units import NS_PER_S
 
 WEEK_S, ROLLOVER_S, QUARTER_S = 604_800, 1_024 * 604_800, 900  # time zones are multiples of a quarter of an hour
-_NEAR_S = 0.35  # of whole seconds: receivers are late by less
+_NEAR_S = 0.35  # largest distance from whole seconds: receivers are late by less
 _LEAP_S = range(13, 21)  # GPS time less UTC since 1999, and for some years to come
 _MISTAKES = {
     "leap_seconds": "{seconds:+.2f} s: equal to the leap seconds between GPS time and UTC",
@@ -58,7 +58,7 @@ class ClockSegment:
 
 @dataclass(frozen=True)
 class ClockBreak:
-    """Where two clocks part: one was set, or changed its rate.
+    """Moment at which two clocks part: one was set, or changed its rate.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Mistake:
 
     @property
     def text(self) -> str:
-        """In words.
+        """Describe the mistake in words.
 
         Examples
         --------
@@ -129,7 +129,7 @@ class Mistake:
 
 @dataclass(frozen=True)
 class ClockRelation:
-    """The recorder's corrected clock by another clock.
+    """Comparison of the recorder's corrected clock with another clock.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class ClockRelation:
 
     @property
     def name(self) -> str:
-        """For people."""
+        """Name of the other clock for people."""
         return f"{self.clock.upper()} time ({self.source})"
 
     def offset_text(self, segment: ClockSegment, *, has_utc: bool) -> str:
@@ -190,7 +190,10 @@ class ClockRelation:
         return f"{segment.drift_ppm:+.{_places(sigma)}f} ± {_figure(sigma)} ppm"
 
     def entry(self, text: Callable[[int], str], *, has_utc: bool) -> RelationEntry:
-        """What is kept of it: seconds to the microsecond, rates to a thousandth of a ppm; ``text`` writes a time."""
+        """Return the form to keep: seconds to the microsecond, rates to a thousandth of a ppm.
+
+        ``text`` writes a time.
+        """
         return RelationEntry(
             clock=self.clock,
             source=self.source,
@@ -261,7 +264,7 @@ def mistake_of_told_step(size_s: float, utc_ns: int) -> str:
 
 
 def mistake_of_offset(offset_s: float) -> str:
-    """Name of a standing difference between two clocks that both tell UTC, empty where it has none.
+    """Name a standing difference between two clocks that both tell UTC; empty if it has none.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Steps of a recorder's clock, and rows out of order that are none."""
+"""Steps of a recorder's clock, and rows out of order that are no steps."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -14,7 +14,7 @@ _DAY_NS = 86_400 * NS_PER_S
 
 @dataclass(frozen=True)
 class ClockSettings:
-    """What counts as a clock step.
+    """Criteria of a clock step.
 
     Parameters
     ----------
@@ -66,7 +66,9 @@ class ClockStep:
 
 
 def middle_of(steps: Int64Array) -> float:
-    """Median of steps, 0 of none: by a sort, as the selection of ``np.median`` is slow on steps that keep repeating.
+    """Return the median of steps, 0 if there are none.
+
+    The steps are sorted, as the selection of ``np.median`` is slow on steps that keep repeating.
 
     Examples
     --------
@@ -77,7 +79,7 @@ def middle_of(steps: Int64Array) -> float:
 
 
 def quantile(ordered: Int64Array, share: float) -> float:
-    """Value below which a share of ordered integers lies, between two of them by proportion.
+    """Return the value below which a share of ordered integers lies, interpolated.
 
     Examples
     --------
@@ -91,7 +93,10 @@ def quantile(ordered: Int64Array, share: float) -> float:
 
 
 class Steps:
-    """Clock steps and stray rows among the timed records (positions here count timed records only)."""
+    """Clock steps and stray rows among the timed records.
+
+    Positions here count timed records only.
+    """
 
     def __init__(self, index: Int64Array, time: Int64Array, settings: ClockSettings) -> None:
         self.index, self.time, self.settings = index, time, settings
@@ -113,7 +118,7 @@ class Steps:
             self._judge(int(at))
 
     def sort(self) -> None:
-        """Take the log as unordered: without steps, each record at its own time."""
+        """Treat the log as unordered: no steps, each record at its own time."""
         self.is_unordered, self.steps = True, []
         self.implausible[:] = self.stray[:] = False
         self.stray[1:] = self.time[1:] < np.maximum.accumulate(self.time)[:-1]
@@ -132,7 +137,7 @@ class Steps:
         return offsets[::-1]
 
     def described(self, offsets: Int64Array) -> tuple[ClockStep, ...]:
-        """The steps as the ledger tells them."""
+        """Return the steps in the form of the ledger."""
         firsts = [0, *(at for at, _last in self.steps)]
         return tuple(
             ClockStep(
@@ -170,7 +175,7 @@ class Steps:
         self._judge_strays(first, stop)
 
     def _strays_before(self, at: int, last: int, size: int) -> tuple[int, int] | None:
-        """Rows just before ``at`` that jumped ahead, the order being restored at ``at``."""
+        """Find rows just before ``at`` that jumped ahead, with order restored at ``at``."""
         if size >= 0:
             return None
         jump = max(1.5 * self.period_ns, 0.5 * -size)
@@ -181,7 +186,10 @@ class Steps:
         return None
 
     def _strays_from(self, at: int, last: int, size: int) -> tuple[int, int] | None:
-        """Rows from ``at`` on that are out of order, the order being restored after them (or the log ends)."""
+        """Find rows from ``at`` on that are out of order, with order restored after them.
+
+        The end of the log serves as well as restored order.
+        """
         count = len(self.time)
         jump = max(1.5 * self.period_ns, 0.5 * abs(size))
         for stop in range(at + 1, min(count, at + self.settings.stray_rows + 1)):
@@ -191,7 +199,10 @@ class Steps:
         return (at, count) if count - at < self.settings.rows_after_step else None
 
     def _judge_strays(self, first: int, stop: int) -> None:
-        """A stray row for which the log has a hole where it stands has a wrong time, not a wrong place."""
+        """Mark stray rows whose time is wrong rather than their place.
+
+        The log has a hole where such a row stands.
+        """
         before = first - 1
         rows = stop - first
         away = np.abs(self.time[first:stop] - self.time[before]) > _DAY_NS

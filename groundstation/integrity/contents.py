@@ -1,4 +1,4 @@
-"""What the batches of a log hold, counted as they pass: fields, counters, motion, drop-outs, and rows in time."""
+"""Contents of a log, counted batch by batch: fields, counters, motion, drop-outs, rows."""
 
 import math
 from collections.abc import Mapping
@@ -30,7 +30,7 @@ class _FieldTally:
 
     low: float
     high: float
-    is_known: bool = True  # of a field that nobody knows, infinity may be meant: "no limit"
+    is_known: bool = True  # in an unknown field, infinity may be meant: "no limit"
     constancy: Constancy | None = None
     present: int = 0
     nan: int = 0
@@ -39,7 +39,7 @@ class _FieldTally:
     last: Place | None = None
 
     def add(self, column: Column, rows: Int64Array | None, record_index: Int64Array, device_ns: Int64Array) -> None:
-        """Go on with a batch; ``rows`` are those in which the column is present, all of them without."""
+        """Count a batch; ``rows`` are those where the column is present, None for all."""
         values = column.values if rows is None else column.values[rows]
         self.present += len(values)
         if values.dtype.kind != "f":
@@ -50,7 +50,10 @@ class _FieldTally:
             self.constancy.add(values, record_index, device_ns, rows)
 
     def _may_be_odd(self, values: FloatArray) -> bool:
-        """Whether there may be NaN, or a value out of range: two passes tell it, one where nobody knows the range."""
+        """Tell whether there may be a NaN, or a value out of range.
+
+        Two passes over the values tell it, one where nobody knows the range.
+        """
         most = np.maximum.reduce(values, initial=-np.inf)
         if not self.is_known:
             return math.isnan(most)
@@ -60,7 +63,7 @@ class _FieldTally:
     def _without_odd(
         self, values: FloatArray, rows: Int64Array | None, record_index: Int64Array, device_ns: Int64Array
     ) -> tuple[FloatArray, Int64Array | None]:
-        """Count NaN and what is out of range; gives the values that are no NaN, and their rows."""
+        """Count NaN and values out of range; return the values that are not NaN, and their rows."""
         if self.is_known:
             at = np.flatnonzero((values < self.low) | (values > self.high) | np.isinf(values))
             if len(at):
@@ -100,7 +103,7 @@ class _TopicTally:
 
 
 class Contents:
-    """Counts the batches of a log; what they say is told once the clock is known."""
+    """Counter of the batches of a log; its counts are read once the clock is known."""
 
     def __init__(self, thresholds: Thresholds) -> None:
         self._thresholds = thresholds
@@ -111,7 +114,10 @@ class Contents:
         self._judge: Judge | None = None
 
     def add(self, batch: RecordBatch, device_ns: Int64Array | None = None) -> None:
-        """Count a batch; ``device_ns`` are the times to go by, those of the device unless they are given."""
+        """Count a batch.
+
+        ``device_ns`` are the times to go by, those of the device unless they are given.
+        """
         device_ns = batch.device_time_ns.values if device_ns is None else device_ns
         tally = self._topics.setdefault(batch.topic, _TopicTally())
         rows_of: dict[int, Int64Array] = {}  # columns of one source share the array that tells where they are present
@@ -140,7 +146,7 @@ class Contents:
         return found
 
     def _sample(self, batch: RecordBatch, device_ns: Int64Array) -> None:
-        """Keep some rows of canonical topics, to tell the time of a row that was lost."""
+        """Keep some rows of canonical topics, which give the time of a row that was lost."""
         if not is_canonical(batch.topic):
             return
         rows = self._timeline.rows(len(batch))
@@ -166,7 +172,7 @@ class Contents:
         return contradictions(self._motion, clock, self._topics, metadata)
 
     def sequences(self, topic: str, clock: ClockModel) -> tuple[Sequence, ...]:
-        """What the counters of a topic say."""
+        """Return the losses that the counters of a topic show."""
         counters = self._topics[topic].counters or {}
         return tuple(told for told in (counter.sequence(clock) for counter in counters.values()) if told is not None)
 

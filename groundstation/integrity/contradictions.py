@@ -1,4 +1,4 @@
-"""Places where a log contradicts itself: values that cannot all be true, though each is possible.
+"""Contradictions within a log: values that cannot all be true, though each is possible.
 
 A speed that its own positions do not show, a vehicle on wheels or fast in the air whose nose points away from its
 track, a vehicle that drives or flies on its side, a height that pressure does not follow. Mostly it is a unit, a sign
@@ -20,13 +20,13 @@ from groundstation.integrity.stuck import METRES_PER_DEG, Motion
 
 FloatArray = NDArray[np.float64]
 CONTRADICTION = "data.contradiction"  # code of the finding
-LASTS_S = 60.0  # what is shorter may be a turn, a slip, a receiver's bad minute
+LASTS_S = 60.0  # a shorter stretch may be a turn, a slip, a receiver's bad minute
 WINDOW_S = 10.0  # speeds and directions are those between the ends of windows
 LONGEST_STEP_S = 5.0  # between samples; across a longer one nothing is compared
 
-SPEED_MPS, SPEED_SHARE = 5.0, 0.3  # of the larger speed: what positions and velocity may differ by
-SIDE_DEG = 75.0  # of roll; no vehicle drives or flies so for a minute
-STEEP_DEG = 60.0  # of pitch, beyond which roll says little
+SPEED_MPS, SPEED_SHARE = 5.0, 0.3  # allowed difference of the speeds by positions and velocity
+SIDE_DEG = 75.0  # roll at which no vehicle drives or flies for a minute
+STEEP_DEG = 60.0  # pitch beyond which roll says little
 MOVES_MPS = 0.5
 OFF_DEG = 60.0  # nose against track
 FAST_MPS = 25.0  # no multirotor flies sideways so fast for a minute
@@ -41,7 +41,7 @@ ROLLS = "rolls"
 
 @dataclass(frozen=True)
 class Contradiction:
-    """Values of a topic that cannot all be true: which, from when (corrected time), for how long."""
+    """Values of a topic that cannot all be true: which, corrected time of the start, length."""
 
     topic: str
     text: str
@@ -51,7 +51,10 @@ class Contradiction:
 
 @dataclass(frozen=True)
 class _Series:
-    """Samples of one topic in order of corrected time: seconds since the first of the log, shape (n,), and columns."""
+    """Samples of one topic in order of corrected time.
+
+    Times are seconds since the first sample of the log, shape (n,).
+    """
 
     topic: str
     time_s: FloatArray
@@ -61,7 +64,7 @@ class _Series:
         return all(name in self.columns and bool(np.isfinite(self.columns[name]).any()) for name in names)
 
     def known(self, *names: str) -> "_Series":
-        """The samples in which all of these are known, one at a time."""
+        """Return the samples in which all of these fields are known, one for each time."""
         mask = np.all([np.isfinite(self.columns[name]) for name in names], axis=0)
         mask &= np.concatenate([[True], np.diff(self.time_s) > 0.0]) if len(self.time_s) else mask
         return _Series(self.topic, self.time_s[mask], {name: values[mask] for name, values in self.columns.items()})
@@ -69,9 +72,10 @@ class _Series:
 
 @dataclass(frozen=True)
 class _Windows:
-    """Motion between samples some ten seconds apart: times of both ends, metres per second north and east, shapes (n,).
+    """Motion between samples some ten seconds apart, shapes (n,).
 
-    ``first`` and ``last`` are the samples at the ends.
+    It has the times of both ends, and metres per second north and east. ``first`` and ``last`` are the samples at the
+    ends.
     """
 
     start_s: FloatArray
@@ -129,7 +133,7 @@ def _series_of(motion: Motion, clock: ClockModel) -> tuple[int, list[_Series]]:
 
 
 def _possible(name: str, values: FloatArray) -> FloatArray:
-    """The values with NaN for what no motion has: the ledger tells of it as out of range."""
+    """Replace by NaN the values that no motion has; the ledger lists them as out of range."""
     return np.where(np.abs(values) <= (90.0 if name == "latitude_deg" else ANY), values, np.nan)
 
 
@@ -159,7 +163,7 @@ def _windows_of(one: _Series) -> _Windows | None:
 
 
 def _speed(one: _Series, windows: _Windows | None, zero_ns: int) -> Contradiction | None:
-    """Velocity, or speed, that the topic's own positions do not show."""
+    """Find velocity, or speed, that the topic's own positions do not show."""
     if windows is None or not len(windows.start_s):
         return None
     names = ("velocity_north_mps", "velocity_east_mps")
@@ -186,7 +190,7 @@ def _speed(one: _Series, windows: _Windows | None, zero_ns: int) -> Contradictio
 
 
 def _side(one: _Series, windows: Mapping[str, _Windows], zero_ns: int) -> Contradiction | None:
-    """Roll of a vehicle on its side, while it moves."""
+    """Find the roll of a vehicle on its side while it moves."""
     if not one.has("roll_deg"):
         return None
     known = one.known("roll_deg")
@@ -202,7 +206,7 @@ def _side(one: _Series, windows: Mapping[str, _Windows], zero_ns: int) -> Contra
 
 
 def _heading(one: _Series, windows: Mapping[str, _Windows], does_roll: bool, zero_ns: int) -> Contradiction | None:
-    """Heading far off the track, of a vehicle that cannot move sideways."""
+    """Find heading far off the track of a vehicle that cannot move sideways."""
     name = next((name for name in HEADINGS if one.has(name)), "")
     track = windows.get(one.topic) or next((found for found in windows.values() if len(found.start_s)), None)
     if not name or track is None:
@@ -225,7 +229,7 @@ def _heading(one: _Series, windows: Mapping[str, _Windows], does_roll: bool, zer
 
 
 def _height(one: _Series, series: list[_Series], zero_ns: int) -> Contradiction | None:
-    """Height that the pressure altitude does not follow."""
+    """Find height that the pressure altitude does not follow."""
     name = next((name for name in ALTITUDES if one.has(name)), "")
     baro = next(
         (other for other in series if kind_of(other.topic) == "baro" and other.has("pressure_altitude_m")), None

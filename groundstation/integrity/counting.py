@@ -1,9 +1,9 @@
-"""The clock of a log whose device times count up from power-up: nothing sets it, so it has no steps.
+"""Clock of a log whose device times count up from power-up.
 
-Its records come topic by topic out of many buffers: an order between topics proves nothing, and each record keeps its
-own time. Not believed are times far from those of the records around them: an autopilot that begins a log writes the
-newest value of every topic with the time at which it was published, minutes before, and some topics never advance
-their time at all. Such records are placed where they stand in the log.
+Nothing sets it, so it has no steps. Its records come topic by topic out of many buffers: an order between topics proves
+nothing, and each record keeps its own time. Times far from those of the records around them are not believed: an
+autopilot that begins a log writes the newest value of every topic with the time at which it was published, minutes
+before, and some topics never advance their time at all. Such records are placed where they stand in the log.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ FROZEN_SHARE, FROZEN_LEAST_RECORDS = 0.9, 10
 
 @dataclass(frozen=True)
 class CountingSettings:
-    """What a counting clock believes.
+    """Criteria for believing the times of a counting clock.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class CountingSettings:
 
 
 def is_frozen(times: int, repeats: int) -> bool:
-    """Whether a topic repeats one time again and again instead of telling when its values were true.
+    """Tell whether a topic repeats one time instead of telling when its values were true.
 
     Examples
     --------
@@ -130,7 +130,7 @@ class _Judged(NamedTuple):
 
 
 def _judged(time: Int64Array, tolerance_ns: int, run_records: int) -> _Judged:
-    """Records earlier than the runs around them allow, and later than those; shape (n,) each.
+    """Return masks of records earlier, and later, than the runs around them allow, shape (n,).
 
     A run is a stretch of records each within the tolerance of the one before. Long runs are believed; a short one is
     believed when it lies between the end of the long run before it and the start of the one after, both widened by the

@@ -1,4 +1,4 @@
-"""The integrity ledger: what a log holds, topic by topic, and what is odd about it. Figures only, no judgement."""
+"""Integrity ledger: contents and oddities of a log, topic by topic; figures, no judgement."""
 
 import math
 from collections.abc import Mapping
@@ -36,7 +36,7 @@ GAPS_LISTED = STUCK_LISTED = SPANS_LISTED = 100
 
 @dataclass(frozen=True)
 class FieldCounts:
-    """One field: samples present, NaN the device wrote, values outside the physical range, stretches it was stuck.
+    """Counts of one field: samples, NaN of the device, values out of range, stuck stretches.
 
     ``first_out_of_range`` is the record of the first value outside the range; ``first_outside_ns`` and
     ``last_outside_ns`` are the corrected times of the first and the last.
@@ -55,11 +55,11 @@ class FieldCounts:
 
     @property
     def is_odd(self) -> bool:
-        """Whether there is more to say of it than how many samples it has."""
+        """Tell whether there is more to say of the field than its number of samples."""
         return bool(self.nan or self.out_of_range or self.stuck)
 
     def entry(self, clock: ClockModel) -> FieldEntry:
-        """What is kept of it."""
+        """Return the form to keep."""
         first_ns, ends = self.first_outside_ns, (self.low, self.high)
         low, high = (end if math.isfinite(end) else None for end in ends)
         time = None if first_ns is None else clock.text(first_ns)
@@ -129,7 +129,7 @@ class TopicCounts:
         return (self.last_ns - self.first_ns) / NS_PER_S
 
     def entry(self, clock: ClockModel, losses: Mapping[str, int]) -> TopicEntry:
-        """What is kept of it: seconds to the millisecond, rates to 4 decimals, shares to 6."""
+        """Return the form to keep: seconds to the millisecond, rates to 4 decimals, shares to 6."""
         listed = zip(self.gaps.start_ns[:GAPS_LISTED], self.gaps.length_s[:GAPS_LISTED], strict=True)
         return TopicEntry(
             rows=self.rows,
@@ -156,7 +156,7 @@ class TopicCounts:
 
 @dataclass(frozen=True)
 class LedgerCounts:
-    """The ledger of a log: its topics in alphabetical order, its clock, and what the reader lost and remarked.
+    """Ledger of a log: topics in alphabetical order, clock, damage and remarks of the reader.
 
     ``power_ups`` are those of the source, where it holds several.
     """
@@ -172,7 +172,7 @@ class LedgerCounts:
     power_ups: tuple[PowerUpClock, ...] = ()
 
     def __getitem__(self, topic: str) -> TopicCounts:
-        """The ledger of one topic; KeyError when the log has none of that name."""
+        """Return the ledger of one topic; KeyError when the log has none of that name."""
         for ledger in self.topics:
             if ledger.topic == topic:
                 return ledger
@@ -185,7 +185,7 @@ class LedgerCounts:
 
     @property
     def loses_data(self) -> bool:
-        """Whether anything recorded could not be read (exit code 3)."""
+        """Tell whether anything recorded could not be read (exit code 3)."""
         return any(damage.loses_data for damage in self.damages)
 
     @property
@@ -200,7 +200,10 @@ class LedgerCounts:
 
     @property
     def end_ns(self) -> int:
-        """Corrected time of the last record of topics with a nominal rate, of canonical ones where there are any."""
+        """Corrected time of the last record of topics with a nominal rate.
+
+        Only canonical topics count where there are any.
+        """
         rated = [ledger for ledger in self.topics if ledger.nominal_rate_hz is not None]
         canonical = [ledger for ledger in rated if is_canonical(ledger.topic)]
         return max((ledger.last_ns for ledger in canonical or rated), default=self.start_ns)
@@ -216,7 +219,7 @@ class LedgerCounts:
         return tuple(sorted(found, key=lambda span: (span.start_ns, span.topic, span.field, span.cause)))
 
     def losses(self, topic: str) -> dict[str, int]:
-        """What could not be read of a topic, counted by kind of damage."""
+        """Count the unreadable records of a topic by kind of damage."""
         counts: dict[str, int] = {}
         for damage in self.damages:
             if damage.topic == topic and damage.loses_data:
@@ -224,7 +227,7 @@ class LedgerCounts:
         return counts
 
     def document(self) -> Ledger:
-        """What is kept of it."""
+        """Return the form to keep."""
         limits, spans = self.thresholds.gaps, self.spans
         skipped, skipped_spans = skipped_bytes(self.damages)
         return Ledger(
@@ -243,7 +246,7 @@ class LedgerCounts:
 
 
 def damage_entry(damage: Damage) -> DamageEntry:
-    """What is kept of damage."""
+    """Return the form of damage to keep."""
     return DamageEntry(
         kind=damage.kind,
         place=damage.place,

@@ -1,4 +1,4 @@
-"""What a user must know of a ledger, one line each, with figures and places."""
+"""Findings on a ledger, one line each, with figures and places."""
 
 from collections.abc import Iterator
 
@@ -41,7 +41,7 @@ def _contradiction(one: Contradiction, clock: ClockModel) -> Finding:
 
 
 def topic_findings(ledger: LedgerCounts) -> tuple[Finding, ...]:
-    """Those of the findings that are about topics: order, gaps, counters and values."""
+    """Return the findings about topics: order, gaps, counters and values."""
     return tuple(finding for topic in ledger.topics for finding in _topic(topic, ledger))
 
 
@@ -53,7 +53,10 @@ def damage_finding(damage: Damage) -> Finding:
 
 
 def _duplicates(topic: TopicCounts, clock: ClockModel, limits: DuplicateLimits) -> Finding:
-    """Records at one time: a warning where many, but of a counting clock's topics, whose sources share times."""
+    """Report records at one time; a warning where there are many.
+
+    It is none for the topics of a counting clock, whose sources share times.
+    """
     share = topic.duplicates / topic.rows
     text = f"{topic.topic}: {topic.duplicates} of {topic.rows} records repeat the time of the one before"
     is_many = topic.duplicates >= limits.fewest and share > limits.share

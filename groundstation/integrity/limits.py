@@ -1,4 +1,7 @@
-"""Thresholds of the integrity ledger: one versioned TOML file, shipped, that the user replaces in whole or in part."""
+"""Thresholds of the integrity ledger: one versioned TOML file, shipped with the package.
+
+The user replaces it in whole or in part.
+"""
 
 import hashlib
 import json
@@ -25,7 +28,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class GapLimits:
-    """A gap is a step longer than ``periods`` nominal periods and than ``min_s`` seconds.
+    """Limits of a gap: longer than ``periods`` nominal periods and than ``min_s`` seconds.
 
     A topic breaks off when it ends ``end_s`` seconds and ``end_share`` of the log before the others.
     """
@@ -38,7 +41,7 @@ class GapLimits:
 
 @dataclass(frozen=True)
 class RhythmLimits:
-    """When a topic has a nominal rate; the file explains each number."""
+    """Criteria for a nominal rate of a topic; the file explains each number."""
 
     sporadic_topics: tuple[str, ...]
     fewest_steps: int = required_number(1)
@@ -50,7 +53,7 @@ class RhythmLimits:
 
 @dataclass(frozen=True)
 class DuplicateLimits:
-    """When records that repeat the time of the one before are a warning."""
+    """Limits beyond which records that repeat the time of the one before are a warning."""
 
     fewest: int = required_number(1)
     share: float = required_number(0.0, 1.0)
@@ -59,7 +62,7 @@ class DuplicateLimits:
 
 @dataclass(frozen=True)
 class SequenceLimits:
-    """Which fields count records, and when they are believed to."""
+    """Fields that count records, and criteria for believing them."""
 
     fields: tuple[str, ...]
     loss_counters: tuple[str, ...]
@@ -70,7 +73,7 @@ class SequenceLimits:
 
 @dataclass(frozen=True)
 class StuckLimits:
-    """When a value that does not change is stuck; the file explains each number."""
+    """Limits beyond which a value that does not change is stuck; the file explains each one."""
 
     min_s: float = required_number(0.0)
     min_samples: int = required_number(3)
@@ -85,7 +88,7 @@ class StuckLimits:
 
 @dataclass(frozen=True)
 class FindingLimits:
-    """When a finding is a warning."""
+    """Limits beyond which a finding is a warning."""
 
     missing_times_share: float = required_number(0.0, 1.0)
 
@@ -119,19 +122,25 @@ class Thresholds:
 
     @property
     def sha256(self) -> str:
-        """Digest of the values: equal limits have equal digests, whatever the file's comments and name."""
+        """Digest of the values.
+
+        Equal limits have equal digests, whatever the file's comments and name.
+        """
         values = {key: value for key, value in asdict(self).items() if key != "name"}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
     def range_of(self, topic: str, name: str) -> Range | None:
-        """Physical range of a field, infinite where it has no end; None of a field that nobody knows."""
+        """Return the physical range of a field, infinite where it has no end.
+
+        It is None for a field that is not known.
+        """
         known = field_of(topic, name)
         if known is None:
             return None
         return self.ranges.get(kind_of(topic), {}).get(name, (known.low, known.high))
 
     def used(self) -> ThresholdsUsed:
-        """Which thresholds these are: name, version and digest."""
+        """Identify these thresholds: name, version and digest."""
         return ThresholdsUsed(name=self.name, version=self.version, sha256=self.sha256)
 
 
@@ -143,7 +152,7 @@ def shipped() -> Thresholds:
 
 
 def thresholds_from(table: Mapping[str, Any], where: str = "thresholds", key: str = "") -> Thresholds:
-    """Thresholds of the user: what the table states, and the shipped ones for what it leaves out.
+    """Read the user's thresholds; the shipped ones stand in for what the table leaves out.
 
     Parameters
     ----------
@@ -173,7 +182,7 @@ def thresholds_from(table: Mapping[str, Any], where: str = "thresholds", key: st
 
 
 def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """One table over another, table by table."""
+    """Lay one table over another, table by table."""
     out = dict(base)
     for key, value in over.items():
         below = out.get(key)

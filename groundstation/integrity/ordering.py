@@ -9,11 +9,11 @@ from groundstation.integrity.clock import ClockModel
 
 
 def corrected(items: Iterable[Item], clock: ClockModel) -> Iterator[RecordBatch]:
-    """Yield the batches of a log with corrected time, each topic in non-decreasing ``time_ns``.
+    """Yield the batches of a log with corrected time, each topic in time order.
 
-    A record is held back until no earlier one of its topic can follow, which the lateness found by the survey tells:
-    memory is bounded by it. Records of equal time keep the order of the source. Damages and remarks are left out: the
-    survey has them.
+    ``time_ns`` never decreases within a topic. A record is held back until no earlier one of its topic can follow,
+    which the lateness found by the survey tells: memory is bounded by it. Records of equal time keep the order of the
+    source. Damages and remarks are left out: the survey has them.
 
     Parameters
     ----------
@@ -62,7 +62,10 @@ def _bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
 
 
 def joined(batches: Sequence[RecordBatch]) -> RecordBatch:
-    """One batch of several of one topic, in the order given; a field that one of them lacks is absent there."""
+    """Join batches of one topic, in the order given.
+
+    A field that one of them lacks is absent there.
+    """
     names = dict.fromkeys(name for batch in batches for name in batch.columns)
     validity = [batch.validity_time_ns if batch.validity_time_ns is not None else batch.time_ns for batch in batches]
     has_validity = any(batch.validity_time_ns is not None for batch in batches)
@@ -85,7 +88,7 @@ def _column_of(batch: RecordBatch, name: str, batches: Sequence[RecordBatch]) ->
 
 
 def joined_columns(columns: Sequence[Column]) -> Column:
-    """One column of several, in the order given."""
+    """Join columns into one, in the order given."""
     present: BoolArray | None = None
     if any(column.present is not None for column in columns):
         present = np.concatenate([column.mask for column in columns])

@@ -1,7 +1,7 @@
-"""Places and times of a log's records: kept as they came, and beyond a size compactly in a temporary file.
+"""Places and times of a log's records, kept in memory or compactly in a temporary file.
 
-A survey needs them twice more: for the clock, in the order of the log, and for the ledger, topic by topic. Neither
-needs all at once.
+The file is used beyond a certain size. A survey needs them twice more: for the clock, in the order of the log, and for
+the ledger, topic by topic. Neither needs all at once.
 """
 
 import tempfile
@@ -24,7 +24,7 @@ WINDOW_RECORDS = 500_000  # at least so many records of all topics are laid in o
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Places and times of one batch, or of all of a topic; topics that are sampled together share it.
+    """Places and times of one batch, or of a whole topic; topics sampled together share it.
 
     ``validity_ns`` are times of validity by the device's clock, where they are others.
     """
@@ -35,18 +35,18 @@ class Piece:
 
     @property
     def timed(self) -> Int64Array:
-        """The times that are there, in the order of the places."""
+        """Times that are present, in the order of the places."""
         return self.time.values if self.time.present is None else self.time.values[self.time.present]
 
     @property
     def nbytes(self) -> int:
-        """Memory that it takes."""
+        """Memory that the piece takes."""
         present = self.time.present
         validity = 0 if self.validity_ns is None else self.validity_ns.nbytes
         return self.index.nbytes + self.time.values.nbytes + (0 if present is None else present.nbytes) + validity
 
     def holds(self, batch: RecordBatch) -> bool:
-        """Whether it is the places and times of this batch."""
+        """Tell whether these are the places and times of this batch."""
         device, validity = batch.device_time_ns, batch.validity_time_ns
         return (
             len(self.index) == len(batch)
@@ -59,7 +59,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class Kept:
-    """Where a piece is kept, and what is asked of it without a look at it.
+    """Location of a kept piece in the file, with a summary that saves reading it.
 
     Parameters
     ----------
@@ -91,13 +91,13 @@ class Kept:
 
     @property
     def size(self) -> int:
-        """Bytes that it takes in a file."""
+        """Number of bytes that the piece takes in a file."""
         of_one = (4 if self.is_near else 8) + 8 + (0 if self.is_timed else 1) + (8 if self.has_validity else 0)
         return self.count * of_one
 
 
 class Places:
-    """Keeps pieces, once for batches with the same places and times, and gives them back.
+    """Store of pieces: kept once for batches with the same places and times, and read back.
 
     Attributes
     ----------
@@ -114,14 +114,14 @@ class Places:
         self._recent: deque[tuple[Piece, Kept]] = deque(maxlen=8)
 
     def close(self) -> None:
-        """Let pieces and file go."""
+        """Release pieces and file."""
         self._held.clear()
         if self._file is not None:
             self._file.close()
 
     @property
     def is_long(self) -> bool:
-        """Whether there may be several windows."""
+        """Tell whether there may be several windows."""
         return self.records > WINDOW_RECORDS
 
     def of(self, batch: RecordBatch) -> Kept:
@@ -157,7 +157,7 @@ class Places:
         return kept
 
     def _write(self) -> None:
-        """Write what is in memory to the file, and let it go."""
+        """Write the pieces in memory to the file, and release them."""
         try:
             if self._file is None:
                 self._file = tempfile.TemporaryFile()  # noqa: SIM115 -- lives as long as this
@@ -177,7 +177,7 @@ class Places:
         self._held_bytes = 0
 
     def piece(self, kept: Kept) -> Piece:
-        """A piece as it was."""
+        """Read a piece back."""
         if kept.number in self._held:
             return self._held[kept.number][1]
         self._file.seek(kept.at)
@@ -190,9 +190,9 @@ class Places:
         return np.frombuffer(self._file.read(count * np.dtype(dtype).itemsize), dtype)
 
     def in_order(self, topics: Iterable[Sequence[Kept]]) -> Iterator[tuple[Int64Array, Column, BoolArray]]:
-        """Places, device times and frozenness of all records in the order of the log, each place once, in windows.
+        """Yield places, device times and frozenness of all records in log order, in windows.
 
-        Where topics tell different times of a place, the topic that is named first is believed.
+        Each place comes once. Where topics tell different times of a place, the topic that is named first is believed.
         """
         topics = list(topics)
         frozen = {kept.number for several in topics if _is_frozen(several) for kept in several}
@@ -222,7 +222,10 @@ def _are_equal(one: Int64Array | None, other: Int64Array | None) -> bool:
 
 
 def _lasting(array: Any) -> Any:
-    """The array, or a copy where it would hold much more memory than its own; arrays of records never change."""
+    """Return the array, or a copy where it would hold much more memory than its own.
+
+    Arrays of records never change.
+    """
     owner = array if array.base is None else array.base
     return array if isinstance(owner, np.ndarray) and owner.nbytes <= 2 * array.nbytes else np.array(array)
 
@@ -232,7 +235,7 @@ def _repeats(times: Int64Array) -> int:
 
 
 def _is_frozen(several: Sequence[Kept]) -> bool:
-    """Whether the times of a topic are."""
+    """Tell whether the times of a topic are frozen."""
     timed = [kept.times for kept in several if kept.times]
     count = sum(times[2] for times in timed)
     repeats = sum(times[3] for times in timed)
@@ -241,7 +244,10 @@ def _is_frozen(several: Sequence[Kept]) -> bool:
 
 
 def _windows(pieces: Collection[Kept]) -> Iterator[list[Kept]]:
-    """Pieces of one stretch of the log after another, none of which reaches into the next; each in the order given."""
+    """Yield the pieces of one stretch of the log after another, none reaching into the next.
+
+    The pieces of a stretch stand in the order given.
+    """
     rank = {kept.number: at for at, kept in enumerate(pieces)}
     window: list[Kept] = []
     count, reached = 0, -1

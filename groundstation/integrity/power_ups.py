@@ -1,7 +1,7 @@
-"""Power-ups in one source: where a counter starts again, and where one of n bits wraps and goes on.
+"""Power-ups in one source: where a counter restarts, and where one of n bits wraps.
 
-The source is seen as runs of records whose times follow one another. What one run is to those before it, its first
-time tells: it goes on, it is the same counter behind its wrap, or it is another power-up.
+The source is seen as runs of records whose times follow one another. The first time of a run tells how it belongs to
+those before it: it goes on, it is the same counter behind its wrap, or it is another power-up.
 """
 
 from bisect import bisect_left
@@ -18,13 +18,13 @@ from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock_relation import QUARTER_S, ROLLOVER_S, WEEK_S
 
 LAST_RECORD = 1 << 62
-MOST_RUNS = 100_000  # of more, no record follows another: order is lost, and with it where something began
+MOST_RUNS = 100_000  # with more runs no record follows another: order is lost, and so are the starts
 TOLERANCE_NS, PERIODS, MOST_NS = 3 * NS_PER_S, 3, 60 * NS_PER_S  # a record follows another within both, and the last
-SHUFFLED_SHARE = 0.2  # of runs to records: beyond it nothing follows anything
-FEWEST_RECORDS = 20  # of a run that counts; a shorter one is late, early or damaged
+SHUFFLED_SHARE = 0.2  # largest ratio of runs to records: beyond it nothing follows anything
+FEWEST_RECORDS = 20  # least length of a run that counts; a shorter one is late, early or damaged
 LEAST_NS = 10 * NS_PER_S  # a smaller step back is a clock that was set
 SHORT_NS = 20 * NS_PER_S  # a power-up that is shorter is none, unless another log begins behind it
-NEAR_NS, NEAR_SHARE = 5 * NS_PER_S, 0.1  # of the first time, and of the length so far
+NEAR_NS, NEAR_SHARE = 5 * NS_PER_S, 0.1  # distance from the first time, and share of the length so far
 BOOT_NS = 30 * NS_PER_S  # a counter so soon after its zero has just been started
 PART_NS = 10 * NS_PER_S  # a log that begins so soon after the one before is a part of it
 MARKED_NS = 60 * NS_PER_S  # the same of a clock that tells UTC, which may be set where a log begins
@@ -37,7 +37,7 @@ _LATE_NS = 30 * NS_PER_S  # records of the time before a wrap come no later
 
 
 class Run(NamedTuple):
-    """Records whose times follow one another: places and device times of the first and the last, how many."""
+    """Records whose times follow one another: place and device time of both ends, and number."""
 
     first_index: int
     last_index: int
@@ -72,7 +72,7 @@ class Wrap:
     late_until: int
 
     def added_ns(self, record_index: Int64Array, time_ns: Int64Array) -> Int64Array:
-        """What the wrap adds to device times, shape (n,)."""
+        """Return the time that the wrap adds to device times, shape (n,)."""
         is_behind = record_index >= self.record_index
         is_low = time_ns < self.middle_ns
         is_mixed = (record_index >= self.early_from) & (record_index <= self.late_until)
@@ -101,7 +101,7 @@ class PowerUp:
     is_ahead: bool = False
 
     def unwrapped_ns(self, record_index: Int64Array, time_ns: Int64Array) -> Int64Array:
-        """Device times of its records as those of a counter without an end, shape (n,)."""
+        """Return the device times of its records as a counter without an end has them, shape (n,)."""
         for wrap in self.wraps:
             time_ns = time_ns + wrap.added_ns(record_index, time_ns)
         return time_ns
@@ -109,7 +109,7 @@ class PowerUp:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What is known of a source beside the times of its records.
+    """Knowledge of a source beside the times of its records.
 
     Parameters
     ----------
@@ -134,7 +134,9 @@ class Evidence:
 
 
 def power_ups(windows: Iterable[tuple[Int64Array, Int64Array]], evidence: Evidence) -> tuple[PowerUp, ...]:
-    """Power-ups of a source, in the order of its records; one without wraps where it holds nothing odd.
+    """Find the power-ups of a source, in the order of its records.
+
+    There is one, without wraps, where the source holds nothing odd.
 
     Parameters
     ----------
@@ -154,7 +156,10 @@ def power_ups(windows: Iterable[tuple[Int64Array, Int64Array]], evidence: Eviden
 
 
 def _runs(windows: Iterable[tuple[Int64Array, Int64Array]], tolerance_ns: int) -> list[Run]:
-    """Runs of the records of all windows, in order; no more than are looked at."""
+    """Return the runs of the records of all windows, in order.
+
+    Where there are more than ``MOST_RUNS``, the list only shows that there are too many.
+    """
     runs: list[Run] = []
     for index, time in windows:
         if not len(time):
@@ -176,7 +181,10 @@ def _runs(windows: Iterable[tuple[Int64Array, Int64Array]], tolerance_ns: int) -
 
 @dataclass
 class _Level:
-    """Where the counter of a power-up stands: its first time, the last one without wraps, and what those add."""
+    """State of the counter of a power-up.
+
+    It has its first time, its last one without wraps, and the time that wraps add.
+    """
 
     first_ns: int
     top_ns: int
@@ -189,7 +197,10 @@ class _Level:
 
 @dataclass
 class _Walk:
-    """Goes through the long runs, one after the other; short ones are of whatever is around them."""
+    """Walk through the long runs, one after the other.
+
+    Short runs belong to whatever is around them.
+    """
 
     runs: Sequence[Run]
     evidence: Evidence
@@ -217,19 +228,22 @@ class _Walk:
         return tuple(self.found)
 
     def _mark(self, before: int, number: int) -> int | None:
-        """Where another log begins between two runs."""
+        """Return the place between two runs where another log begins, None without one."""
         marks = self.evidence.new_logs
         at = bisect_left(marks, self.runs[before].last_index + 1)
         return marks[at] if at < len(marks) and marks[at] <= self.runs[number].first_index else None
 
     def _place(self, level: _Level, before: int, number: int) -> int:
-        """Where a power-up would begin behind a long run: behind the last run that is not below it."""
+        """Return the place where a power-up would begin after a long run.
+
+        It is behind the last run that is not below it.
+        """
         floor_ns = level.top_ns - level.added_ns - TOLERANCE_NS
         lower = (at for at in range(before + 1, number) if self.runs[at].first_ns < floor_ns)
         return self.runs[next(lower, number) - 1].last_index + 1
 
     def _is_restart(self, level: _Level, number: int, long: Sequence[int], place: int, *, is_marked: bool) -> bool:
-        """Whether a long run is of another power-up, which then begins at ``place``."""
+        """Tell whether a long run is of another power-up, which then begins at ``place``."""
         run = self.runs[number]
         step_ns = run.first_ns + level.added_ns - level.top_ns
         if is_marked:
@@ -246,24 +260,27 @@ class _Walk:
         return not self.evidence.is_utc and step_ns < -LEAST_NS and self._is_at_its_start(level, run)
 
     def _is_at_its_start(self, level: _Level, run: Run) -> bool:
-        """Whether a counter is back near its first value, or near zero."""
+        """Tell whether a counter is back near its first value, or near zero."""
         near_ns = max(NEAR_NS, round(NEAR_SHARE * level.length_ns))
         is_near = abs(run.first_ns - level.first_ns) <= near_ns or 0 <= run.first_ns <= BOOT_NS
         return is_near and level.length_ns >= SHORT_NS
 
     def _is_set_nowhere(self, step_ns: int) -> bool:
-        """Whether a step is one that no clock is set by: not of a time zone, nor of a GPS week."""
+        """Tell whether a step is none that sets a clock: no time zone, no GPS week."""
         if _is_near_multiple(step_ns, QUARTER_S * NS_PER_S) or _is_near_multiple(step_ns, ROLLOVER_S * NS_PER_S):
             return False
         return step_ns < -SET_NS or (self.evidence.is_utc and SILENT_NS < step_ns < YEAR_NS)
 
     def _lasts(self, number: int) -> bool:
-        """Whether what begins with a run goes on for a while."""
+        """Tell whether the records that begin with a run go on for a while."""
         start_ns = self.runs[number].first_ns
         return any(LASTING_NS <= run.last_ns - start_ns < YEAR_NS for run in self.runs[number:])
 
     def _is_restored(self, level: _Level, number: int, long: Sequence[int]) -> bool:
-        """Whether what follows is a stretch out of its place: behind it the records go on from before it."""
+        """Tell whether the records that follow are merely a stretch out of its place.
+
+        Behind it the records go on from before it.
+        """
         start, raw_top_ns = self.runs[number].first_ns, level.top_ns - level.added_ns
         behind = [one for one in long if one >= number]
         for one, other in pairwise(behind):
@@ -288,14 +305,14 @@ class _Walk:
         return Wrap(run.first_index, *known, middle_ns, *mixed)
 
     def _until(self, number: int, top_ns: int) -> int:
-        """The end of what follows a wrap without another step back."""
+        """Return the end of what follows a wrap without another step back."""
         for one, other in pairwise(self.runs[number:]):
             if other.first_ns < one.last_ns - LEAST_NS and one.last_ns < top_ns - _LATE_NS:
                 return other.first_index
         return LAST_RECORD
 
     def _late_until(self, number: int, top_ns: int) -> int:
-        """The last record of the time before a wrap that stands behind it."""
+        """Return the last record behind a wrap whose time is from before it."""
         until = self.runs[number].first_index
         for run in self.runs[number:]:
             if run.first_ns >= top_ns - _LATE_NS:
@@ -306,13 +323,13 @@ class _Walk:
 
 
 def _is_near_multiple(step_ns: int, unit_ns: int) -> bool:
-    """Whether a step is a multiple of a unit, to 5 s, and no zero."""
+    """Tell whether a step is a multiple of a unit, to 5 s, and not zero."""
     times = round(step_ns / unit_ns)
     return times != 0 and abs(step_ns - times * unit_ns) <= 5 * NS_PER_S
 
 
 def _wrap_of(before_ns: int, after_ns: int) -> tuple[int, str] | None:
-    """What a counter starts again at, and what kind it is; None where the step is no wrap.
+    """Return the value at which a counter wraps, and its kind; None if the step is no wrap.
 
     Examples
     --------
@@ -327,7 +344,9 @@ def _wrap_of(before_ns: int, after_ns: int) -> tuple[int, str] | None:
 
 
 def _week_wrap(before_ns: int, after_ns: int) -> tuple[int, str] | None:
-    """The same of UTC that a receiver made from a GPS week of 10 or 13 bits: the leap seconds are those of two days.
+    """Return the wrap of UTC that a receiver made from a GPS week of 10 or 13 bits.
+
+    It has the form of :func:`_wrap_of`. The leap seconds are those of two days.
 
     Examples
     --------
@@ -348,7 +367,10 @@ def _week_wrap(before_ns: int, after_ns: int) -> tuple[int, str] | None:
 
 
 def _moduli() -> tuple[tuple[int, str], ...]:
-    """Counters of 24, 32 and 48 bits by their ticks, of a day and of a week; those that last less than a minute not."""
+    """List counters of 24, 32 and 48 bits by their ticks, and those of a day and of a week.
+
+    Counters that last less than a minute are left out.
+    """
     names = {100: "100 ns", 1_000: "1 µs", 10_000: "10 µs", 100_000: "0.1 ms", 1_000_000: "1 ms", 10_000_000: "10 ms"}
     found = [
         ((1 << bits) * tick, f"counter of {bits} bits and {name}")

@@ -1,4 +1,4 @@
-"""The rhythm of a topic: its usual step in time, whether that is a period, and the gaps by it."""
+"""Rhythm of a topic: its usual step in time, whether that is a period, and its gaps."""
 
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -12,14 +12,14 @@ from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock_steps import quantile
 from groundstation.integrity.limits import GapLimits, RhythmLimits, Thresholds
 
-MOST_STEPS = 10_000  # of which a typical step is taken
+MOST_STEPS = 10_000  # steps from which a typical step is taken
 WHOLE = 0.2  # periods that a step may be off a whole number of them
 MOST_SKIPPED = 10.0  # periods: a longer step that is no gap explains nothing
 
 
 @dataclass(frozen=True)
 class Rhythm:
-    """How a topic's times follow each other.
+    """Steps between the times of a topic.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Rhythm:
         return min(1.0, (self.ahead + 1) / expected)
 
     def gaps(self, topic: str, time_ns: Int64Array) -> Gaps:
-        """Steps that are too long, by the times that the steps are of."""
+        """Return the steps that are too long, for the times that the steps are of."""
         if not self.has_gaps:
             return Gaps(topic, np.zeros(0, dtype=np.int64), np.zeros(0))
         before = np.flatnonzero(self.steps_ns > _longest_ns(self.period_ns, self.limits))
@@ -83,7 +83,7 @@ def _longest_ns(period_ns: float, limits: GapLimits) -> float:
 
 
 def _is_sporadic(topic: str, rhythm: Rhythm, long_ns: float, limits: RhythmLimits) -> bool:
-    """Whether a topic is written when something happens."""
+    """Tell whether a topic is written only when something happens."""
     if any(fnmatchcase(topic, pattern) for pattern in limits.sporadic_topics):
         return True
     if is_canonical(topic):
@@ -96,7 +96,7 @@ def _is_sporadic(topic: str, rhythm: Rhythm, long_ns: float, limits: RhythmLimit
 
 
 def _is_unexplained(rhythm: Rhythm, limits: RhythmLimits) -> bool:
-    """Whether more is missing than gaps explain: then the usual step is not the period."""
+    """Tell whether more is missing than gaps explain: then the usual step is not the period."""
     coverage = rhythm.coverage
     if 1.0 - coverage <= limits.unexplained:
         return False

@@ -1,4 +1,4 @@
-"""Sequence loss: what record counters and the recorder's own counters of losses say is missing."""
+"""Lost records by record counters and by the recorder's own counters of losses."""
 
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -19,7 +19,7 @@ _WRAPS = (1 << 8, 1 << 16, 1 << 24, 1 << 32, 1 << 48)
 
 @dataclass(frozen=True)
 class Sequence:
-    """What one counter says.
+    """Losses that one counter shows.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Sequence:
     places: tuple[tuple[int, int], ...] = ()
 
     def entry(self, clock: ClockModel) -> CounterEntry:
-        """What is kept of it."""
+        """Return the form to keep."""
         return CounterEntry(
             field=self.field,
             kind=self.kind,
@@ -57,7 +57,7 @@ class Sequence:
 
 @dataclass
 class Counter:
-    """Follows one field batch by batch."""
+    """Counter in one field, followed batch by batch."""
 
     name: str
     counts_losses: bool
@@ -71,7 +71,7 @@ class Counter:
     places: list[tuple[Place, int]] = field(default_factory=list)
 
     def add(self, column: Column, record_index: Int64Array, device_ns: Int64Array) -> None:
-        """Go on with a batch."""
+        """Continue with a batch."""
         values = column.values
         if values.dtype.kind not in "uif":
             return
@@ -99,7 +99,7 @@ class Counter:
             self.places.append((Place(int(index[at]), int(device[at])), int(step[at]) - usual))
 
     def sequence(self, clock: ClockModel) -> Sequence | None:
-        """What it says; None when it is no counter after all."""
+        """Return the losses that the counter shows; None when it is no counter after all."""
         if self.first is None:
             return None
         if not self.counts_losses and (
@@ -113,7 +113,7 @@ class Counter:
 
 
 def _unwrapped(count: Int64Array, before: int, longest_jump: int) -> Int64Array:
-    """Steps of a counter; one that begins again at the end of 8, 16, 24, 32 or 48 bits goes on."""
+    """Return the steps of a counter; one that wraps at 8, 16, 24, 32 or 48 bits goes on."""
     previous = np.concatenate(([before], count[:-1]))
     step = count - previous
     for wrap in _WRAPS:
@@ -137,5 +137,8 @@ def counters_of(batch: RecordBatch, limits: SequenceLimits) -> dict[str, Counter
 
 @lru_cache(maxsize=8)
 def _loss_fields(limits: SequenceLimits) -> frozenset[str]:
-    """Fields of the patterns of loss counters: what follows the last dot, which no wildcard stands for."""
+    """Return the fields of the patterns of loss counters.
+
+    That is what follows the last dot, for which no wildcard stands.
+    """
     return frozenset(pattern.rpartition(".")[2] for pattern in limits.loss_counters)

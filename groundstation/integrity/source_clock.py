@@ -1,4 +1,4 @@
-"""The clock of a source: one model where it holds one power-up; else one of each, side by side in one model."""
+"""Clock of a source: one model, made of one part for each power-up."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -50,7 +50,10 @@ class PowerUpClock:
 
 @dataclass(frozen=True)
 class Found:
-    """What a pass over a source gave: its header, further logs that begin in it, places and times, other clocks."""
+    """Results of a pass over a source.
+
+    They are its header, further logs that begin in it, places and times, other clocks.
+    """
 
     header: LogHeader
     new_logs: tuple[NewLog, ...]
@@ -74,7 +77,7 @@ class Found:
 
 
 def clock_of(found: Found, limits: Thresholds) -> tuple[ClockModel, tuple[PowerUpClock, ...]]:
-    """Model the clock of a source; the second value has its power-ups where there are several.
+    """Model the clock of a source; also return its power-ups where there are several.
 
     A source is looked at for them where its clock steps back, is out of order, is silent for an hour, or another log
     begins in it.
@@ -111,7 +114,10 @@ def _whole(found: Found, limits: Thresholds, offsets: ClockOffsets | None = None
 
 
 def _set_by_another(found: Found, limits: Thresholds, offsets: ClockOffsets) -> ClockModel:
-    """The model for times as the device wrote them, from one for times as another clock sets them."""
+    """Return the model for times as the device wrote them, set by another clock of the log.
+
+    It is made from the model for times that the other clock has set.
+    """
     clock = _whole(found, limits, offsets)
     return clock.on(offsets, clock.first_device_ns - int(offsets.offsets_ns[0])) if clock.has_times else clock
 
@@ -119,7 +125,10 @@ def _set_by_another(found: Found, limits: Thresholds, offsets: ClockOffsets) -> 
 def _counting_clock(
     windows: Iterable[Window], is_long: bool, zero_ns: int | None, settings: CountingSettings
 ) -> ClockModel:
-    """The model of a counting clock; of a long log only the records that have a say are laid together."""
+    """Estimate the model of a counting clock.
+
+    In a long log only the records that matter are laid together.
+    """
     thinner = Thinner(round(settings.tolerance_s * NS_PER_S), settings.run_records)
     kept_ones: list[Window] = []
     for index, time, frozen in windows:
@@ -159,7 +168,10 @@ def _evidence(found: Found, clock: ClockModel) -> Evidence:
 
 
 def _most_step_back(found: Found, place: int, middle_ns: int) -> bool:
-    """Whether most of the topics that are in the second half of a power-up go back at its end, each by itself."""
+    """Tell whether most topics go back, each by itself, at the end of a power-up.
+
+    Only topics in the second half of the power-up count.
+    """
     back = on = late = 0
     for several in found.topics:
         before_ns, behind_ns = _around(found.places, several, place)
@@ -173,7 +185,7 @@ def _most_step_back(found: Found, place: int, middle_ns: int) -> bool:
 
 
 def _around(places: Places, several: Sequence[Kept], place: int) -> tuple[int | None, int | None]:
-    """The last time of a topic before a place, and the first one from there on."""
+    """Return the last time of a topic before a place, and the first one from there on."""
     before_ns = behind_ns = None
     for kept in several:
         if kept.last < place:
@@ -194,17 +206,21 @@ def _around(places: Places, several: Sequence[Kept], place: int) -> tuple[int | 
 
 
 def _read_zero(found: Found, first: int, end: int) -> int | None:
-    """UTC of device time zero by what the reader, or else another clock of the log, tells between two records."""
+    """Return UTC of device time zero by the readings between two records.
+
+    They are the reader's, or else those of another clock of the log.
+    """
     readings = found.header.utc_readings
     zeros = readings.between(first, end) if readings is not None else found.references.zeros_ns(first, end)
     return int(zeros[len(zeros) // 2]) if len(zeros) else None
 
 
 def _zero_of(part: PowerUp, found: Found, before_ns: int | None, *, is_alone: bool) -> int | None:
-    """UTC of device time zero of one power-up; of a clock that tells UTC it is zero for all.
+    """Return UTC of device time zero of one power-up.
 
-    What a header says is of the first log in the source; what a reader read of all of a source fits none of several.
-    A counter that is ahead of the one before (whose zero is ``before_ns``) is taken for the same.
+    It is 0 for all power-ups where the device's own time is UTC. A header speaks for the first log in the source;
+    readings over a whole source fit none of several power-ups. A counter that is ahead of the one before (whose zero is
+    ``before_ns``) is taken for the same.
     """
     header = found.header
     if header.utc_of_zero_ns == 0:
@@ -220,7 +236,7 @@ def _zero_of(part: PowerUp, found: Found, before_ns: int | None, *, is_alone: bo
 
 
 def _of(part: PowerUp, found: Found, limits: Thresholds, zero_ns: int | None) -> tuple[ClockModel, PowerUpClock]:
-    """The model of one power-up by the device's own times, and what is known of it."""
+    """Model one power-up by the device's own times; also return what is known of it."""
     header = found.header
     if header.has_counting_clock:
         clock = _counting_clock(found.windows(part), found.places.is_long, zero_ns, limits.counting_clock)
@@ -245,7 +261,10 @@ def _ends(clock: ClockModel, window: Window) -> tuple[int, int]:
 
 
 def _with_mixed(clock: ClockModel, part: PowerUp, window: Window) -> ClockModel:
-    """The model with the records placed that stand mixed with those behind a wrap: their place does not tell them."""
+    """Return the model with records placed one by one where both sides of a wrap are mixed.
+
+    Their place in the log does not tell on which side they are.
+    """
     index, time, _frozen = window
     is_mixed = np.zeros(len(index), dtype=bool)
     for wrap in part.wraps:
@@ -258,7 +277,7 @@ def _with_mixed(clock: ClockModel, part: PowerUp, window: Window) -> ClockModel:
 
 
 def _wrapped(clock: ClockModel, part: PowerUp) -> ClockModel:
-    """The model for times as the device wrote them, from one for a counter without an end."""
+    """Return the model for times as the device wrote them, from that of a counter without end."""
     starts = np.unique(np.concatenate((clock.starts, [wrap.record_index for wrap in part.wraps])).astype(np.int64))
     offsets = ClockOffsets(clock.starts, clock.offsets_ns).at(starts)
     for wrap in part.wraps:
@@ -270,7 +289,7 @@ def _wrapped(clock: ClockModel, part: PowerUp) -> ClockModel:
 def _beside(
     several: Sequence[tuple[ClockModel, PowerUpClock]],
 ) -> tuple[ClockModel, tuple[PowerUpClock, ...]]:
-    """One model of several power-ups: those without UTC are laid behind the one before them."""
+    """Join the models of several power-ups; those without UTC follow the one before them."""
     timed = [(clock, known) for clock, known in several if clock.has_times]
     if len(timed) < 2:
         return (timed or list(several))[0][0], ()
@@ -304,7 +323,10 @@ def _beside(
 
 
 def _shifts(known: Sequence[PowerUpClock]) -> list[int]:
-    """What each power-up is moved by, so that those without UTC stand behind the one before, or before the first."""
+    """Return the shift of each power-up that brings those without UTC in order.
+
+    Each stands behind the one before it, or before the first.
+    """
     anchor = next((number for number, one in enumerate(known) if one.is_absolute), 0)
     shifts = [0] * len(known)
     for number in range(anchor + 1, len(known)):

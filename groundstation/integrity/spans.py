@@ -1,4 +1,4 @@
-"""Where damage lies: spans of time in which data was lost or is wrong, and spans of bytes that were skipped."""
+"""Spans of damage: time in which data was lost or is wrong, and bytes that were skipped."""
 
 import re
 from collections.abc import Sequence
@@ -20,7 +20,10 @@ _TIMES = re.compile(r", (\d{4}-\S+Z) to (\d{4}-\S+Z): ")
 
 
 class Dropout(NamedTuple):
-    """The recorder could not write: corrected time of the newest record before, and for how long."""
+    """Time in which the recorder could not write.
+
+    It has the corrected time of the newest record before it, and its length.
+    """
 
     start_ns: int
     length_s: float
@@ -53,7 +56,10 @@ class Span:
     count: int
 
     def entry(self, clock: ClockModel, zero_ns: int) -> DamagedSpan:
-        """What is kept of it; ``start_s`` counts from the first record of the log, as flight time does."""
+        """Return the form to keep.
+
+        ``start_s`` counts from the first record of the log, as flight time does.
+        """
         return DamagedSpan(
             cause=self.cause,
             topic=self.topic,
@@ -75,12 +81,15 @@ class Timeline:
 
     @classmethod
     def of(cls, index: Int64Array, device_ns: Int64Array, clock: ClockModel) -> "Timeline":
-        """From rows in any order."""
+        """Make a timeline from rows in any order."""
         index, first = np.unique(index, return_index=True)
         return cls(frozen(index), frozen(clock.time_ns(index, Column(device_ns[first]))))
 
     def around(self, first: int, last: int) -> tuple[int, int] | None:
-        """Times of the row before ``first`` and of the row after ``last``; of the log's ends beyond them."""
+        """Return the times of the row before ``first`` and of the row after ``last``.
+
+        Beyond the ends of the log they are the times of these ends.
+        """
         if not len(self.index):
             return None
         before = max(0, int(np.searchsorted(self.index, first)) - 1)
@@ -90,7 +99,7 @@ class Timeline:
 
 
 def spans_of(damages: Sequence[Damage], dropouts: Sequence[Dropout], timeline: Timeline, end_ns: int) -> list[Span]:
-    """Spans of what the reader lost, where their place in time is known.
+    """Return the spans of what the reader lost, where their place in time is known.
 
     Rows of a table, and bytes of a binary log that were skipped, lie between the records around them; what the end of a
     file cuts off lies at the end of the log.
@@ -115,7 +124,7 @@ def _ms(dropout: Dropout) -> int:
 
 
 def _times(damage: Damage, timeline: Timeline, end_ns: int) -> tuple[tuple[int, int] | None, bool]:
-    """When, and whether all of it."""
+    """Return the time of damage, and whether all within it is damaged."""
     rows, stated = _ROWS.search(damage.place), _TIMES.search(damage.what)
     if damage.between_records is not None:
         before, behind = damage.between_records
@@ -131,7 +140,7 @@ def _times(damage: Damage, timeline: Timeline, end_ns: int) -> tuple[tuple[int, 
 
 
 def skipped_bytes(damages: Sequence[Damage]) -> tuple[int, tuple[tuple[int, int, int], ...]]:
-    """Bytes that no record was made of: how many together, and the spans as (first, last, bytes)."""
+    """Count the bytes that no record was made of, and list their spans (first, last, bytes)."""
     spans = []
     for damage in damages:
         place = _BYTES.search(damage.place)
@@ -142,6 +151,6 @@ def skipped_bytes(damages: Sequence[Damage]) -> tuple[int, tuple[tuple[int, int,
 
 
 def truncation(damages: Sequence[Damage]) -> Truncation | None:
-    """Where the log is cut: place, what is lost of it, how many; None when it is whole."""
+    """Return the place where the log is cut and how much is lost; None when it is whole."""
     cut = next((damage for damage in damages if damage.kind == "truncated"), None)
     return None if cut is None else Truncation(place=cut.place, what=cut.what, count=cut.count)

@@ -1,4 +1,7 @@
-"""Stretches in which a field does not change, found batch by batch, and where records stand in time."""
+"""Stretches in which a field does not change, and places of records in time.
+
+They are found batch by batch.
+"""
 
 from typing import Any, NamedTuple
 
@@ -9,24 +12,24 @@ from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.integrity.clock import ClockModel
 
 MOST_STRETCHES = 512  # kept of a field: the longest
-CHANGES_MEASURED = 512  # of a batch
+CHANGES_MEASURED = 512  # number of changes of a batch that are measured
 FloatArray = NDArray[np.float64]
 
 
 class Place(NamedTuple):
-    """Where a record stands: its number in the source, and its device time (0 where it has none)."""
+    """Place of a record: its number in the source, and its device time (0 if it has none)."""
 
     record_index: int
     device_ns: int
 
     def time_ns(self, clock: ClockModel) -> int:
-        """Its corrected time."""
+        """Return the corrected time of the record."""
         time = clock.time_ns(np.array([self.record_index]), Column(np.array([self.device_ns], dtype=np.int64)))
         return int(time[0])
 
 
 class Stretch(NamedTuple):
-    """Samples in a row with one value: the first, the last, how many."""
+    """Consecutive samples with one value: the first, the last, their number."""
 
     first: Place
     last: Place
@@ -47,7 +50,7 @@ _STRETCH = np.dtype(
 
 
 class Constancy:
-    """How long a field keeps its value.
+    """Lengths of the stretches over which a field keeps its value.
 
     Attributes
     ----------
@@ -67,7 +70,10 @@ class Constancy:
     def add(
         self, values: FloatArray, record_index: Int64Array, device_ns: Int64Array, rows: Int64Array | None = None
     ) -> None:
-        """Go on with more samples, all of them finite; ``rows`` of the batch they stand in, all of it without."""
+        """Add more samples, all finite.
+
+        ``rows`` are their rows in the batch; without them, the samples are all of it.
+        """
         count = len(values)
         if not count:
             return
@@ -96,7 +102,7 @@ class Constancy:
             self.resolution = min(self.resolution or smallest, smallest)
 
     def stretches(self) -> list[Stretch]:
-        """The long ones, in the order of the log."""
+        """Return the long stretches, in the order of the log."""
         self._keep(self._open)
         self._open = self._open[:0]
         kept = np.concatenate((self._open, *self._kept))
@@ -119,7 +125,7 @@ class Constancy:
 
 
 def _ends_and_long(differs: BoolArray, changes: int, min_samples: int) -> tuple[Int64Array, Int64Array]:
-    """The first and the last stretch of some samples, and the long ones between: where they start and end."""
+    """Return starts and ends of the first, the last and the long stretches of some samples."""
     count = len(differs) + 1
     if changes == count - 1:  # every sample differs: the usual case of what is measured
         starts = np.array([0, count - 1] if count > 1 else [0])
@@ -132,7 +138,7 @@ def _ends_and_long(differs: BoolArray, changes: int, min_samples: int) -> tuple[
 
 
 class Sampler:
-    """Some rows of a topic, evenly spread however long it is: never more than ``most``."""
+    """Sample of a topic's rows, evenly spread: never more than ``most`` however long it is."""
 
     def __init__(self, most: int = 16_384) -> None:
         self._most, self._every, self._seen = most, 1, 0
@@ -140,7 +146,7 @@ class Sampler:
         self._count = 0
 
     def rows(self, count: int) -> slice:
-        """Which of the next rows are wanted."""
+        """Return the slice of the next rows that are wanted."""
         first = -self._seen % self._every
         self._seen += count
         return slice(first, None, self._every)
@@ -157,7 +163,7 @@ class Sampler:
             self._count, self._every = len(kept_index[::2]), 2 * self._every
 
     def all(self) -> tuple[Int64Array, dict[str, NDArray[Any]]]:
-        """Places and values of what is kept; NaN where a part lacks a field."""
+        """Return places and values of the kept rows; NaN where a part lacks a field."""
         if not self._parts:
             return np.zeros(0, dtype=np.int64), {}
         if len(self._parts) == 1:

@@ -1,4 +1,4 @@
-"""Stuck values: a field that keeps exactly one value while another source says that it must change.
+"""Stuck values: a field keeps one value while another source shows that it must change.
 
 Nothing is called stuck without a witness: a parked aircraft, a held slow channel and a constant are no damage.
 """
@@ -17,7 +17,7 @@ from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.limits import StuckLimits
 from groundstation.integrity.stretches import Constancy, FloatArray, Sampler, Stretch
 
-METRES_PER_DEG = 111_195.0  # of latitude, on a sphere: for a comparison with a hundred metres
+METRES_PER_DEG = 111_195.0  # metres per degree of latitude on a sphere: enough for a comparison with a hundred metres
 FINE = 1.05  # samples that a value lasts, on average, where a channel is finer than its noise
 
 _ALTITUDES = ("altitude_ellipsoid_m", "altitude_msl_m", "pressure_altitude_m")
@@ -37,7 +37,10 @@ _KINDS = ("ins", "gnss", "baro", "magnetometer")
 
 @dataclass(frozen=True)
 class Stuck:
-    """A stretch in which a field was stuck: place, corrected time, length, samples, value, and what says so."""
+    """Stretch in which a field was stuck.
+
+    It has its place, corrected time, length, samples, value, and the evidence.
+    """
 
     record_index: int
     start_ns: int
@@ -48,7 +51,7 @@ class Stuck:
 
 
 def is_watched(topic: str, name: str) -> bool:
-    """Whether a field may be found stuck."""
+    """Tell whether a field may be found stuck."""
     return name in WATCHED and kind_of(topic) in _KINDS
 
 
@@ -61,7 +64,7 @@ class _Seen(NamedTuple):
     values: FloatArray
 
     def within(self, stretch: Stretch) -> FloatArray:
-        """Finite values of the records inside a stretch."""
+        """Return the finite values of the records inside a stretch."""
         low = np.searchsorted(self.places, stretch.first.record_index)
         high = np.searchsorted(self.places, stretch.last.record_index, side="right")
         values = self.values[low:high]
@@ -69,7 +72,7 @@ class _Seen(NamedTuple):
 
 
 class Motion:
-    """What all sources say of the motion of the aircraft, thinned."""
+    """Motion of the aircraft by all sources, thinned."""
 
     def __init__(self) -> None:
         self._samplers: dict[str, Sampler] = {}
@@ -92,13 +95,16 @@ class Motion:
         sampler.put(np.array(batch.record_index[rows]), columns)
 
     def samples(self) -> Iterator[tuple[str, Int64Array, Int64Array, dict[str, FloatArray]]]:
-        """Topic by topic: places, device times and values, in the order of the log."""
+        """Yield places, device times and values topic by topic, in the order of the log."""
         for topic, sampler in sorted(self._samplers.items()):
             index, columns = sampler.all()
             yield topic, index, columns[_TIME], {name: one for name, one in columns.items() if name != _TIME}
 
     def sources(self) -> list[_Seen]:
-        """Every source of every quantity; speed and track from velocities where they are not logged."""
+        """Return every source of every quantity.
+
+        Speed and track are made from velocities where they are not logged.
+        """
         found = []
         for topic, sampler in sorted(self._samplers.items()):
             index, columns = sampler.all()
@@ -115,14 +121,14 @@ class Motion:
 
 
 class Judge:
-    """Tells stuck stretches from innocent ones."""
+    """Judge that tells stuck stretches from innocent ones."""
 
     def __init__(self, motion: Motion, clock: ClockModel, limits: StuckLimits) -> None:
         self._sources = motion.sources()
         self._clock, self._limits = clock, limits
 
     def stuck(self, topic: str, fields: dict[str, Constancy]) -> dict[str, tuple[Stuck, ...]]:
-        """Stuck stretches of a topic, by field."""
+        """Return the stuck stretches of a topic, by field."""
         long = {name: list(self._long(name, constancy)) for name, constancy in fields.items()}
         found = {}
         for name, stretches in long.items():
@@ -133,7 +139,7 @@ class Judge:
         return found
 
     def _long(self, name: str, constancy: Constancy) -> Iterator[Stretch]:
-        """Stretches that last, of a field that is not constant through the whole log."""
+        """Return the stretches that last, of a field that is not constant through the whole log."""
         times = self._limits.noise_times_usual if name in _NOISY else self._limits.times_usual
         for stretch in constancy.stretches() if constancy.changes else ():
             is_long = stretch.samples >= times * constancy.usual_samples(without=stretch)
@@ -153,7 +159,7 @@ class Judge:
     def _why(
         self, topic: str, name: str, stretch: Stretch, constancy: Constancy, long: dict[str, list[Stretch]]
     ) -> str:
-        """What says that the value should have changed; empty when nothing does."""
+        """Return the evidence that the value should have changed; empty when there is none."""
         if name in _NOISY:
             return self._why_noisy(stretch, constancy.usual_samples(without=stretch))
         least = self._limits.times_resolution * constancy.resolution
@@ -169,7 +175,10 @@ class Judge:
         return why or self._why_position(topic, name, stretch, enough_m, long)
 
     def _shrinks(self, name: str, stretch: Stretch) -> float:
-        """How much shorter a degree of longitude is than one of latitude."""
+        """Return the length of a degree of longitude over that of one of latitude.
+
+        It is 1 for the latitude itself.
+        """
         if name == "latitude_deg":
             return 1.0
         seen = [one.within(stretch) for one in self._sources if one.name == "latitude_deg"]
@@ -179,7 +188,7 @@ class Judge:
     def _why_elsewhere(
         self, topic: str, names: tuple[str, ...], stretch: Stretch, enough: float, unit: str, scale: float = 1.0
     ) -> str:
-        """The same quantity of another topic moves."""
+        """Return the evidence that the same quantity of another topic moves."""
         for seen in self._sources:
             if seen.name not in names or seen.topic == topic:
                 continue
@@ -190,7 +199,7 @@ class Judge:
         return ""
 
     def _slowest(self, topic: str, stretch: Stretch) -> tuple[str, float, float] | None:
-        """Source, least and mean speed meanwhile; of the topic itself where that is named."""
+        """Return source, least and mean speed during a stretch; of one topic where it is named."""
         for seen in self._sources:
             if seen.name == "ground_speed_mps" and topic in ("", seen.topic):
                 values = seen.within(stretch)
@@ -203,7 +212,7 @@ class Judge:
     def _why_position(
         self, topic: str, name: str, stretch: Stretch, enough_m: float, long: dict[str, list[Stretch]]
     ) -> str:
-        """Both coordinates stand still while the speed says that the aircraft moves."""
+        """Return the evidence that the aircraft moves while both coordinates stand still."""
         other = "longitude_deg" if name == "latitude_deg" else "latitude_deg"
         first, last = stretch.first.record_index, stretch.last.record_index
         both = any(one.first.record_index < last and one.last.record_index > first for one in long.get(other, ()))
@@ -214,7 +223,10 @@ class Judge:
         return f"the speed of {speed[0]} covers {moved_m:.0f} m meanwhile" if moved_m > enough_m else ""
 
     def _why_heading(self, topic: str, name: str, stretch: Stretch, least: float) -> str:
-        """Another heading or track turns; a track counts only where the aircraft moves."""
+        """Return the evidence that another heading or track turns.
+
+        A track counts only where the aircraft moves.
+        """
         moving = self._limits.moving_mps
         own = self._slowest(topic, stretch)
         if name == "track_deg" and (own is None or own[1] <= moving):
@@ -235,7 +247,10 @@ class Judge:
         return ""
 
     def _why_noisy(self, stretch: Stretch, usual: float) -> str:
-        """What is never still stands still, and the aircraft moves or nobody knows whether it does."""
+        """Return the evidence against a noisy value that stands still.
+
+        The aircraft moves, or nobody knows whether it does.
+        """
         speed = self._slowest("", stretch)
         if speed is None:
             return f"a value lasts {usual:.2f} samples otherwise" if usual <= FINE else ""

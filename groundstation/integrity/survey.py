@@ -27,7 +27,7 @@ from groundstation.integrity.source_clock import Found, PowerUpClock, clock_of
 
 @dataclass(frozen=True)
 class Survey:
-    """What one pass over a log tells.
+    """Results of one pass over a log.
 
     Parameters
     ----------
@@ -48,12 +48,12 @@ class Survey:
 
     @property
     def damages(self) -> tuple[Damage, ...]:
-        """What could not be read."""
+        """Records and bytes that could not be read."""
         return self.ledger.damages
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What the reader derived or assumed."""
+        """Remarks of the reader: values that it derived or assumed."""
         return self.ledger.remarks
 
     @property
@@ -63,7 +63,10 @@ class Survey:
 
 
 class _Order(NamedTuple):
-    """Times of validity of a topic in order, and how far from it its records were: lateness in nanoseconds, counts."""
+    """Times of validity of a topic in order, and the disorder of its records.
+
+    The disorder is lateness in nanoseconds, and counts of rows.
+    """
 
     valid_ns: Int64Array
     lateness_ns: int
@@ -97,7 +100,7 @@ def _order_of(places: Places, pieces: Sequence[Kept], clock: ClockModel) -> _Ord
 
 
 def survey(items: Iterable[Item], *, thresholds: Thresholds | None = None) -> Survey:
-    """Read a log once and say what is in it.
+    """Read a log once and report its contents.
 
     Parameters
     ----------
@@ -151,7 +154,10 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
 def _ledgers(
     places: Places, pieces: Mapping[str, Sequence[Kept]], contents: Contents, clock: ClockModel, limits: Thresholds
 ) -> list[tuple[TopicCounts, int]]:
-    """Ledgers and latenesses of all topics in alphabetical order; topics that are sampled together share theirs."""
+    """Return ledgers and latenesses of all topics in alphabetical order.
+
+    Topics that are sampled together share theirs.
+    """
     together: dict[tuple[int, ...], list[str]] = {}
     for topic, several in pieces.items():
         together.setdefault(tuple(kept.number for kept in several), []).append(topic)
@@ -173,7 +179,7 @@ def _ledgers(
 
 
 class Census:
-    """Ledger of records whose corrected time is known: what is in a store file."""
+    """Count of the records of a store file, whose corrected time is known."""
 
     def __init__(self, is_absolute: bool, thresholds: Thresholds | None = None, *, is_counting: bool = False) -> None:
         self._clock = ClockModel(is_absolute=is_absolute, is_counting=is_counting)
@@ -192,7 +198,7 @@ class Census:
         self._contents.add(batch, batch.time_ns)
 
     def ledger(self, damages: Sequence[Damage] = ()) -> LedgerCounts:
-        """The ledger of what is in the file; device order and device clock are not in it."""
+        """Return the ledger of the file; device order and device clock are not in it."""
         topics = [
             topic_ledger(
                 topic,

@@ -1,4 +1,4 @@
-"""Records of a counting clock that say nothing new: a clock that is estimated without them is the same.
+"""Thinning of the records of a counting clock that leaves its estimate the same.
 
 A long log has millions of records, each within the tolerance of the one before. Kept are those that
 :func:`groundstation.integrity.counting.estimate_counting_clock` has to see: without a time or frozen, their neighbours,
@@ -12,7 +12,7 @@ from groundstation.base.records import BoolArray, Int64Array
 
 
 class Thinner:
-    """Thins the windows of a log, which come in its order.
+    """Thinner of the windows of a log, which come in its order.
 
     Parameters
     ----------
@@ -26,7 +26,10 @@ class Thinner:
         self._steps: list[tuple[Int64Array, Int64Array]] = []
 
     def kept(self, time_ns: Int64Array, usable: BoolArray) -> BoolArray:
-        """Which records of a window are needed, shape (n,); ``usable`` are those with a time that is not frozen."""
+        """Tell which records of a window are needed, shape (n,).
+
+        ``usable`` are those with a time that is not frozen.
+        """
         places = np.flatnonzero(usable)
         if not len(places):
             return np.ones(len(usable), dtype=bool)
@@ -46,7 +49,7 @@ class Thinner:
 
     @property
     def period_ns(self) -> int:
-        """Median of the steps ahead between usable records of the windows that were thinned, 0 of none."""
+        """Median of the forward steps between usable records of the thinned windows; 0 of none."""
         if not self._steps:
             return 0
         steps, counts = (np.concatenate(parts) for parts in zip(*self._steps, strict=True))
@@ -58,7 +61,7 @@ class Thinner:
         return int(steps[order[middle]].sum()) // 2
 
     def _of_runs(self, time: Int64Array, steps: Int64Array) -> BoolArray:
-        """Beginnings of runs, both ends of the window, and what is late."""
+        """Select beginnings of runs, both ends of the window, and late records."""
         starts = np.concatenate(([0], np.flatnonzero(np.abs(steps) > self._tolerance_ns) + 1))
         lengths = np.diff(starts, append=len(time))
         kept: BoolArray = np.arange(len(time)) - np.repeat(starts, lengths) < self._run_records
@@ -72,7 +75,7 @@ class Thinner:
         return kept
 
     def _ahead(self, time: Int64Array, starts: Int64Array, lengths: Int64Array) -> BoolArray:
-        """Short runs that are later than the long ones around them allow: they make nothing late."""
+        """Select short runs later than the long ones around them allow: they make nothing late."""
         long = np.flatnonzero(lengths >= self._run_records)
         after = np.searchsorted(long, np.arange(len(starts)))
         is_between = (after > 0) & (after < len(long)) & (lengths < self._run_records)

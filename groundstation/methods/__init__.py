@@ -1,1 +1,4 @@
-"""Mathematics that several systems share: filters, fits, intervals; no files, no wall clock, no prints."""
+"""Mathematics that several systems share: filters, fits, intervals.
+
+No files, no wall clock, no prints.
+"""

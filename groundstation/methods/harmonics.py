@@ -1,4 +1,4 @@
-"""The five classical coefficients, with errors that allow for residuals correlated from sample to sample."""
+"""Five classical deviation coefficients, with errors that allow for correlated residuals."""
 
 import math
 from collections.abc import Callable
@@ -15,7 +15,7 @@ BANDWIDTH_SHARE = 0.1
 
 
 def design(heading_deg: FloatArray) -> FloatArray:
-    """Columns 1, sin c, cos c, sin 2c, cos 2c, shape (n, 5)."""
+    """Return the columns 1, sin c, cos c, sin 2c, cos 2c, shape (n, 5)."""
     rad = np.deg2rad(np.asarray(heading_deg, dtype=np.float64))
     return np.stack([np.ones_like(rad), np.sin(rad), np.cos(rad), np.sin(2 * rad), np.cos(2 * rad)], axis=-1)
 
@@ -23,9 +23,10 @@ def design(heading_deg: FloatArray) -> FloatArray:
 def fit(
     heading_deg: FloatArray, error_deg: FloatArray, weight: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Coefficients A to E, shape (5,), by weighted least squares, and their covariance, shape (5, 5).
+    """Fit the coefficients A to E, shape (5,), and their covariance, shape (5, 5).
 
-    Errors must not wrap: they are differences from a middle, not headings. Samples in order of time or of heading.
+    The fit is by weighted least squares. Errors must not wrap: they are differences from a middle, not headings.
+    Samples come in order of time or of heading.
 
     Examples
     --------
@@ -45,7 +46,10 @@ def fit(
 
 
 def fit_to(heading_deg: FloatArray) -> Callable[[FloatArray], FloatArray]:
-    """What gives the coefficients of :func:`fit` alone, shape (5,), for many errors on the same headings."""
+    """Return a function that gives the coefficients of :func:`fit` alone, shape (5,).
+
+    It serves many errors on the same headings.
+    """
     columns = design(heading_deg)
     bread = _bread(columns, columns)
     return lambda error_deg: bread @ (columns.T @ error_deg)
@@ -56,7 +60,9 @@ def _bread(columns: FloatArray, weighted: FloatArray) -> FloatArray:
 
 
 def autocorrelation(residual: FloatArray, parameters: int) -> float:
-    """Correlation of neighbours, in [0, 0.995], freed of the bias that fitting so many slow regressors makes.
+    """Return the correlation of neighbours, in [0, 0.995].
+
+    It is freed of the bias that fitting so many slow regressors makes.
 
     Source: M. G. Kendall, Biometrika 41 (1954) 403-404, whose (1 + 3 r) / n is that of a mean; k (1 + r) / n + 2 r / n
     here.
@@ -69,9 +75,10 @@ def autocorrelation(residual: FloatArray, parameters: int) -> float:
 
 
 def inflation(samples: int, parameters: int, correlation: float) -> float:
-    """Factor n / (n - k) on a variance, n the number of independent samples that correlated ones are worth; at most 4.
+    """Return the factor n / (n - k) on a variance, at most 4.
 
-    They are worth no more than the windows of :func:`long_run`, among which the parameters take theirs.
+    n is the number of independent samples that correlated ones are worth. They are worth no more than the windows of
+    :func:`long_run`, among which the parameters take theirs.
 
     Examples
     --------
@@ -84,11 +91,12 @@ def inflation(samples: int, parameters: int, correlation: float) -> float:
 
 
 def long_run(scores: FloatArray, correlation: float) -> FloatArray:
-    """Covariance of the sum of correlated scores, shape (n, k) -> (k, k): prewhitened, then with Bartlett weights.
+    """Return the covariance of the sum of correlated scores, shape (n, k) -> (k, k).
 
-    Scores are whitened by the first-order autocorrelation of the residuals, and the sum is recoloured by
-    1 / (1 - correlation)^2. What wanders below white noise does not show in the correlation of neighbours: the weights
-    reach over ``BANDWIDTH_SHARE`` of the samples at least. With them the covariance is that of sums over windows.
+    The scores are prewhitened, then summed with Bartlett weights. Scores are whitened by the first-order
+    autocorrelation of the residuals, and the sum is recoloured by 1 / (1 - correlation)^2. Wander below white noise
+    does not show in the correlation of neighbours, so the weights reach over ``BANDWIDTH_SHARE`` of the samples at
+    least. With them the covariance is that of sums over windows.
 
     Source: D. W. K. Andrews, J. C. Monahan, Econometrica 60 (1992) 953-966; W. K. Newey, K. D. West, Econometrica 55
     (1987) 703-708.
@@ -104,6 +112,6 @@ def long_run(scores: FloatArray, correlation: float) -> FloatArray:
 
 
 def _width(samples: int) -> int:
-    """Samples over which the weights reach."""
+    """Return the number of samples over which the weights reach."""
     lags: float = max(BANDWIDTH_FACTOR * samples ** (1.0 / 3.0), BANDWIDTH_SHARE * samples)
     return min(1 + math.ceil(lags), samples)

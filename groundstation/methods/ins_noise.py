@@ -1,4 +1,4 @@
-"""Noise parameters by INS class (TOML in ins_classes/): what the filter believes of gyros, GNSS and the start."""
+"""Noise parameters by INS class (TOML in ins_classes/): gyros, GNSS, initial errors."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -38,7 +38,7 @@ class GnssNoise:
     is_inflated: bool = True
 
     def averaged(self, samples: float) -> "GnssNoise":
-        """Noise of means of so many samples: the white part falls, the correlated part stays."""
+        """Return the noise of means of samples: the white part falls, the correlated part stays."""
         root = math.sqrt(samples)
         return replace(
             self,
@@ -70,7 +70,7 @@ def _variance(white: float, correlated: float, correlation_s: float, interval_s:
 
 @dataclass(frozen=True)
 class Calibration:
-    """What the filter's forecast sigma must be multiplied by at each horizon, and how sure that is.
+    """Factors on the filter's forecast sigma at each horizon, and their weight.
 
     ``scale`` belongs to ``horizon_min``; found on simulated flights of the class. ``bank_scale`` is that of the bank's
     mixture, ``coupled_scale`` that of the coupled model; left out, they are one. ``weight`` is what it counts against
@@ -100,7 +100,10 @@ class Calibration:
             raise SettingsError("horizon_min", str(list(self.horizon_min)), "growing numbers")
 
     def at(self, lead_s: FloatArray, of: ScaleName = "separate") -> FloatArray:
-        """Scale at other lead times (linear in the logarithm of the lead, held beyond the ends)."""
+        """Return the scale at other lead times.
+
+        It is linear in the logarithm of the lead, and held beyond the ends.
+        """
         scale = {"separate": self.scale, "bank": self.bank_scale, "coupled": self.coupled_scale}[of]
         lead_min = np.maximum(np.asarray(lead_s, dtype=np.float64) / 60.0, 1e-3)
         return np.asarray(np.interp(np.log(lead_min), np.log(self.horizon_min), scale))
@@ -108,7 +111,7 @@ class Calibration:
 
 @dataclass(frozen=True)
 class BankFactors:
-    """Factors of the sets of a bank on the noise of their class; every combination is a set.
+    """Factors on the noise of a class for the sets of a bank; every combination is a set.
 
     ``random_drift`` and ``random_drift_correlation`` go together, one to one.
     """
@@ -139,11 +142,12 @@ class BankFactors:
 
 @dataclass(frozen=True)
 class InsNoise:
-    """Noise parameters of an INS class. Initial sigmas, then what the white noises add per square root of time.
+    """Noise parameters of an INS class.
 
-    ``random_drift_dph`` and ``random_drift_correlation_s`` are the stationary sigma and correlation time (1 / beta) of
-    the random drift. Of the coupled model alone: ``azimuth_deg`` is the initial sigma of the azimuth,
-    ``accelerometer_ug`` that of accelerometer biases, which turn with the body where ``is_strapdown``.
+    They are initial sigmas, then what the white noises add per square root of time. ``random_drift_dph`` and
+    ``random_drift_correlation_s`` are the stationary sigma and correlation time (1 / beta) of the random drift. Two are
+    of the coupled model alone: ``azimuth_deg`` is the initial sigma of the azimuth, ``accelerometer_ug`` that of
+    accelerometer biases, which turn with the body where ``is_strapdown``.
     """
 
     name: str = DEFAULT_CLASS
@@ -226,9 +230,10 @@ def load_class(name: str) -> InsNoise:
 
 
 def choose_class(asked_for: str, aircraft_class: str = "", logged_class: str = "") -> tuple[InsNoise, str]:
-    """Noise parameters: of the settings, else of the aircraft file, else of the log, else navigation; and who chose.
+    """Choose the noise parameters, and tell who chose them.
 
-    A log may name any INS: of its names only those of shipped classes are taken.
+    They are those of the settings, else of the aircraft file, else of the log, else navigation. A log may name any INS:
+    of its names only those of shipped classes are taken.
 
     Raises
     ------

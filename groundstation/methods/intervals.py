@@ -7,7 +7,9 @@ from groundstation.base.quantiles import chi_square_quantile, share_quantile
 
 
 def share_interval(inside: float, checks: float, confidence: float = 0.95) -> tuple[float, float]:
-    """Exact interval of a share; of correlated checks both numbers are effective ones.
+    """Return the exact interval of a share.
+
+    For correlated checks, both numbers are effective ones.
 
     Source: Clopper, Pearson, Biometrika 26 (1934), 404-413.
 
@@ -25,7 +27,9 @@ def share_interval(inside: float, checks: float, confidence: float = 0.95) -> tu
 
 
 def nees_limits(freedom: int, independent: int, share: float = 0.95) -> tuple[float, float]:
-    """Limits of the mean of ``independent`` normalised squared errors of ``freedom`` degrees: ``share`` lie inside.
+    """Return the limits of the mean of ``independent`` normalised squared errors.
+
+    Each has ``freedom`` degrees of freedom; ``share`` of the means lie inside.
 
     Examples
     --------
@@ -41,10 +45,11 @@ def nees_limits(freedom: int, independent: int, share: float = 0.95) -> tuple[fl
 
 
 def effective_samples(values: FloatArray, about: float | None = None) -> float:
-    """Number of independent samples that give the mean the same variance: n / (1 + 2 sum of autocorrelations).
+    """Return the number of independent samples that give the mean the same variance.
 
-    The sum ends at the first pair of lags whose sum is not positive. ``about`` is the true mean where it is known, else
-    that of the samples: errors that are claimed to have none are one another's repetition where they share one.
+    It is n / (1 + 2 sum of autocorrelations). The sum ends at the first pair of lags whose sum is not positive.
+    ``about`` is the true mean where it is known, else that of the samples: errors that are claimed to have none are one
+    another's repetition where they share one.
 
     Source: C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992), section 3.3 (initial
     positive sequence).
@@ -64,7 +69,7 @@ def effective_samples(values: FloatArray, about: float | None = None) -> float:
 
 
 def slope_through_origin(hours: FloatArray, error: FloatArray, weight: FloatArray) -> float:
-    """Time-position fit: error = slope times hours by least squares.
+    """Fit error = slope times hours by least squares.
 
     Examples
     --------

@@ -1,4 +1,6 @@
-"""Steps of linear error models: transition and noise, and the dynamics of an aircraft in a local frame.
+"""Steps of linear error models, and the dynamics of an aircraft in a local frame.
+
+A step is a transition and its noise.
 
 Source: Van Loan, Computing integrals involving the matrix exponential, IEEE Transactions on Automatic Control 23(3),
 1978 (the integral of exp(F s) Q exp(F' s); both are summed as power series here: their terms follow from one
@@ -11,7 +13,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.compile import in_place
 
 TERMS, FEWEST_TERMS = 40, 4
-SMALLEST = 1e-16  # of a term of the transition: its largest entry is 1 or more
+SMALLEST = 1e-16  # smallest term of the transition, whose largest entry is 1 or more
 ROOMS = 11  # matrices of n by n that a step works in; the last three keep the last step of aircraft in a local frame
 
 
@@ -19,10 +21,10 @@ ROOMS = 11  # matrices of n by n that a step works in; the last three keep the l
 def fill_step(
     n: int, F: FloatArray, q: FloatArray, step_s: float, phi: FloatArray, noise: FloatArray, room: FloatArray
 ) -> None:
-    """Transition and covariance of the noise of a step of dx/dt = F x + w; entries of F that are zero cost nothing.
+    """Fill transition and noise covariance of a step of dx/dt = F x + w.
 
-    Phi = sum (F h)^k / k!; Q = sum L_k h^(k+1) / (k+1)! with L_0 = diag(q), L_(k+1) = F L_k + L_k F'. A step may go
-    back; then the noise means nothing.
+    Entries of F that are zero cost nothing. Phi = sum (F h)^k / k!; Q = sum L_k h^(k+1) / (k+1)! with L_0 = diag(q),
+    L_(k+1) = F L_k + L_k F'. A step may go back; then the noise means nothing.
     """
     term, level, moved = room[0], room[1], room[2]
     for i in range(n):
@@ -53,7 +55,7 @@ def fill_step(
 
 @in_place
 def _times(n: int, F: FloatArray, matrix: FloatArray, product: FloatArray) -> None:
-    """product <- F matrix."""
+    """Multiply: product <- F matrix."""
     for i in range(n):
         for j in range(n):
             product[i, j] = 0.0

@@ -9,7 +9,10 @@ EDGE_S = 1e-6  # a sample at the very edge of a window belongs to it
 
 
 def window_bounds(at: FloatArray, time_s: FloatArray, window_s: float) -> tuple[IndexArray, IndexArray]:
-    """First index and one past the last of the samples within half a window of each time, shapes as ``at``."""
+    """Return first index and one past the last of the samples around each time.
+
+    They lie within half a window of it. The shapes are that of ``at``.
+    """
     low = np.searchsorted(time_s, at - 0.5 * window_s - EDGE_S)
     return low, np.searchsorted(time_s, at + 0.5 * window_s + EDGE_S)
 

@@ -1,1 +1,4 @@
-"""Plots told once, without a painter: page, paper, recording and notebook draw the same description."""
+"""Descriptions of plots, without a painter.
+
+Page, paper, recording and notebook draw the same description.
+"""

@@ -1,4 +1,7 @@
-"""Axes that many plots have: flight time, whole or broken, and lines across a panel at zero."""
+"""Axes that many plots have: flight time, whole or broken, and zero lines.
+
+Zero lines run across a panel.
+"""
 
 from collections.abc import Sequence
 
@@ -10,7 +13,7 @@ ZERO = Limit(value=0.0, role="faint", dash="", emphasis="faint")
 
 
 def time_axis(low: float, high: float) -> Axis:
-    """Axis of flight time between two moments; a second about one alone.
+    """Return the axis of flight time between two moments; one second about a single moment.
 
     Examples
     --------
@@ -22,7 +25,10 @@ def time_axis(low: float, high: float) -> Axis:
 
 
 def broken_time_axis(windows: Sequence[tuple[float, float]]) -> Axis:
-    """Axis of flight time that shows some spans alone; its title is that of the longest."""
+    """Return an axis of flight time that shows some spans alone.
+
+    Its title is that of the longest span.
+    """
     longest = max(windows, key=lambda span: span[1] - span[0])
     return Axis(_title(longest[1]), "time", windows[0][0], windows[-1][1], windows=tuple(windows))
 

@@ -1,4 +1,4 @@
-"""Ends of the axes of a panel: those of all that is drawn, rows with names, windows."""
+"""Ends of the axes of a panel, from all that is drawn, from named rows, or from windows."""
 
 from collections.abc import Sequence
 
@@ -24,11 +24,13 @@ from groundstation.plots.plot import Panel
 from groundstation.plots.ranges import finite
 from groundstation.plots.scales import NO_PLACES, Span, span_of
 
-ABOVE_ROWS, BELOW_ROWS = 0.6, 0.6  # of a row, before the first and behind the last
+ABOVE_ROWS, BELOW_ROWS = 0.6, 0.6  # share of a row before the first and behind the last
 
 
 def edges(centres: Floats) -> Floats:
-    """Edges of cells about their places: half way between these; one more than places.
+    """Return the edges of cells about their places, halfway between these.
+
+    There is one more than places.
 
     Examples
     --------
@@ -91,7 +93,10 @@ def _y_of(mark: AnyMark) -> Floats:
 
 
 def names_of(panel: Panel) -> tuple[tuple[float, str], ...]:
-    """Places of the vertical axis that have a name: the axis' own, else the lanes of what stands on it."""
+    """Return the places of the vertical axis that have a name.
+
+    The names are the axis' own, else the lanes of what stands on it.
+    """
     lanes = sorted((mark.order for mark in panel.marks if isinstance(mark, Lanes)), key=len)
     return panel.y.names or tuple((float(place), name) for place, name in enumerate(lanes[-1] if lanes else ()))
 
@@ -123,7 +128,10 @@ def y_span(panel: Panel) -> Span:
 
 
 def x_span(panel: Panel, drawn: Floats) -> Span:
-    """Ends of the horizontal axis; ``drawn`` are those of what stands on it and on panels that share it."""
+    """Return the ends of the horizontal axis.
+
+    ``drawn`` are those of what stands on it and on panels that share it.
+    """
     axis = panel.x
     return span_of(
         axis.scale,
@@ -140,7 +148,10 @@ def _is_grid(panel: Panel) -> bool:
 
 
 def windows_of(panel: Panel, span: Span) -> tuple[Span, ...]:
-    """The spans of the horizontal axis that have a frame each: one, or the windows of a broken axis."""
+    """Return the spans of the horizontal axis that have a frame each.
+
+    There is one, or the windows of a broken axis.
+    """
     known = [(low, high) for low, high in panel.x.windows if np.isfinite([low, high]).all() and high > low]
     if not known:
         return (span,)
@@ -148,7 +159,7 @@ def windows_of(panel: Panel, span: Span) -> tuple[Span, ...]:
 
 
 def equal(x: Span, y: Span, width_pt: float, height_pt: float) -> tuple[Span, Span]:
-    """Both axes of a map at one scale: the one that has room to spare is shown farther.
+    """Bring both axes of a map to one scale; the one with room to spare shows more.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What stands on a panel: curves, dots, bands, lanes, limits and the rest, each with a role in place of a colour.
+"""Marks on a panel: curves, dots, bands, lanes, limits, each with a role for its colour.
 
 Every array has one dimension unless said otherwise; NaN is a gap. A mark without a name is left out of the legend.
 """
@@ -39,13 +39,13 @@ Role = Literal[
     "series 7",
 ]
 SERIES: tuple[Role, ...] = ("series 1", "series 2", "series 3", "series 4", "series 5", "series 6", "series 7")
-Emphasis = Literal["faint", "thin", "usual", "bold"]  # how heavy a mark is drawn
+Emphasis = Literal["faint", "thin", "usual", "bold"]  # weight of a mark
 Dash = Literal["", "dashed", "dotted"]
 Symbol = Literal["dot", "circle", "ring", "triangle", "cross", "star", "diamond"]
 
 
 def series(place: int) -> Role:
-    """The role of one of several alike, beginning again behind the seventh.
+    """Return the role of one of several series alike, starting again behind the seventh.
 
     Examples
     --------
@@ -79,7 +79,10 @@ class Mark:
 
 @dataclass(frozen=True, kw_only=True)
 class Curve(Mark):
-    """A line through samples; it breaks at NaN. ``steps``: each value holds about its place, as of a histogram."""
+    """Line through samples; it breaks at NaN.
+
+    ``steps``: each value holds about its place, as of a histogram.
+    """
 
     x: Floats
     y: Floats
@@ -89,7 +92,7 @@ class Curve(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Dots(Mark):
-    """Samples, each by itself."""
+    """Samples as single dots."""
 
     x: Floats
     y: Floats
@@ -97,7 +100,7 @@ class Dots(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Band(Mark):
-    """The area between two curves; with ``steps`` each edge holds about its place."""
+    """Area between two curves; with ``steps`` each edge holds about its place."""
 
     x: Floats
     low: Floats
@@ -115,9 +118,10 @@ class Histogram(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Lanes(Mark):
-    """States over time, a lane each, drawn where they hold; ``roles`` of some states, others take ``role``.
+    """States over time, a lane each, drawn where they hold.
 
-    ``order`` names the lanes from the top; what is not in it is not drawn.
+    ``roles`` are those of some states, the others take ``role``. ``order`` names the lanes from the top; what is not in
+    it is not drawn.
     """
 
     start: Floats
@@ -129,7 +133,7 @@ class Lanes(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Spans(Mark):
-    """Shaded ground between places of the horizontal axis.
+    """Shaded background between places of the horizontal axis.
 
     A phase of flight as ``kind`` has a shade of its own, any other a faint one of the role. With a name each kind
     stands in the legend once, as itself; where it is empty, by the name.
@@ -142,7 +146,7 @@ class Spans(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Limit(Mark):
-    """A dashed line across the panel at a value; upright at a place of the horizontal axis.
+    """Dashed line across the panel at a value; upright at a place of the horizontal axis.
 
     A ``label`` stands beside the line, where the name stands in the legend.
     """
@@ -156,7 +160,10 @@ class Limit(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Bars(Mark):
-    """Values with their 95 % intervals, upright; ``half`` is half of each, NaN where it is not known."""
+    """Values with their 95 % intervals, upright.
+
+    ``half`` is half of each interval, NaN where it is not known.
+    """
 
     x: Floats
     y: Floats
@@ -165,7 +172,7 @@ class Bars(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Intervals(Mark):
-    """Rows with nested intervals, lying: one row of a forest plot.
+    """Rows with nested horizontal intervals, one row each as in a forest plot.
 
     Parameters
     ----------
@@ -187,7 +194,10 @@ class Intervals(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Points(Mark):
-    """Places with a symbol, and a label where there is one; ``is_hollow`` of those that are not judged."""
+    """Points with a symbol, and a label where there is one.
+
+    ``is_hollow`` marks those that are not judged.
+    """
 
     x: Floats
     y: Floats
@@ -212,20 +222,26 @@ class Outlines(Mark):
 
 @dataclass(frozen=True, kw_only=True)
 class Cells(Mark):
-    """A grid of values by colour, shape (len(y), len(x)), NaN empty; values beyond ``high`` have its colour."""
+    """Grid of values by colour, shape (len(y), len(x)), NaN empty.
+
+    Values beyond ``high`` have its colour.
+    """
 
     x: Floats
     y: Floats
     values: Floats
     low: float
     high: float
-    title: str  # of the scale, with its unit
+    title: str  # title of the scale, with its unit
     is_log: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
 class Told(Mark):
-    """A value that is told when the cursor is near a place; nothing is drawn. ``title`` says of what."""
+    """Value that is shown when the cursor is near a place; nothing is drawn.
+
+    ``title`` says of what it is.
+    """
 
     x: Floats
     y: Floats

@@ -1,4 +1,4 @@
-"""A plot: panels in rows, each with two axes and what stands on them; sizes on paper in millimetres."""
+"""Plot: panels in rows, each with two axes and marks; sizes on paper in millimetres."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Panel:
-    """A pair of axes with what stands on it, the first mark behind.
+    """Pair of axes with its marks, the first mark behind.
 
     Parameters
     ----------
@@ -78,10 +78,11 @@ class Panel:
 
 @dataclass(frozen=True)
 class Row:
-    """Panels side by side, of one height; ``shares_x``: their axis is that of the row below, where it is written.
+    """Panels side by side, of one height.
 
-    The height is that of the frames; titles, legends and numbers stand around them. ``columns``: each panel is as wide
-    as one of so many, where the row holds fewer.
+    ``shares_x``: their axis is that of the row below, where it is written. The height is that of the frames; titles,
+    legends and numbers stand around them. ``columns``: each panel is as wide as one of so many, where the row holds
+    fewer.
     """
 
     panels: tuple[Panel, ...]
@@ -120,7 +121,7 @@ class Plot:
 
 
 def one_panel(panel: Panel, height_mm: float) -> tuple[Row, ...]:
-    """The rows of a plot of one panel."""
+    """Return the rows of a plot of one panel."""
     return (Row((panel,), height_mm),)
 
 

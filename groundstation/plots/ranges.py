@@ -1,4 +1,4 @@
-"""Ranges of axes, spans of time, lines that break, samples that are left out: rules that every painter shares."""
+"""Rules that every painter shares: ranges of axes, spans of time, broken lines, thinning."""
 
 from typing import Any
 
@@ -61,7 +61,9 @@ def thin(count: int, most: int) -> NDArray[np.int64]:
 
 
 def windows(time: Any, least_gap_s: float = LEAST_PAUSE_S) -> tuple[tuple[float, float], ...]:
-    """Spans of flight time that the samples fill, a little around each; a longer pause ends one, at most six of them.
+    """Return the spans of flight time that the samples fill, a little around each.
+
+    A longer pause ends a span; there are at most six.
 
     Examples
     --------
@@ -81,7 +83,9 @@ def windows(time: Any, least_gap_s: float = LEAST_PAUSE_S) -> tuple[tuple[float,
 
 
 def broken_at_wrap(time: Any, angle_deg: Any) -> tuple[Floats, Floats]:
-    """Time and headings with a NaN between two that jump through north: the line breaks instead of crossing the figure.
+    """Insert a NaN between two headings that jump through north, and a time for it.
+
+    The line breaks instead of crossing the figure.
 
     Examples
     --------
@@ -95,7 +99,7 @@ def broken_at_wrap(time: Any, angle_deg: Any) -> tuple[Floats, Floats]:
 
 
 def broken_at_gaps(time: Any, *values: Any) -> tuple[Floats, ...]:
-    """Time and values with a NaN wherever time leaps: the line breaks at the gap.
+    """Return time and values with a NaN at each leap in time: the line breaks at the gap.
 
     Examples
     --------

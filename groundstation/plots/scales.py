@@ -1,4 +1,4 @@
-"""Scales of axes: where a value lies between the ends, and the ends of what has none of its own."""
+"""Scales of axes: place of a value between the ends, and ends for an axis without any."""
 
 import math
 from dataclasses import dataclass
@@ -9,18 +9,18 @@ from groundstation.plots.marks import Floats
 from groundstation.plots.plot import Scale
 from groundstation.plots.ranges import finite
 
-LINEAR_SHARE = 10.0 / 9.0  # of a decade: the room of a symlog scale from zero to where it becomes logarithmic
-MARGIN = 0.05  # of what is drawn, on either side
-LEAST_SPAN = 1e-9  # of the greater end: ends nearer to each other are moved apart
+LINEAR_SHARE = 10.0 / 9.0  # decades from zero to where a symlog scale becomes logarithmic
+MARGIN = 0.05  # margin on either side, as a share of what is drawn
+LEAST_SPAN = 1e-9  # least span as a share of the greater end: nearer ends are moved apart
 SMALLEST = 1e-200  # ends nearer to each other are one, and nothing smaller stands on a logarithmic scale
 LEAST_LINEAR = 1e-100
-LARGEST = 1e200  # what is beyond is as good as infinite, and its squares are not
+LARGEST = 1e200  # larger numbers count as infinite; squares of smaller ones are finite
 NO_PLACES: Floats = np.zeros(0)
 
 
 @dataclass(frozen=True)
 class Span:
-    """A scale with its ends; one that runs backwards has the greater first."""
+    """Scale with its ends; one that runs backwards has the greater first."""
 
     scale: Scale
     low: float
@@ -58,7 +58,9 @@ def span_of(
     *,
     is_tight: bool = False,
 ) -> Span:
-    """The scale with ends: its own, else those of what is drawn, with a little around them unless ``is_tight``.
+    """Return the scale with ends: its own, else those of what is drawn.
+
+    The latter get a little around them unless ``is_tight``.
 
     Examples
     --------
@@ -85,14 +87,14 @@ def span_of(
 
 
 def _about(scale: Scale, low: float | None, high: float | None) -> list[float]:
-    """Ends where nothing is drawn, from the one that is known."""
+    """Return ends for an axis where nothing is drawn, from the one end that is known."""
     if scale == "log":
         return [low or 0.1 * (high or 10.0), high or 10.0 * (low or 1.0)]
     return [(1.0 if high is None else high) - 1.0 if low is None else low, (low or 0.0) + 1.0 if high is None else high]
 
 
 def _apart(scale: Scale, first: float, last: float) -> tuple[float, float]:
-    """Ends that are not one, nor so near that no number lies between them."""
+    """Return ends that are apart, so far that numbers lie between them."""
     first, last = min(first, last), max(first, last)
     least = max(LEAST_SPAN * max(abs(first), abs(last)), SMALLEST)
     if scale == "log":
@@ -107,7 +109,7 @@ def _apart(scale: Scale, first: float, last: float) -> tuple[float, float]:
 def _wider(
     scale: Scale, ends: tuple[float, float], is_open: tuple[bool, bool], linear_to: float
 ) -> tuple[float, float]:
-    """Ends with a margin where they are not given."""
+    """Return the ends with a margin where they are not given."""
     span = Span(scale, *ends, linear_to)
     if scale == "log":
         factor = 10.0 ** (MARGIN * (math.log10(ends[1]) - math.log10(ends[0])))

@@ -1,4 +1,4 @@
-"""The scale of colours of cells: viridis, even to the eye and told apart by colour-blind readers.
+"""Colour scale of cells: viridis, even to the eye, safe for colour-blind readers.
 
 Source: S. van der Walt, N. Smith, viridis, 2015 (CC0), at sixteenths of its length.
 """
@@ -13,7 +13,7 @@ _STEPS = [[int(text[at : at + 2], 16) for at in (0, 2, 4)] for text in _TEXT.spl
 
 
 def viridis(share: float) -> tuple[int, int, int]:
-    """The colour at a share of the scale from 0 to 1: red, green, blue.
+    """Return the colour at a share of the scale from 0 to 1: red, green, blue.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Answer of an acceptance: what the flights of a folder show of their INS against the limits of a standard."""
+"""Answer of an acceptance: INS figures of a folder of flights against a standard's limits."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -36,7 +36,7 @@ QUANTITIES: Mapping[str, Quantity] = {
 
 @dataclass(frozen=True)
 class Bound:
-    """A figure of a flight by its name in :data:`QUANTITIES`, and what its magnitude may be at most."""
+    """Largest allowed magnitude of a figure of a flight, named as in :data:`QUANTITIES`."""
 
     quantity: str
     at_most: float = required_number(1e-9)
@@ -71,11 +71,13 @@ class Limit:
             raise SettingsError("hours_up_to", f"{self.hours_up_to:g}", f"more than hours_over = {self.hours_over:g}")
 
     def is_for(self, hours: float) -> bool:
-        """Whether a flight of so many hours is judged by it."""
+        """Tell whether a flight of so many hours is judged by it."""
         return self.hours_over < hours <= (float("inf") if self.hours_up_to is None else self.hours_up_to)
 
     def part(self, values: Mapping[str, float]) -> float | None:
-        """The figures of a flight as a part of the limit, by the worst bound; over one is over. None: not measured.
+        """Return the figures of a flight as a part of the limit, by the worst bound.
+
+        More than one is over the limit; None is not measured.
 
         Examples
         --------
@@ -154,13 +156,13 @@ class FlightError:
 
     @property
     def is_included(self) -> bool:
-        """Whether it enters the figures."""
+        """Tell whether the flight enters the figures."""
         return not self.reason
 
 
 @dataclass(frozen=True)
 class InsRow:
-    """What the flights of one INS show, or all (``ins`` is :data:`ENSEMBLE`).
+    """Figures from the flights of one INS, or of all (``ins`` is :data:`ENSEMBLE`).
 
     Parameters
     ----------
@@ -195,7 +197,7 @@ class InsRow:
 
 @dataclass(frozen=True)
 class Judgement:
-    """One limit against the flights of one INS, or all: what is shown, how sure, what is missing.
+    """One limit against the flights of one INS, or of all: decision, confidence, missing data.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Two analyses of one log that answer the same question, beside each other: do they agree within their intervals?"""
+"""Two analyses of one log that answer the same question: agreement within intervals."""
 
 import math
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from groundstation.results.latency import Latencies
 from groundstation.results.magnetic import LETTERS, MagneticResult
 from groundstation.results.magnetic_ground import GroundDeviation, GroundRun
 
-DRIFT_SIGMA_DEG_PER_H = 0.1  # of the azimuth of an INS between two looks at it
+DRIFT_SIGMA_DEG_PER_H = 0.1  # drift of the azimuth of an INS between two looks at it
 AGREE_SIGMAS, CONTRADICT_SIGMAS = 2.0, 3.0
 NARROWED = 0.95  # a sigma that the turns of a taxi leave of the one known before: above it they show nothing
 S_PER_H = 3600.0
@@ -19,7 +19,7 @@ S_PER_H = 3600.0
 
 @dataclass(frozen=True)
 class OneFinding:
-    """Value that one analysis found, with its sigma and whence it is."""
+    """Value that one analysis found, with its sigma and its origin."""
 
     origin: str
     value: float
@@ -32,7 +32,10 @@ class OneFinding:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Two findings on one question; ``between_sigma``: what may have changed between them."""
+    """Two findings on one question.
+
+    ``between_sigma`` is what may have changed between them.
+    """
 
     question: str
     unit: str
@@ -47,7 +50,7 @@ class Agreement:
 
     @property
     def sigmas(self) -> float:
-        """By how many sigma they differ.
+        """Difference of the two in sigmas.
 
         Examples
         --------
@@ -63,7 +66,10 @@ class Agreement:
 
 
 def heading_agreement(answers: Answers) -> Agreement | None:
-    """Azimuth error of the platform by taxi (system 1) and by turns in flight (system 2) of the same INS."""
+    """Compare the platform's azimuth error by taxi (system 1) and by turns (system 2).
+
+    Both are of the same INS; the turns are in flight.
+    """
     taxi, inertial = answer_of(answers, HeadingResult), answer_of(answers, InertialResult)
     turns = inertial.azimuth if inertial is not None else None
     if taxi is None or inertial is None or turns is None or taxi.ins_topic != inertial.ins_topic:
@@ -81,9 +87,10 @@ def heading_agreement(answers: Answers) -> Agreement | None:
 
 
 def latency_agreement(answers: Answers) -> Agreement | None:
-    """GNSS latency behind the INS by motion (latency analysis) and by the turns of the taxi (system 1).
+    """Compare the GNSS latency behind the INS by motion and by the turns of the taxi.
 
-    Where the former was taken out before the turns were looked at, it was their prior: it is taken off again.
+    The first is the latency analysis, the second system 1. Where the former was taken out before the turns were looked
+    at, it was their prior: it is taken off again.
     """
     taxi, latencies = answer_of(answers, HeadingResult), answer_of(answers, Latencies)
     found = latencies.observed(taxi.ins_topic, taxi.gnss_topic) if latencies and taxi else None
@@ -104,9 +111,10 @@ def latency_agreement(answers: Answers) -> Agreement | None:
 
 
 def deviation_agreement(answers: Answers) -> Agreement | None:
-    """Error of the magnetic heading in the air, by the recommended method, and on ground runs, at their headings.
+    """Compare the error of the magnetic heading in the air and on ground runs.
 
-    The declination is in both and is counted once, in the air.
+    The error in the air is that by the recommended method, at the headings of the runs. The declination is in both and
+    is counted once, in the air.
     """
     air, ground = answer_of(answers, MagneticResult), answer_of(answers, GroundDeviation)
     runs = [run for run in ground.used if run.error_deg is not None and run.sigma_deg] if ground else []
@@ -134,12 +142,12 @@ def deviation_agreement(answers: Answers) -> Agreement | None:
 
 
 def _own_variance(run: GroundRun, declination_sigma_deg: float, place_sigma_deg: float) -> float:
-    """Variance of what a run has of its own: noise, slip and place."""
+    """Return the variance of a run's own error: noise, slip and place."""
     sigma = run.sigma_deg or 0.0
     return max(sigma**2 - declination_sigma_deg**2, (run.noise_sigma_deg or 0.0) ** 2, 1e-6) + place_sigma_deg**2
 
 
 def _columns(heading_deg: float) -> tuple[float, ...]:
-    """1, sin c, cos c, sin 2c, cos 2c."""
+    """Return the columns 1, sin c, cos c, sin 2c, cos 2c."""
     rad = math.radians(heading_deg)
     return (1.0, math.sin(rad), math.cos(rad), math.sin(2.0 * rad), math.cos(2.0 * rad))

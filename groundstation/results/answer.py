@@ -1,4 +1,4 @@
-"""What every analysis answers with: a frozen dataclass that says which analysis it is the answer of."""
+"""Base of the answers of all analyses: a frozen dataclass that names its analysis."""
 
 from collections.abc import Mapping
 from typing import ClassVar, TypeVar
@@ -44,5 +44,5 @@ def answer_of(answers: Answers, kind: type[A]) -> A | None:
 
 
 def by_analysis(*answers: Answer | None) -> dict[str, Answer]:
-    """Answers by the name of their analysis; what is None is left out."""
+    """Return the answers by the name of their analysis; None is left out."""
     return {answer.analysis: answer for answer in answers if answer is not None}

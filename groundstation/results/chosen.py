@@ -1,4 +1,7 @@
-"""Intervals that the user left out of the estimates, or forced into them, as the configuration of a run has them."""
+"""Intervals that the user left out of the estimates, or forced into them.
+
+They come from the configuration of a run.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -12,7 +12,7 @@ AnswerT = TypeVar("AnswerT", bound=Answer)
 
 @dataclass(frozen=True)
 class FlightColumn:
-    """A column of the table of flights: name with unit, kind, and what it is in plain words.
+    """Column of the table of flights: name with unit, kind, and description in plain words.
 
     In memory ``number`` and ``count`` are float64 (NaN where missing), ``flag`` is bool, ``time`` datetime64[ns] in UTC
     (NaT where missing), the rest text (empty where missing). In fleet.parquet a missing value is null.
@@ -39,5 +39,5 @@ class AnswerColumn(FlightColumn, Generic[AnswerT]):
     is_indexed: bool = True
 
     def value(self, answer: AnswerT) -> Any:
-        """What stands in it for an answer."""
+        """Return the column's value for an answer."""
         return getattr(answer, self.name) if self.of is None else self.of(answer)

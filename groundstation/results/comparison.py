@@ -1,4 +1,4 @@
-"""Answer of ``compare``: two saved flights held against each other, their clocks aligned. Everywhere B less A."""
+"""Answer of ``compare``: two saved flights with their clocks aligned, everywhere B less A."""
 
 import math
 from dataclasses import asdict, dataclass
@@ -17,7 +17,7 @@ Value: TypeAlias = float | str | bool | None
 
 @dataclass(frozen=True)
 class Side:
-    """One of the two flights: what it is of. ``start_utc`` is None without absolute time."""
+    """One of the two flights, by its names; ``start_utc`` is None without absolute time."""
 
     flight_id: str
     aircraft: str
@@ -30,7 +30,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Alignment:
-    """The event that both clocks are aligned on, and when it was: flight seconds of A and of B."""
+    """Event that both clocks are aligned on, with its flight seconds in A and in B."""
 
     event: Event
     a_s: float
@@ -38,7 +38,7 @@ class Alignment:
 
     @property
     def offset_s(self) -> float:
-        """What is added to flight seconds of B to give those of A.
+        """Seconds to add to the flight seconds of B to get those of A.
 
         Examples
         --------
@@ -74,7 +74,7 @@ class Delta:
 
     @property
     def is_significant(self) -> bool | None:
-        """Whether the difference is beyond its 95 % bound; None without a sigma.
+        """Tell whether the difference is beyond its 95 % bound; None without a sigma.
 
         Examples
         --------
@@ -87,13 +87,16 @@ class Delta:
 
     @property
     def is_different(self) -> bool:
-        """Whether the two answers are not the same."""
+        """Tell whether the two answers differ."""
         return self.a != self.b
 
 
 @dataclass(frozen=True)
 class SettingPair:
-    """A setting, or the version of a program, that differs; None where a flight has none of that name."""
+    """Setting, or version of a program, that differs.
+
+    It is None where a flight has none of that name.
+    """
 
     name: str
     a: Value
@@ -135,12 +138,15 @@ class Comparison:
 
     @property
     def origin(self) -> str:
-        """What both come from, where they share it."""
+        """Common origin of both, where they share it."""
         return "the same logs" if self.are_sessions else "one log"
 
     @property
     def cause(self) -> str:
-        """What the differences between two flights of one log follow from; empty where they are of two."""
+        """Cause of the differences between two flights of one log.
+
+        It is empty where they are of two logs.
+        """
         if not self.is_same_log:
             return ""
         is_whole = self.a.source_sha256 == self.b.source_sha256

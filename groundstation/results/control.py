@@ -1,4 +1,4 @@
-"""Answer of a planned session: how aircraft should move, and the accuracy that follows."""
+"""Answer of a planned session: best motion of aircraft, and the accuracy that follows."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
@@ -12,7 +12,7 @@ UNCONTROLLED = "uncontrolled"
 
 @dataclass(frozen=True)
 class LawRow:
-    """One law of control and where it leads.
+    """One law of control, and its result.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class LawRow:
 
 @dataclass(frozen=True)
 class ControlRow:
-    """One control of one aircraft: its bounds, and its value at the end under the recommended law."""
+    """One control of one aircraft: bounds, and value at the end under the recommended law."""
 
     aircraft: str
     control: str
@@ -81,7 +81,7 @@ class ControlRow:
 
 @dataclass(frozen=True)
 class ControlPlan(PlanAnswer):
-    """How aircraft should move for the accuracy of one of them.
+    """Plan of the motion of aircraft for the accuracy of one of them.
 
     Parameters
     ----------

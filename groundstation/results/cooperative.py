@@ -1,4 +1,7 @@
-"""Answer of the cooperative analysis (system 4): positions from ranges between vehicles, by every algorithm."""
+"""Answer of the cooperative analysis (system 4): positions from ranges, by each algorithm.
+
+The ranges are between vehicles.
+"""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -76,7 +79,7 @@ class VehicleRow:
 
 @dataclass(frozen=True)
 class GeometryRow:
-    """Geometry of one vehicle: medians over the session, and the worst of determinant and eigenvalue.
+    """Geometry of one vehicle: medians over the session, worst determinant and eigenvalue.
 
     ``determinant`` is det(H'H) of the horizontal directions, sin^2 of the angle for two sources; ``gram_determinant``
     that of its mean over a sliding interval.

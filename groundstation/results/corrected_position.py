@@ -1,4 +1,4 @@
-"""The corrected position of an unaided INS with its sigmas, as pages and recordings draw it."""
+"""Corrected position of an unaided INS with its sigmas, as pages and recordings draw it."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,10 @@ LARGEST_SIGMA_M = 1e7  # more is no position on Earth
 
 @dataclass(frozen=True)
 class CorrectedPosition:
-    """INS minus its estimated error, with the sigmas north and east, arrays of shape (n,); their errors are apart."""
+    """INS minus its estimated error, with the sigmas north and east, arrays of shape (n,).
+
+    The errors north and east are uncorrelated.
+    """
 
     time_s: FloatArray
     latitude_deg: FloatArray
@@ -29,7 +32,7 @@ class CorrectedPosition:
         return np.unique(np.linspace(0, len(self.time_s) - 1, SHOWN_ALONG).round().astype(np.int64))
 
     def larger(self, side_m: float) -> int:
-        """How many times their size the 95 % ellipses are drawn on a map of a given side."""
+        """Return the factor by which the 95 % ellipses are enlarged on a map of a given side."""
         half_m = ELLIPSE_95 * np.hypot(self.sigma_north_m, self.sigma_east_m)[self.along()]
         return magnified(side_m, float(np.median(half_m)))
 

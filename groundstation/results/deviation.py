@@ -1,4 +1,4 @@
-"""A deviation on its own: to be applied to a heading, and as a table (deviation.csv) that people and programs read."""
+"""Deviation on its own: applied to a heading, and as a table (deviation.csv)."""
 
 import csv
 import io
@@ -61,7 +61,7 @@ class Deviation:
 
     @property
     def title(self) -> str:
-        """Whose it is, for people."""
+        """Name of the flight it is of, for people."""
         return self.flight_id or "an unnamed flight"
 
 
@@ -105,7 +105,9 @@ def deviation_from_summary(summary: Mapping[str, Any], where: str) -> Deviation:
 
 
 def deviation_from_csv(text: str, where: str) -> Deviation:
-    """The deviation in a table as :func:`deviation_csv` writes it; further columns and the order of rows do not matter.
+    """Read the deviation from a table that :func:`deviation_csv` wrote.
+
+    Further columns and the order of rows do not matter.
 
     Raises
     ------
@@ -138,11 +140,11 @@ def deviation_from_csv(text: str, where: str) -> Deviation:
 
 
 def deviation_csv(results: FlightResults) -> str | None:
-    """The deviation of a flight as a table of 360 rows; None when it has none, or lacks the arrays of it.
+    """Return the deviation of a flight as a table of 360 rows; None when it has none.
 
-    Columns: the uncorrected magnetic heading in the middle of its bin; what is to be added to it, with its sigma, by
-    the recommended method and by the table of branches; whether both branches covered the bin; whose it is. Deviations
-    are those of level flight, east positive.
+    It is None also when the flight lacks the arrays. Columns: the uncorrected magnetic heading in the middle of its
+    bin; what is to be added to it, with its sigma, by the recommended method and by the table of branches; whether both
+    branches covered the bin; whose it is. Deviations are those of level flight, east positive.
 
     Source of the form: RFC 4180, Common Format and MIME Type for CSV Files, 2005.
     """
@@ -206,7 +208,10 @@ def _number(text: str | None, where: str) -> float:
 
 
 def _only(rows: Sequence[Mapping[str, str | None]], name: str, where: str) -> str:
-    """The one text of a column, without the apostrophe that keeps a spreadsheet from running it."""
+    """Return the one text of a column.
+
+    The apostrophe that keeps a spreadsheet from running it is taken off.
+    """
     texts = {row.get(name) or "" for row in rows}
     if len(texts) > 1:
         raise UsageError(where, f"several values of {name}", "the table of one flight")

@@ -1,4 +1,7 @@
-"""What stands in summary.json around the answers; the schema is generated from it and from the answers' types."""
+"""Parts of summary.json around the answers.
+
+The schema is generated from them and from the answers' types.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,7 +18,7 @@ UTC = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z$"
 
 @dataclass(frozen=True)
 class FlightDocument:
-    """Which flight it is; ``start_utc`` is null without absolute time."""
+    """Identity of the flight; ``start_utc`` is null without absolute time."""
 
     id: str = field(metadata={"pattern": "^[A-Za-z0-9_-]+$"})
     aircraft: str

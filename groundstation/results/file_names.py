@@ -1,4 +1,7 @@
-"""Names of what stands in a folder of results: told apart from logs without loading what reads them."""
+"""Names of the files in a folder of results.
+
+They tell results from logs without loading the readers.
+"""
 
 SUMMARY, MANIFEST, ARRAYS, TABLES = "summary.json", "manifest.json", "arrays", "tables"
 OLD_ARRAYS = "results.parquet"  # an earlier name of that folder, still read

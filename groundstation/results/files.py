@@ -1,4 +1,7 @@
-"""The files of one flight: summary.json, manifest.json, arrays/*.parquet and its readable copies tables/*.csv."""
+"""Files of one flight: summary.json, manifest.json, arrays/*.parquet, tables/*.csv.
+
+The tables are readable copies of the arrays.
+"""
 
 import json
 import shutil
@@ -53,7 +56,7 @@ PARQUET_LEAST_BYTES = 12  # both, and the length of what describes the file
 
 @dataclass(frozen=True)
 class SavedFlight:
-    """What a flight folder holds, as the report, ``compare`` and the fleet read it.
+    """Contents of a flight folder, as the report, ``compare`` and the fleet read it.
 
     ``results`` are the answers as the run had them; the arrays in ``figures`` are read when they are asked for.
     ``summary`` is the JSON document.
@@ -67,7 +70,9 @@ class SavedFlight:
 
     @cached_property
     def results(self) -> FlightResults:
-        """The answers, rounded as they were written; their arrays are read when they are asked for.
+        """Return the answers, rounded as they were written.
+
+        Their arrays are read when they are asked for.
 
         Raises
         ------
@@ -79,7 +84,9 @@ class SavedFlight:
         return replace(results, figures=figures, chosen=chosen_intervals(self.manifest.configuration))
 
     def rows_of(self, kind: type[T]) -> T | None:
-        """The typed arrays of a figure, None when the flight has none, they are empty or lack a column.
+        """Return the typed arrays of a figure; None when they are missing, empty or incomplete.
+
+        Incomplete means that a column is missing.
 
         Raises
         ------
@@ -96,7 +103,7 @@ class SavedFlight:
 
 
 def mapping(document: Any, *keys: str) -> Mapping[str, Any]:
-    """The object at a path of keys, empty when it is missing or something else."""
+    """Return the object at a path of keys, empty when it is missing or something else."""
     for key in keys:
         document = document.get(key) if isinstance(document, Mapping) else None
     return document if isinstance(document, Mapping) else {}
@@ -111,7 +118,7 @@ def write_text(path: Path, text: str, *, is_synced: bool = True) -> None:
 
 
 def has_text(path: Path, text: str) -> bool:
-    """Tell whether a file holds what :func:`write_text` would write."""
+    """Tell whether a file holds the text that :func:`write_text` would write."""
     return path.is_file() and path.read_bytes() == _encoded(text)
 
 
@@ -120,9 +127,10 @@ def _encoded(text: str) -> bytes:
 
 
 def write_bytes(path: Path, content: bytes, *, is_synced: bool = True) -> None:
-    """Write a file under a temporary name and move it into place: a kill never leaves half a file.
+    """Write a file under a temporary name and move it into place.
 
-    Nor does a loss of power, if ``is_synced``: without, the caller writes it through to the disk.
+    A kill never leaves half a file. With ``is_synced`` a loss of power does not either; without, the caller writes it
+    through to the disk.
     """
     temporary = path.with_name(f".{path.name}.partial")
     try:
@@ -142,9 +150,9 @@ def json_text(document: Any) -> str:
 
 
 def save(folder: Path, results: FlightResults, manifest: Manifest) -> None:
-    """Write a flight's answers and arrays into its folder; what an earlier run left of them is replaced.
+    """Write a flight's answers and arrays into its folder.
 
-    They are not yet written through to the disk.
+    Those of an earlier run are replaced. They are not yet written through to the disk.
 
     Parameters
     ----------
@@ -174,7 +182,7 @@ def _save_figure(folder: Path, figure: FigureData) -> None:
 
 
 def put_failures(folder: Path, found: Sequence[Failure], made_again: Sequence[str] = ()) -> bool:
-    """Put findings on parts that failed into summary.json; whether it changed.
+    """Add findings on failed parts to summary.json; tell whether it changed.
 
     ``made_again`` are the kinds of parts of which earlier failures no longer hold.
     """
@@ -281,7 +289,7 @@ def load(folder: Path, answer_types: Mapping[str, type[Answer]]) -> SavedFlight:
 
 
 def _require_whole(path: Path) -> None:
-    """Refuse a Parquet file that is cut, by its ends alone."""
+    """Refuse a Parquet file that is cut, by looking at its ends alone."""
     try:
         with path.open("rb") as file:
             begin = file.read(len(PARQUET_MAGIC))
@@ -331,12 +339,15 @@ def _read_parquet(path: Path) -> FigureData:
 
 
 def utf8_text(text: Any) -> str:
-    """Text as Parquet takes it: a lone surrogate becomes its escape."""
+    """Return text as Parquet takes it: a lone surrogate becomes its escape."""
     return str(text).encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def csv_text(figure: FigureData, line_end: str = "\n") -> str:
-    """Readable copy of a figure's arrays: rounded, NaN empty, no cell a spreadsheet would run as a formula."""
+    """Return a figure's arrays as readable CSV: rounded, NaN empty.
+
+    No cell holds what a spreadsheet would run as a formula.
+    """
     cells = []
     for name, values in figure.columns.items():
         places = figure.digits.get(name, digits_of(name))

@@ -1,4 +1,4 @@
-"""Answers over a fleet: what many flights say together, for the fleet report, fleet.rrd and notebooks."""
+"""Answers over a fleet of flights, for the fleet report, fleet.rrd and notebooks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -27,7 +27,9 @@ WHOLE_FLEET = ""  # where an aircraft is named and all of them are meant
 
 @dataclass(frozen=True)
 class Densities:
-    """Density of the heading error (INS heading - track, used samples) of every flight, on one grid.
+    """Density of the heading error of every flight, on one grid.
+
+    Heading error is INS heading - track, of used samples.
 
     Parameters
     ----------
@@ -63,9 +65,10 @@ class Densities:
 
 @dataclass(frozen=True)
 class FittedNormal:
-    """Normal distribution fitted to samples of the heading error; ``aircraft`` is empty for the whole fleet.
+    """Normal distribution fitted to samples of the heading error.
 
-    Merged from n, mean and M2 of the flights: exactly what all samples in one array would give.
+    ``aircraft`` is empty for the whole fleet. It is merged from n, mean and M2 of the flights, and is exactly what all
+    samples in one array would give.
     """
 
     aircraft: str
@@ -77,7 +80,9 @@ class FittedNormal:
 
 @dataclass(frozen=True)
 class AircraftRow:
-    """Heading error of one aircraft over its flights; the whole fleet where ``aircraft`` is :data:`WHOLE_FLEET`.
+    """Heading error of one aircraft over its flights.
+
+    It is that of the whole fleet where ``aircraft`` is :data:`WHOLE_FLEET`.
 
     Parameters
     ----------
@@ -116,7 +121,7 @@ class AircraftRow:
 
 @dataclass(frozen=True)
 class ChangePoint:
-    """A flight from which on a quantity of an aircraft has another level.
+    """Flight from which on a quantity of an aircraft has another level.
 
     ``flight_id`` is the first flight of the new level; ``level_before`` and ``level_after`` are medians, in the unit of
     ``quantity``; ``p_value`` the chance of so large a step anywhere in a steady series.
@@ -135,12 +140,13 @@ class ChangePoint:
 
 @dataclass(frozen=True)
 class FleetSkill:
-    """Forecast skill of a method at a horizon over all flights: mean squares and coverage merged by starts.
+    """Forecast skill of a method at a horizon over all flights.
 
-    ``rms_m`` is over all starts of all flights; ``median_flight_rms_m``, ``highest_flight_rms_m`` over the flights'
-    own RMS; ``coverage95`` over the ``coverage_starts`` starts that had a band, None without any. Outages of one flight
-    overlap, so a flight's own coverage says little: of the ``flights_judged`` with enough independent starts
-    ``flights_within`` had a NEES within its 95 % limits.
+    Mean squares and coverage are merged by starts. ``rms_m`` is over all starts of all flights;
+    ``median_flight_rms_m``, ``highest_flight_rms_m`` over the flights' own RMS; ``coverage95`` over the
+    ``coverage_starts`` starts that had a band, None without any. Outages of one flight overlap, so a flight's own
+    coverage says little: of the ``flights_judged`` with enough independent starts ``flights_within`` had a NEES within
+    its 95 % limits.
     """
 
     method: str
@@ -158,7 +164,9 @@ class FleetSkill:
 
 @dataclass(frozen=True)
 class FleetCalibration:
-    """How often something independent was inside the stated 95 % interval, flights with verdict reject left out.
+    """Share of independent checks inside the stated 95 % interval.
+
+    Flights with verdict reject are left out.
 
     Parameters
     ----------
@@ -188,7 +196,7 @@ class FleetCalibration:
 
 @dataclass(frozen=True)
 class DeviationRow:
-    """Magnetic deviation that one flight found, beside the mean of the ``others`` of its aircraft.
+    """Magnetic deviation found in one flight, beside the mean of its aircraft's ``others``.
 
     ``coefficients_deg`` A to E are of the error, by the method recommended; ``before_rms_deg`` and ``after_rms_deg`` of
     level flight that no fit has seen. ``difference_rms_deg`` is the RMS over the circle of what the curves differ by,
@@ -209,7 +217,10 @@ class DeviationRow:
     expected_rms_deg: float | None
 
     def error_deg(self, heading_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A + B sin c + C cos c + D sin 2c + E cos 2c of uncorrected magnetic headings c, shape (n,)."""
+        """Evaluate A + B sin c + C cos c + D sin 2c + E cos 2c, shape (n,).
+
+        c are uncorrected magnetic headings.
+        """
         once, twice = np.deg2rad(heading_deg), 2.0 * np.deg2rad(heading_deg)
         a, b, c, d, e = (self.coefficients_deg[letter] for letter in LETTERS)
         return np.asarray(a + b * np.sin(once) + c * np.cos(once) + d * np.sin(twice) + e * np.cos(twice))
@@ -234,7 +245,10 @@ class OutlierRow:
 
 @dataclass(frozen=True)
 class NotInFleet:
-    """A log that gave no flight, or a flight folder that cannot be read; ``kind`` is ``failed`` or ``skipped``."""
+    """Log that gave no flight, or flight folder that cannot be read.
+
+    ``kind`` is ``failed`` or ``skipped``.
+    """
 
     kind: Literal["failed", "skipped"]
     source: str
@@ -243,7 +257,7 @@ class NotInFleet:
 
 @dataclass(frozen=True)
 class SessionRow:
-    """A session of several aircraft: the algorithm to trust, and what it is worth.
+    """Session of several aircraft: the algorithm to trust, and its accuracy.
 
     ``two_sigma_r_m`` is that of the worst aircraft at the end, as computed; ``reckoned_two_sigma_r_m`` that of dead
     reckoning alone; ``rms_m``, ``is_consistent`` and ``diverges`` are None without a truth. ``reason`` says why there
@@ -337,7 +351,10 @@ class FleetResults:
         return tuple(sorted(set(self.flights["aircraft"].tolist())))
 
     def normal(self, aircraft: str | None = None) -> FittedNormal | None:
-        """The fitted normal of the whole fleet (which stands first), or of one aircraft; None without samples."""
+        """Return the fitted normal of the whole fleet, or of one aircraft; None without samples.
+
+        That of the fleet stands first.
+        """
         candidates = self.normals[:1] if aircraft is None else self.normals[1:]
         return next((one for one in candidates if aircraft is None or one.aircraft == aircraft), None)
 
@@ -377,7 +394,10 @@ class FleetResults:
         return frame
 
     def to_dict(self) -> dict[str, Any]:
-        """Every table as plain JSON values, rounded by its names: lists of rows, columns for the densities."""
+        """Return every table as plain JSON values, rounded by its names.
+
+        Tables are lists of rows, densities are columns.
+        """
         out: dict[str, Any] = {}
         for part in fields(self):
             found = getattr(self, part.name)

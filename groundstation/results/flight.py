@@ -1,4 +1,4 @@
-"""Everything found out about one flight, in one frozen object: what the recording and the report are made from."""
+"""All results of one flight in one frozen object, for the recording and the report."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -43,7 +43,7 @@ class Source:
     reader: str
 
 
-NAT_NS = np.iinfo(np.int64).min  # what numpy takes for "not a time"
+NAT_NS = np.iinfo(np.int64).min  # numpy's "not a time"
 UTC_OF = {"time_s": "utc", "start_s": "start_utc", "end_s": "end_utc"}  # columns of flight seconds, and their UTC
 
 
@@ -105,7 +105,7 @@ class FlightResults(Tabular):
         return answer_of(self.answers, kind)
 
     def reasons(self, *analyses: str) -> tuple[str, ...]:
-        """Why these analyses could not run, those of them that could not."""
+        """Return the reasons why these analyses could not run, for those that could not."""
         return tuple(entry.reason for entry in self.not_assessable if entry.analysis in analyses)
 
     def figure(self, name: str) -> FigureData | None:
@@ -115,7 +115,9 @@ class FlightResults(Tabular):
         return next((figure for figure in self.figures if figure.name == name), None)
 
     def rows_of(self, kind: type[T], *of: str) -> T | None:
-        """The typed arrays of a figure, None when the flight has none, they are empty or lack a column.
+        """Return the typed arrays of a figure; None when they are missing, empty or incomplete.
+
+        Incomplete means that a column is missing.
 
         Parameters
         ----------
@@ -138,13 +140,16 @@ class FlightResults(Tabular):
 
     @property
     def figure_names(self) -> tuple[str, ...]:
-        """Names of the figure data, none of which is read for it."""
+        """Names of the figure data; none of them is read for it."""
         if isinstance(self.figures, FigureSet):
             return self.figures.names
         return tuple(figure.name for figure in self.figures)
 
     def table_names(self) -> tuple[str, ...]:
-        """Names that :meth:`to_frame` takes: findings, what was not assessable, the arrays behind the figures."""
+        """Names that :meth:`to_frame` takes.
+
+        They are findings, what was not assessable, and the arrays behind the figures.
+        """
         return (*super().table_names(), *self.figure_names)
 
     def to_frame(self, table: str = "findings") -> "pd.DataFrame":

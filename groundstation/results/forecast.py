@@ -1,4 +1,7 @@
-"""Answer of the forecast mode (system 2): how good a forecast of the INS errors is, replayed on the flight itself."""
+"""Answer of the forecast mode (system 2): accuracy of a forecast of the INS errors.
+
+The forecast is replayed on the flight itself.
+"""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -6,7 +9,7 @@ from typing import ClassVar
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 
-WITHIN, TOO_FEW = "within limits", "too few to judge"  # what NEES says
+WITHIN, TOO_FEW = "within limits", "too few to judge"  # verdicts by NEES
 FEWEST_STARTS = 5  # independent ones: with fewer the limits of NEES are so wide that anything passes
 
 # Names of the contract, in the order they are shown; titles for people.
@@ -26,10 +29,11 @@ HORIZONS_MIN = (1, 5, 10, 30, 60, 90, 120)
 
 @dataclass(frozen=True)
 class SkillRow:
-    """Radial position error built up since the start of the outage, one method, one horizon, over all starts.
+    """Radial position error since the start of the outage, over all starts.
 
-    ``coverage95`` is the share of the channel errors inside the forecast's own 95 % band, None for a method without
-    one; ``coverage95_model`` the same before the sigma is scaled to what the class and the flight's past show.
+    It is of one method at one horizon. ``coverage95`` is the share of the channel errors inside the forecast's own 95 %
+    band, None for a method without one; ``coverage95_model`` the same before the sigma is scaled to what the class and
+    the flight's past show.
     """
 
     method: str = field(metadata={"one_of": tuple(METHODS)})
@@ -44,7 +48,10 @@ class SkillRow:
 
 @dataclass(frozen=True)
 class GapRow:
-    """Replayed gaps with GNSS on both sides: root mean square over the gaps of the largest radial error in each."""
+    """Errors of replayed gaps with GNSS on both sides.
+
+    ``max_error_rms_m`` is the root mean square over the gaps of the largest radial error in each.
+    """
 
     method: str = field(metadata={"one_of": ("forward", "rts")})
     length_min: float
@@ -69,7 +76,10 @@ class PhaseRow:
 
 @dataclass(frozen=True)
 class ClassicStart:
-    """One of the paper's four starts (1.5, 2, 2.5, 3 h): radial and east error at the end and at equal horizons."""
+    """One of the paper's four starts (1.5, 2, 2.5, 3 h).
+
+    It has the radial and the east error at the end and at equal horizons.
+    """
 
     start_h: float
     method: str = field(metadata={"one_of": tuple(METHODS)})
@@ -80,11 +90,11 @@ class ClassicStart:
 
 @dataclass(frozen=True)
 class CalibrationRow:
-    """How honest the forecast's sigma is at one horizon: shares inside the 50, 68 and 95 % bands, and NEES.
+    """Honesty of the forecast's sigma at one horizon: shares inside bands, and NEES.
 
-    ``nees`` is the mean normalised squared error of the position forecast (two degrees of freedom, divided by two, so 1
-    is honest), ``nees_low``, ``nees_high`` its 95 % limits from the number of independent starts.
-    ``scale`` is what the model's sigma was multiplied by (mean over the starts).
+    The bands are those of 50, 68 and 95 %. ``nees`` is the mean normalised squared error of the position forecast (two
+    degrees of freedom, divided by two, so 1 is honest), ``nees_low``, ``nees_high`` its 95 % limits from the number of
+    independent starts. ``scale`` is what the model's sigma was multiplied by (mean over the starts).
     """
 
     method: str = field(metadata={"one_of": tuple(METHODS)})
@@ -102,9 +112,10 @@ class CalibrationRow:
 
 @dataclass(frozen=True)
 class CoupledRow:
-    """Gain of the coupled model over two separate channels: 1 - RMS ratio, last estimate of both.
+    """Gain of the coupled model over two separate channels.
 
-    The coupled model has sixteen states: six of each channel, the azimuth error, its drift, two accelerometer biases.
+    It is 1 - RMS ratio, of the last estimates of both. The coupled model has sixteen states: six of each channel, the
+    azimuth error, its drift, two accelerometer biases.
     """
 
     horizon_min: float
@@ -150,7 +161,7 @@ class ForecastResult(Answer):
 
 
 def honesty(independent_starts: int, nees: float, nees_low: float, nees_high: float) -> str:
-    """Say in words what NEES of a :class:`CalibrationRow` shows of the forecast's sigma.
+    """Say in words what the NEES of a :class:`CalibrationRow` tells of the forecast's sigma.
 
     Examples
     --------

@@ -51,7 +51,7 @@ class Tabular:
         return rows_frame(known[name], getattr(self, name))
 
     def _repr_html_(self) -> str:
-        """What is no list, as a table for notebooks."""
+        """Return all fields that are no list, as a table for notebooks."""
         import pandas as pd
 
         shown = {part.name: getattr(self, part.name) for part in fields(cast(Any, self))}

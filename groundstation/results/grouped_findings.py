@@ -1,4 +1,4 @@
-"""Findings as a reader wants them: what many raw topics have in common is one line with its count."""
+"""Findings grouped for the reader: remarks on many raw topics in one line with a count."""
 
 from collections.abc import Iterable, Sequence
 from itertools import groupby
@@ -17,11 +17,11 @@ KINDS = {
 
 
 def grouped(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Findings with the remarks on raw topics joined by kind; warnings, failures and canonical topics stand alone.
+    """Join remarks on raw topics by kind.
 
-    Nothing is estimated from raw topics, and an autopilot's log has a hundred of them with thousands of fields. Where
-    more than three remarks are of one kind they become one: how many there are, in which topics, and the sum of their
-    counts. ``summary.json`` lists each.
+    Warnings, failures and findings on canonical topics stand alone. Nothing is estimated from raw topics, and an
+    autopilot's log has a hundred of them with thousands of fields. Where more than three remarks are of one kind they
+    become one: how many there are, in which topics, and the sum of their counts. ``summary.json`` lists each.
 
     Examples
     --------

@@ -1,4 +1,7 @@
-"""Answer of the heading estimator (system 1): what the operator types, why, and how sure it is."""
+"""Answer of the heading estimator (system 1): the correction to type, and its basis.
+
+The basis is the reason for it, and its interval.
+"""
 
 import math
 from dataclasses import dataclass, field
@@ -18,11 +21,11 @@ STORED_STEP = 1e-6  # limits in summary.json are rounded to it
 
 @dataclass(frozen=True)
 class Gate:
-    """One acceptance gate: figure, limit, unit, state. ``value`` is None when it could not be measured.
+    """One acceptance gate: figure, limit, unit, state.
 
-    ``limit`` is a number that the figure must reach or not exceed, as ``sense`` says, or a pair [low, high];
-    ``required`` gates decide the verdict, others inform.
-    ``reason`` says in a few words why it failed or was not measured.
+    ``value`` is None when it could not be measured. ``limit`` is a number that the figure must reach or not exceed, as
+    ``sense`` says, or a pair [low, high]; ``required`` gates decide the verdict, others inform. ``reason`` says in a
+    few words why it failed or was not measured.
     """
 
     name: str
@@ -36,7 +39,7 @@ class Gate:
     sense: Sense = "at_most"
 
     def under(self, bound: Bound) -> "Gate":
-        """The same value against another limit; the gate itself where the limit is the one it has.
+        """Return the gate judged against another limit; itself where the limit is the same.
 
         Examples
         --------
@@ -60,7 +63,10 @@ def judged_gate(
     reason: str = "",
     required: bool = True,
 ) -> Gate:
-    """A gate that passes where low <= value <= high; its limit is the one bound given, or both."""
+    """Make a gate that passes where low <= value <= high.
+
+    Its limit is the one bound given, or both.
+    """
     low, high = bound
     bounds = tuple(end for end in bound if end is not None)
     limit = bounds[0] if len(bounds) == 1 else (bounds[0], bounds[1])
@@ -114,7 +120,10 @@ class TaxiSegment:
 
 @dataclass(frozen=True)
 class HeadingStep:
-    """A step of the INS heading: flight time of the first sample after it, heading after minus heading before."""
+    """Step of the INS heading: flight time of the first sample after it, and its size.
+
+    The size is heading after minus heading before.
+    """
 
     time_s: float
     size_deg: float
@@ -122,7 +131,10 @@ class HeadingStep:
 
 @dataclass(frozen=True)
 class TaxiWind:
-    """Wind on taxi: velocity of the air, sigma of either component, and whence: ``log`` or the METAR line."""
+    """Wind on taxi: velocity of the air, sigma of either component, and its origin.
+
+    The origin is ``log`` or the METAR line.
+    """
 
     north_mps: float
     east_mps: float
@@ -132,9 +144,9 @@ class TaxiWind:
 
 @dataclass(frozen=True)
 class IntervalPart:
-    """One part of the interval of the error: ``taxi``, ``wind`` or ``installation``. The squares of the sigmas add up.
+    """One part of the interval of the error: ``taxi``, ``wind`` or ``installation``.
 
-    ``half_width_deg`` is what the 95 % interval would be with this part alone.
+    The squares of the sigmas add up. ``half_width_deg`` is what the 95 % interval would be with this part alone.
     """
 
     name: str
@@ -144,7 +156,10 @@ class IntervalPart:
 
 @dataclass(frozen=True)
 class RunwayCheck:
-    """Second reference: runway true bearing on line-up or take-off run against the INS heading there."""
+    """Check against the runway: its true bearing beside the INS heading there.
+
+    It is a second reference, on line-up or take-off run.
+    """
 
     name: str
     true_bearing_deg: float
@@ -156,7 +171,10 @@ class RunwayCheck:
 
 @dataclass(frozen=True)
 class OnboardComparison:
-    """The aircraft's own figures (topic ``onboard``) beside ours; differences are onboard minus ours."""
+    """Figures of the aircraft itself (topic ``onboard``) beside ours.
+
+    Differences are onboard minus ours.
+    """
 
     heading_error_deg: float | None
     precision_deg: float | None
@@ -292,7 +310,10 @@ class HeadingResult(Answer):
 
     @property
     def azimuth(self) -> tuple[float, float]:
-        """Error of the platform's azimuth and its standard error; the airframe's in an answer of an older version."""
+        """Error of the platform's azimuth and its standard error.
+
+        In an answer of an older version they are the airframe's.
+        """
         if self.platform_error_deg is None or self.platform_standard_error_deg is None:
             return self.error_deg, self.standard_error_deg
         return self.platform_error_deg, self.platform_standard_error_deg

@@ -1,4 +1,4 @@
-"""Answer of the INS error estimator (system 2): errors of the INS found against GNSS, and what they rest on."""
+"""Answer of the INS error estimator (system 2): INS errors against GNSS, and their basis."""
 
 import math
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ STARTS = ("stated", "mode", "standstill", "unknown")
 STATES = ("position", "velocity", "tilt", "drift", "drift_rate", "random_drift")
 NOT_SEEN = 0.01  # observability below which the data said nothing of a state
 UNMOVED = 0.01  # share of its sigma at the start by which the sigma of such a state may differ
-SUMMARY_ROUNDING = 1e-6  # of a sigma in summary.json
+SUMMARY_ROUNDING = 1e-6  # rounding of a sigma in summary.json
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,12 @@ class StateEstimate:
 
 @dataclass(frozen=True)
 class ChannelResult:
-    """One horizontal channel, ``north`` or ``east``. Error = INS - truth, innovation = measured - predicted.
+    """One horizontal channel, ``north`` or ``east``.
 
-    ``nis`` is the mean normalised innovation squared per measurement with its 95 % chi-square limits ``nis_low``,
-    ``nis_high`` (None where the measurement noise was inflated for colour: then NIS is below one by design);
-    ``share_inside95`` of the innovations inside their own 95 % band; ``rejected`` of ``innovations`` were gated.
+    Error = INS - truth, innovation = measured - predicted. ``nis`` is the mean normalised innovation squared per
+    measurement with its 95 % chi-square limits ``nis_low``, ``nis_high`` (None where the measurement noise was inflated
+    for colour: then NIS is below one by design); ``share_inside95`` of the innovations inside their own 95 % band;
+    ``rejected`` of ``innovations`` were gated.
     """
 
     name: str = field(metadata={"one_of": CHANNELS})
@@ -62,11 +63,11 @@ class ChannelResult:
 
 @dataclass(frozen=True)
 class RealOutage:
-    """An interval of the log itself in which nothing could be compared: the filter forecast through it.
+    """Interval of the log in which nothing could be compared.
 
-    ``jump_m`` is how far the forecast position error was from what GNSS showed at its end, ``sigma_m`` what the
-    forecast claimed (both radial); None when the flight ended before. ``missing`` is what was absent: ``"gnss"``,
-    ``"ins"`` or ``"both"``.
+    The filter forecast through it. ``jump_m`` is how far the forecast position error was from what GNSS showed at its
+    end, ``sigma_m`` what the forecast claimed (both radial); None when the flight ended before. ``missing`` is what was
+    absent: ``"gnss"``, ``"ins"`` or ``"both"``.
     """
 
     start_s: float
@@ -79,9 +80,10 @@ class RealOutage:
 
 @dataclass(frozen=True)
 class EarlyAzimuth:
-    """Azimuth error at flight time ``time_s``, from the turns of the first hour of them alone, and its drift.
+    """Azimuth error at flight time ``time_s``, and its drift.
 
-    An azimuth error oscillates over 24 h: what is carried back to the taxi may not come from hours later.
+    It rests on the turns of the first hour of turns alone. An azimuth error oscillates over 24 h: what is carried back
+    to the taxi may not come from hours later.
     """
 
     error_deg: float
@@ -109,11 +111,11 @@ class EarlyAzimuth:
 
 @dataclass(frozen=True)
 class AzimuthEstimate:
-    """Azimuth (heading) error of the INS from what turns do to its velocity error; offered only where they allow it.
+    """Azimuth (heading) error of the INS, from the effect of turns on its velocity error.
 
-    ``observable`` says whether ``sigma_deg`` is below the limit of the settings; if not, ``error_deg`` is None. The
-    error is that at ``time_s``, flight seconds: the last turn; ``early`` is for the time of the taxi, None where the
-    first hour shows too little.
+    It is offered only where the turns allow it. ``observable`` says whether ``sigma_deg`` is below the limit of the
+    settings; if not, ``error_deg`` is None. The error is that at ``time_s``, flight seconds: the last turn; ``early``
+    is for the time of the taxi, None where the first hour shows too little.
     """
 
     observable: bool
@@ -128,9 +130,10 @@ class AzimuthEstimate:
 
 @dataclass(frozen=True)
 class Difference:
-    """INS minus GNSS over the epochs compared: ``north``, ``east``, or ``horizontal``, the length of both.
+    """INS minus GNSS over the epochs compared.
 
-    ``mean`` has its sign; ``median``, ``p95`` and ``largest`` are of the magnitude.
+    ``axis`` is ``north``, ``east``, or ``horizontal``, the length of both. ``mean`` has its sign; ``median``, ``p95``
+    and ``largest`` are of the magnitude.
     """
 
     quantity: str = field(metadata={"one_of": QUANTITIES})
@@ -145,11 +148,12 @@ class Difference:
 
 @dataclass(frozen=True)
 class OwnInnovation:
-    """What the INS's own filter logged of its innovations against GNSS: innovation = measured - predicted.
+    """Innovations against GNSS that the INS's own filter logged.
 
-    ``mean`` has its sign; ``median`` and ``p95`` are of the magnitude. ``sigma`` is the root of the filter's median
-    variance, ``share_inside95`` that of the innovations inside their 95 % band; None where it logs no variance.
-    ``share_rejected`` is that of the samples beyond the filter's own gate, None where it logs no ratio to it.
+    Innovation = measured - predicted. ``mean`` has its sign; ``median`` and ``p95`` are of the magnitude. ``sigma`` is
+    the root of the filter's median variance, ``share_inside95`` that of the innovations inside their 95 % band; None
+    where it logs no variance. ``share_rejected`` is that of the samples beyond the filter's own gate, None where it
+    logs no ratio to it.
     """
 
     quantity: str = field(metadata={"one_of": QUANTITIES})
@@ -166,7 +170,7 @@ class OwnInnovation:
 
 @dataclass(frozen=True)
 class NavigationStart:
-    """Moment from which an INS navigates, and what proves it.
+    """Moment from which an INS navigates, and the evidence for it.
 
     ``time_s`` is in flight seconds, negative before the log, None where nothing proves it. ``basis`` is ``stated``,
     ``mode`` (a logged change from alignment), ``standstill`` (the log begins parked, with INS and GNSS together) or
@@ -180,7 +184,9 @@ class NavigationStart:
 
 @dataclass(frozen=True)
 class InertialResult(Answer):
-    """INS errors of one flight; of an INS that GNSS corrects already, what it differs from GNSS by and nothing else.
+    """INS errors of one flight.
+
+    For an INS that GNSS corrects already, it only has the differences from GNSS.
 
     Parameters
     ----------
@@ -272,7 +278,10 @@ class InertialResult(Answer):
         return ("states", "channels", *super().table_names())
 
     def to_frame(self, table: str = "states") -> "pd.DataFrame":
-        """A list of rows as a frame (see :class:`Tabular`); ``states`` are those of both channels."""
+        """Return a list of rows as a frame (see :class:`Tabular`).
+
+        ``states`` are those of both channels.
+        """
         if table == "channels":
             return rows_frame(ChannelResult, self.channels)
         if table != "states":
@@ -284,9 +293,10 @@ class InertialResult(Answer):
 
 
 def is_left_alone(name: str, sigma: Any, observability: Any, settings: Mapping[str, Any]) -> bool:
-    """Whether a state is not estimated in this INS class: the data say nothing of it and its sigma is the one it had.
+    """Tell whether a state is not estimated in this INS class.
 
-    A class leaves a state out by a tiny sigma at the start; value and sigma are then no answer of this flight.
+    The data say nothing of it, and its sigma is the one it had. A class leaves a state out by a tiny sigma at the
+    start; value and sigma are then no answer of this flight.
 
     Parameters
     ----------

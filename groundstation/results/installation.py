@@ -1,4 +1,4 @@
-"""What flights teach of an INS's installation, and the heading errors that follow from it."""
+"""Knowledge of an INS's installation from flights, and heading errors that follow from it."""
 
 import json
 from dataclasses import dataclass, field
@@ -12,13 +12,16 @@ from groundstation.results.figures import FigureData
 from groundstation.results.heading import IntervalPart
 
 FORMAT_VERSION = 1
-METHOD_VERSION = 1  # of the model: another one makes every learned answer again
+METHOD_VERSION = 1  # version of the model: with another one every learned answer is made again
 POOLED = ("compass_a_deg", "antenna_arm_m", "gnss_latency_s")  # figures of other sensors that stay as they are
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A figure of a sensor that one flight measured, in the unit that ends its name, and its sigma."""
+    """Figure of a sensor that one flight measured, and its sigma.
+
+    Its unit ends its name.
+    """
 
     name: str = field(metadata={"one_of": POOLED})
     value: float
@@ -27,7 +30,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Lesson:
-    """What one flight says of its installation: stored numbers alone.
+    """Contribution of one flight to the knowledge of its installation: stored numbers alone.
 
     Parameters
     ----------
@@ -95,26 +98,27 @@ class Lesson:
 
     @property
     def teaches(self) -> bool:
-        """Whether later flights learn from it."""
+        """Tell whether later flights learn from it."""
         return not self.not_taught
 
     @property
     def place(self) -> tuple[str, str]:
-        """Orders flights by time."""
+        """Key that orders flights by time."""
         return self.start_utc.removesuffix("Z"), self.flight_id
 
     @property
     def prior(self) -> tuple[float, ...]:
-        """What is known before the first flight."""
+        """Knowledge before the first flight: factor, steady sideslip, mounting, with sigmas."""
         return (self.factor, self.factor_sigma, self.steady_sigma_deg, self.mounting_deg, self.mounting_sigma_deg)
 
 
 @dataclass(frozen=True)
 class Installed:
-    """Posterior of an installation: mounting of the unit, factor and steady sideslip of the aircraft.
+    """Posterior of an installation.
 
-    ``factor`` is in degrees per m/s of crosswind; ``sum_deg`` is mounting + steady sideslip, which the flights see
-    together: its sigma is smaller than either's.
+    It has the mounting of the unit, and the factor and steady sideslip of the aircraft. ``factor`` is in degrees per
+    m/s of crosswind; ``sum_deg`` is mounting + steady sideslip, which the flights see together: its sigma is smaller
+    than either's.
     """
 
     flights: int
@@ -130,7 +134,7 @@ class Installed:
 
 @dataclass(frozen=True)
 class InstallationResult(Answer):
-    """The heading error with what earlier flights taught (error = INS heading - true heading).
+    """Heading error with the knowledge from earlier flights (INS heading - true heading).
 
     Parameters
     ----------
@@ -192,7 +196,10 @@ class InstallationResult(Answer):
 
 @dataclass(frozen=True)
 class InstalledFlight:
-    """A flight of an installation: what it says, and its answer by what earlier ones taught (None without a taxi)."""
+    """Flight of an installation: its lesson, and its answer by those of earlier flights.
+
+    The answer is None without a taxi.
+    """
 
     lesson: Lesson
     answer: InstallationResult | None
@@ -200,7 +207,7 @@ class InstalledFlight:
 
 @dataclass(frozen=True)
 class Pooled:
-    """A figure of a sensor from all flights of an installation, in the unit that ends its name.
+    """Figure of a sensor from all flights of an installation, in the unit that ends its name.
 
     ``odd`` and ``changed`` name flights that another sensor seems to have made, and those from which on it is another.
     """
@@ -215,7 +222,7 @@ class Pooled:
 
 @dataclass(frozen=True)
 class Installation:
-    """One unit in one aircraft, until it flies in another: what its flights say together.
+    """One unit in one aircraft, until it flies in another, and the results of its flights.
 
     Parameters
     ----------
@@ -243,13 +250,13 @@ class Installation:
 
     @property
     def lessons(self) -> tuple[Lesson, ...]:
-        """What its flights say."""
+        """Lessons of its flights."""
         return tuple(one.lesson for one in self.flights)
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A flight with a serial that is in no installation, and why."""
+    """Flight with a serial that is in no installation, and the reason."""
 
     flight_id: str
     reason: str
@@ -271,13 +278,13 @@ class Installations:
 
     @property
     def lessons(self) -> tuple[Lesson, ...]:
-        """What all flights say."""
+        """Lessons of all flights."""
         return tuple(lesson for one in self.installations for lesson in one.lessons)
 
 
 @dataclass(frozen=True)
 class InstallationRow:
-    """One unit in one aircraft: what its flights say together; :class:`Installed`.
+    """One unit in one aircraft and the results of its flights together; :class:`Installed`.
 
     ``place`` counts the installations of the fleet from 1. ``odd`` and ``changed`` name flights taken for another
     unit's, and those from which on it sits otherwise, joined by ", ". ``pooled`` are figures of other sensors.
@@ -302,7 +309,10 @@ class InstallationRow:
 
 
 def as_stored(lesson: Lesson) -> Lesson:
-    """A lesson with its numbers rounded as the file has them: whoever reads the file computes the same."""
+    """Round the numbers of a lesson as the file has them.
+
+    Every reader of the file then computes the same.
+    """
     return from_json(Lesson, to_json(lesson))
 
 

@@ -1,4 +1,4 @@
-"""Approaches of a recorded flight: the path flown against the runway's, the touchdown, and what shows accuracy."""
+"""Approaches of a recorded flight: path against the runway's, touchdown, accuracy."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
@@ -46,7 +46,7 @@ class RunwayUsed:
 
 @dataclass(frozen=True)
 class Touchdown:
-    """Where and how the wheels met the ground.
+    """Place, time and manner in which the wheels met the ground.
 
     Parameters
     ----------
@@ -76,7 +76,10 @@ class Touchdown:
 
 @dataclass(frozen=True)
 class Established:
-    """The part of a final that was flown on the guidance, and how closely. Times are flight seconds."""
+    """Part of a final that was flown on the guidance, and its deviations.
+
+    Times are flight seconds.
+    """
 
     start_s: float
     end_s: float
@@ -95,7 +98,7 @@ StabilisedVerdict = Literal["stabilised", "not stabilised", "not measured"]
 
 @dataclass(frozen=True)
 class StabilisedAt:
-    """The criteria of a stabilised approach from a height down to where the flare begins."""
+    """Criteria of a stabilised approach, from a height down to the start of the flare."""
 
     height_m: float
     verdict: StabilisedVerdict
@@ -106,7 +109,7 @@ class StabilisedAt:
 
 @dataclass(frozen=True)
 class ErrorPart:
-    """What a part of the error budget contributes to sigma at the threshold."""
+    """Contribution of a part of the error budget to sigma at the threshold."""
 
     name: str
     sigma_m: float
@@ -114,7 +117,9 @@ class ErrorPart:
 
 @dataclass(frozen=True)
 class PositionError:
-    """Error of recorded positions across the course, with the localizer for reference: it needs no GNSS.
+    """Error of recorded positions across the course, against the localizer.
+
+    It needs no GNSS.
 
     Parameters
     ----------
@@ -157,7 +162,9 @@ class PositionError:
 
 @dataclass(frozen=True)
 class HeightError:
-    """Error of a recorded altitude on the roll-out, with the elevation of the runway for reference: it needs no GNSS.
+    """Error of a recorded altitude on the roll-out, against the elevation of the runway.
+
+    It needs no GNSS.
 
     Parameters
     ----------
@@ -186,9 +193,10 @@ class HeightError:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """How far positions move across the course over how far the localizer shows it: 1 where its sense and width fit.
+    """Ratio of positions across the course to what the localizer shows of them.
 
-    ``ratio`` is None where the aircraft never was far enough off the course for it.
+    It is 1 where the localizer's sense and width fit. ``ratio`` is None where the aircraft never was far enough off the
+    course for it.
     """
 
     ratio: float | None
@@ -198,7 +206,9 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class Protection:
-    """Protection levels of a satellite receiver along a final. The error itself is not known: nothing here is one.
+    """Protection levels of a satellite receiver along a final.
+
+    They are no errors: the error itself is not known.
 
     Parameters
     ----------
@@ -223,7 +233,10 @@ class Protection:
 
 @dataclass(frozen=True)
 class Approach:
-    """One approach. Times are flight seconds; distances are before the threshold, behind it negative."""
+    """One approach.
+
+    Times are flight seconds; distances are before the threshold, behind it negative.
+    """
 
     number: int
     outcome: Outcome
@@ -249,7 +262,7 @@ class Approach:
 
 @dataclass(frozen=True)
 class LeftOutApproach:
-    """A descent that is not told as an approach, and why."""
+    """Descent that is not listed as an approach, and the reason."""
 
     time_s: float
     reason: str
@@ -257,7 +270,9 @@ class LeftOutApproach:
 
 @dataclass(frozen=True)
 class LandingResult(Answer):
-    """The approaches of a flight, each against its runway. Accuracy only: integrity and the rest are not shown.
+    """Approaches of a flight, each against its runway.
+
+    They show accuracy only: integrity and the rest are not shown.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""Answer of landing by locators: deviations from course and glide path by relative bearings and radio altitude."""
+"""Answer of landing by locators: deviations from course and glide path.
+
+They come from relative bearings and radio altitude.
+"""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -9,7 +12,7 @@ from groundstation.results.figures import FigureData
 
 @dataclass(frozen=True)
 class BeaconRow:
-    """A beacon: where it stands and how many bearings of it were used."""
+    """Beacon: its place, and how many bearings of it were used."""
 
     name: str
     before_threshold_m: float
@@ -55,7 +58,9 @@ class BeaconApproachRow:
 
 @dataclass(frozen=True)
 class DeviationRow:
-    """Deviations at one distance: means over a second, with what a single one of them may err by.
+    """Deviations at one distance: means over a second.
+
+    The 95 % figures are those of a single deviation.
 
     Parameters
     ----------

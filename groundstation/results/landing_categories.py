@@ -1,4 +1,4 @@
-"""Accuracy that categories of precision approach ask for, and the 95 % figures that are held against it.
+"""Accuracy that categories of precision approach require, and the 95 % figures for it.
 
 Accuracy only: integrity, continuity and availability are further requirements, and nothing here shows them.
 
@@ -54,7 +54,7 @@ class Category:
 
     @property
     def label(self) -> str:
-        """Name with what the row is."""
+        """Name, with the kind of the row."""
         return f"{self.name} (ILS look-alike)" if self.is_ils_look_alike else self.name
 
 
@@ -67,7 +67,9 @@ ACCURACY_ONLY = "Accuracy only: integrity, continuity and availability are not s
 
 
 def category_met(horizontal_95_m: float, vertical_95_m: float) -> Category | None:
-    """The most demanding category whose accuracy both figures meet, None where they meet none (or are NaN).
+    """Return the most demanding category whose accuracy both figures meet.
+
+    It is None where they meet none (or are NaN).
 
     Examples
     --------
@@ -79,7 +81,9 @@ def category_met(horizontal_95_m: float, vertical_95_m: float) -> Category | Non
 
 
 def axis_category_met(error_95_m: float, axis: str) -> Category | None:
-    """The most demanding category whose horizontal ("lateral": one axis of it) or vertical figure is met alone.
+    """Return the most demanding category whose horizontal or vertical figure is met alone.
+
+    "lateral" is one axis of the horizontal one.
 
     Examples
     --------

@@ -1,4 +1,7 @@
-"""Answer of landing by ranges: accuracy along the approach, held against categories, and how honest it is."""
+"""Answer of landing by ranges: accuracy along the approach against categories.
+
+It also tells how honest that accuracy is.
+"""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -59,7 +62,10 @@ class AccuracyRow:
 
 @dataclass(frozen=True)
 class CategorySpan:
-    """Stretch of the path on which a category's accuracy is met: all of it, or along one axis alone."""
+    """Stretch of the path on which a category's accuracy is met.
+
+    It is met in all, or along one axis alone.
+    """
 
     category: str
     axis: str

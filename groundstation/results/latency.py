@@ -1,4 +1,4 @@
-"""Answer of the latency estimator: how much later each sensor shows the motion that the INS shows."""
+"""Answer of the latency estimator: delay of each sensor behind the motion of the INS."""
 
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal

@@ -1,4 +1,7 @@
-"""Answer of the magnetic estimator (system 3): the deviation found in flight, how sure it is, what it leaves over."""
+"""Answer of the magnetic estimator (system 3): deviation found in flight, with its sigma.
+
+It also tells what the correction leaves over.
+"""
 
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
@@ -29,7 +32,7 @@ class AlignmentSource:
     """One way in which the flight shows the INS heading error, at the time of the figure.
 
     ``taxi``: the heading analysis; ``ground run``: the run to lift-off; ``turns``: azimuth by turns in flight, the
-    sigma of the mounting included. None where there is no number. ``at_s``: flight seconds at which it was seen.
+    sigma of the mounting included. It is None where there is no number. ``at_s``: flight seconds at which it was seen.
     ``reason``: why it is not used.
     """
 
@@ -44,13 +47,14 @@ class AlignmentSource:
 
 @dataclass(frozen=True)
 class Alignment:
-    """INS heading error at the time of the figure, taken off the INS heading before anything is compared with it.
+    """INS heading error at the time of the figure.
 
-    ``aligned_error_deg`` and ``aligned_sigma_deg`` belong to ``aligned_at_s``, ``error_deg`` and ``sigma_deg`` to
-    ``figure_at_s`` (flight seconds), after the drift of the hours between. ``origin`` says whence.
-    ``speed_min_mps`` is the speed from which on the track may align. ``gyro_*`` are the drifts along forward, right,
-    down at the standstill before flight and their sigmas; None where no rates are logged. ``sources`` lists every way
-    in which the flight shows the error. It is the airframe's, less the mounting that the aircraft file states.
+    It is taken off the INS heading before anything is compared with it. ``aligned_error_deg`` and ``aligned_sigma_deg``
+    belong to ``aligned_at_s``, ``error_deg`` and ``sigma_deg`` to ``figure_at_s`` (flight seconds), after the drift of
+    the hours between. ``origin`` says whence. ``speed_min_mps`` is the speed from which on the track may align.
+    ``gyro_*`` are the drifts along forward, right, down at the standstill before flight and their sigmas; None where no
+    rates are logged. ``sources`` lists every way in which the flight shows the error. It is the airframe's, less the
+    mounting that the aircraft file states.
     """
 
     origin: str
@@ -74,7 +78,10 @@ class Alignment:
 
 @dataclass(frozen=True)
 class DeclinationUsed:
-    """Declination at the figure, east positive, with its sigma, and the model's horizontal and vertical intensity."""
+    """Declination at the figure, east positive, with its sigma and the model's intensities.
+
+    The intensities are horizontal and vertical.
+    """
 
     value_deg: float
     sigma_deg: float
@@ -85,7 +92,10 @@ class DeclinationUsed:
 
 @dataclass(frozen=True)
 class Turn:
-    """A turn of about constant bank, and why it is not used. Bank right positive; times are flight seconds."""
+    """Turn of about constant bank, and the reason where it is not used.
+
+    Bank is right positive; times are flight seconds.
+    """
 
     start_s: float
     end_s: float
@@ -128,7 +138,7 @@ class SigmaPart:
 
 @dataclass(frozen=True)
 class Coverage:
-    """How much of the circle of magnetic headings both branches cover.
+    """Share of the circle of magnetic headings that both branches cover.
 
     ``share`` counts bins with readings of both, or in a gap no wider than the settings allow; ``measured_bins`` those
     with readings alone, ``interpolated_bins`` the rest of 360; ``widest_gap_deg`` without readings of both.
@@ -142,7 +152,10 @@ class Coverage:
 
 @dataclass(frozen=True)
 class Residual:
-    """RMS error of the magnetic heading on the part of the flight that no fit has seen, its mean included."""
+    """RMS error of the magnetic heading on the part of the flight that no fit has seen.
+
+    Its mean is included.
+    """
 
     before: float
     after: float
@@ -150,9 +163,9 @@ class Residual:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """The level part of the flight that no fit has seen; ``level_share`` is its share of all that none has seen.
+    """Level part of the flight that no fit has seen.
 
-    ``heading_sectors`` of 30 deg, of 12, were flown in it.
+    ``level_share`` is its share of all that none has seen. ``heading_sectors`` of 30 deg, of 12, were flown in it.
     """
 
     samples: int
@@ -164,7 +177,9 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class Method:
-    """One way to find the deviation, fitted or refused, and what it leaves on the held-out part.
+    """One method to find the deviation, fitted or refused, and its error.
+
+    The error is that on the held-out part.
 
     Parameters
     ----------
@@ -202,10 +217,11 @@ class Method:
 
 @dataclass(frozen=True)
 class PoissonParameters:
-    """Iron of the aircraft: reading = soft_iron @ field + hard_iron + current_effect x (current - reference).
+    """Iron of the aircraft: hard iron, soft iron, effect of a current.
 
-    ``field`` is the earth's along the body axes (forward, right, down). Sigmas have the same shapes;
-    ``current_*`` are None where no current was logged, or it did not vary.
+    They make reading = soft_iron @ field + hard_iron + current_effect x (current - reference). ``field`` is the earth's
+    along the body axes (forward, right, down). Sigmas have the same shapes; ``current_*`` are None where no current was
+    logged, or it did not vary.
     """
 
     hard_iron_nt: Vector
@@ -219,7 +235,10 @@ class PoissonParameters:
 
 @dataclass(frozen=True)
 class BankBias:
-    """Forecast from the fitted iron: error that the average of opposite banks has in level flight."""
+    """Error that the average of opposite banks has in level flight.
+
+    It is forecast from the fitted iron.
+    """
 
     bank_deg: float
     rms_deg: float
@@ -228,7 +247,7 @@ class BankBias:
 
 @dataclass(frozen=True)
 class OtherCondition:
-    """By how much the deviation is another than the table's under conditions that the figure did not have.
+    """Change of the deviation from the table's under conditions that the figure did not have.
 
     ``pitch``: for each degree of pitch more than the figure's, by the fitted iron. ``ground``: on the ground, by a
     steady field in the body, ``added_nt``, that a current makes that flows only there or only in the air. ``gain``: at
@@ -246,9 +265,10 @@ class OtherCondition:
 
 @dataclass(frozen=True)
 class CardRow:
-    """Steer card: to fly ``magnetic_heading_deg`` steer ``steer_deg`` by the uncorrected magnetic heading.
+    """Row of a steer card: to fly ``magnetic_heading_deg``, steer ``steer_deg``.
 
-    ``deviation_deg`` is added to the reading; ``is_interpolated``: no reading of both branches near it.
+    ``steer_deg`` is the uncorrected magnetic heading. ``deviation_deg`` is added to the reading; ``is_interpolated``:
+    no reading of both branches near it.
     """
 
     magnetic_heading_deg: float
@@ -321,6 +341,6 @@ class MagneticResult(Answer):
     figures: tuple[FigureData, ...] = ()
 
     def method(self, name: MethodName) -> Method:
-        """The row of a method; refused where it was never tried."""
+        """Return the row of a method; refused where it was never tried."""
         found = (row for row in self.methods if row.name == name)
         return next(found, Method(name, "refused", "not tried"))

@@ -1,4 +1,7 @@
-"""Deviation of the installed heading sensor from straight runs on the ground: what each run says, and all together."""
+"""Deviation of the installed heading sensor from straight runs on the ground.
+
+It is given by each run, and by all together.
+"""
 
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
@@ -13,7 +16,7 @@ CoefficientState = Literal["found", "not observable"]
 
 @dataclass(frozen=True)
 class GroundRun:
-    """A straight run on the ground, and why it is not used. Times are flight seconds.
+    """Straight run on the ground, and the reason where it is not used. Times: flight seconds.
 
     Parameters
     ----------
@@ -49,7 +52,7 @@ class GroundRun:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """GNSS epochs that belong to no run, and why."""
+    """GNSS epochs that belong to no run, and the reason."""
 
     reason: str
     epochs: int
@@ -57,7 +60,10 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class GroundCoefficient:
-    """One of A to E. ``value_deg`` is None where the runs do not show it; ``sigma_deg`` is what they leave of it."""
+    """One of the coefficients A to E.
+
+    ``value_deg`` is None where the runs do not show it; ``sigma_deg`` is what they leave of it.
+    """
 
     letter: str = field(metadata={"one_of": LETTERS})
     value_deg: float | None
@@ -68,7 +74,10 @@ class GroundCoefficient:
 
 @dataclass(frozen=True)
 class AlongAxis:
-    """What opposite runs show of B and C: ``value_deg`` x cos(heading - ``axis_deg``), the axis in [0, 180)."""
+    """Part of B and C that opposite runs show.
+
+    It is ``value_deg`` x cos(heading - ``axis_deg``), the axis in [0, 180).
+    """
 
     axis_deg: float
     value_deg: float
@@ -77,7 +86,10 @@ class AlongAxis:
 
 @dataclass(frozen=True)
 class Repeat:
-    """Runs on about one heading: the spread of their errors beside what their noise and slip alone would give."""
+    """Runs on about one heading: spread of their errors, and the spread to expect.
+
+    The latter is that by their noise and slip alone.
+    """
 
     magnetic_heading_deg: float
     runs: int
@@ -87,7 +99,9 @@ class Repeat:
 
 @dataclass(frozen=True)
 class GroundDeviation(Answer):
-    """Errors of the installed heading sensor on straight ground runs. Advisory, not a release to service.
+    """Errors of the installed heading sensor on straight ground runs.
+
+    They are advisory, not a release to service.
 
     Parameters
     ----------

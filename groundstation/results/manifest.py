@@ -1,4 +1,4 @@
-"""manifest.json: when, where and with what a run was made, and what a later run need not do again."""
+"""manifest.json: time, place and versions of a run, and results a later run can reuse."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,14 +20,19 @@ class SourceOfRun:
 
 @dataclass(frozen=True)
 class LogOfSession(SourceOfRun):
-    """One log of a session; ``mcap`` is its store, beside the manifest where the session converted it."""
+    """One log of a session.
+
+    ``mcap`` is its store, beside the manifest where the session converted it.
+    """
 
     mcap: str = ""
 
 
 @dataclass(frozen=True)
 class PartOfRun(SourceOfRun):
-    """One of the consecutive logs of a flight, and where it begins and ends; most flights have one.
+    """One of the consecutive logs of a flight, and its start and end.
+
+    Most flights have one.
 
     Parameters
     ----------
@@ -53,7 +58,7 @@ class PartOfRun(SourceOfRun):
 
 @dataclass(frozen=True)
 class PowerUpOfRun:
-    """Which of several power-ups in the log, from 1, and of how many."""
+    """Number of the power-up in the log, from 1, and their count."""
 
     number: int
     count: int
@@ -78,7 +83,10 @@ class Keys:
 
 @dataclass(frozen=True)
 class Resume:
-    """What a later run need not do again: keys of the stages, what was found in one line, whether data was lost."""
+    """Record that lets a later run skip work: keys of the stages, and what was found.
+
+    The findings are in one line; a flag tells whether data was lost.
+    """
 
     keys: Keys
     text: str
@@ -87,7 +95,10 @@ class Resume:
 
 @dataclass(frozen=True)
 class FileOfRun:
-    """A file as the run left it: bytes; of the MCAP its digest and the time of its last change, too."""
+    """File as the run left it: its size in bytes.
+
+    The MCAP has its digest and the time of its last change, too.
+    """
 
     size_bytes: int
     sha256: str = field(default="", metadata=LEFT_OUT_WHEN_DEFAULT)

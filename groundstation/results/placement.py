@@ -1,4 +1,4 @@
-"""Answer of a planned session: where ground points should stand."""
+"""Answer of a planned session: best places of ground points."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -11,7 +11,7 @@ GIVEN = "given"
 
 @dataclass(frozen=True)
 class DesignRow:
-    """One set of places and the accuracy it leads to.
+    """One set of places, and the accuracy it gives.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class DesignRow:
 
 @dataclass(frozen=True)
 class PlaceRow:
-    """Where one point stands in one design.
+    """Place of one point in one design.
 
     ``keep_out_distance_m`` is that to the nearest edge of what is kept out; ``below_way_m`` how far below the way it
     stands, None where the way does not lead over it.
@@ -77,7 +77,7 @@ class PlaceRow:
 
 @dataclass(frozen=True)
 class PlacementPlan(PlanAnswer):
-    """Where ground points should stand for the accuracy of an aircraft on a given way.
+    """Best places of ground points for the accuracy of an aircraft on a given way.
 
     Parameters
     ----------

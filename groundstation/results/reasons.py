@@ -9,7 +9,7 @@ WHAT_HEADING_NEEDS = (
 
 
 def explained(analysis: str, reason: str) -> str:
-    """The reason as it stands, and behind it, where the aircraft did not taxi, what the method would have needed.
+    """Return the reason, with the needs of the method where the aircraft did not taxi.
 
     Examples
     --------
@@ -23,7 +23,7 @@ def explained(analysis: str, reason: str) -> str:
 
 
 def in_plain_words(reason: str) -> str:
-    """The reason as it stands, but for names of gates.
+    """Return the reason with the names of gates in plain words.
 
     Examples
     --------

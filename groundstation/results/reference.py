@@ -1,4 +1,7 @@
-"""Answer of the comparison with a reference: errors of what was recorded and estimated, and claimed against seen."""
+"""Answer of the comparison with a reference: errors, and claimed against seen.
+
+The errors are those of what was recorded and of what was estimated.
+"""
 
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
@@ -23,7 +26,9 @@ SUBJECTS: dict[str, str] = {
 
 @dataclass(frozen=True)
 class Spread:
-    """Statistics of one error. Intervals are 95 % ones by ``effective_samples``; None where those are too few.
+    """Statistics of one error.
+
+    Intervals are 95 % ones by ``effective_samples``; None where those are too few.
 
     Parameters
     ----------
@@ -67,10 +72,10 @@ class ErrorRow:
 
 @dataclass(frozen=True)
 class ClaimRow:
-    """Claimed against seen: the share of the errors inside the 95 % region that subject and reference claim together.
+    """Share of the errors inside the 95 % region that is claimed.
 
-    ``claimed_sigma`` and ``reference_sigma`` are RMS, of a horizontal length those of north and east together;
-    ``confidence95`` is of the share, by the effective number of samples.
+    Subject and reference claim it together. ``claimed_sigma`` and ``reference_sigma`` are RMS, of a horizontal length
+    those of north and east together; ``confidence95`` is of the share, by the effective number of samples.
     """
 
     subject: str
@@ -88,7 +93,10 @@ class ClaimRow:
 
 @dataclass(frozen=True)
 class PathRow:
-    """Absolute trajectory error: RMS of the horizontal position error after an alignment; yaw in degrees."""
+    """Absolute trajectory error: RMS of the horizontal position error after an alignment.
+
+    The yaw is in degrees.
+    """
 
     subject: str
     alignment: Alignment
@@ -98,7 +106,7 @@ class PathRow:
 
 @dataclass(frozen=True)
 class RelativeRow:
-    """Relative error: how much the horizontal position error changes over a time or a way.
+    """Relative error: change of the horizontal position error over a time or a distance.
 
     ``length`` is in ``unit`` (s or m), errors in metres; ``effective_pairs`` of the overlapping ``pairs`` are
     independent. ``share_of_way`` is the RMS over the mean way between the two ends.
@@ -118,7 +126,9 @@ class RelativeRow:
 
 @dataclass(frozen=True)
 class Placed:
-    """Where a subject stands against the reference's point, and whose clock is late, from position in turns and motion.
+    """Place and clock of a subject against the reference, from its position in motion.
+
+    The place is that against the reference's point, from position in turns; the clock offset says whose clock is late.
 
     Parameters
     ----------
@@ -150,10 +160,10 @@ class Placed:
 
 @dataclass(frozen=True)
 class HeadingCheck:
-    """The heading error that was found and its interval, against INS minus reference at the same samples.
+    """Heading error that was found, against INS minus reference at the same samples.
 
-    ``seen95_deg`` allows for errors correlated in time; ``is_inside``: the difference is within the 95 % that both
-    claim together.
+    Both have their intervals. ``seen95_deg`` allows for errors correlated in time; ``is_inside``: the difference is
+    within the 95 % that both claim together.
     """
 
     ins_topic: str
@@ -169,7 +179,7 @@ class HeadingCheck:
 
 @dataclass(frozen=True)
 class ForecastCheck:
-    """The replayed forecast of the position error against what it became by the reference, at one horizon."""
+    """Replayed forecast of the position error, against the reference, at one horizon."""
 
     method: str
     horizon_min: float
@@ -182,7 +192,7 @@ class ForecastCheck:
 
 @dataclass(frozen=True)
 class ReferenceResult(Answer):
-    """What a flight's recordings and estimates are worth by a reference that none of them has seen.
+    """Errors of a flight's recordings and estimates by a reference that none of them has seen.
 
     Parameters
     ----------

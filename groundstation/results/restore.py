@@ -1,4 +1,4 @@
-"""Saved answers as dataclasses again: what summary.json tells, rounded as it was written."""
+"""Saved answers as dataclasses again: the contents of summary.json, rounded as written."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,7 +12,9 @@ from groundstation.results.flight import FlightResults
 
 
 def restored(summary: Mapping[str, Any], where: str, answer_types: Mapping[str, type[Answer]]) -> FlightResults:
-    """Results of a flight as the run had them, but for the digits that summary.json leaves out.
+    """Restore the results of a flight from its summary.
+
+    They are those of the run, but for the digits that summary.json leaves out.
 
     Parameters
     ----------
@@ -56,7 +58,7 @@ def restored(summary: Mapping[str, Any], where: str, answer_types: Mapping[str, 
 
 
 def restored_answer(summary: Mapping[str, Any], answer_type: type[A]) -> A:
-    """One answer of a summary, whatever the rest of it is, without figures.
+    """Restore one answer of a summary, whatever the rest of it is, without figures.
 
     Raises
     ------

@@ -1,4 +1,7 @@
-"""What other rules make of verdicts that were given: gates and verdict before and after, from stored values."""
+"""Verdicts judged again by other rules: gates and verdict before and after.
+
+They are judged from stored values.
+"""
 
 from dataclasses import dataclass
 
@@ -7,9 +10,10 @@ from groundstation.results.heading import Gate
 
 @dataclass(frozen=True)
 class Rejudged:
-    """A verdict under other limits. ``subject`` says what it is on: "heading", "landing 1 from 305 m".
+    """Verdict under other limits.
 
-    ``gates_before`` and ``gates_after`` go together, one to one.
+    ``subject`` says what it is on: "heading", "landing 1 from 305 m". ``gates_before`` and ``gates_after`` go together,
+    one to one.
     """
 
     subject: str
@@ -20,5 +24,5 @@ class Rejudged:
 
     @property
     def is_changed(self) -> bool:
-        """Whether the verdict is another one."""
+        """Tell whether the verdict is another one."""
         return self.before != self.after

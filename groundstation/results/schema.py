@@ -1,8 +1,8 @@
-"""The JSON Schema of summary.json, made from the dataclasses that are written to it.
+"""JSON Schema of summary.json, made from the dataclasses that are written to it.
 
-``make schemas`` writes it. What a type alone does not say stands in the metadata of a
-field (``one_of``, ``pattern``, ``keys``, ``items``: see :func:`_narrowed`) or follows from its name: shares lie within
-[0, 1], sigmas and lengths are not negative, whole numbers are counts.
+``make schemas`` writes it. Limits beyond the type stand in the metadata of a field (``one_of``, ``pattern``, ``keys``,
+``items``: see :func:`_narrowed`) or follows from its name: shares lie within [0, 1], sigmas and lengths are not
+negative, whole numbers are counts.
 """
 
 import dataclasses
@@ -28,7 +28,7 @@ KNOWN_NUMBERS = tuple(
 )
 SHARES = re.compile(r"(share|coverage|observability|inside)\d*(_.*)?|.*_share")
 NOT_NEGATIVE = re.compile(r".*sigma.*|(length|longest|total|span|nominal_period|residual|resolution)_s|completeness")
-NAMES = {  # of definitions, where they are not that of the class
+NAMES = {  # names of definitions that differ from the class name
     "HeadingResult": "heading",
     "TaxiSegment": "segment",
     "RunwayCheck": "runway",
@@ -105,7 +105,10 @@ def definition_name(cls: type) -> str:
 
 
 def _object(cls: type, definitions: dict[str, Schema]) -> Schema:
-    """A dataclass: its fields in order, all of them required but those that are left out when they say nothing."""
+    """Return the schema of a dataclass: its fields in order.
+
+    All are required but those that are left out when they say nothing.
+    """
     hints, told = typing.get_type_hints(cls), _told(cls)
     properties: dict[str, Schema] = {}
     required: list[str] = []
@@ -129,7 +132,7 @@ def _object(cls: type, definitions: dict[str, Schema]) -> Schema:
 
 
 def _of(hint: Any, definitions: dict[str, Schema], is_known: bool = False) -> Schema:
-    """Schema of a type; ``is_known``: a float is never NaN."""
+    """Return the schema of a type; ``is_known``: a float is never NaN."""
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if dataclasses.is_dataclass(hint):
         name = definition_name(typing.cast(type, hint))
@@ -167,7 +170,7 @@ def _array(arguments: tuple[Any, ...], definitions: dict[str, Schema], is_known:
 
 
 def _one_of_several(members: list[Schema]) -> Schema:
-    """Any of some schemas; plain types are told in one list."""
+    """Return the schema that allows any of several; plain types go in one list."""
     if not all(member.keys() <= {"type", "minimum"} for member in members):
         return {"anyOf": members}
     kinds: list[str] = []
@@ -180,7 +183,7 @@ def _one_of_several(members: list[Schema]) -> Schema:
 
 
 def _narrowed(schema: Schema, metadata: Mapping[str, Any]) -> Schema:
-    """What the metadata of a field adds to its type.
+    """Add the limits in the metadata of a field to the schema of its type.
 
     ``one_of``: texts it may be (of a mapping: its values); ``pattern``: of a text; ``keys``: of a mapping; ``items``:
     how many; ``above``, ``least``: a number is greater, or not less.
@@ -203,7 +206,10 @@ def _narrowed(schema: Schema, metadata: Mapping[str, Any]) -> Schema:
 
 
 def _bounded(schema: Schema, name: str) -> Schema:
-    """Bounds that follow from the name of a field, of numbers and of the numbers in an object."""
+    """Add the bounds that follow from the name of a field.
+
+    They hold for numbers, and for the numbers in an object.
+    """
     if name == "completeness" or (schema.get("type") == "object" and NOT_NEGATIVE.fullmatch(name)):
         return {**schema, "additionalProperties": _bounded(schema["additionalProperties"], "sigma")}
     kinds = schema.get("type", ())
@@ -215,7 +221,10 @@ def _bounded(schema: Schema, name: str) -> Schema:
 
 
 def _told(cls: type) -> dict[str, str]:
-    """What the docstring of a class says of its fields, by name (numpydoc, section Parameters)."""
+    """Return the descriptions of a class's fields in its docstring, by name.
+
+    They stand in the numpydoc section Parameters.
+    """
     _, _, listed = (cls.__doc__ or "").partition("Parameters\n    ----------\n")
     told: dict[str, str] = {}
     names: list[str] = []

@@ -1,4 +1,7 @@
-"""summary.json: the answers of one flight as plain values, each rounded to its stated digits, NaN as null."""
+"""summary.json: the answers of one flight as plain values.
+
+Each is rounded to its stated digits, NaN is null.
+"""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""How several logs of one flight were put on one clock, and which of their sources the analyses use."""
+"""Clock that several logs of one flight share, and the sources that analyses use of them."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
@@ -7,12 +7,12 @@ from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 
 JoinMethod = Literal["own_clock", "gnss_time", "motion", "gnss_time_and_motion", "file_time"]
-LABELS = "bcdefghijklmnopqrstuvwxyz"  # of the logs behind the first, whose topics keep their names
+LABELS = "bcdefghijklmnopqrstuvwxyz"  # labels of the logs behind the first, whose topics keep their names
 
 
 @dataclass(frozen=True)
 class JoinedStretch:
-    """A stretch over which the clock of a log runs evenly by that of the flight.
+    """Stretch over which the clock of a log runs evenly by that of the flight.
 
     Parameters
     ----------
@@ -84,14 +84,14 @@ class JoinedLog:
 
 @dataclass(frozen=True)
 class Joining:
-    """The logs of a flight, in the order in which they were named."""
+    """Logs of a flight, in the order in which they were named."""
 
     logs: tuple[JoinedLog, ...] = ()
 
 
 @dataclass(frozen=True)
 class ChosenSource:
-    """The source of a kind that the analyses use, of those that the logs have, and why."""
+    """Source of a kind that the analyses use, among those of the logs, and the reason."""
 
     kind: str
     topic: str
@@ -101,7 +101,7 @@ class ChosenSource:
 
 @dataclass(frozen=True)
 class MotionAgreement:
-    """How well the motion of a joined log agrees with that of the log whose clock the flight has.
+    """Agreement of a joined log's motion with that of the log whose clock the flight has.
 
     ``residual_rms`` and ``motion_rms`` in ``unit``, of ``signal``, at the samples of the joined log.
     """

@@ -1,1 +1,4 @@
-"""Truth flights and sensor models: seeded, quantised, written as the flat CSV every recorder can export."""
+"""Truth flights and sensor models: seeded, quantised, written as flat CSV.
+
+Every recorder can export that CSV.
+"""

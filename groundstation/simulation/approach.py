@@ -1,4 +1,7 @@
-"""Simulated approaches with ILS channels: true motion along a final, the ILS's own errors, coarse INS positions."""
+"""Simulated approaches with ILS channels: true motion, errors of the ILS, coarse INS.
+
+The motion is that along a final.
+"""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -21,7 +24,7 @@ from groundstation.tables.table import Flight, Table
 
 _SCENARIOS = ShippedToml("groundstation.simulation", "approaches", "approach")
 FULL_SCALE_DDM = 0.155
-GLIDE_SLOPE_DOT = 0.12  # of the glide angle
+GLIDE_SLOPE_DOT = 0.12  # one dot as a share of the glide angle
 NEEDLE_STOP_DOTS = 4.5
 FLARE_M = 15.0  # height at which the sink rate begins to fall
 SLOWEST_MPS = 15.0  # the roll-out is recorded down to it
@@ -31,7 +34,7 @@ CAPTURE_M = 2_500.0  # distance over which an offset from the course falls to 37
 
 @dataclass(frozen=True)
 class TrueRunway:
-    """Runway and its aids as they are; what a site file says of them may differ."""
+    """True runway and its aids; what a site file says of them may differ."""
 
     latitude_deg: float = required_number(-80.0, 80.0)
     longitude_deg: float = required_number(-180.0, 180.0)
@@ -49,7 +52,10 @@ class TrueRunway:
 
 @dataclass(frozen=True)
 class Flown:
-    """How the final is flown. Across is right of the course; ``crab_deg`` turns the nose right of the track."""
+    """Motion on the final.
+
+    Across is right of the course; ``crab_deg`` turns the nose right of the track.
+    """
 
     start_distance_m: float = number(22_000.0, 2_000.0, 60_000.0)
     start_across_m: float = number(0.0, -20_000.0, 20_000.0)
@@ -64,7 +70,10 @@ class Flown:
 
 @dataclass(frozen=True)
 class Recorded:
-    """Errors of what is recorded. Position error = INS minus truth as the threshold is crossed, and its growth."""
+    """Errors of the recorded data.
+
+    Position error = INS minus truth as the threshold is crossed, and its growth.
+    """
 
     across_m: float = number(0.0, -20_000.0, 20_000.0)
     along_m: float = number(0.0, -20_000.0, 20_000.0)
@@ -100,7 +109,10 @@ class ApproachScenario:
 
 @dataclass(frozen=True, eq=False)
 class SimulatedApproach:
-    """The log, and what an analysis should find: times are flight seconds, errors as the threshold is crossed."""
+    """Log of a simulated approach, and the values that an analysis should find.
+
+    Times are flight seconds, errors are those as the threshold is crossed.
+    """
 
     scenario: ApproachScenario
     flight: Flight
@@ -160,7 +172,10 @@ def write_approach(scenario: ApproachScenario, folder: str | Path, seed: int | N
 
 
 def _along(scenario: ApproachScenario) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Time, distance before the threshold, height above it, ground speed: once a second down to a slow roll-out."""
+    """Return time, distance before the threshold, height above it, and ground speed.
+
+    They are given once a second down to a slow roll-out.
+    """
     flown, runway = scenario.flown, scenario.runway
     slope = np.tan(np.deg2rad(runway.glide_angle_deg))
     height = runway.threshold_crossing_height_m + flown.start_distance_m * slope + flown.above_path_m
@@ -183,7 +198,10 @@ def _along(scenario: ApproachScenario) -> tuple[FloatArray, FloatArray, FloatArr
 
 
 def _course_line(scenario: ApproachScenario, distance_m: FloatArray) -> FloatArray:
-    """How far right of the true course the mean course line lies; the aircraft follows it."""
+    """Return the offset of the mean course line, right of the true course.
+
+    The aircraft follows the mean course line.
+    """
     to_antenna = np.maximum(distance_m + scenario.runway.localizer_distance_m, 50.0)
     return np.asarray(scenario.recorded.course_line_m * to_antenna / scenario.runway.localizer_distance_m)
 
@@ -191,7 +209,10 @@ def _course_line(scenario: ApproachScenario, distance_m: FloatArray) -> FloatArr
 def _across(
     flown: Flown, time_s: FloatArray, distance_m: FloatArray, height_m: FloatArray, rng: np.random.Generator
 ) -> FloatArray:
-    """True displacement right of the course: capture, wander that narrows towards the runway, the roll-out."""
+    """Return the true displacement right of the course: capture, wander, roll-out.
+
+    The wander narrows towards the runway.
+    """
     capture = flown.start_across_m * np.exp(-(flown.start_distance_m - distance_m) / CAPTURE_M)
     narrowing = np.clip(0.2 + distance_m / 10_000.0, 0.05, 3.0)
     wander = gauss_markov(rng, (len(time_s),), 1.0, flown.wander_m, flown.wander_s) * narrowing
@@ -238,7 +259,7 @@ def _guidance(
     height_m: FloatArray,
     rng: np.random.Generator,
 ) -> dict[str, FloatArray]:
-    """Deviations in dots as a receiver shows them."""
+    """Return the deviations in dots as a receiver shows them."""
     recorded, runway = scenario.recorded, scenario.runway
     to_antenna = np.maximum(distance_m + runway.localizer_distance_m, 50.0)
     per_dot = 0.5 * runway.localizer_width_m / DOTS_PER_FULL_SCALE * to_antenna / runway.localizer_distance_m

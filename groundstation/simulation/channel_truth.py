@@ -1,4 +1,7 @@
-"""The six-state channel model of system 2 as a truth generator: errors of which the filter's model is exactly true."""
+"""Six-state channel model of system 2 as a truth generator.
+
+The filter's model is exactly true of the errors that it makes.
+"""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -18,10 +21,10 @@ POSITION, VELOCITY, TILT, CONSTANT, TREND, RANDOM = range(6)
 
 @dataclass(frozen=True)
 class ChannelTruth:
-    """States of c channels at n times; SI units, tilt positive where it makes the velocity error fall.
+    """States of c channels at n times in SI units.
 
-    ``states`` has shape (c, n, 6): position error m, velocity error m/s, tilt rad, constant drift rad/s, its first
-    derivative rad/s^2, random drift rad/s.
+    Tilt is positive where it makes the velocity error fall. ``states`` has shape (c, n, 6): position error m, velocity
+    error m/s, tilt rad, constant drift rad/s, its first derivative rad/s^2, random drift rad/s.
     """
 
     states: FloatArray
@@ -36,7 +39,7 @@ class ChannelTruth:
 
 
 def channel_matrix(beta_per_s: float, gravity_mps2: float = MPS2_PER_G, radius_m: float = RADIUS_M) -> FloatArray:
-    """A of the channel, shape (6, 6). Source: Neusypin et al., Herald of BMSTU, 2003."""
+    """Return A of the channel, shape (6, 6). Source: Neusypin et al., Herald of BMSTU, 2003."""
     out = np.zeros((6, 6))
     out[POSITION, VELOCITY] = 1.0
     out[VELOCITY, TILT] = -gravity_mps2
@@ -93,7 +96,9 @@ def channel_truth(
     gravity_mps2: float = MPS2_PER_G,
     radius_m: float = RADIUS_M,
 ) -> ChannelTruth:
-    """Draw channels of the design's own model: x' = A x + noise, stepped with the exact exponential.
+    """Draw channels of the filter's own model, x' = A x + noise.
+
+    They are stepped with the exact exponential.
 
     Parameters
     ----------
@@ -116,7 +121,10 @@ def channel_truth(
 
 @lru_cache(maxsize=16)
 def _step_of(ins: InsClass, step_s: float, gravity_mps2: float, radius_m: float) -> tuple[FloatArray, FloatArray]:
-    """Transition of a step, and the factor that makes its noise of unit white noise; shapes (6, 6)."""
+    """Return the transition of a step and the factor of its noise, shapes (6, 6).
+
+    The factor makes the noise of unit white noise.
+    """
     matrix = channel_matrix(1.0 / ins.gyro_correlation_s, gravity_mps2, radius_m)
     transition, covariance = channel_noise(ins, matrix, step_s)
     is_driven = np.diag(covariance) > 1e-40  # the constant drift and its trend are not; rounding must not drive them

@@ -1,4 +1,4 @@
-"""The buses of a flight written as Chapter 10: which topic speaks on which, and the ICD that tells it."""
+"""Buses of a flight written as Chapter 10: the topics on each, and the ICD."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -49,7 +49,7 @@ AnyElement = TypeVar("AnyElement", bound=Element)
 
 @dataclass(frozen=True)
 class Bus1553:
-    """A 1553 bus: its channel, the message on it, when each was sent, and data words of shape (n, 32)."""
+    """One 1553 bus: channel, message, times of transmission, data words of shape (n, 32)."""
 
     channel: int
     message: Message1553
@@ -59,7 +59,7 @@ class Bus1553:
 
 @dataclass(frozen=True)
 class Bus429:
-    """An ARINC 429 bus: its number in the channel, from 1, what is on it, and the words in order of time."""
+    """One ARINC 429 bus: number in the channel, from 1, contents, and words in order of time."""
 
     subchannel: int
     name: str
@@ -78,7 +78,10 @@ class Buses:
 
     @property
     def icd(self) -> Icd:
-        """What the words mean. A signal that goes over both kinds of bus is fed by the 1553 message alone."""
+        """Return the ICD of the words.
+
+        A signal that goes over both kinds of bus is fed by the 1553 message alone.
+        """
         words = tuple(word for bus in self.buses_429 for word in bus.meanings)
         return Icd("buses", words, tuple(bus.message for bus in self.buses_1553))
 
@@ -109,7 +112,7 @@ def buses_of(flight: Flight) -> Buses:
 
 
 def _bus_1553(table: Table, channel: int) -> list[Bus1553]:
-    """The bus of one inertial system; none when it has nothing of B100."""
+    """Return the bus of one inertial system; none when it has nothing of B100."""
     (layout,) = shipped("b100").messages_1553
     given = {one.name: _values(table, one) for one in layout.elements if one.signal}
     sent = {name: values for name, values in given.items() if values is not None}
@@ -151,7 +154,10 @@ def _bus_429(
 
 
 def _carried(table: Table, words: tuple[Word429, ...]) -> list[tuple[Word429, FloatArray]]:
-    """The words that a table feeds and their values; what is cut off a coarse word is the value of its fine one."""
+    """Return the words that a table feeds, with their values.
+
+    A fine word holds what is cut off its coarse word.
+    """
     found: dict[str, tuple[Word429, FloatArray]] = {}
     for word in words:
         values = _values(table, word.elements[0])
@@ -169,7 +175,10 @@ def _carried(table: Table, words: tuple[Word429, ...]) -> list[tuple[Word429, Fl
 
 
 def _every(table: Table, words: int) -> int:
-    """Of how many samples one is sent: all words of one fit between it and the next."""
+    """Return the number of samples of which one is sent.
+
+    All words of one sample fit between it and the next.
+    """
     if len(table) < 2:
         return 1
     period_ns = max(float(np.median(np.diff(table.time_ns))), 1.0)
@@ -177,7 +186,7 @@ def _every(table: Table, words: int) -> int:
 
 
 def _values(table: Table, element: Element) -> FloatArray | None:
-    """What the words of an element hold in every row of a table; None when the table does not feed it."""
+    """Return the words' values of an element for every row; None if the table lacks it."""
     topic, _, name = (element.signal or "").rpartition(".")
     if not topic or kind_of(topic) != kind_of(table.topic):
         return None
@@ -187,6 +196,9 @@ def _values(table: Table, element: Element) -> FloatArray | None:
 
 
 def _of_unit(element: AnyElement, topic: str, fed: Iterable[str | None], *, is_sent: bool = True) -> AnyElement:
-    """The element as one of this topic; without a signal where it is not sent or another bus feeds it."""
+    """Return the element as one of this topic.
+
+    It has no signal where it is not sent or another bus feeds it.
+    """
     signal = f"{topic}.{(element.signal or '').rpartition('.')[2]}" if element.signal else None
     return replace(element, signal=signal if is_sent and signal not in fed else None)

@@ -1,4 +1,6 @@
-"""Packets of IRIG 106 Chapter 10 as bytes: header, TMATS, time, MIL-STD-1553 and ARINC 429, each with its checksums.
+"""Packets of IRIG 106 Chapter 10 as bytes, each with its checksums.
+
+They are header, TMATS, time, MIL-STD-1553 and ARINC 429.
 
 Source: IRIG 106-17, chapter 10 (file) and chapter 11 (packets): 11.2.1 header, 11.2.7.2 TMATS, 11.2.3.1 time data
 format 1, 11.2.4.1 1553 format 1, 11.2.8.1 ARINC 429 format 0.
@@ -13,15 +15,15 @@ from numpy.typing import NDArray
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
 
-NS_PER_TICK = 100  # of the relative time counter
+NS_PER_TICK = 100  # tick of the relative time counter
 SYNC = 0xEB25
 VERSION_106_17 = 8
 TMATS_106_17 = 0x0C
 TMATS, TIME_F1, BUS_1553_F1, ARINC_429_F0 = 0x01, 0x11, 0x19, 0x38
 CHECKSUM_32 = 3
 LARGEST_GAP_TICKS = 1 << 20  # between two ARINC 429 words of a packet: the field has 20 bits
-FIRST_BIT_OF_FIRST_WORD = 1 << 30  # what the time stamp of a 1553 message marks
-RESPONSE_TICKS = 40  # of a terminal, 4 us
+FIRST_BIT_OF_FIRST_WORD = 1 << 30  # the time stamp of a 1553 message marks this bit
+RESPONSE_TICKS = 40  # response time of a terminal, 4 us
 
 HEADER = np.dtype(
     [
@@ -45,7 +47,7 @@ WORD_429 = np.dtype([("bus_and_gap", "<u4"), ("word", "<u4")])
 
 @dataclass
 class Packer:
-    """Makes packets, numbered within each channel."""
+    """Maker of packets, numbered within each channel."""
 
     sequences: dict[int, int] = field(default_factory=dict)
 
@@ -101,12 +103,14 @@ def time_body(utc_ns: int) -> bytes:
 
 
 def _digits(number: int) -> int:
-    """Two decimal digits, four bits each."""
+    """Return two decimal digits, four bits each."""
     return number // 10 << 4 | number % 10
 
 
 def body_1553(ticks: Int64Array, command: int, data: NDArray[np.uint16]) -> bytes:
-    """Messages of one terminal that sends 32 words to the bus controller, on bus A and without error.
+    """Return messages of one terminal that sends 32 words to the bus controller.
+
+    They go over bus A and are without error.
 
     Parameters
     ----------
@@ -124,7 +128,9 @@ def body_1553(ticks: Int64Array, command: int, data: NDArray[np.uint16]) -> byte
 
 
 def body_429(ticks: Int64Array, subchannels: NDArray[np.uint8], words: NDArray[np.uint32]) -> bytes:
-    """Words of high-speed buses; their times are told by the gaps between them, each below ``LARGEST_GAP_TICKS``.
+    """Return words of high-speed buses.
+
+    Their times are told by the gaps between them, each below ``LARGEST_GAP_TICKS``.
 
     Parameters
     ----------

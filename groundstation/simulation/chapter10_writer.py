@@ -1,4 +1,7 @@
-"""A flight as IRIG 106 Chapter 10: TMATS, time, the layout B100 on 1553 and labels on ARINC 429; the ICD beside it."""
+"""Writer of a flight as IRIG 106 Chapter 10, with the ICD beside it.
+
+It writes TMATS, time, the layout B100 on 1553 and labels on ARINC 429.
+"""
 
 from collections.abc import Iterator
 from heapq import merge
@@ -26,7 +29,7 @@ from groundstation.simulation.chapter10_packets import (
 from groundstation.tables.table import Flight
 
 TIME_CHANNEL, ARINC_CHANNEL = 1, 40
-FIRST_TICK = 100_000_000  # of the counter at the beginning of the flight: the recorder has run for ten seconds
+FIRST_TICK = 100_000_000  # counter at the start of the flight: the recorder has run for ten seconds
 PACKET_TICKS = 1_000_000  # a packet holds what begins within 0.1 s; any gap in it fits the field of ARINC 429
 Draft: TypeAlias = tuple[int, int, int, int, bytes]  # counter at its last and first word, channel, type, body
 
@@ -35,7 +38,7 @@ def write_chapter10(path: Path, flight: Flight, *, cut_bytes: int = 0) -> tuple[
     """Write a flight, and the ICD of its buses beside it: ``x.ch10`` and ``x.icd.yaml``.
 
     The relative time counter follows the flight's corrected time. Time packets, one a second, give UTC where the flight
-    has it. What is sent is told by :func:`groundstation.simulation.chapter10_buses.buses_of`.
+    has it. :func:`groundstation.simulation.chapter10_buses.buses_of` decides what is sent.
 
     Parameters
     ----------
@@ -74,7 +77,7 @@ def _ticks(time_ns: Int64Array, start_ns: int) -> Int64Array:
 
 
 def _time_packets(flight: Flight, buses: Buses) -> Iterator[Draft]:
-    """One at every whole second of UTC, the first before all data."""
+    """Make a time packet at every whole second of UTC, the first before all data."""
     times = [*(bus.time_ns for bus in buses.buses_1553), *(bus.time_ns for bus in buses.buses_429)]
     ends = [one[[0, -1]] for one in times if len(one)]
     if not flight.has_utc or not ends:
@@ -86,7 +89,7 @@ def _time_packets(flight: Flight, buses: Buses) -> Iterator[Draft]:
 
 
 def _blocks(ticks: Int64Array) -> Iterator[slice]:
-    """Rows of each packet."""
+    """Return the rows of each packet."""
     edges = np.flatnonzero(np.diff(ticks // PACKET_TICKS)) + 1
     for first, last in zip([0, *edges], [*edges, len(ticks)], strict=True):
         if last > first:
@@ -101,7 +104,7 @@ def _packets_1553(bus: Bus1553, start_ns: int) -> Iterator[Draft]:
 
 
 def _packets_429(buses: tuple[Bus429, ...], start_ns: int) -> Iterator[Draft]:
-    """Words of all ARINC 429 buses in one channel."""
+    """Make the packets of all ARINC 429 buses in one channel."""
     if not buses:
         return
     ticks = np.concatenate([_ticks(bus.time_ns, start_ns) for bus in buses])
@@ -146,5 +149,5 @@ def _names_429(bus: Bus429) -> list[str]:
 
 
 def _text(text: str) -> str:
-    """A value as TMATS takes it: printable ASCII without semicolons."""
+    """Return a value as TMATS takes it: printable ASCII without semicolons."""
     return "".join(one if " " <= one <= "~" and one != ";" else "_" for one in text)

@@ -1,4 +1,7 @@
-"""Truth of the magnetic deviation: what a simulated magnetometer shows at every heading, without noise."""
+"""Truth of the magnetic deviation: readings of a simulated magnetometer at every heading.
+
+They are without noise.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +21,7 @@ LETTERS = "ABCDE"
 
 @dataclass(frozen=True)
 class DeviationTruth:
-    """Deviation of one magnetometer at one place and one attitude, which its headings go round.
+    """Deviation of one magnetometer at one place and one attitude, for all headings.
 
     Parameters
     ----------
@@ -39,12 +42,15 @@ class DeviationTruth:
 
     @property
     def deviation_deg(self) -> FloatArray:
-        """What has to be added to the heading shown for the magnetic heading, by bin, shape (360,)."""
+        """Angle to add to the heading shown to get the magnetic heading, by bin, shape (360,)."""
         return np.asarray(wrap_180(-self.compass_error_deg - self.declination_deg))
 
     @property
     def coefficients_deg(self) -> Mapping[str, float]:
-        """A to E of heading shown minus magnetic heading = A + B sin c + C cos c + D sin 2c + E cos 2c."""
+        """Coefficients A to E of heading shown minus magnetic heading.
+
+        The difference is A + B sin c + C cos c + D sin 2c + E cos 2c.
+        """
         shown_rad = np.deg2rad(BIN_MIDDLES_DEG)
         waves = (np.sin(shown_rad), np.cos(shown_rad), np.sin(2.0 * shown_rad), np.cos(2.0 * shown_rad))
         error = -self.deviation_deg
@@ -53,7 +59,9 @@ class DeviationTruth:
 
 
 def levelled_heading_deg(field_body_nt: FloatArray, roll_deg: FloatArray, pitch_deg: FloatArray) -> FloatArray:
-    """Magnetic heading of a field in body axes, shape (n, 3), turned level by roll and pitch, in [0, 360).
+    """Return the magnetic heading of a field in body axes, shape (n, 3), in [0, 360).
+
+    The field is turned level by roll and pitch.
 
     Examples
     --------
@@ -76,7 +84,9 @@ def deviation_truth(
     roll_error_deg: float = 0.0,
     pitch_error_deg: float = 0.0,
 ) -> DeviationTruth:
-    """Deviation of a magnetometer in a field at a roll and pitch held on every heading, and levelled with both.
+    """Return the deviation of a magnetometer at a roll and pitch held on every heading.
+
+    The reading is levelled with this roll and pitch.
 
     Parameters
     ----------
@@ -109,10 +119,11 @@ def deviation_truth(
 
 
 def scenario_deviation(scenario: Scenario, motion: Trajectory) -> DeviationTruth | None:
-    """Deviation in level flight (on the ground, if there is no other) under the base load; None without magnetometer.
+    """Return the deviation in level flight under the base load; None without magnetometer.
 
-    Constant errors of the INS's roll and pitch are in it: the heading shown is levelled with them on every flight.
-    The field is that of the middle of the flight: over 50 km the declination changes by tenths of a degree.
+    Without level flight it is that on the ground. Constant errors of the INS's roll and pitch are in it: the heading
+    shown is levelled with them on every flight. The field is that of the middle of the flight: over 50 km the
+    declination changes by tenths of a degree.
     """
     if scenario.magnetometer is None:
         return None

@@ -1,4 +1,4 @@
-"""Electric current near the magnetometer: a base load and loads that are switched on and off."""
+"""Electric current near the magnetometer: a base load, and loads switched on and off."""
 
 import numpy as np
 
@@ -11,7 +11,9 @@ from groundstation.simulation.trajectory import Trajectory
 
 
 def current_a(time_s: FloatArray, settings: ElectricSettings | None) -> FloatArray:
-    """True current at times in log seconds, shape (n,): base load + the loads that are on; 0 without a system.
+    """Return the true current at times in log seconds, shape (n,).
+
+    It is the base load and the loads that are on; 0 without a system.
 
     Examples
     --------
@@ -29,7 +31,7 @@ def current_a(time_s: FloatArray, settings: ElectricSettings | None) -> FloatArr
 
 
 def electric_readings(trajectory: Trajectory, settings: ElectricSettings, rng: np.random.Generator) -> Readings:
-    """The current as the recorder has it: with noise, rounded."""
+    """Return the current as the recorder has it: with noise, rounded."""
     time_ns = trajectory.time_ns[every(trajectory, settings.rate_hz)]
     noise = settings.noise_a * rng.standard_normal(len(time_ns))
     values = quantised(current_a(time_ns / NS_PER_S, settings) + noise, settings.resolution_a)

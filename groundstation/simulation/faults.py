@@ -1,4 +1,4 @@
-"""Damage that a log can have, put into a simulated flight on purpose: rows lost, doubled, a clock set back, bad values.
+"""Damage put into a simulated flight: rows lost, doubled, a clock set back, bad values.
 
 Truth is never damaged but for the rows that a doubled or re-timed log row carries with it.
 """
@@ -20,7 +20,7 @@ from groundstation.tables.table import Flight, Table
 
 @dataclass(frozen=True)
 class Dropout:
-    """Samples of a topic (empty: of all topics) between two log times are not recorded."""
+    """Samples of a topic (empty: of all topics) missing between two log times."""
 
     kind: ClassVar[str] = "dropout"
     from_s: float = required_number(0.0)
@@ -30,7 +30,7 @@ class Dropout:
 
 @dataclass(frozen=True)
 class Duplicate:
-    """Log rows between two log times are recorded twice in succession."""
+    """Log rows recorded twice in succession between two log times."""
 
     kind: ClassVar[str] = "duplicate"
     from_s: float = required_number(0.0)
@@ -39,7 +39,7 @@ class Duplicate:
 
 @dataclass(frozen=True)
 class BackwardStep:
-    """The recorder's clock is set back by ``step_s`` at a log time and runs on from there."""
+    """Recorder's clock set back by ``step_s`` at a log time, from which it runs on."""
 
     kind: ClassVar[str] = "backward_step"
     at_s: float = required_number(0.0)
@@ -48,7 +48,7 @@ class BackwardStep:
 
 @dataclass(frozen=True)
 class ForwardStep:
-    """The recorder's clock is set ahead by ``step_s`` at a log time and runs on from there."""
+    """Recorder's clock set ahead by ``step_s`` at a log time, from which it runs on."""
 
     kind: ClassVar[str] = "forward_step"
     at_s: float = required_number(0.0)
@@ -57,7 +57,10 @@ class ForwardStep:
 
 @dataclass(frozen=True)
 class ClockDrift:
-    """The recorder's clock runs fast (negative: slow) from a log time on, beside what it did before."""
+    """Drift of the recorder's clock from a log time on: fast, or slow where negative.
+
+    It comes on top of what the clock did before.
+    """
 
     kind: ClassVar[str] = "clock_drift"
     at_s: float = required_number(0.0)
@@ -66,7 +69,7 @@ class ClockDrift:
 
 @dataclass(frozen=True)
 class Stuck:
-    """A field keeps the value it had at ``from_s``."""
+    """Field that keeps the value it had at ``from_s``."""
 
     kind: ClassVar[str] = "stuck"
     topic: str
@@ -77,7 +80,7 @@ class Stuck:
 
 @dataclass(frozen=True)
 class NotANumber:
-    """The device writes NaN into a numeric field."""
+    """NaN that the device writes into a numeric field."""
 
     kind: ClassVar[str] = "nan"
     topic: str
@@ -88,7 +91,7 @@ class NotANumber:
 
 @dataclass(frozen=True)
 class MissingChannel:
-    """A topic, or one field of it, was not recorded at all."""
+    """Topic, or one field of it, that was not recorded at all."""
 
     kind: ClassVar[str] = "missing_channel"
     topic: str
@@ -97,7 +100,7 @@ class MissingChannel:
 
 @dataclass(frozen=True)
 class Frozen:
-    """A device repeats its last sample, all numbers of it, while the aircraft moves on."""
+    """Device that repeats all numbers of its last sample while the aircraft moves on."""
 
     kind: ClassVar[str] = "frozen"
     topic: str
@@ -107,7 +110,7 @@ class Frozen:
 
 @dataclass(frozen=True)
 class Jump:
-    """The position that a device gives is displaced for a while."""
+    """Position of a device that is displaced for a while."""
 
     kind: ClassVar[str] = "jump"
     topic: str
@@ -119,9 +122,10 @@ class Jump:
 
 @dataclass(frozen=True)
 class Reset:
-    """The errors of a navigator step at a log time and stay so: position, and velocity with the position it adds up to.
+    """Step of a navigator's errors at a log time, which lasts.
 
-    The Schuler oscillation that such a step starts is left out: 4 % of the added position in 10 min.
+    The position steps, and the velocity with the position it adds up to. The Schuler oscillation that such a step
+    starts is left out: 4 % of the added position in 10 min.
     """
 
     kind: ClassVar[str] = "reset"
@@ -135,7 +139,10 @@ class Reset:
 
 @dataclass(frozen=True)
 class Jitter:
-    """The recorder stamps a topic's samples up to ``spread_s`` early or late, evenly distributed: rows of their own."""
+    """Time stamps of a topic up to ``spread_s`` early or late, evenly distributed.
+
+    Its samples get rows of their own.
+    """
 
     kind: ClassVar[str] = "jitter"
     topic: str
@@ -160,10 +167,10 @@ Fault: TypeAlias = (
 
 
 def apply_faults(flight: Flight, faults: Iterable[Fault]) -> Flight:
-    """Damage a flight, fault after fault in the order given; log times are those of the undamaged clock.
+    """Damage a flight, fault after fault in the order given.
 
-    ``time_ns`` stays the true time of every row; ``device_time_ns`` is what the recorder wrote and ``record_index``
-    the row of the log.
+    Log times are those of the undamaged clock. ``time_ns`` stays the true time of every row; ``device_time_ns`` is what
+    the recorder wrote and ``record_index`` the row of the log.
 
     Raises
     ------
@@ -196,7 +203,7 @@ def apply_faults(flight: Flight, faults: Iterable[Fault]) -> Flight:
 
 
 def describe(fault: Fault) -> str:
-    """One line for people.
+    """Describe a fault in one line for people.
 
     Examples
     --------
@@ -271,7 +278,7 @@ def _duplicate(flight: Flight, fault: Duplicate) -> Flight:
 
 
 def _clock_changed(flight: Flight, at_s: float, *, step_s: float = 0.0, rate: float = 0.0) -> Flight:
-    """From a log time on the recorder's clock shows another time, and counts at another rate."""
+    """Change the recorder's clock from a log time on: another time, another rate."""
     tables = {}
     for topic, table in flight.tables.items():
         since_ns = table.time_ns - flight.start_ns - round(at_s * NS_PER_S)
@@ -335,7 +342,10 @@ def _displace(flight: Flight, fault: Jump | Reset) -> Flight:
 
 
 def _jitter(flight: Flight, fault: Jitter) -> Flight:
-    """Move the recorder's times of one topic; its samples leave the rows they shared with other topics."""
+    """Move the recorder's times of one topic.
+
+    Its samples leave the rows they shared with other topics.
+    """
     table = _table_of(flight, fault, fault.topic)
     closest_s = float(np.min(np.diff(table.time_ns), initial=10**18)) / NS_PER_S
     if 2.0 * fault.spread_s >= closest_s:
@@ -368,7 +378,10 @@ def _remove(flight: Flight, fault: MissingChannel) -> Flight:
 
 
 def all_rows(flight: Flight, topics: Iterable[str] | None = None) -> Int64Array:
-    """Rows of the log that hold a sample of any of the topics (all when not named), increasing, shape (n,)."""
+    """Return the rows of the log that hold a sample of any of the topics, shape (n,).
+
+    They increase. All topics count when none are named.
+    """
     names = flight.topics() if topics is None else tuple(topics)
     last = max((int(flight[name].record_index[-1]) for name in names if len(flight[name])), default=-1)
     holds_sample = np.zeros(last + 1, dtype=bool)  # rows are nearly dense: cheaper than sorting
@@ -378,7 +391,7 @@ def all_rows(flight: Flight, topics: Iterable[str] | None = None) -> Int64Array:
 
 
 def _renumbered(flight: Flight) -> Flight:
-    """Rows counted without holes, as a reader of the log would count them."""
+    """Number the rows without holes, as a reader of the log would count them."""
     rows = all_rows(flight)
     tables = {
         topic: replace(table, record_index=np.searchsorted(rows, table.record_index).astype(np.int64))

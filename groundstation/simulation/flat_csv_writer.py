@@ -1,4 +1,7 @@
-"""The flat CSV: all topics of a flight on one time column, each at its own rate, byte for byte reproducible."""
+"""Flat CSV: all topics of a flight on one time column, each at its own rate.
+
+It is byte for byte reproducible.
+"""
 
 import math
 from collections.abc import Mapping
@@ -40,10 +43,11 @@ def write_flat_csv(
     with_truth: bool = False,
     cut_bytes: int = 0,
 ) -> None:
-    """Write a flight as flat CSV: ``# key: value`` lines, one header, one row per ``record_index``.
+    """Write a flight as flat CSV: ``# key: value`` lines, one header, a row per record.
 
-    Time is ``time_s``, the recorder's own (``device_time_ns``), printed exactly from the integer. A missing sample is
-    an empty cell; NaN that the device wrote is ``nan``; flags are 0 and 1.
+    The rows are numbered by ``record_index``. Time is ``time_s``, the recorder's own (``device_time_ns``), printed
+    exactly from the integer. A missing sample is an empty cell; NaN that the device wrote is ``nan``; flags are 0 and
+    1.
 
     Parameters
     ----------
@@ -98,7 +102,9 @@ def _decimals_of_times(time_ns: Int64Array) -> int:
 
 
 def decimals_of(resolution: float) -> int:
-    """Decimals that print a multiple of the resolution: exactly where it is a power of ten, else to a thousandth of it.
+    """Return the decimals that print a multiple of the resolution.
+
+    Exactly where it is a power of ten, else to a thousandth of it.
 
     Examples
     --------
@@ -113,7 +119,10 @@ def decimals_of(resolution: float) -> int:
 
 
 def _topic_cells(table: Table, block: Int64Array, resolution: Mapping[str, float], delimiter: str) -> list[Any]:
-    """Cells of all fields of a topic for a block of log rows, as pyarrow text arrays without nulls."""
+    """Return the cells of all fields of a topic for a block of log rows.
+
+    They are pyarrow text arrays without nulls.
+    """
     first, last = np.searchsorted(table.record_index, [block[0], block[-1] + 1])
     place = np.searchsorted(block, table.record_index[first:last])
     units = {item.name: item.unit for item in TOPICS.get(kind_of(table.topic), ())}
@@ -170,7 +179,7 @@ def _time_cells(time_ns: Int64Array, decimals: int) -> Any:
 
 
 def _spread(cells: Any, place: Int64Array, length: int) -> Any:
-    """Cells put at their rows of the block, the rest empty."""
+    """Put cells at their rows of the block, the rest empty."""
     import pyarrow as pa
     import pyarrow.compute as pc
 

@@ -1,4 +1,4 @@
-"""A whole simulated flight: the true motion, every sensor, put together on the rows of one log."""
+"""Whole simulated flight: true motion and every sensor, on the rows of one log."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -61,7 +61,7 @@ class Simulated:
 
     @property
     def damaged(self) -> Flight:
-        """The flight with the scenario's faults: what the recorder wrote."""
+        """Return the flight with the scenario's faults, as the recorder wrote it."""
         return apply_faults(self.flight, self.scenario.faults)
 
 
@@ -94,13 +94,13 @@ def simulate(scenario: Scenario, seed: int | None = None) -> Simulated:
 
 
 def scenario_truth(simulated: Simulated) -> dict[str, float]:
-    """What an analysis of the flight should find: true values by name, degrees and metres.
+    """Return the true values that an analysis of the flight should find, by name.
 
-    ``heading_error_deg`` is INS heading minus nose at log second 0 (azimuth error + mounting); ``taxi_difference_deg``
-    what heading minus track shows there on straights (sideslip added); ``drift_deg_per_h`` its drift, the mean one
-    where the errors are those of an INS class. ``deviation_a_deg`` to ``deviation_e_deg`` are the coefficients A to E
-    of the magnetometer levelled with the INS (heading shown minus magnetic heading) in level flight, NaN where iron
-    outweighs the field.
+    They are in degrees and metres. ``heading_error_deg`` is INS heading minus nose at log second 0 (azimuth error +
+    mounting); ``taxi_difference_deg`` what heading minus track shows there on straights (sideslip added);
+    ``drift_deg_per_h`` its drift, the mean one where the errors are those of an INS class. ``deviation_a_deg`` to
+    ``deviation_e_deg`` are the coefficients A to E of the magnetometer levelled with the INS (heading shown minus
+    magnetic heading) in level flight, NaN where iron outweighs the field.
     """
     scenario = simulated.scenario
     ins, gnss = scenario.ins, scenario.gnss
@@ -165,7 +165,10 @@ def _all_readings(scenario: Scenario, trajectory: Trajectory) -> list[Readings]:
 
 
 def _assemble(scenario: Scenario, readings: list[Readings]) -> Flight:
-    """Tables whose rows know their row of the log: samples recorded at one time share a row, unless repeated."""
+    """Put readings into tables whose rows know their row of the log.
+
+    Samples recorded at one time share a row, unless repeated.
+    """
     utc_of_zero_ns = scenario.start_utc_ns
     zero_ns = utc_of_zero_ns or 0
     row_times: Int64Array = np.unique(np.concatenate([part.time_ns for part in readings]))

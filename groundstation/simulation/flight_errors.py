@@ -1,4 +1,7 @@
-"""Errors of a simulated flight's INS: the closed Schuler solution of its settings, or the full truth of a class."""
+"""Errors of a simulated flight's INS.
+
+They are the closed Schuler solution of its settings, or the full truth of a class.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -50,17 +53,20 @@ def flight_errors(motion: Trajectory, settings: InsSettings, seed: int) -> Fligh
 
 
 def heading_error_deg(time_s: FloatArray, settings: InsSettings) -> FloatArray:
-    """INS heading minus nose heading without noise: azimuth error, its drift, mounting. Degrees, shape as the time."""
+    """Return INS heading minus nose heading without noise, degrees, shape as the time.
+
+    It is the azimuth error, its drift and the mounting.
+    """
     drift = settings.azimuth_drift_dph / 3600.0
     return np.asarray(settings.azimuth_error_deg + settings.boresight_deg + drift * time_s)
 
 
 def schuler_error(time_s: FloatArray, settings: InsSettings, channel: int) -> tuple[FloatArray, FloatArray]:
-    """Position (m) and velocity (m/s) error of one horizontal channel (0 north, 1 east) under a constant drift.
+    """Return position (m) and velocity (m/s) error of one channel under a constant drift.
 
-    Closed solution of dp' = dv, dv' = -g phi, phi' = dv / R + drift, the model of system 2 without its slow states.
-    Ignored: coupling of the channels, curvature of the path. Source: Titterton and Weston, Strapdown Inertial
-    Navigation Technology, 2nd ed. 2004, section 12.3.
+    Horizontal channel 0 is north, 1 is east. Closed solution of dp' = dv, dv' = -g phi, phi' = dv / R + drift, the
+    model of system 2 without its slow states. Ignored: coupling of the channels, curvature of the path. Source:
+    Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed. 2004, section 12.3.
     """
     speed, rate, radius = settings.velocity_error_mps[channel], SCHULER_RADPS, EARTH_RADIUS_M
     tilt_rad = np.deg2rad(settings.tilt_arcsec[channel] / 3600.0)
@@ -80,12 +86,12 @@ def schuler_error(time_s: FloatArray, settings: InsSettings, channel: int) -> tu
 def turned_velocity_error(
     time_s: FloatArray, north_mps: FloatArray, east_mps: FloatArray, settings: InsSettings
 ) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
-    """Position (m) and velocity (m/s) error, north then east, of an azimuth error psi that turns each acceleration.
+    """Return position (m) and velocity (m/s) errors that an azimuth error causes.
 
-    dv' = -g phi + psi x (-acceleration east, +acceleration north), phi' = dv / R: each change of velocity starts a
-    Schuler oscillation of its own. The mounting turns nothing. Ignored: Earth's rotation seen by the azimuth error,
-    which alignment on the ground balances. Source: Titterton and Weston, Strapdown Inertial Navigation Technology,
-    2nd ed. 2004, section 12.3.
+    They are given for north, then east. The azimuth error psi turns each acceleration. dv' = -g phi + psi x
+    (-acceleration east, +acceleration north), phi' = dv / R: each change of velocity starts a Schuler oscillation of
+    its own. The mounting turns nothing. Ignored: Earth's rotation seen by the azimuth error, which alignment on the
+    ground balances. Source: Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed. 2004, section 12.3.
     """
     azimuth_rad = np.deg2rad(heading_error_deg(time_s, settings) - settings.boresight_deg)
     cosine, sine = np.cos(SCHULER_RADPS * time_s), np.sin(SCHULER_RADPS * time_s)
@@ -136,7 +142,10 @@ def _full_errors(motion: Trajectory, settings: InsSettings, seed: int) -> Flight
 
 
 def _reader(at_s: FloatArray, time_s: FloatArray) -> Callable[[FloatArray], FloatArray]:
-    """Reads values between their times, and on along the last slope: the last step may be cut short."""
+    """Return a function that interpolates values to the wanted times.
+
+    Beyond the end it goes on along the last slope: the last step may be cut short.
+    """
 
     def between(values: FloatArray) -> FloatArray:
         slope = (values[-1] - values[-2]) / (time_s[-1] - time_s[-2])

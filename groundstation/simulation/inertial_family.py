@@ -1,7 +1,7 @@
-"""Families of flights with INS errors and GNSS for Monte Carlo: many flights at 1 Hz, no log, vectorised arrays.
+"""Families of flights with INS errors and GNSS for Monte Carlo.
 
-Run k of a family is the same flight whatever the number of runs; each kind of randomness has its own stream, so that a
-switch changes what it names and nothing else.
+They are many flights at 1 Hz, as vectorised arrays without a log. Run k of a family is the same flight whatever the
+number of runs; each kind of randomness has its own stream, so that a switch changes what it names and nothing else.
 """
 
 from collections.abc import Iterator
@@ -25,7 +25,10 @@ from groundstation.simulation.routes import Route, RouteKind, draw_route
 
 @dataclass(frozen=True)
 class GnssNoise:
-    """GNSS errors per horizontal axis: white + first-order Gauss-Markov, position and velocity independent."""
+    """GNSS errors per horizontal axis: white + first-order Gauss-Markov.
+
+    Position and velocity are independent.
+    """
 
     position_white_m: float = number(10.0, 0.0, 1e4)
     position_correlated_m: float = number(0.0, 0.0, 1e4)
@@ -84,7 +87,9 @@ class FamilySettings:
 
 @dataclass(frozen=True)
 class ErrorBatch:
-    """Flights of a family: f flights, n epochs; channels (last axis) 0 north, 1 east; errors are INS or GNSS - truth.
+    """Flights of a family: f flights, n epochs, channels (last axis) 0 north, 1 east.
+
+    Errors are INS or GNSS - truth.
 
     Parameters
     ----------
@@ -161,7 +166,7 @@ def simulate_family(family: FamilySettings, runs: int, seed: int, *, first_run: 
 
 
 def iterate_family(family: FamilySettings, runs: int, seed: int, chunk: int = 20) -> Iterator[ErrorBatch]:
-    """The same flights as :func:`simulate_family`, ``chunk`` at a time, for bounded memory."""
+    """Yield the flights of :func:`simulate_family`, ``chunk`` at a time, for bounded memory."""
     for first in range(0, runs, chunk):
         yield simulate_family(family, min(chunk, runs - first), seed, first_run=first)
 

@@ -1,4 +1,7 @@
-"""INS classes: the error budget of an inertial navigator, shipped as TOML beside this module, one file a class."""
+"""INS classes: error budgets of inertial navigators.
+
+They ship as TOML beside this module, one file a class.
+"""
 
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -14,10 +17,11 @@ _CLASSES = ShippedToml("groundstation.simulation", "ins_classes", "ins_class")
 
 @dataclass(frozen=True)
 class HeadingWander:
-    """Error of the heading output beside the azimuth error proper: wanders in straight flight, pulled back by turns.
+    """Error of the heading output beside the azimuth error proper.
 
-    ``offset_deg`` is the sigma of a constant; ``drift_deg_per_sqrt_h`` the size of the random walk; ``turn_deg`` the
-    angle turned (either way) that takes it back by a factor e.
+    It wanders in straight flight and is pulled back by turns. ``offset_deg`` is the sigma of a constant;
+    ``drift_deg_per_sqrt_h`` the size of the random walk; ``turn_deg`` the angle turned (either way) that takes it back
+    by a factor e.
     """
 
     offset_deg: float = number(0.0, 0.0, 5.0)
@@ -27,12 +31,13 @@ class HeadingWander:
 
 @dataclass(frozen=True)
 class InsClass:
-    """Error budget of one class of INS; every number is a sigma per axis unless it says otherwise.
+    """Error budget of one class of INS.
 
-    ``gyro_random`` and ``accelerometer_random`` are first-order Gauss-Markov processes. ``is_strapdown``: errors are
-    fixed to the body, else to a platform slaved to north. ``is_levelled``: at the start the tilts are those that
-    balance the accelerometer biases, as levelling on the ground leaves them; ``is_gyrocompassed``: the azimuth error
-    balances the east gyro likewise. ``initial_tilt_rad`` and ``initial_azimuth_deg`` come on top.
+    Every number is a sigma per axis unless it says otherwise. ``gyro_random`` and ``accelerometer_random`` are
+    first-order Gauss-Markov processes. ``is_strapdown``: errors are fixed to the body, else to a platform slaved to
+    north. ``is_levelled``: at the start the tilts are those that balance the accelerometer biases, as levelling on the
+    ground leaves them; ``is_gyrocompassed``: the azimuth error balances the east gyro likewise. ``initial_tilt_rad``
+    and ``initial_azimuth_deg`` come on top.
     """
 
     gyro_constant_dph: float = required_number(0.0, 10_000.0)
@@ -76,7 +81,10 @@ INSTRUMENT_SPREAD = {
 
 
 def draw_instrument(ins: InsClass, rng: np.random.Generator) -> InsClass:
-    """One instrument of a class: its error budget is the class's times factors of :data:`INSTRUMENT_SPREAD`."""
+    """Draw one instrument of a class.
+
+    Its error budget is the class's times factors of :data:`INSTRUMENT_SPREAD`.
+    """
     drawn: dict[str, Any] = {
         name: float(getattr(ins, name)) * float(np.exp(rng.uniform(*np.log(ends))))
         for name, ends in INSTRUMENT_SPREAD.items()

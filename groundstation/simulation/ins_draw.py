@@ -1,4 +1,4 @@
-"""Random errors of one INS of a class: sensors, gravity, alignment, and the wander of its heading output."""
+"""Random errors of one INS of a class: sensors, gravity, alignment, heading output."""
 
 from collections.abc import Callable
 
@@ -52,7 +52,7 @@ def draw_sensor_errors(
     acceleration = MICRO_G * ins.accelerometer_constant_ug * fixed[6:9, None] + gauss_markov(
         accelerometer, (3, n), step_s, MICRO_G * ins.accelerometer_random_ug, ins.accelerometer_correlation_s
     )
-    settled = acceleration[:, 0].copy()  # what levelling sees: noise is averaged out
+    settled = acceleration[:, 0].copy()  # acceleration that levelling sees: noise is averaged out
     noise = ins.velocity_random_walk_mps_per_sqrt_s / np.sqrt(step_s)
     acceleration += noise * accelerometer.standard_normal((3, n))
     gravity = np.zeros((n, 2))
@@ -90,7 +90,9 @@ def _alignment(
     earth_rate: bool,
     body_fixed: bool,
 ) -> tuple[FloatArray, float]:
-    """Tilts and heading error in which an alignment on the ground comes to rest: no velocity and no tilt rate.
+    """Return the tilts and heading error that an alignment on the ground leaves.
+
+    At rest there is no velocity and no tilt rate.
 
     Source: Titterton and Weston 2004, chapter 10: tilt = accelerometer bias / g, azimuth = east drift /
     (Earth rate x cos latitude).
@@ -112,7 +114,9 @@ def _alignment(
 
 
 def spatial_gauss_markov(rng: np.random.Generator, motion: TrueMotion, correlation_m: float) -> FloatArray:
-    """Draw a pair of unit processes along one flight's path, correlated as exp(-distance travelled / correlation).
+    """Draw a pair of unit processes along one flight's path.
+
+    Their correlation is exp(-distance travelled / correlation length).
 
     Returns
     -------
@@ -131,10 +135,11 @@ def spatial_gauss_markov(rng: np.random.Generator, motion: TrueMotion, correlati
 def draw_heading_wander(
     rng: np.random.Generator, time_s: FloatArray, heading_deg: FloatArray, settings: HeadingWander
 ) -> FloatArray:
-    """Draw the wander of the heading output, degrees: constant + a random walk that turns pull back.
+    """Draw the wander of the heading output, degrees.
 
-    d' = -|turn rate| / turn_deg d + white noise; ``heading_deg`` need not be continuous. This is an error of the
-    output, not of the platform: 0.1 deg of true azimuth error would drive the north channel with 0.026 deg/h cos(lat).
+    It is a constant and a random walk that turns pull back. d' = -|turn rate| / turn_deg d + white noise;
+    ``heading_deg`` need not be continuous. This is an error of the output, not of the platform: 0.1 deg of true azimuth
+    error would drive the north channel with 0.026 deg/h cos(lat).
 
     Parameters
     ----------
@@ -155,7 +160,7 @@ def draw_heading_wander(
 
 @compiled
 def _first_order(values, keep):  # type: ignore[no-untyped-def]
-    """Unit white noise into a stationary unit process, in place."""
+    """Turn unit white noise into a stationary unit process, in place."""
     n, width = values.shape
     for k in range(1, n):
         drive = np.sqrt(1.0 - keep[k - 1] * keep[k - 1])

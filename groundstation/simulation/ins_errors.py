@@ -1,7 +1,8 @@
-"""Errors of an INS along a true trajectory: the linear phi-angle model in north-east-down, vertical channel damped.
+"""Errors of an INS along a true trajectory, by the linear phi-angle model.
 
-The truth behind the tests of system 2: it holds what the six-state filter leaves out (Earth and transport rate,
-azimuth, turns, body-fixed sensors, deflection of the vertical).
+The frame is north-east-down; the vertical channel is damped. It is the truth behind the tests of system 2 and holds
+what the six-state filter leaves out (Earth and transport rate, azimuth, turns, body-fixed sensors, deflection of the
+vertical).
 
 Signs: error = INS - truth. The computed attitude is (I - [phi x]) n_from_b, so that the heading error is -phi_D; the
 channels' tilt is -phi_E (north) and +phi_N (east), positive where it makes the velocity error fall.
@@ -68,7 +69,7 @@ class TrueMotion:
 
 @dataclass(frozen=True)
 class SensorErrors:
-    """What drives the errors of f flights: sensors, gravity and the state at the start.
+    """Sources of the errors of f flights: sensors, gravity, initial state.
 
     Parameters
     ----------
@@ -182,8 +183,8 @@ def propagate(
     SettingsError
         When the motion has fewer than two times.
 
-    What it ignores: vertical errors, pitch, the share of Earth and transport rate in scale factor errors, the change
-    of the radii of curvature with the position error.
+    It ignores vertical errors, pitch, the share of Earth and transport rate in scale factor errors, the change of the
+    radii of curvature with the position error.
     """
     shape = motion.latitude_deg.shape
     if shape[1] < 2:
@@ -248,7 +249,10 @@ def _gravity(sine_squared, altitude_m):  # type: ignore[no-untyped-def]
 
 @compiled
 def _rates(x, c, out):  # type: ignore[no-untyped-def]
-    """Derivative of [d_lat, d_lon, v_N, v_E, phi_N, phi_E, phi_D]; c holds what is constant in a step."""
+    """Fill the derivative of [d_lat, d_lon, v_N, v_E, phi_N, phi_E, phi_D].
+
+    c holds what is constant in a step.
+    """
     sine, cosine, tangent, meridian, normal = c[0], c[1], c[2], c[3], c[4]
     north, east, down = c[5], c[6], c[7]
     f_n, f_e, f_d = c[8], c[9], c[10]
@@ -348,7 +352,7 @@ def _propagate(  # type: ignore[no-untyped-def]
             right = -f_n * sin_h + f_e * cos_h
             force[0] = f_n * cos_h + f_e * sin_h
             force[1] = right * cos_r + f_d * sin_r
-            force[2] = -right * sin_r + f_d * cos_r + gravity  # what gravity brings in level flight counts as bias
+            force[2] = -right * sin_r + f_d * cos_r + gravity  # the part of gravity in level flight counts as bias
             for i in range(3):
                 y[i], y[i + 3] = gyro[flight, start, i], accelerometer[flight, start, i]
                 for j in range(3):

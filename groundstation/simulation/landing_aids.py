@@ -1,4 +1,4 @@
-"""Landing aids of a simulated flight: bearings of beacons by an automatic direction finder, and a radio altimeter.
+"""Landing aids of a simulated flight: direction finder on beacons, radio altimeter.
 
 The runway is where the flight lands: its course is the track at touchdown, its threshold lies a stated distance before
 the touchdown and to a stated side of it, so that a scenario lands off the centre line without flying otherwise.
@@ -21,7 +21,10 @@ from groundstation.simulation.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class RunwayPlaces:
-    """A trajectory in the frame of its runway, shape (n,): along, right, up; heading off the course."""
+    """Trajectory in the frame of its runway, shape (n,): along, right, up.
+
+    With it goes the heading off the course.
+    """
 
     along_m: FloatArray
     right_m: FloatArray
@@ -99,7 +102,10 @@ def adf_readings(
 def radio_altimeter_readings(
     trajectory: Trajectory, settings: RadioAltimeterSettings, runway: RunwayOfLanding, rng: np.random.Generator
 ) -> Readings:
-    """Height above the ground: that of the runway, and before the threshold as it rises."""
+    """Return the height above the ground, which rises before the threshold.
+
+    From the threshold on, the ground is the runway.
+    """
     index = every(trajectory, settings.rate_hz)
     places, motion = runway_places(trajectory, runway), trajectory.at(index)
     ground = settings.rise_m_per_km * np.maximum(-places.along_m[index], 0.0) / 1000.0

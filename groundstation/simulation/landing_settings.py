@@ -1,4 +1,7 @@
-"""Settings of the landing aids of a simulated flight: beacons, direction finder, radio altimeter, runway."""
+"""Settings of simulated landing aids: beacons, direction finder, altimeter, runway.
+
+The altimeter is a radio altimeter.
+"""
 
 from dataclasses import dataclass
 
@@ -16,9 +19,10 @@ class SimulatedBeacon:
 
 @dataclass(frozen=True)
 class AdfSettings:
-    """Automatic direction finder, one channel for each beacon. Errors: white + first-order Gauss-Markov.
+    """Automatic direction finder, one channel for each beacon.
 
-    ``is_reversed`` is a finder whose bearings run the wrong way round, a fault.
+    Errors are white + first-order Gauss-Markov. ``is_reversed`` is a finder whose bearings run the wrong way round, a
+    fault.
     """
 
     beacons: tuple[SimulatedBeacon, ...]
@@ -33,9 +37,10 @@ class AdfSettings:
 
 @dataclass(frozen=True)
 class RadioAltimeterSettings:
-    """Radio altimeter: height above the ground, up to ``highest_m``; the ground rises ahead of the threshold.
+    """Radio altimeter: height above the ground, up to ``highest_m``.
 
-    ``rise_m_per_km`` raises the ground before the threshold with the distance from it.
+    The ground rises ahead of the threshold. ``rise_m_per_km`` raises the ground before the threshold with the distance
+    from it.
     """
 
     rate_hz: float = number(10.0, 0.01, 100.0)
@@ -47,7 +52,7 @@ class RadioAltimeterSettings:
 
 @dataclass(frozen=True)
 class RunwayOfLanding:
-    """Where the threshold is against the touchdown."""
+    """Place of the threshold against the touchdown."""
 
     threshold_before_touchdown_m: float = number(450.0, 0.0, 3000.0)
     threshold_right_m: float = number(0.0, -500.0, 500.0)

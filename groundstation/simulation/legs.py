@@ -1,4 +1,4 @@
-"""Legs of a simulated flight, as a scenario lists them, and the motion pieces each of them is made of.
+"""Legs of a simulated flight, as a scenario lists them, and their pieces of motion.
 
 On the ground the state is ground speed along the track; in the air it is airspeed along the direction of the air
 velocity, so that a turn at constant bank is one in the air mass and the wind adds to the ground velocity.
@@ -25,7 +25,7 @@ GREAT_CIRCLE_PIECE_S = 60.0  # the turn rate of a great circle is followed linea
 
 @dataclass(frozen=True)
 class Parked:
-    """Stand still, braking first if the aircraft moves: at the stand, at a stop, lined up on the runway."""
+    """Standstill at the stand, at a stop or on the runway, after braking if needed."""
 
     kind: ClassVar[str] = "parked"
     duration_s: float = required_number(0.0)
@@ -33,7 +33,10 @@ class Parked:
 
 @dataclass(frozen=True)
 class Taxi:
-    """Taxi straight on for a length; the change to the leg's speed is made at its start and is part of the length."""
+    """Straight taxi over a length.
+
+    The change to the leg's speed is made at its start and is part of the length.
+    """
 
     kind: ClassVar[str] = "taxi"
     length_m: float = required_number(0.0)
@@ -52,7 +55,10 @@ class GroundTurn:
 
 @dataclass(frozen=True)
 class TakeOff:
-    """Accelerate straight on, rotate in the last seconds and lift off at a speed, then begin to climb."""
+    """Take-off straight on: acceleration, lift-off at a speed, start of the climb.
+
+    The aircraft rotates in the last seconds before lift-off.
+    """
 
     kind: ClassVar[str] = "take_off"
     lift_off_speed_mps: float = number(55.0, 20.0, 120.0)
@@ -62,9 +68,10 @@ class TakeOff:
 
 @dataclass(frozen=True)
 class Fly:
-    """Fly straight for a time; airspeed and climb rate change smoothly at the start (0 keeps level).
+    """Straight flight for a time.
 
-    Straight is along the rhumb line, or with ``great_circle`` along the great circle that starts with the heading.
+    Airspeed and climb rate change smoothly at the start (0 keeps level). Straight is along the rhumb line, or with
+    ``great_circle`` along the great circle that starts with the heading.
     """
 
     kind: ClassVar[str] = "fly"
@@ -76,7 +83,7 @@ class Fly:
 
 @dataclass(frozen=True)
 class ClimbTo:
-    """Climb or descend to an ellipsoid altitude and level off there, exactly."""
+    """Climb or descent to an ellipsoid altitude, levelled off there exactly."""
 
     kind: ClassVar[str] = "climb_to"
     altitude_m: float = required_number(-500.0, 20_000.0)
@@ -86,9 +93,10 @@ class ClimbTo:
 
 @dataclass(frozen=True)
 class AirTurn:
-    """Coordinated turn (right positive) at constant airspeed and altitude; the bank is rolled in and out smoothly.
+    """Coordinated turn (right positive) at constant airspeed and altitude.
 
-    ``bank_change_deg`` is how much more bank there is at the end of the turn than at its start, ``bank_deg`` between.
+    The bank is rolled in and out smoothly. ``bank_change_deg`` is how much more bank there is at the end of the turn
+    than at its start, ``bank_deg`` between.
     """
 
     kind: ClassVar[str] = "air_turn"
@@ -104,7 +112,7 @@ class AirTurn:
 
 @dataclass(frozen=True)
 class Landing:
-    """Descend to the runway, flare, touch down at a speed and brake to taxi speed."""
+    """Descent to the runway, flare, touchdown at a speed, braking to taxi speed."""
 
     kind: ClassVar[str] = "landing"
     runway_altitude_m: float = required_number(-500.0, 6_000.0)
@@ -118,9 +126,10 @@ Leg: TypeAlias = Parked | Taxi | GroundTurn | TakeOff | Fly | ClimbTo | AirTurn 
 
 @dataclass(frozen=True)
 class Piece:
-    """A stretch of motion: speed, turn rate and climb rate go smoothly from their last values to these.
+    """Stretch of motion with smooth changes of speed, turn rate and climb rate.
 
-    ``airborne`` is the state during the piece. Durations are rounded up to whole steps by the planner beforehand.
+    They go from their last values to these. ``airborne`` is the state during the piece. Durations are rounded up to
+    whole steps by the planner beforehand.
     """
 
     duration_s: float
@@ -132,9 +141,10 @@ class Piece:
 
 @dataclass(frozen=True)
 class MotionState:
-    """Where the aircraft stands between two pieces: speed and direction over the ground, or through the air.
+    """State of the aircraft between two pieces.
 
-    The latitude is good to some kilometres: it serves the turn rate of great circles alone.
+    Its speed and direction are over the ground, or through the air. The latitude is good to some kilometres: it serves
+    the turn rate of great circles alone.
     """
 
     step_s: float
@@ -240,9 +250,10 @@ def _taxi(leg: Taxi, state: MotionState, place: str) -> tuple[Piece, ...]:
 def _turn(
     angle_deg: float, rate_dps: float, ramp_s: float, speed_mps: float, state: MotionState, growth: float = 0.0
 ) -> tuple[Piece, ...]:
-    """Rate up, hold, rate down; the rate is adjusted so that whole steps give exactly the angle.
+    """Return the pieces of a turn: rate up, hold, rate down.
 
-    ``growth`` is the share by which the rate at the end of the hold lies above its mean, and below it at the start.
+    The rate is adjusted so that whole steps give exactly the angle. ``growth`` is the share by which the rate at the
+    end of the hold lies above its mean, and below it at the start.
     """
     hold_s = state.whole_steps(max(abs(angle_deg) / rate_dps - ramp_s, 0.0))
     ramp_s = state.whole_steps(ramp_s)
@@ -252,7 +263,10 @@ def _turn(
 
 
 def _great_circle(leg: Fly, ramp_s: float, hold_s: float, state: MotionState) -> tuple[Piece, ...]:
-    """Change of speed, then short pieces that take up the turn rate of the great circle, then none again."""
+    """Return a change of speed and short pieces that follow a great circle.
+
+    The pieces take up the turn rate of the great circle; at the end there is none again.
+    """
     pieces, rate = [Piece(ramp_s, leg.airspeed_mps, 0.0, leg.climb_rate_mps, True)], 0.0
     state = state.after(pieces[0], rate)
     length_s = state.whole_steps(GREAT_CIRCLE_PIECE_S)
@@ -269,7 +283,10 @@ def _take_off(leg: TakeOff, state: MotionState) -> tuple[Piece, ...]:
 
 
 def pieces_after_transition(leg: Leg, state: MotionState) -> tuple[Piece, ...]:
-    """The pieces of a take-off in the air and of a landing on the ground, flown after lift-off and touchdown."""
+    """Return the pieces of a take-off in the air, or of a landing on the ground.
+
+    They are flown after lift-off and touchdown.
+    """
     if isinstance(leg, TakeOff):
         return (Piece(state.whole_steps(CLIMB_RAMP_S), state.speed_mps, 0.0, leg.climb_rate_mps, True),)
     if isinstance(leg, Landing):
@@ -288,7 +305,10 @@ def _level(state: MotionState) -> Piece:
 def _climb_to(
     altitude_m: float, airspeed_mps: float, climb_rate_mps: float, state: MotionState, place: str
 ) -> tuple[Piece, ...]:
-    """Change speed and begin to climb, climb, level off: the middle rate is solved so that the altitude is exact."""
+    """Return the pieces of a climb: change speed and begin to climb, climb, level off.
+
+    The middle rate is solved so that the altitude is exact.
+    """
     ramp_s, level_s = state.whole_steps(_air_ramp_s(state, airspeed_mps)), state.whole_steps(CLIMB_RAMP_S)
     to_gain = altitude_m - state.altitude_m - 0.5 * state.climb_rate_mps * ramp_s
     hold_s = state.whole_steps(max(abs(to_gain) / climb_rate_mps - 0.5 * (ramp_s + level_s), 0.0))

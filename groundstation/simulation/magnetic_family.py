@@ -1,7 +1,8 @@
-"""Family of flights with figure-eights for Monte Carlo: whole flights at 10 Hz as tables, no log on disk.
+"""Family of flights with figure-eights for Monte Carlo.
 
-A flight is a scenario drawn from its seed, hence the same whatever the other seeds are: stand, two straights of taxi,
-take-off, climb to 1500 m, a figure-eight, straights on several headings, further figure-eights.
+They are whole flights at 10 Hz as tables, with no log on disk. A flight is a scenario drawn from its seed, hence the
+same whatever the other seeds are: stand, two straights of taxi, take-off, climb to 1500 m, a figure-eight, straights on
+several headings, further figure-eights.
 """
 
 from collections.abc import Iterable, Iterator
@@ -40,7 +41,9 @@ LEAST_BANK_DEG = 2.0
 
 @dataclass(frozen=True)
 class MagneticFamilySettings:
-    """What the flights of a family have in common; a ``sigma`` is that of a normal draw, per axis or matrix element.
+    """Settings that the flights of a family have in common.
+
+    A ``sigma`` is that of a normal draw, per axis or matrix element.
 
     Parameters
     ----------
@@ -199,7 +202,7 @@ def _magnetometer(settings: MagneticFamilySettings, rng: np.random.Generator) ->
 def _in_the_world(
     magnetometer: MagnetometerSettings, settings: MagneticFamilySettings, rng: np.random.Generator
 ) -> MagnetometerSettings:
-    """The same magnetometer in a world that is not the model's."""
+    """Return the same magnetometer in a world that is not the model's."""
     north, east, down = (rng.standard_normal(3) * settings.field_error_sigmas * NORTH_EAST_DOWN_SIGMA_NT).tolist()
     wavelength_m, (direction, phase) = rng.uniform(*settings.anomaly_wavelength_m), rng.uniform(0.0, 360.0, 2)
     anomaly = Anomaly(settings.anomaly_nt, float(wavelength_m), float(direction), float(phase))

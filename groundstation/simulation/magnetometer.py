@@ -1,4 +1,4 @@
-"""Three-axis magnetometer in the field of the World Magnetic Model, with what the aircraft adds to it."""
+"""Three-axis magnetometer in the field of the World Magnetic Model and the aircraft."""
 
 import math
 
@@ -24,7 +24,10 @@ MODEL_YEARS = range(2010, 2030)  # that the sets of pygeomag serve
 def magnetometer_readings(
     trajectory: Trajectory, scenario: Scenario, settings: MagnetometerSettings, rng: np.random.Generator
 ) -> Readings:
-    """Field at the sensor's axes with white and correlated noise, rounded, recorded ``latency_s`` late."""
+    """Return the field at the sensor's axes with noise, rounded, recorded ``latency_s`` late.
+
+    The noise is white and correlated.
+    """
     motion = trajectory.at(every(trajectory, settings.rate_hz))
     body_from_n = np.swapaxes(rotation_n_from_b(motion.roll_deg, motion.pitch_deg, motion.heading_deg), 1, 2)
     field_body = np.einsum("nij,nj->ni", body_from_n, world_field_nt(motion, scenario, settings))
@@ -45,7 +48,7 @@ def magnetometer_readings(
 def sensed_nt(
     field_body_nt: FloatArray, roll_deg: FloatArray, current_a: FloatArray, settings: MagnetometerSettings
 ) -> FloatArray:
-    """What a magnetometer without noise reads of the world's field.
+    """Return the reading of a magnetometer without noise in the world's field.
 
     reading = scale * sensor_from_body @ (soft iron @ field + hard iron + coupling * current
     + odd * sin(roll) + even * sin(roll)^2).
@@ -100,10 +103,11 @@ def world_field_nt(motion: Trajectory, scenario: Scenario, settings: Magnetomete
 
 
 def anomaly_nt(motion: Trajectory, airport: Airport, anomaly: Anomaly) -> FloatArray:
-    """Field of a plane wave of the crust north, east, down along a motion, shape (n, 3), free of curl and divergence.
+    """Return the field of a plane wave of the crust along a motion, shape (n, 3).
 
-    It is -grad V of V = amplitude / k exp(-k height) cos(k . position + phase), the exponential counted as 1 at the
-    altitude flown: horizontal and vertical parts have one amplitude and are a quarter of a wave apart.
+    It is north, east, down, and free of curl and divergence. It is -grad V of V = amplitude / k exp(-k height) cos(k .
+    position + phase), the exponential counted as 1 at the altitude flown: horizontal and vertical parts have one
+    amplitude and are a quarter of a wave apart.
 
     Source: Blakely, Potential Theory in Gravity and Magnetic Applications, 1995, section 11.1.
     """

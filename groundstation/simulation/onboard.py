@@ -1,4 +1,4 @@
-"""The aircraft's own heading estimate, as its computer made and logged it during taxi."""
+"""Heading estimate of the aircraft's own computer, made and logged during taxi."""
 
 import numpy as np
 
@@ -16,11 +16,12 @@ STANDING_MPS = 0.1
 
 
 def onboard_readings(trajectory: Trajectory, ins: Readings, gnss: Readings, settings: OnboardSettings) -> Readings:
-    """The paper's recursion over computer cycles: the last GNSS output is used again until the next one arrives.
+    """Run the paper's recursion over computer cycles.
 
-    m_i = m_(i-1) - (m_(i-1) - d_i) / i,  e_i = 1.96 sqrt(s2_i / (i - 1)),  quality = standard deviation of m about its
-    own running mean; a cycle counts above the speed gate and below the gate on the raw heading rate.
-    It ends when the operator enters the correction, standing lined up; an estimate that is not ready is not entered.
+    The last GNSS output is used again until the next one arrives. m_i = m_(i-1) - (m_(i-1) - d_i) / i, e_i = 1.96
+    sqrt(s2_i / (i - 1)), quality = standard deviation of m about its own running mean; a cycle counts above the speed
+    gate and below the gate on the raw heading rate. It ends when the operator enters the correction, standing lined up;
+    an estimate that is not ready is not entered.
 
     Source: Markelov, Kostishin, Shukalov, Information and Control Systems 2015 No 6, pp. 34-38.
     """
@@ -57,7 +58,10 @@ def onboard_readings(trajectory: Trajectory, ins: Readings, gnss: Readings, sett
 def _cycles(
     cycle_ns: Int64Array, ins: Readings, gnss: Readings, settings: OnboardSettings
 ) -> tuple[FloatArray, BoolArray]:
-    """Heading minus track of each cycle and whether it counts, from the last outputs of both devices."""
+    """Return heading minus track of each cycle, and whether the cycle counts.
+
+    They come from the last outputs of both devices.
+    """
     heading_deg = ins.columns["true_heading_deg"].values
     of_ins = np.searchsorted(ins.time_ns, cycle_ns, side="right") - 1
     of_gnss = np.searchsorted(gnss.time_ns, cycle_ns, side="right") - 1
@@ -77,7 +81,10 @@ def _running_mean(values: FloatArray, count: Int64Array) -> FloatArray:
 
 
 def _entry_ns(trajectory: Trajectory) -> int:
-    """When the operator enters the correction and the mode ends: at the last standstill before lift-off."""
+    """Return the time when the operator enters the correction and the mode ends.
+
+    It is at the last standstill before lift-off.
+    """
     lift_off = np.flatnonzero(trajectory.airborne)
     if not lift_off.size:
         return int(trajectory.time_ns[-1]) + 1

@@ -1,4 +1,7 @@
-"""Stationary random processes of sensor models, drawn exactly at any step (no integration error)."""
+"""Stationary random processes of sensor models, drawn exactly at any step.
+
+There is no integration error.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +12,9 @@ FloatArray = NDArray[np.float64]
 def gauss_markov(
     rng: np.random.Generator, shape: tuple[int, ...], step_s: float, sigma: float, correlation_time_s: float
 ) -> FloatArray:
-    """Draw a first-order Gauss-Markov process: autocovariance sigma^2 exp(-|t| / tau), stationary from the start.
+    """Draw a first-order Gauss-Markov process, stationary from the start.
+
+    Its autocovariance is sigma^2 exp(-|t| / tau).
 
     Parameters
     ----------
@@ -37,10 +42,11 @@ def gauss_markov(
 def damped_oscillation(
     rng: np.random.Generator, shape: tuple[int, ...], step_s: float, sigma: float, frequency_hz: float, damping: float
 ) -> FloatArray:
-    """Draw a noise-driven damped oscillator: narrow-band sway with a given natural frequency and damping ratio.
+    """Draw a noise-driven damped oscillator: narrow-band sway.
 
-    The state (displacement, rate) obeys x'' + 2 z w x' + w^2 x = white noise; it is started from its stationary
-    distribution and stepped with the exact exponential, so the sample statistics hold at any step.
+    It has a given natural frequency and damping ratio. The state (displacement, rate) obeys x'' + 2 z w x' + w^2 x =
+    white noise; it is started from its stationary distribution and stepped with the exact exponential, so the sample
+    statistics hold at any step.
 
     Parameters
     ----------

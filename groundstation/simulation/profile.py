@@ -1,4 +1,7 @@
-"""The planned motion of a flight: legs chained into pieces, and the pieces sampled on the internal time grid."""
+"""Planned motion of a flight: legs chained into pieces, sampled on the internal grid.
+
+The grid is one of times.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -48,7 +51,9 @@ class Profile:
 
 
 def smoothstep(share: FloatArray) -> FloatArray:
-    """3 s^2 - 2 s^3, held at 0 and 1 outside [0, 1]: continuous with its slope. A polynomial, hence exact anywhere.
+    """Return 3 s^2 - 2 s^3, held at 0 and 1 outside [0, 1].
+
+    It is continuous with its slope. A polynomial is exact anywhere.
 
     Examples
     --------
@@ -99,7 +104,10 @@ def plan(scenario: Scenario) -> Profile:
 def _fly(
     pieces: tuple[Piece, ...], state: MotionState, turn_rate_dps: float, planned: list[tuple[MotionState, Piece, float]]
 ) -> MotionState:
-    """Append pieces with the state and turn rate at their start; every leg ends with a turn rate of zero."""
+    """Append pieces with the state and turn rate at their start.
+
+    Every leg ends with a turn rate of zero.
+    """
     for piece in pieces:
         planned.append((state, piece, turn_rate_dps))
         state = state.after(piece, turn_rate_dps)
@@ -108,7 +116,10 @@ def _fly(
 
 
 def _change_frame(state: MotionState, scenario: Scenario) -> MotionState:
-    """Ground velocity into air velocity at lift-off, back at touchdown: the velocity over the ground is continuous."""
+    """Turn ground velocity into air velocity at lift-off, and back at touchdown.
+
+    The velocity over the ground is continuous.
+    """
     sign = 1.0 if state.airborne else -1.0
     direction_rad = np.deg2rad(state.direction_deg)
     north = state.speed_mps * np.cos(direction_rad) + sign * scenario.wind.north_mps
@@ -147,7 +158,10 @@ def _sample(planned: list[tuple[MotionState, Piece, float]], end: MotionState, s
 
 
 def _sample_piece(state: MotionState, piece: Piece, turn_rate_dps: float, count: int) -> FloatArray:
-    """Sample one piece, shape (8, count): speed, direction and altitude with their derivatives, in closed form."""
+    """Sample one piece, shape (8, count), in closed form.
+
+    Rows are speed, direction and altitude with their derivatives.
+    """
     share = np.arange(count, dtype=np.float64) / max(count, 1)
     duration_s = piece.duration_s
     time_s = share * duration_s

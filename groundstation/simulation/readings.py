@@ -1,4 +1,7 @@
-"""What a sensor wrote: columns rounded to the sensor's resolution at recorded times, before the log is put together."""
+"""Readings of a sensor: columns rounded to its resolution at recorded times.
+
+They are not yet put together into a log.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -40,7 +43,7 @@ class Readings:
         object.__setattr__(self, "resolution", MappingProxyType(dict(self.resolution)))
 
     def only(self, names: tuple[str, ...]) -> "Readings":
-        """Only the named fields, in canonical order; no names keeps all."""
+        """Keep the named fields, in canonical order; all where none is named."""
         if not names:
             return self
         columns = {name: column for name, column in self.columns.items() if name in names}
@@ -48,7 +51,9 @@ class Readings:
 
 
 def generator(seed: int, stream: str) -> np.random.Generator:
-    """A random generator of its own for each named stream, so that one sensor's settings never move another's noise.
+    """Return a random generator of its own for each named stream.
+
+    So one sensor's settings never move another's noise.
 
     Examples
     --------

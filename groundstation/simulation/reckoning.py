@@ -1,4 +1,7 @@
-"""Dead reckoning made from true poses: for recorded sets that hold poses and ranges, and no inertial sensor."""
+"""Dead reckoning made from true poses.
+
+It serves recorded sets that hold poses and ranges, and no inertial sensor.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -11,7 +14,10 @@ from groundstation.tables.session_antennas import Poses
 
 @dataclass(frozen=True)
 class ReckoningErrors:
-    """Sigmas of what is added to the truth: start, velocity and height (Gauss-Markov), a constant heading error."""
+    """Sigmas of the errors added to the truth.
+
+    They are start, velocity and height (Gauss-Markov), and a constant heading error.
+    """
 
     position_m: float = 0.1
     velocity_mps: float = 0.05
@@ -25,9 +31,10 @@ class ReckoningErrors:
 def drifting_reckoning(
     poses: Poses, rng: np.random.Generator, errors: ReckoningErrors | None = None
 ) -> tuple[DeadReckoning, Poses]:
-    """Dead reckoning of one vehicle, and the poses that it believes in (their attitude has its heading error).
+    """Return dead reckoning of one vehicle, and the poses that it believes in.
 
-    Position is truth plus the integral of a Gauss-Markov velocity error; error = reading - truth.
+    The attitude of these poses has its heading error. Position is truth plus the integral of a Gauss-Markov velocity
+    error; error = reading - truth.
     """
     errors = errors or ReckoningErrors()
     time_s = np.arange(poses.time_s[0], poses.time_s[-1], errors.step_s)

@@ -1,8 +1,8 @@
-"""Routes for Monte Carlo: kinematic flights at the epochs of a log, without the fine grid of a whole simulated flight.
+"""Routes for Monte Carlo: kinematic flights at the epochs of a log.
 
-A route is a speed, an altitude and a turn rate in time; the heading follows the geodesic (great circle) between turns
-and the position is integrated on the ellipsoid. No wind: heading = track. Turns are coordinated: tan(bank) =
-speed x turn rate / g.
+They do without the fine grid of a whole simulated flight. A route is a speed, an altitude and a turn rate in time; the
+heading follows the geodesic (great circle) between turns and the position is integrated on the ellipsoid. No wind:
+heading = track. Turns are coordinated: tan(bank) = speed x turn rate / g.
 """
 
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ class Route:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a route is flown from; arrays of shape (n,).
+    """Plan that a route is flown from; arrays of shape (n,).
 
     Where ``steers`` the aircraft turns to its destination by itself, at most at ``steering_radps``.
     """
@@ -110,7 +110,10 @@ def _ramp(time_s: FloatArray, start_s: float, length_s: float) -> FloatArray:
 
 
 def turn_of(time_s: FloatArray, start_s: float, angle_deg: float, rate_dps: float) -> tuple[FloatArray, float]:
-    """Turn rate (rad/s) of one turn with bank ramps, exact in its angle to the step, and its end."""
+    """Return the turn rate (rad/s) of one turn with bank ramps, and its end.
+
+    The angle is exact to the step.
+    """
     length = max(abs(angle_deg) / rate_dps, BANK_RAMP_S)
     shape = _ramp(time_s, start_s, BANK_RAMP_S) - _ramp(time_s, start_s + length, BANK_RAMP_S)
     area = float(np.sum(shape)) * float(time_s[1] - time_s[0])
@@ -125,7 +128,7 @@ def _rate_dps(bank_deg: float, speed_mps: float) -> float:
 def _climb_out(
     time_s: FloatArray, field_m: float, cruise_m: float, lift_off_mps: float, cruise_mps: float, climb_mps: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Speed and altitude of a stand of 30 s, a take-off run, climb and acceleration to cruise."""
+    """Return speed and altitude of a stand of 30 s, a take-off run, climb and acceleration."""
     climb_s = 1.5 * (cruise_m - field_m) / climb_mps
     speed = lift_off_mps * _ramp(time_s, 30.0, ROLL_S)
     speed += (cruise_mps - lift_off_mps) * _ramp(time_s, 30.0 + ROLL_S, 0.7 * climb_s)
@@ -133,7 +136,10 @@ def _climb_out(
 
 
 def _straight(time_s: FloatArray, rng: np.random.Generator) -> Plan:
-    """A ferry flight: one departure turn, then a great circle, anywhere below 75 deg of latitude."""
+    """Plan a ferry flight: one departure turn, then a great circle.
+
+    It lies anywhere below 75 deg of latitude.
+    """
     cruise = rng.uniform(180.0, 240.0)
     speed, altitude = _climb_out(time_s, rng.uniform(0.0, 600.0), rng.uniform(8e3, 12e3), 75.0, cruise, 10.0)
     turn_deg, turn_at = rng.uniform(-150.0, 150.0), rng.uniform(150.0, 400.0)
@@ -149,7 +155,7 @@ def _straight(time_s: FloatArray, rng: np.random.Generator) -> Plan:
 
 
 def _highest_deg(latitude_deg: float, course_deg: float, arc_rad: float) -> float:
-    """Largest distance from the equator along a great circle, on the sphere."""
+    """Return the largest distance from the equator along a great circle, on the sphere."""
     arc = np.linspace(0.0, arc_rad, 50)
     start, course = np.deg2rad(latitude_deg), np.deg2rad(course_deg)
     sine = np.sin(start) * np.cos(arc) + np.cos(start) * np.sin(arc) * np.cos(course)
@@ -157,7 +163,10 @@ def _highest_deg(latitude_deg: float, course_deg: float, arc_rad: float) -> floa
 
 
 def _norilsk_moscow(time_s: FloatArray, rng: np.random.Generator) -> Plan:
-    """The paper's flight: 400 s of departure, the great circle, 1400 s of approach; cruise speed fits the time."""
+    """Plan the paper's flight: 400 s of departure, the great circle, 1400 s of approach.
+
+    The cruise speed fits the time.
+    """
     end = float(time_s[-1])
     field_m, cruise_m = 180.0, rng.uniform(8e3, 10e3)
     start, goal = np.deg2rad(NORILSK_DEG), np.deg2rad(MOSCOW_DEG)
@@ -187,7 +196,7 @@ def _norilsk_moscow(time_s: FloatArray, rng: np.random.Generator) -> Plan:
 
 
 def _manoeuvring(time_s: FloatArray, rng: np.random.Generator) -> Plan:
-    """Survey lines or racetracks: a turn every 5 to 20 min, back and forth or onwards."""
+    """Plan survey lines or racetracks: a turn every 5 to 20 min, back and forth or onwards."""
     cruise = rng.uniform(100.0, 180.0)
     speed, altitude = _climb_out(time_s, rng.uniform(0.0, 600.0), rng.uniform(3e3, 9e3), 70.0, cruise, 8.0)
     turn, at, side = np.zeros(len(time_s)), 150.0, float(rng.choice([-1.0, 1.0]))
@@ -201,31 +210,37 @@ def _manoeuvring(time_s: FloatArray, rng: np.random.Generator) -> Plan:
 
 
 def _out_and_back(time_s: FloatArray, rng: np.random.Generator) -> Plan:
-    """One long leg, one turn of 180 deg near the middle of the flight, the same leg back."""
+    """Plan one long leg, a turn of 180 deg near mid-flight, and the same leg back."""
     return _legs(time_s, rng, [(rng.uniform(0.35, 0.6) * float(time_s[-1]), 180.0 * rng.choice([-1.0, 1.0]))])
 
 
 def _dogleg(time_s: FloatArray, rng: np.random.Generator) -> Plan:
-    """An airway: legs of 15 to 45 min with a change of course of 20 to 80 deg between them, either way."""
+    """Plan an airway: legs of 15 to 45 min with changes of course of 20 to 80 deg.
+
+    The changes go either way.
+    """
     at = np.cumsum(rng.uniform(900.0, 2700.0, 20))
     return _legs(time_s, rng, [(start, rng.choice([-1.0, 1.0]) * rng.uniform(20.0, 80.0)) for start in at])
 
 
 def _racetrack(time_s: FloatArray, rng: np.random.Generator) -> Plan:
-    """A patrol: legs of one length, 3 to 25 min, every turn 180 deg to the same side."""
+    """Plan a patrol: legs of one length, 3 to 25 min, every turn 180 deg to the same side."""
     angle, leg_s = 180.0 * rng.choice([-1.0, 1.0]), rng.uniform(180.0, 1500.0)
     return _legs(time_s, rng, [(start, angle) for start in np.arange(600.0 + leg_s, time_s[-1], leg_s + 120.0)])
 
 
 def _late_survey(time_s: FloatArray, rng: np.random.Generator) -> Plan:
-    """A straight transit over 0.4 to 0.6 of the time, then a turn every 5 to 15 min: the past does not tell it."""
+    """Plan a straight transit over 0.4 to 0.6 of the time, then a turn every 5 to 15 min.
+
+    The past does not tell what comes.
+    """
     begin_s = rng.uniform(0.4, 0.6) * float(time_s[-1])
     at = begin_s + np.cumsum(rng.uniform(300.0, 900.0, 60))
     return _legs(time_s, rng, [(start, float(rng.choice([-180.0, -90.0, 60.0, 90.0, 180.0]))) for start in at])
 
 
 def _legs(time_s: FloatArray, rng: np.random.Generator, turns: list[tuple[float, float]]) -> Plan:
-    """Climb out, cruise, and turns (start, angle) at 20 deg of bank."""
+    """Plan a climb out, cruise, and turns (start, angle) at 20 deg of bank."""
     cruise = rng.uniform(120.0, 230.0)
     speed, altitude = _climb_out(time_s, rng.uniform(0.0, 600.0), rng.uniform(5e3, 11e3), 70.0, cruise, 8.0)
     turn = np.zeros(len(time_s))
@@ -250,7 +265,10 @@ def _fly(  # type: ignore[no-untyped-def]
     heading,
     turn,
 ):
-    """Latitude, longitude, heading by Heun's rule; the geodesic turns the heading by v_E tan(lat) / (N + h)."""
+    """Fill latitude, longitude and heading by Heun's rule.
+
+    The geodesic turns the heading by v_E tan(lat) / (N + h).
+    """
     n = len(speed_mps)
     lat, lon, course, rate = start_rad[0], start_rad[1], start_rad[2], 0.0
     pi = np.pi

@@ -1,4 +1,7 @@
-"""Logs on disk: one scenario as a flat CSV, and the sample logs of the repository with their README."""
+"""Logs on disk: one scenario as a flat CSV, and the sample logs of the repository.
+
+The sample logs come with their README.
+"""
 
 from pathlib import Path
 
@@ -15,7 +18,9 @@ PAPER_SPEED_MPS = 6.0
 
 
 def write_scenario(name_or_path: str | Path, folder: str | Path, seed: int | None = None) -> Path:
-    """Simulate a scenario and write its log ``<folder>/<scenario>.csv``, damaged as the scenario says.
+    """Simulate a scenario and write its log ``<folder>/<scenario>.csv``.
+
+    The log is damaged as the scenario says.
 
     Returns
     -------
@@ -48,7 +53,9 @@ def write_log(simulated: Simulated, folder: str | Path) -> Path:
 
 
 def make_sample_logs(folder: str | Path) -> tuple[Path, ...]:
-    """Write the sample logs and the README that tells the truth behind them; the same bytes every time.
+    """Write the sample logs and the README that tells the truth behind them.
+
+    The bytes are the same every time.
 
     Returns
     -------
@@ -63,7 +70,7 @@ def make_sample_logs(folder: str | Path) -> tuple[Path, ...]:
 
 
 def readme_text(simulated: list[Simulated]) -> str:
-    """The README of the sample logs: what each holds, the true values, the damage done."""
+    """Return the README of the sample logs: contents, true values and damage of each."""
     logs = [_log_line(one) for one in simulated]
     truths = [_truth_line(one) for one in simulated]
     damage = [f"- `{one.scenario.name}.csv`: {text}." for one in simulated for text in _damage_of(one)]

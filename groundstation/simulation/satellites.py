@@ -1,7 +1,8 @@
-"""Positions of navigation satellites from published mean elements: Kepler's ellipse with a turning node and perigee.
+"""Positions of navigation satellites from published mean elements.
 
-The elements (orbits/satellites.csv) are real ones of GPS and GLONASS; the file says whose and of what day. A position
-is good to some kilometres within weeks of the epoch, enough for a geometry: simulation and estimator share it.
+They are on Kepler's ellipse with a turning node and perigee. The elements (orbits/satellites.csv) are real ones of GPS
+and GLONASS; the file says whose and of what day. A position is good to some kilometres within weeks of the epoch,
+enough for a geometry: simulation and estimator share it.
 
 Source: Vallado, Fundamentals of Astrodynamics and Applications, 4th ed. 2013, sections 2.2 (Kepler's equation), 3.5
 (sidereal time, equation 3-45) and 9.6 (secular rates due to J2, equations 9-37 to 9-39).
@@ -29,7 +30,10 @@ KEPLER_STEPS = 12
 
 @dataclass(frozen=True)
 class Orbit:
-    """Mean elements of one satellite at an epoch; angles in degrees, node counted from the equinox."""
+    """Mean elements of one satellite at an epoch.
+
+    Angles are in degrees, the node is counted from the equinox.
+    """
 
     satellite: str
     epoch_utc_ns: int
@@ -69,7 +73,7 @@ def orbit_of(name: str) -> Orbit:
 def satellite_ecef_m(orbit: Orbit, start_utc_ns: int, time_s: FloatArray) -> FloatArray:
     """Position in ECEF at seconds after a UTC instant, metres, shape (n, 3).
 
-    What it ignores: periodic perturbations, polar motion, UT1 - UTC.
+    It ignores periodic perturbations, polar motion, UT1 - UTC.
     """
     since_s = (start_utc_ns - orbit.epoch_utc_ns) / NS_PER_S + time_s
     motion = orbit.revolutions_per_day * 2.0 * np.pi / 86_400.0
@@ -113,7 +117,10 @@ def sidereal_angle_rad(start_utc_ns: int, time_s: FloatArray) -> FloatArray:
 
 
 def elevation_deg(satellite_m: FloatArray, place_m: FloatArray, down: FloatArray) -> FloatArray:
-    """Elevation above the horizon, degrees, of positions (..., 3) seen from a place whose down axis is ``down``."""
+    """Return the elevation above the horizon, degrees, of positions (..., 3).
+
+    They are seen from a place whose down axis is ``down``.
+    """
     line = satellite_m - place_m
     return np.asarray(np.rad2deg(np.arcsin(-(line * down).sum(axis=-1) / np.linalg.norm(line, axis=-1))))
 
@@ -121,7 +128,9 @@ def elevation_deg(satellite_m: FloatArray, place_m: FloatArray, down: FloatArray
 def emission_ecef_m(
     orbit: Orbit, start_utc_ns: int, time_s: FloatArray, receiver_m: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Where the satellite was when it sent what is received at ``time_s``, and the distance travelled.
+    """Return the satellite's position at emission, and the distance travelled.
+
+    The signal is received at ``time_s``.
 
     Returns
     -------

@@ -1,4 +1,7 @@
-"""Scenarios: everything that determines a simulated flight, as frozen dataclasses read from TOML."""
+"""Scenarios: everything that determines a simulated flight.
+
+They are frozen dataclasses read from TOML.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
@@ -32,7 +35,10 @@ class Airport:
 
 @dataclass(frozen=True)
 class ParkingReference:
-    """Reference heading of the stand as a theodolite measured it: true heading plus ``error_deg``."""
+    """Reference heading of the stand as a theodolite measured it.
+
+    It is the true heading plus ``error_deg``.
+    """
 
     error_deg: float = number(0.0, -5.0, 5.0)
     sigma_deg: float = number(0.02, 0.0, 5.0)
@@ -41,7 +47,7 @@ class ParkingReference:
 
 @dataclass(frozen=True)
 class Wind:
-    """Velocity of the air over the ground, constant (where it blows to)."""
+    """Velocity of the air over the ground, constant, in the direction to which it blows."""
 
     north_mps: float = number(0.0, -60.0, 60.0)
     east_mps: float = number(0.0, -60.0, 60.0)
@@ -49,7 +55,7 @@ class Wind:
 
 @dataclass(frozen=True)
 class GroundMotion:
-    """What taxiing adds to the planned track.
+    """Motion that taxiing adds to the planned track.
 
     ``sway`` is heading about the track (tyres and gear give way), ``steering`` a slow wander of track and heading
     together, ``sideslip_deg`` a constant angle of the nose to the right of the track, parked position included.
@@ -117,10 +123,11 @@ class Interval:
 
 @dataclass(frozen=True)
 class GnssSettings:
-    """GNSS receiver. Errors: white + first-order Gauss-Markov per axis; vertical ``vertical_factor`` times larger.
+    """GNSS receiver.
 
-    ``repeat`` rows of the log carry each receiver output (a recorder faster than the receiver); ``latency_s`` delays
-    the record behind the time of validity. Low-integrity intervals clear ``integrity_ok`` and add ``jump_mps`` east.
+    Errors are white + first-order Gauss-Markov per axis; vertical ones are ``vertical_factor`` times larger. ``repeat``
+    rows of the log carry each receiver output (a recorder faster than the receiver); ``latency_s`` delays the record
+    behind the time of validity. Low-integrity intervals clear ``integrity_ok`` and add ``jump_mps`` east.
     """
 
     rate_hz: float = number(10.0, 0.01, 100.0)
@@ -151,7 +158,10 @@ class GnssSettings:
 
 @dataclass(frozen=True)
 class Anomaly:
-    """A plane wave of the field of the crust: ``amplitude_nt`` at the altitude flown, phase that of the stand."""
+    """Plane wave of the field of the crust.
+
+    ``amplitude_nt`` is that at the altitude flown, the phase that of the stand.
+    """
 
     amplitude_nt: float = required_number(0.0, 100_000.0)
     wavelength_m: float = required_number(100.0, 1e7)
@@ -161,14 +171,14 @@ class Anomaly:
 
 @dataclass(frozen=True)
 class MagnetometerSettings:
-    """Three-axis magnetometer: see :func:`groundstation.simulation.magnetometer.sensed_nt`; vectors are of body axes.
+    """Three-axis magnetometer; vectors are of body axes.
 
-    The field is the World Magnetic Model's of the date (``decimal_year``, or that of ``start_utc``) and place, or
-    ``world_field_nt`` (north, east, down) everywhere; ``field_error_nt`` (north, east, down) and ``anomaly`` are what
-    the world has more. ``misalignment_deg`` are roll, pitch, heading of the sensor in
-    the aircraft. ``bank_odd_nt`` and ``bank_even_nt`` move with the bank (control rods, fuel), as sin(roll) and its
-    square. ``latency_s`` delays the record behind the time of validity. Noise per axis: white + first-order
-    Gauss-Markov.
+    See :func:`groundstation.simulation.magnetometer.sensed_nt`. The field is the World Magnetic Model's of the date
+    (``decimal_year``, or that of ``start_utc``) and place, or ``world_field_nt`` (north, east, down) everywhere;
+    ``field_error_nt`` (north, east, down) and ``anomaly`` are what the world has more. ``misalignment_deg`` are roll,
+    pitch, heading of the sensor in the aircraft. ``bank_odd_nt`` and ``bank_even_nt`` move with the bank (control rods,
+    fuel), as sin(roll) and its square. ``latency_s`` delays the record behind the time of validity. Noise per axis:
+    white + first-order Gauss-Markov.
     """
 
     rate_hz: float = number(10.0, 0.01, 1000.0)
@@ -192,14 +202,17 @@ class MagnetometerSettings:
 
 @dataclass(frozen=True)
 class Load(Interval):
-    """A consumer that is on for an interval."""
+    """Consumer of current that is on for an interval."""
 
     current_a: float = required_number(-10_000.0, 10_000.0)
 
 
 @dataclass(frozen=True)
 class ElectricSettings:
-    """Electric system: ``base_a`` all the time, ``loads`` on top. Its magnetic field is the magnetometer's affair."""
+    """Electric system: ``base_a`` all the time, ``loads`` on top.
+
+    Its magnetic field is part of the magnetometer.
+    """
 
     rate_hz: float = number(5.0, 0.01, 1000.0)
     base_a: float = number(0.0, -10_000.0, 10_000.0)
@@ -210,7 +223,10 @@ class ElectricSettings:
 
 @dataclass(frozen=True)
 class BaroSettings:
-    """Barometric altimeter: ellipsoid altitude + offset + noise (the atmosphere is taken as standard)."""
+    """Barometric altimeter: ellipsoid altitude + offset + noise.
+
+    The atmosphere is taken as standard.
+    """
 
     rate_hz: float = number(1.0, 0.01, 100.0)
     offset_m: float = number(-15.0, -1000.0, 1000.0)
@@ -238,9 +254,10 @@ class DiscreteSettings:
 
 @dataclass(frozen=True)
 class OnboardSettings:
-    """The aircraft's own estimate: the paper's recursion on the last GNSS and INS outputs, at its cycle rate.
+    """Estimate of the aircraft itself: the paper's recursion at its cycle rate.
 
-    Cycles reuse GNSS samples when faster than the receiver; the heading rate is the raw difference between INS outputs.
+    It uses the last GNSS and INS outputs. Cycles reuse GNSS samples when faster than the receiver; the heading rate is
+    the raw difference between INS outputs.
     """
 
     cycle_rate_hz: float = number(20.0, 0.1, 100.0)
@@ -253,7 +270,7 @@ class OnboardSettings:
 
 @dataclass(frozen=True)
 class TruthSettings:
-    """Truth in the tables always; in the CSV only when ``written``."""
+    """Settings of the truth: always in the tables, in the CSV only when ``written``."""
 
     rate_hz: float = number(10.0, 0.01, 1000.0)
     written: bool = False
@@ -261,7 +278,7 @@ class TruthSettings:
 
 @dataclass(frozen=True)
 class EventMarker:
-    """A marker of the recorder or an operator's command."""
+    """Marker of the recorder, or an operator's command."""
 
     time_s: float = required_number(0.0)
     name: str = ""
@@ -269,7 +286,10 @@ class EventMarker:
 
 @dataclass(frozen=True)
 class LogSettings:
-    """How the flat CSV is written. ``cut_bytes`` are missing at its end, as after a loss of power."""
+    """Format of the flat CSV.
+
+    ``cut_bytes`` are missing at its end, as after a loss of power.
+    """
 
     delimiter: Literal[",", ";", "\t"] = ","
     encoding: Literal["utf-8", "cp1251"] = "utf-8"
@@ -279,11 +299,12 @@ class LogSettings:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A simulated flight. Sensors that a scenario does not name are off, except INS, GNSS and weight on wheels.
+    """Simulated flight.
 
-    ``start_utc`` is the UTC of log second 0; empty means that the log has no absolute time (NOTIME).
-    ``parking_heading_deg`` is the true heading of the nose at the stand; ``expected_verdict`` what an analysis of the
-    taxi should come to. All rates divide ``internal_rate_hz``.
+    Sensors that a scenario does not name are off, except INS, GNSS and weight on wheels. ``start_utc`` is the UTC of
+    log second 0; empty means that the log has no absolute time (NOTIME). ``parking_heading_deg`` is the true heading of
+    the nose at the stand; ``expected_verdict`` what an analysis of the taxi should come to. All rates divide
+    ``internal_rate_hz``.
     """
 
     name: str
@@ -356,7 +377,10 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
 
 
 def scenario_from_table(table: dict[str, Any], name: str, where: str) -> Scenario:
-    """Make a scenario of a TOML table and check what one key cannot show: rates, intervals, the start time."""
+    """Make a scenario of a TOML table, and check what one key cannot show.
+
+    These are rates, intervals and the start time.
+    """
     scenario = settings_from(Scenario, {"name": name} | table, where)
     if not scenario.legs:
         raise SettingsError(f"{where}, key legs", "no leg", "one or more")

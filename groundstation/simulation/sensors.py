@@ -39,7 +39,10 @@ def truth_readings(trajectory: Trajectory, settings: TruthSettings) -> Readings:
 
 
 def ins_readings(trajectory: Trajectory, settings: InsSettings, rng: np.random.Generator, seed: int = 0) -> Readings:
-    """INS at the reference point: errors of its error model (``seed`` draws those of a class) + noise of its output."""
+    """Return the readings of the INS at the reference point.
+
+    They have the errors of its error model (``seed`` draws those of a class) and the noise of its output.
+    """
     motion = trajectory.at(every(trajectory, settings.rate_hz))
     n = len(motion)
     noise = rng.standard_normal((7, n))
@@ -82,7 +85,10 @@ def ins_readings(trajectory: Trajectory, settings: InsSettings, rng: np.random.G
 
 
 def gnss_readings(trajectory: Trajectory, settings: GnssSettings, rng: np.random.Generator) -> Readings:
-    """GNSS at its antenna: position and velocity with white and correlated errors, quality, outages, latency."""
+    """Return the readings of GNSS at its antenna.
+
+    They are position and velocity with white and correlated errors, quality, outages, latency.
+    """
     index = every(trajectory, settings.rate_hz)
     antenna = trajectory.at(index).moved_to(
         (settings.antenna_forward_m, settings.antenna_right_m, settings.antenna_down_m)
@@ -184,7 +190,10 @@ def discrete_readings(trajectory: Trajectory, settings: DiscreteSettings) -> Rea
 
 
 def event_readings(trajectory: Trajectory, events: tuple[EventMarker, ...]) -> Readings:
-    """Markers at the first row of the internal grid not before their time; markers after the end are left out."""
+    """Place markers at the first row of the internal grid not before their time.
+
+    Markers after the end are left out.
+    """
     named = sorted((event for event in events), key=lambda event: event.time_s)
     times = [-(-round(event.time_s * NS_PER_S) // trajectory.step_ns) * trajectory.step_ns for event in named]
     kept = [(time, event.name) for time, event in zip(times, named, strict=True) if time <= trajectory.time_ns[-1]]

@@ -1,4 +1,4 @@
-"""Simulated sessions of several aircraft: what the estimators are given, and the truth to judge them by."""
+"""Simulated sessions of several aircraft: inputs of the estimators, and the truth."""
 
 from dataclasses import dataclass
 
@@ -44,7 +44,10 @@ class VehicleTruth:
 
 @dataclass(frozen=True)
 class SimulatedSession:
-    """A session and its truth, vehicles in the same order; ``point_errors_m`` is believed minus true position."""
+    """Session and its truth, vehicles in the same order.
+
+    ``point_errors_m`` is believed minus true position.
+    """
 
     session: Session
     truth: tuple[VehicleTruth, ...]
@@ -63,7 +66,7 @@ def simulate_session(scenario: SessionScenario, seed: int, run: int = 0, *, scal
     scale : float
         Every error times this: 0 gives a session without errors.
 
-    What it ignores: the motion of an aircraft while a signal of the link travels (2 cm at 30 km).
+    It ignores the motion of an aircraft while a signal of the link travels (2 cm at 30 km).
     """
     time_s = grid_s(scenario)
     seeds = np.random.SeedSequence((seed, run)).spawn(len(scenario.aircraft) + 3)

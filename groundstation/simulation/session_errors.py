@@ -1,8 +1,9 @@
-"""Errors of INS, barometric altimeter and clocks of the aircraft of a session, drawn without integration error.
+"""Errors of INS, barometric altimeter and clocks of the aircraft of a session.
 
-Local frame: position is the integral of a Gauss-Markov velocity error, a clock's offset that of a Gauss-Markov
-frequency offset; both pairs are stepped with the exact transition and covariance. Global frame: the full linear error
-propagation of :mod:`groundstation.simulation.ins_errors` on a platform slaved to north.
+They are drawn without integration error. Local frame: position is the integral of a Gauss-Markov velocity error, a
+clock's offset that of a Gauss-Markov frequency offset; both pairs are stepped with the exact transition and covariance.
+Global frame: the full linear error propagation of :mod:`groundstation.simulation.ins_errors` on a platform slaved to
+north.
 
 Source: Van Loan, Computing integrals involving the matrix exponential, 1978 (the covariance of a step, here in closed
 form); Gelb, Applied Optimal Estimation, 1974, section 3.8.
@@ -21,7 +22,7 @@ from groundstation.simulation.session_scenario import SessionErrors, SessionScen
 
 RAD_PER_ARCSEC = float(np.deg2rad(1.0 / 3600.0))
 SMALL_STEP = (
-    1e-3  # of the correlation time: below, the closed form of the variance loses digits and its series does not
+    1e-3  # share of the correlation time below which the closed form of the variance loses digits, not its series
 )
 
 
@@ -61,7 +62,9 @@ class VehicleErrors:
 def integrated_gauss_markov(
     rng: np.random.Generator, shape: tuple[int, ...], step_s: float, start: float, sigma: float, correlation_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Draw a stationary Gauss-Markov process and its integral, which starts at ``start`` (one sigma).
+    """Draw a stationary Gauss-Markov process and its integral.
+
+    The integral starts at ``start`` (one sigma).
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""What the aircraft of a session measure: pseudo-ranges over the slots of the link, and to satellites."""
+"""Pseudo-ranges that a session's aircraft measure, over the link and to satellites.
+
+The link is shared in slots.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,10 +30,11 @@ class Flown:
 
 
 def draw_ranges(scenario: SessionScenario, flown: Sequence[Flown], rng: np.random.Generator, scale: float) -> Ranges:
-    """Pseudo-ranges over the link: in its slot each transmits, all aircraft that hear it measure.
+    """Draw pseudo-ranges over the link.
 
-    Points transmit in the first slots of a frame, then aircraft in their order. Pseudo-range = distance + clock of the
-    receiver - clock of the transmitter + bias of the receiver + noise; points keep the session's time.
+    Each aircraft transmits in its slot, and all that hear it measure. Points transmit in the first slots of a frame,
+    then aircraft in their order. Pseudo-range = distance + clock of the receiver - clock of the transmitter + bias of
+    the receiver + noise; points keep the session's time.
     """
     link = scenario.link
     per_frame = round(link.frame_s / link.slot_s)
@@ -62,7 +66,7 @@ def draw_ranges(scenario: SessionScenario, flown: Sequence[Flown], rng: np.rando
 def _pseudorange(
     scenario: SessionScenario, transmitter: "SessionPoint | Flown", receiver: Flown, at: "np.ndarray"
 ) -> FloatArray:
-    """True distance with both clocks in it, at places of the grid."""
+    """Return the true distance with both clocks in it, at places of the grid."""
     place, clock = receiver.motion.position_m[at], receiver.errors.clock_m[at]
     if isinstance(transmitter, Flown):
         distance = np.linalg.norm(place - transmitter.motion.position_m[at], axis=1)
@@ -75,7 +79,7 @@ def _is_present(one: SessionAircraft | SessionPoint, time_s: FloatArray) -> Bool
 
 
 def _in_order(rows: list[tuple[FloatArray, ...]], names: list[tuple[str, str]], sigma_m: float) -> Ranges:
-    """One table in order of time; rows of one slot in the order of the receivers."""
+    """Return one table in order of time; rows of one slot in the order of the receivers."""
     if not rows:
         return Ranges.none()
     time_s, read, slot = (np.concatenate(parts) for parts in zip(*rows, strict=True))
@@ -121,7 +125,10 @@ def draw_satellite_ranges(
 def _sight(
     scenario: SessionScenario, aircraft: SessionAircraft, name: str
 ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-    """Places of the grid at which one satellite is received, where it was at emission, and the distance."""
+    """Return the grid places at which one satellite is received, its position, its distance.
+
+    The position is that at emission.
+    """
     motion, settings = fly(scenario, aircraft), scenario.satellite
     per_frame = round(scenario.link.frame_s / scenario.link.slot_s)
     at = np.arange(0, len(motion.time_s), per_frame)

@@ -1,4 +1,7 @@
-"""A simulated session as logs: one flat CSV for each aircraft, the ground stations, and settings that fit."""
+"""Simulated session as logs: a flat CSV for each aircraft, ground stations, settings.
+
+The settings fit the session.
+"""
 
 import json
 import re
@@ -21,7 +24,7 @@ from groundstation.tables.table import Flight, Table
 
 DEFAULT_SEED = 1
 STATIONS_TOML, SETTINGS_TOML = "stations.toml", "settings.toml"
-STEPS = {"deg": 1e-9, "m": 1e-4, "mps": 1e-5, "": 1.0, "s": 1e-9}  # of what is written, by unit
+STEPS = {"deg": 1e-9, "m": 1e-4, "mps": 1e-5, "": 1.0, "s": 1e-9}  # steps of written values, by unit
 HEADING_STEP_DEG = 1e-6
 VELOCITY_AXES = ("north", "east", "down")
 
@@ -83,9 +86,10 @@ def origin_of(scenario: SessionScenario) -> LocalFrame | None:
 
 
 def session_flights(simulated: SimulatedSession, scenario: SessionScenario, name: str) -> list[Flight]:
-    """The session as the flights that its aircraft recorded, times since ``start_utc`` of the scenario.
+    """Return the session as the flights that its aircraft recorded.
 
-    A range is recorded when it arrives: time of transmission and the pseudo-range over the speed of light.
+    Times count since ``start_utc`` of the scenario. A range is recorded when it arrives: time of transmission and the
+    pseudo-range over the speed of light.
     """
     start_ns, _ = iso_to_utc_ns(scenario.satellite.start_utc)
     origin = origin_of(scenario)
@@ -117,7 +121,7 @@ def _ns(time_s: FloatArray) -> Int64Array:
 
 
 def _motion(position_m: FloatArray, velocity_mps: FloatArray, origin: LocalFrame | None) -> dict[str, FloatArray]:
-    """Positions and velocities of the session's frame as an INS tells them."""
+    """Return positions and velocities of the session's frame as an INS has them."""
     ecef = position_m if origin is None else origin.to_ecef_m(position_m)
     latitude, longitude, altitude = geodetic_deg_m(ecef)
     velocity = velocity_mps if origin is None else origin.turned_to(latitude, longitude, velocity_mps)
@@ -193,7 +197,10 @@ def stations_text(session: Session, origin: LocalFrame | None) -> str:
 
 
 def settings_text(scenario: SessionScenario) -> str:
-    """What a filter may believe of the scenario, as the tables [session] and [cooperative.ins] of a settings file."""
+    """Return what a filter may believe of the scenario, as text of a settings file.
+
+    Its tables are [session] and [cooperative.ins].
+    """
     lines = ["# The sigmas that the scenario draws its errors with.", "[session]"]
     lines += [f"range_sigma_m = {scenario.link.range_sigma_m!r}"]
     lines += [f"satellite_range_sigma_m = {scenario.satellite.range_sigma_m!r}", "", "[cooperative.ins]"]

@@ -1,4 +1,7 @@
-"""True motion of the aircraft of a session: straight flight and turns at constant speed and height."""
+"""True motion of the aircraft of a session.
+
+It is straight flight and turns at constant speed and height.
+"""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -102,9 +105,10 @@ def _over_the_ellipsoid(
 
 
 def place_m(scenario: SessionScenario, one: SessionAircraft | SessionPoint) -> FloatArray:
-    """Where an aircraft starts or a point stands, frame of the session, shape (3,).
+    """Return the start of an aircraft, or the place of a point, shape (3,).
 
-    In the global frame north and east are counted along the ellipsoid from the origin.
+    It is in the frame of the session. In the global frame north and east are counted along the ellipsoid from the
+    origin.
     """
     if scenario.frame == "local":
         return np.array([one.north_m, one.east_m, -one.height_m])

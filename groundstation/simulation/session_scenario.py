@@ -24,7 +24,7 @@ class Turn:
 
 @dataclass(frozen=True)
 class SessionAircraft:
-    """One aircraft: where it starts (north and east of the origin), how it flies, what it receives.
+    """One aircraft: start (north and east of the origin), flight, reception.
 
     ``satellites`` are names of shipped orbits; one below the mask is not received. ``rank`` 0 is the highest;
     ``hears`` are names of those whose slots it uses, empty for all.
@@ -46,7 +46,10 @@ class SessionAircraft:
 
 @dataclass(frozen=True)
 class SessionPoint:
-    """A ground reference point; ``position_sigma_m`` is how wrong its own position is, along each axis."""
+    """Ground reference point.
+
+    ``position_sigma_m`` is the error of its own position, along each axis.
+    """
 
     name: str
     north_m: float = required_number()
@@ -111,7 +114,7 @@ class SatelliteSettings:
 
 @dataclass(frozen=True)
 class SessionScenario:
-    """A session: everything that determines it but the seed.
+    """Scenario of a session: everything that determines it but the seed.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""Taxi runs before take-off: heading, GNSS velocity and the truth, over the family of docs/heading-family.md."""
+"""Taxi runs before take-off: heading, GNSS velocity and the truth.
+
+They are of the family of docs/heading-family.md.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -29,18 +32,18 @@ Family = Literal["grid", "continuous", "wide"]
 INS_RATE_HZ = 50
 GNSS_EVERY = 5  # INS steps per GNSS epoch: 10 Hz
 FASTEST_GATED_MPS = 6.0
-QUIET_SHARE = 0.5  # of family wide: receivers good enough for the gate at standstill
+QUIET_SHARE = 0.5  # share of family wide with receivers good enough for the gate at standstill
 AIRFIELD_DEG = (59.8, 179.999)  # beside the date line: the wrap is met in every test
 START_OF_DAY_NS = 1_777_874_400 * NS_PER_S  # 2026-05-04T06:00:00Z
 
 
 @dataclass(frozen=True)
 class TaxiCase:
-    """Parameters of one simulated taxi run; docs/heading-family.md tells what each is and how it is drawn.
+    """Parameters of one simulated taxi run.
 
-    Times in seconds, angles in degrees, speeds in m/s, ``drift_deg_per_h`` in degrees an hour. ``segments_s`` are the
-    lengths above 6 m/s, ``turns_deg`` (one fewer) the turns between them, ``curve_dps`` the rate of a gentle 10-s curve
-    in the longest segment (0: none).
+    docs/heading-family.md tells what each is and how it is drawn. Times are in seconds, angles in degrees, speeds in
+    m/s, ``drift_deg_per_h`` in degrees an hour. ``segments_s`` are the lengths above 6 m/s, ``turns_deg`` (one fewer)
+    the turns between them, ``curve_dps`` the rate of a gentle 10-s curve in the longest segment (0: none).
     """
 
     heading_error_deg: float = 0.8
@@ -69,7 +72,10 @@ class TaxiCase:
 
 
 def noiseless(case: TaxiCase) -> TaxiCase:
-    """The same run without sway, steering, speed wander and sensor noise: what is left is exact."""
+    """Return the same run without sway, steering, speed wander and sensor noise.
+
+    The run is then exact.
+    """
     return replace(
         case,
         speed_wander_mps=0.0,
@@ -84,7 +90,9 @@ def noiseless(case: TaxiCase) -> TaxiCase:
 
 @dataclass(frozen=True)
 class TaxiRun:
-    """One simulated run. Time runs from 0 at the first sample of standstill; arrays are read-only.
+    """One simulated run; arrays are read-only.
+
+    Time runs from 0 at the first sample of standstill.
 
     Parameters
     ----------
@@ -126,7 +134,10 @@ def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def draw_run(family: Family, seed: int, number: int) -> "TaxiRun":
-    """Run ``number`` of a seed of a family; those of family wide go through its cells one after the other."""
+    """Draw run ``number`` of a seed of a family.
+
+    Runs of family wide go through its cells one after the other.
+    """
     rng = np.random.default_rng((seed, number))
     case = draw_case(rng, family)
     if family == "wide":
@@ -181,7 +192,10 @@ TAKE_OFF_MPS2, LIFT_OFF_MPS, CLIMBING_MPS, CLIMBING_S = 2.5, 30.0, 45.0, 20.0
 
 
 class _Profile:
-    """Nodes of piecewise linear speed, and the turns, written down one manoeuvre after the other."""
+    """Nodes of piecewise linear speed, and the turns.
+
+    They are written down one manoeuvre after the other.
+    """
 
     def __init__(self, standstill_s: float) -> None:
         self.time_s, self.speed_mps = [0.0, standstill_s], [0.0, 0.0]
@@ -310,9 +324,10 @@ def table_of(topic: str, time_ns: NDArray[np.int64], columns: Mapping[str, NDArr
 
 
 def taxi_flight(run: TaxiRun, *, rng: np.random.Generator | None = None) -> Flight:
-    """Make the tables of a simulated run: topics ins, gnss, discrete and truth, as a reader would give them.
+    """Make the tables of a simulated run, as a reader would give them.
 
-    Positions are the sums of the velocities: good enough to tell one epoch from the next. GDOP is 1.5, or drawn.
+    Topics are ins, gnss, discrete and truth. Positions are the sums of the velocities: good enough to tell one epoch
+    from the next. GDOP is 1.5, or drawn.
     """
     gdop = 1.5 if rng is None else rng.uniform(1.2, 1.8)
     ins_ns = START_OF_DAY_NS + np.round(run.ins_time_s * NS_PER_S).astype(np.int64)

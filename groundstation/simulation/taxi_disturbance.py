@@ -1,6 +1,7 @@
-"""What the first family of taxi runs leaves out: disturbances of airframe, INS and GNSS, drawn one kind at a time.
+"""Disturbances of airframe, INS and GNSS on taxi, drawn one kind at a time.
 
-docs/heading-family.md tells the second family in words; :data:`KINDS` are its cells.
+The first family of taxi runs leaves them out. docs/heading-family.md tells the second family in words; :data:`KINDS`
+are its cells.
 """
 
 from dataclasses import dataclass, replace
@@ -194,7 +195,10 @@ def draw_disturbance(rng: np.random.Generator, kind: Kind) -> Disturbance:
 
 
 def draw_wind(rng: np.random.Generator, disturbance: Disturbance) -> Disturbance:
-    """The same with the wind of an ordinary day; in half of the runs class and wind are stated."""
+    """Add the wind of an ordinary day to a disturbance.
+
+    In half of the runs class and wind are stated.
+    """
     name = str(rng.choice(list(CLASS_FACTORS)))
     wind_mps, off_mps = rng.normal(0.0, WIND_MPS, 2), rng.normal(0.0, REPORT_MPS, 2)
     factor, is_stated = CLASS_FACTORS[name] * float(rng.normal(1.0, 0.5)), rng.random() < 0.5
@@ -205,14 +209,20 @@ def draw_wind(rng: np.random.Generator, disturbance: Disturbance) -> Disturbance
 
 
 def metar_line(wind_mps: FloatArray) -> str:
-    """A line with this wind, velocity north and east, to 10 deg and 1 kt, of the time of the simulated flights."""
+    """Return a METAR line with this wind, at the time of the simulated flights.
+
+    The wind is velocity north and east, rounded to 10 deg and 1 kt.
+    """
     knots = round(float(np.hypot(*wind_mps)) / MPS_PER["KT"])
     tens = round(float(np.rad2deg(np.arctan2(-wind_mps[1], -wind_mps[0]))) / 10.0) % 36 or 36
     return f"METAR XXXX 040600Z {10 * tens if knots else 0:03d}{knots:02d}KT 9999 FEW030 12/05 Q1013="
 
 
 def turns_of(kind: Kind, rng: np.random.Generator, turns_deg: tuple[float, ...]) -> tuple[float, ...]:
-    """Turns between the segments: those drawn, but for the cells that are about directions."""
+    """Return the turns between the segments.
+
+    They are as drawn, but for the cells that are about directions.
+    """
     if kind == "crab one way":
         return tuple(30.0 * (-1.0) ** number for number in range(len(turns_deg)))
     if kind == "crab back-taxi":

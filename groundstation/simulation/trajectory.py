@@ -1,11 +1,13 @@
-"""True motion of the aircraft on a fixed fine grid: position, velocity and attitude that are each other's derivatives.
+"""True motion of the aircraft on a fixed fine grid: position, velocity and attitude.
 
-The reference point is the middle of the main-gear axle at ground level. On the ground its velocity is along the true
-track; the nose is at track + sideslip + sway, and steering turns track and nose together. In the air the nose points
-along the air velocity, the wind makes the drift angle, turns are coordinated. Lift-off and touchdown swing the nose
-smoothly between the two in :data:`TRANSITION_S`. Every rate is the exact derivative of its angle.
+They are each other's derivatives. The reference point is the middle of the main-gear axle at ground level. On the
+ground its velocity is along the true track; the nose is at track + sideslip + sway, and steering turns track and nose
+together. In the air the nose points along the air velocity, the wind makes the drift angle, turns are coordinated.
+Lift-off and touchdown swing the nose smoothly between the two in :data:`TRANSITION_S`. Every rate is the exact
+derivative of its angle.
 
-Not modelled: rotation of the north-east-down frame below the aircraft (0.00005 m/s on a 5 m arm), bouncing, flare.
+Rotation of the north-east-down frame below the aircraft (0.00005 m/s on a 5 m arm), bouncing and flare are not
+modelled.
 """
 
 from dataclasses import dataclass, fields
@@ -68,9 +70,10 @@ class Trajectory:
         return Trajectory(**{key: value[index] if key != "step_ns" else value for key, value in values.items()})
 
     def moved_to(self, arm_body_m: tuple[float, float, float]) -> "Trajectory":
-        """Position and velocity of a point fixed in the body, ``arm_body_m`` (forward, right, down) from the reference.
+        """Return position and velocity of another point fixed in the body.
 
-        Position is moved by R r, velocity by R (w x r): exact derivatives of one another.
+        It lies ``arm_body_m`` (forward, right, down) from the reference. Position is moved by R r, velocity by R (w x
+        r): exact derivatives of one another.
         """
         if not any(arm_body_m):
             return self
@@ -93,7 +96,9 @@ class Trajectory:
 
 
 def rotation_n_from_b(roll_deg: FloatArray, pitch_deg: FloatArray, heading_deg: FloatArray) -> FloatArray:
-    """Rotation matrices from body (forward-right-down) to north-east-down, shape (n, 3, 3): v_n = n_from_b @ v_b.
+    """Return rotation matrices from body to north-east-down, shape (n, 3, 3).
+
+    Body axes are forward-right-down; v_n = n_from_b @ v_b.
 
     Source: Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed. 2004, equation 3.47.
 
@@ -153,15 +158,21 @@ def fly(scenario: Scenario, rng: np.random.Generator) -> Trajectory:
 
 
 def track_deg(trajectory: Trajectory) -> FloatArray:
-    """Direction of the ground velocity, [0, 360), shape (n,); meaningless where the aircraft stands."""
+    """Return the direction of the ground velocity, [0, 360), shape (n,).
+
+    It is meaningless where the aircraft stands.
+    """
     return direction_of(trajectory.velocity_north_mps, trajectory.velocity_east_mps)
 
 
 def _integrate(
     north_mps: FloatArray, east_mps: FloatArray, profile: Profile, scenario: Scenario
 ) -> tuple[FloatArray, FloatArray]:
-    """Positions on the ellipsoid by the trapezoidal rule, whose error (step^2 / 12 of the change of acceleration) is
-    some 0.03 mm in all; latitude by fixed-point iteration, since the radius hardly depends on it."""
+    """Integrate positions on the ellipsoid by the trapezoidal rule.
+
+    Its error (step^2 / 12 of the change of acceleration) is some 0.03 mm in all. The latitude comes by fixed-point
+    iteration, since the radius hardly depends on it.
+    """
     from scipy.integrate import cumulative_trapezoid
 
     latitude = np.full(len(profile), scenario.airport.latitude_deg)
@@ -179,7 +190,10 @@ def _integrate(
 def _wander(
     rng: np.random.Generator, profile: Profile, sigma: float, frequency_hz: float, damping: float
 ) -> tuple[FloatArray, FloatArray]:
-    """A damped oscillation and its exact derivative: drawn at knots, twice continuously differentiable between."""
+    """Draw a damped oscillation and its exact derivative.
+
+    It is drawn at knots, and twice continuously differentiable between them.
+    """
     from scipy.interpolate import CubicSpline
 
     if sigma == 0.0:
@@ -192,7 +206,7 @@ def _wander(
 
 
 def _between(low_high: tuple[float, float], profile: Profile) -> tuple[FloatArray, FloatArray]:
-    """A weight growing smoothly from 0 to 1 with the speed, and its derivative in time."""
+    """Return a weight that grows smoothly from 0 to 1 with the speed, and its time derivative."""
     low, high = low_high
     share = (profile.speed_mps - low) / (high - low)
     return smoothstep(share), smoothstep_slope(share) * profile.acceleration_mps2 / (high - low)
@@ -209,7 +223,10 @@ def _steering(scenario: Scenario, profile: Profile, rng: np.random.Generator) ->
 
 
 def _taxiing(profile: Profile) -> tuple[FloatArray, FloatArray]:
-    """A weight that is 1 at taxi speeds, 0 at rest and on the take-off run, and its derivative in time."""
+    """Return a weight that is 1 at taxi speeds, and its derivative in time.
+
+    It is 0 at rest and on the take-off run.
+    """
     rolling, rolling_rate = _between(ROLLING_MPS, profile)
     steady, steady_rate = _between(STEADY_MPS, profile)
     return rolling * (1.0 - steady), rolling_rate * (1.0 - steady) - rolling * steady_rate
@@ -218,7 +235,7 @@ def _taxiing(profile: Profile) -> tuple[FloatArray, FloatArray]:
 def _crosswind_slip(
     scenario: Scenario, profile: Profile, direction_deg: FloatArray, direction_rate_dps: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Angle by which the nose is turned into the wind while taxiing, and its rate."""
+    """Return the angle of the nose into the wind while taxiing, and its rate."""
     wind, factor = scenario.wind, scenario.ground.crosswind_slip_deg_per_mps
     direction_rad = np.deg2rad(direction_deg)
     sine, cosine = np.sin(direction_rad), np.cos(direction_rad)
@@ -234,7 +251,10 @@ def _nose_about_direction(
     crosswind_slip: tuple[FloatArray, FloatArray],
     rng: np.random.Generator,
 ) -> tuple[FloatArray, FloatArray]:
-    """Angle of the nose about the track (ground) or the air velocity (air), and its rate."""
+    """Return the angle of the nose about the track or the air velocity, and its rate.
+
+    On the ground it is the track, in the air the air velocity.
+    """
     ground = scenario.ground
     sway, sway_rate = _wander(rng, profile, ground.sway_sigma_deg, ground.sway_frequency_hz, ground.sway_damping)
     rolling, rolling_rate = _between(ROLLING_MPS, profile)
@@ -256,7 +276,10 @@ def _nose_about_direction(
 
 
 def _roll_and_pitch(profile: Profile) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Roll of coordinated turns, pitch of the flight path plus the angle of attack, with their rates (deg, deg/s)."""
+    """Return roll and pitch with their rates (deg, deg/s).
+
+    Roll is that of coordinated turns, pitch that of the flight path plus the angle of attack.
+    """
     speed, acceleration = profile.speed_mps, profile.acceleration_mps2
     turn_rad, turn_change_rad = np.deg2rad(profile.turn_rate_dps), np.deg2rad(profile.turn_acceleration_dps2)
     tangent = np.where(profile.airborne, speed * turn_rad / MPS2_PER_G, 0.0)
@@ -289,7 +312,10 @@ def _body_rates(
     pitch_rate_dps: FloatArray,
     heading_rate_dps: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rates about the body axes. Source: Titterton and Weston 2004, section 3.6.3.2 (inverse of equation 3.52)."""
+    """Return the rates about the body axes.
+
+    Source: Titterton and Weston 2004, section 3.6.3.2 (inverse of equation 3.52).
+    """
     roll_rad, pitch_rad = np.deg2rad(roll_deg), np.deg2rad(pitch_deg)
     across = heading_rate_dps * np.cos(pitch_rad)
     return (

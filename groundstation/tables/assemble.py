@@ -1,4 +1,4 @@
-"""Tables from record batches, and record batches from tables: the same whether a log or the store was read."""
+"""Tables from record batches and back, the same whether a log or the store was read."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
@@ -66,7 +66,7 @@ def flight_from_batches(
 
 
 def batches_from_flight(flight: Flight, max_rows: int = MAX_BATCH_ROWS) -> Iterator[RecordBatch]:
-    """Yield the tables as batches of at most ``max_rows`` rows, in order of the first time of each batch.
+    """Yield the tables as batches of at most ``max_rows`` rows, in order of their first time.
 
     The order lets a writer keep neighbours in time close together. Nothing is copied.
     """

@@ -26,7 +26,9 @@ WALKING_MPS = 2.0  # nothing flies so slowly that does not hover
 
 @dataclass(frozen=True)
 class GroundSettings:
-    """Limits of the detector. Defaults were set on a UAV carried by hand, light aircraft at 1 Hz and simulations.
+    """Limits of the ground detector.
+
+    Defaults were set on a UAV carried by hand, light aircraft at 1 Hz and simulations.
 
     Parameters
     ----------
@@ -90,7 +92,7 @@ class GroundSettings:
 
 @dataclass(frozen=True)
 class Detection:
-    """What the detector proved on the grid of :class:`Motion`, arrays of shape (n,).
+    """Proofs of the detector on the grid of :class:`Motion`, arrays of shape (n,).
 
     ``ground`` is proven contact, ``standing`` proven standstill, ``airborne`` sure flight; the rest is not known.
     ``speed_limit_mps`` is the largest speed that could be proven. ``reason`` says why nothing was.
@@ -130,7 +132,7 @@ def detect_ground(motion: Motion, settings: GroundSettings | None = None) -> Det
     complete, slow enough, neither climbing nor sinking nor tilting, and whose altitude stays near that of the
     standstill; before an end by climb or tilt the fast rows are taken off, and ``margin_s`` everywhere.
 
-    What it ignores: rolling that no standstill adjoins, slopes above ``slope``, a vehicle carried steadily by hand.
+    It ignores: rolling that no standstill adjoins, slopes above ``slope``, a vehicle carried steadily by hand.
     """
     settings = settings or GroundSettings()
     nothing = np.zeros(len(motion), dtype=bool)
@@ -200,7 +202,10 @@ def _stops(motion: Motion, settings: GroundSettings) -> list[_Stop]:
 
 
 def _scatter_about_line(values: FloatArray, half: int) -> FloatArray:
-    """Standard deviation about the straight line through each centred window; infinite where data lack."""
+    """Return the standard deviation about the straight line through each centred window.
+
+    It is infinite where data lack.
+    """
     known = np.isfinite(values)
     complete = window_sum(known.astype(np.float64), half) == 2 * half + 1
     level = float(np.mean(values[known])) if known.any() else 0.0
@@ -215,7 +220,10 @@ def _scatter_about_line(values: FloatArray, half: int) -> FloatArray:
 
 
 def _altitude_change_m(motion: Motion, half: int) -> tuple[FloatArray, FloatArray]:
-    """Change of altitude across the centred window, the largest of the sources, and the distance travelled in it."""
+    """Return the altitude change across the centred window, and the distance travelled in it.
+
+    The change is the largest of the sources.
+    """
     row = np.arange(len(motion))
     before, after = np.maximum(row - half, 0), np.minimum(row + half, len(motion) - 1)
     smooth = running_mean(motion.all_altitudes_m, 1.0)
@@ -224,7 +232,7 @@ def _altitude_change_m(motion: Motion, half: int) -> tuple[FloatArray, FloatArra
 
 
 def _climbs(motion: Motion, settings: GroundSettings) -> BoolArray:
-    """Where a logged upward speed is more than ground allows."""
+    """Tell where a logged upward speed is more than ground allows."""
     sloping = settings.slope * motion.speed_mps
     fast = np.abs(running_mean(motion.climb_mps, 1.5)) > settings.climb_mps + sloping
     lasting = np.abs(running_mean(motion.climb_mps, 0.5 * settings.climb_window_s)) > settings.drift_mps + sloping
@@ -232,13 +240,16 @@ def _climbs(motion: Motion, settings: GroundSettings) -> BoolArray:
 
 
 def _ground_spread_m(distance_m: FloatArray, elapsed_s: FloatArray, settings: GroundSettings) -> FloatArray:
-    """How far apart two altitudes on one ground may read."""
+    """Return the largest difference that two altitudes on one ground may read."""
     drift = np.minimum(settings.altitude_drift_mps * elapsed_s, settings.altitude_drift_m)
     return np.asarray(settings.altitude_noise_m + settings.slope * distance_m + drift)
 
 
 def _without_hovers(motion: Motion, stops: list[_Stop], settings: GroundSettings) -> list[_Stop]:
-    """Drop standstills that lie above another one by more than ground can: what is lower is the ground."""
+    """Drop standstills that lie above another one by more than ground can.
+
+    The lower one is the ground.
+    """
 
     def is_above(high: _Stop, low: _Stop) -> bool:
         elapsed = max(high.start - low.end, low.start - high.end, 0) / RATE_HZ
@@ -250,7 +261,10 @@ def _without_hovers(motion: Motion, stops: list[_Stop], settings: GroundSettings
 
 
 def _height_above_ground_m(motion: Motion, stops: list[_Stop], settings: GroundSettings) -> FloatArray:
-    """Height above the highest that ground can be, in every source, by the standstill before or after, shape (n,)."""
+    """Return the height above the highest that ground can be, shape (n,).
+
+    Every source is compared with the standstill before or after.
+    """
     starts = np.array([stop.start for stop in stops])
     row = np.arange(len(motion))
     before = np.searchsorted(starts, row, side="right") - 1
@@ -269,7 +283,7 @@ def _height_above_ground_m(motion: Motion, stops: list[_Stop], settings: GroundS
 
 
 def lasting(mask: BoolArray, least_s: float) -> BoolArray:
-    """The runs of a mask that last so long."""
+    """Return the runs of a mask that last so long."""
     out = mask.copy()
     for start, end in runs(mask):
         if end - start < least_s * RATE_HZ:
@@ -278,7 +292,10 @@ def lasting(mask: BoolArray, least_s: float) -> BoolArray:
 
 
 def _rolls(motion: Motion, limit_mps: float, settings: GroundSettings) -> BoolArray:
-    """Where the motion alone could be that of something rolling: slow enough, level, not swaying on the spot."""
+    """Tell where the motion could be that of something rolling.
+
+    It is slow enough, level, and does not sway on the spot.
+    """
     change, travelled = _altitude_change_m(motion, round(0.5 * settings.climb_window_s * RATE_HZ))
     is_level = change <= settings.climb_m + settings.slope * travelled
     half = round(0.5 * settings.standstill_s * RATE_HZ)
@@ -290,7 +307,10 @@ def _rolls(motion: Motion, limit_mps: float, settings: GroundSettings) -> BoolAr
 def _extend(
     ground: BoolArray, motion: Motion, stop: _Stop, rows: slice, settings: GroundSettings, *, is_learnt: bool
 ) -> None:
-    """Mark the rows around a standstill, within its run of allowed rows, that continue it on the ground."""
+    """Mark the rows around a standstill that continue it on the ground.
+
+    They stay within its run of allowed rows.
+    """
     row = np.arange(rows.start, rows.stop)
     height = largest_over_sources(np.abs(running_mean(motion.all_altitudes_m[:, rows], 1.0) - stop.altitude_m[:, None]))
     elapsed = np.maximum(np.maximum(stop.start - row, row - (stop.end - 1)), 0) / RATE_HZ
@@ -309,12 +329,12 @@ def _extend(
 def _kept_end(
     motion: Motion, end: int, standstill: int, step: int, settings: GroundSettings, *, is_learnt: bool
 ) -> int:
-    """Last row that is kept of a stretch from ``standstill`` to ``end`` (``step`` +1 or -1).
+    """Return the last row that is kept of a stretch from ``standstill`` to ``end``.
 
-    Where the motion itself ended it, this may have been a lift-off or touch-down, and the largest speed up to a climb
-    window past it a flying speed: whatever came near it without slowing down in between may have been in the air.
-    Where data ended the same is feared of the speed before, unless flying speeds are learnt from the log and bound it
-    already. A standstill that lasts to the end of data is kept whole.
+    ``step`` is +1 or -1. Where the motion itself ended it, this may have been a lift-off or touch-down, and the largest
+    speed up to a climb window past it a flying speed: whatever came near it without slowing down in between may have
+    been in the air. Where data ended the same is feared of the speed before, unless flying speeds are learnt from the
+    log and bound it already. A standstill that lasts to the end of data is kept whole.
     """
     window = round(settings.climb_window_s * RATE_HZ)
     beyond = [row for row in range(end + step, end + step * (1 + window), step) if 0 <= row < len(motion)]

@@ -8,7 +8,7 @@ MOVING_MPS = 1.0
 
 
 def distinct_epochs(table: Table) -> Table:
-    """GNSS rows with a velocity, each receiver epoch once.
+    """Return the GNSS rows with a velocity, each receiver epoch once.
 
     Rows of one time are one epoch. A recorder that runs faster than the receiver writes each epoch several times:
     a row that repeats the velocity (and position) before it is dropped while moving; and everywhere where more than

@@ -1,4 +1,4 @@
-"""Gaps in the times of a table: found by a stated rule, split at, or marked so that plotted lines break."""
+"""Gaps in the times of a table: find them, split at them, break plotted lines there."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ STEPS_OF_A_GAP = 3.0
 
 @dataclass(frozen=True)
 class Gap:
-    """A stretch without samples: after the sample at ``start_ns``, which is row ``row``, nothing for ``length_s``."""
+    """Stretch without samples: after row ``row`` at ``start_ns``, nothing for ``length_s``."""
 
     row: int
     start_ns: int
@@ -30,9 +30,10 @@ class Gap:
 
 
 def largest_step_s(time_ns: Int64Array, steps: float = STEPS_OF_A_GAP, at_least_s: float = 0.0) -> float:
-    """The rule for gaps: a step longer than ``steps`` median steps, and than ``at_least_s``, is a gap.
+    """Return the longest step that is not a gap.
 
-    Repeated times do not count as steps. Fewer than two different times have no step: infinity.
+    A gap is a step longer than ``steps`` median steps, and than ``at_least_s``. Repeated times do not count as steps.
+    Fewer than two different times have no step: infinity.
 
     Examples
     --------
@@ -105,7 +106,10 @@ def with_gap_breaks(table: Table, *, largest_s: float | None = None) -> Table:
 def break_lines(
     time_ns: Int64Array, columns: Sequence[FloatArray], *, largest_s: float | None = None
 ) -> tuple[Int64Array, tuple[FloatArray, ...]]:
-    """Times and float columns, each (n,) or (n, k), with a row of NaN in every gap: as :func:`with_gap_breaks`."""
+    """Insert a row of NaN in every gap of float columns, each (n,) or (n, k).
+
+    The times get a row there, too, as in :func:`with_gap_breaks`.
+    """
     after = _rows_before_gaps(time_ns, largest_s)
     at = after + 1
     broken = tuple(np.insert(np.asarray(column, dtype=np.float64), at, np.nan, axis=0) for column in columns)

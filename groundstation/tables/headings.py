@@ -117,7 +117,10 @@ def positions_for(flight: Flight, table: Table) -> Table:
 
 
 def _carried_over(table: Table, source: Table, declination_deg: FloatArray) -> FloatArray:
-    """Declination at the times of a table: interpolated between positions, the nearest one held past their ends."""
+    """Interpolate the declination to the times of a table.
+
+    Past the ends of the positions the nearest one is held.
+    """
     time_s = (table.time_ns - source.time_ns[0]) / NS_PER_S
     source_s = (source.time_ns - source.time_ns[0]) / NS_PER_S
     value = wrap_180(np.interp(time_s, source_s, unwrap(declination_deg)))

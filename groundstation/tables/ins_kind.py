@@ -1,11 +1,11 @@
-"""Whether GNSS corrects an INS, as far as its log says: kinds of INS, and how often its mode says so."""
+"""Kind of INS: whether GNSS corrects it, and how often its mode says so, by its log."""
 
 import numpy as np
 
 from groundstation.tables.table import Table
 
 UNAIDED, AIDED, UNKNOWN = "unaided", "gnss_aided", "unknown"
-STATED = (UNAIDED, AIDED)  # what an aircraft file or the head of a log may say
+STATED = (UNAIDED, AIDED)  # kinds that an aircraft file or the head of a log may state
 HALF = 0.5
 
 
@@ -17,5 +17,5 @@ def aided_share(table: Table) -> float:
 
 
 def is_mostly_aided(table: Table) -> bool:
-    """Tell whether the mode of an INS is ``gnss_aided`` more than half of the time that it is logged."""
+    """Tell whether the logged mode of an INS is ``gnss_aided`` for more than half of the time."""
     return aided_share(table) > HALF

@@ -1,4 +1,4 @@
-"""The motion of a flight on one coarse, even grid of times: what the ground detector and the phases look at."""
+"""Motion of a flight on a coarse, even grid of times, for the ground detector and phases."""
 
 from dataclasses import dataclass
 
@@ -60,20 +60,29 @@ class Motion:
         return np.concatenate([self.altitude_m, self.pressure_altitude_m[None, :]])
 
     def distance_m(self, origin: NDArray[np.intp], at: slice | NDArray[np.intp]) -> FloatArray:
-        """Distance between rows of the grid: straight where positions are known, else along the path."""
+        """Return the distance between rows of the grid.
+
+        It is straight where positions are known, else along the path.
+        """
         straight = np.hypot(self.north_m[at] - self.north_m[origin], self.east_m[at] - self.east_m[origin])
         along = np.abs(self.path_m[at] - self.path_m[origin])
         return np.asarray(np.where(np.isfinite(straight), straight, along))
 
 
 def grid_size(flight: Flight) -> int:
-    """Number of grid times from the start of the flight to its end, 0 for none or for a span of many days."""
+    """Return the number of grid times from the start of the flight to its end.
+
+    It is 0 where there are none, or for a span of many days.
+    """
     size = int(flight.duration_s * RATE_HZ) + 1
     return size if any(len(table) for table in flight.tables.values()) and size <= LONGEST_GRID else 0
 
 
 def motion_of(flight: Flight) -> Motion:
-    """Resample the flight's motion: means of the samples around each grid time, straight lines in between."""
+    """Resample the flight's motion to the grid.
+
+    It takes means of the samples around each grid time, and straight lines in between.
+    """
     size = grid_size(flight)
     ins, gnss = first_of_kind(flight, "ins"), first_of_kind(flight, "gnss")
     usable = _usable_fixes(gnss)
@@ -100,7 +109,10 @@ def motion_of(flight: Flight) -> Motion:
 
 
 def first_of_kind(flight: Flight, kind: str) -> Table:
-    """The instance of a topic to use first that has samples; an empty table when there is none."""
+    """Return the first instance of a topic, in order of preference, that has samples.
+
+    The table is empty when there is none.
+    """
     topics = [topic for topic in sources_of_kind(flight, kind) if len(flight[topic])]
     return flight[topics[0]] if topics else Table.empty(kind)
 
@@ -112,7 +124,10 @@ def horizontal_speed_mps(table: Table) -> FloatArray:
 
 
 def running_mean(values: FloatArray, half_width_s: float) -> FloatArray:
-    """Mean of the known values within ``half_width_s`` on either side, along the last axis; NaN stays NaN."""
+    """Average the known values within ``half_width_s`` on either side, along the last axis.
+
+    NaN stays NaN.
+    """
     half = round(half_width_s * RATE_HZ)
     known = np.isfinite(values)
     total, count = window_sum(np.where(known, values, 0.0), half), window_sum(known.astype(np.float64), half)
@@ -128,7 +143,10 @@ def known_mean(values: FloatArray) -> FloatArray:
 
 
 def largest_over_sources(deviation_m: FloatArray) -> FloatArray:
-    """Largest deviation among all altitudes, shape (k + 1, n) -> (n,); the pressure one where no other is known."""
+    """Return the largest deviation among all altitudes, shape (k + 1, n) -> (n,).
+
+    The pressure altitude, the last row, counts only where no other is known.
+    """
     geometric = np.fmax.reduce(deviation_m[:-1], axis=0)
     return np.asarray(np.where(np.isfinite(geometric), geometric, deviation_m[-1]))
 
@@ -137,7 +155,7 @@ def window_sum(values: FloatArray, half: int) -> FloatArray:
     """Sum over the rows i - half ... i + half along the last axis, cut at the ends."""
     size = values.shape[-1]
     reach = min(half, size)
-    total = np.empty((*values.shape[:-1], size + 1))  # of the values before each row
+    total = np.empty((*values.shape[:-1], size + 1))  # sum of the values before each row
     total[..., 0] = 0.0
     np.cumsum(values, axis=-1, out=total[..., 1:])
     sums = np.empty(values.shape)
@@ -160,7 +178,7 @@ def runs(mask: BoolArray) -> list[tuple[int, int]]:
 
 
 def _usable_fixes(gnss: Table) -> BoolArray:
-    """Fixes that the receiver itself trusts; one that says nothing is trusted."""
+    """Tell which fixes the receiver itself trusts; one that says nothing is trusted."""
     is_doubtful = (gnss.values("integrity_ok") == 0.0) | (gnss.values("satellites_used") < FEWEST_SATELLITES)
     return np.asarray(~is_doubtful)
 
@@ -187,7 +205,10 @@ def _altitude(flight: Flight, table: Table, speed_mps: FloatArray) -> FloatArray
 
 
 def _is_frozen(altitude_m: FloatArray, speed_mps: FloatArray) -> BoolArray:
-    """An altitude equal to the last digit for a minute at speed is a stuck sensor: it proves nothing."""
+    """Tell where an altitude is stuck: equal to the last digit for a minute at speed.
+
+    A stuck altitude proves nothing.
+    """
     frozen = np.zeros(len(altitude_m), dtype=bool)
     for start, end in runs(np.diff(altitude_m, append=np.nan) == 0.0):
         if end - start >= FROZEN_S * RATE_HZ and np.any(speed_mps[start : end + 1] > FROZEN_SPEED_MPS):
@@ -196,7 +217,10 @@ def _is_frozen(altitude_m: FloatArray, speed_mps: FloatArray) -> BoolArray:
 
 
 def _on_grid(flight: Flight, table: Table, values: FloatArray, size: int) -> FloatArray:
-    """Mean of the samples nearest to each grid time, straight lines over gaps of at most LARGEST_GAP_S."""
+    """Average the samples nearest to each grid time.
+
+    Gaps of at most LARGEST_GAP_S are filled by straight lines.
+    """
     known = np.isfinite(values)
     out = np.full(size, np.nan)
     if size == 0 or not known.any():

@@ -1,4 +1,4 @@
-"""What an autopilot's own filter logged of its innovations against GNSS, in one form for all autopilots.
+"""GNSS innovations that an autopilot's own filter logged, in one form for all autopilots.
 
 Autopilots log predicted - measured; here it is turned round: innovation = measured - predicted.
 Source: PX4-Autopilot, EKF2, messages EstimatorInnovations and ekf2_innovations; ArduPilot, AP_NavEKF and AP_NavEKF2/3,
@@ -21,7 +21,10 @@ JOINED_S = 1.0  # between two messages of one filter about the same epoch
 
 @dataclass(frozen=True)
 class _Layout:
-    """Where a filter logs: position north and east, then velocity; gates hold the square root of each test ratio."""
+    """Names under which a filter logs: position north and east, then velocity.
+
+    Gates hold the square root of each test ratio.
+    """
 
     topic: str
     innovations: Names
@@ -49,7 +52,9 @@ _LAYOUTS = (
 
 @dataclass(frozen=True)
 class OwnInnovations:
-    """Innovations of an autopilot's filter against GNSS, shape (n, 2, 2): position and velocity, north and east.
+    """Innovations of an autopilot's filter against GNSS, shape (n, 2, 2).
+
+    They are of position and velocity, north and east.
 
     Parameters
     ----------
@@ -75,7 +80,10 @@ class OwnInnovations:
 
 
 def own_innovations(flight: Flight) -> OwnInnovations | None:
-    """Read what the autopilot's own filter logged; of several filters the first, None where nothing is logged."""
+    """Read the innovations that the autopilot's own filter logged; None where there are none.
+
+    Where there are several filters, the first one is read.
+    """
     for layout in _LAYOUTS:
         if layout.topic in flight and flight[layout.topic].has(*layout.innovations):
             found = _read(flight, layout)

@@ -1,4 +1,4 @@
-"""Where a flight was on the ground, proven, and the phases it went through."""
+"""Phases of a flight, and the intervals in which it is proven to be on the ground."""
 
 import weakref
 from collections.abc import Iterator
@@ -35,7 +35,7 @@ UNKNOWN, STANDSTILL, TAXI, TAKE_OFF_RUN, AIRBORNE, LANDING_ROLL = range(len(PHAS
 STEP_NS = round(NS_PER_S / RATE_HZ)
 LEAST_COVERAGE = 0.5  # share of the flight for which a flag must speak
 RUN_SHARE = 0.25  # a run begins and a roll ends at this share of the speed at lift-off and touch-down
-SLOWEST_RUN_MPS = 3.0  # what lifts off slower made no run
+SLOWEST_RUN_MPS = 3.0  # an aircraft that lifts off slower made no run
 LIFTED_M = 1.5  # height at which a lift-off is seen, in smoothed altitudes
 CARRIED_M, CARRIED_S = 5.0, 5.0  # up to that height what is too slow to fly for so long is carried
 SHORTEST_STANDSTILL_S = 3.0
@@ -73,7 +73,10 @@ class Interval:
 
 @dataclass(frozen=True)
 class Phases:
-    """Phases of a flight: intervals without overlap from its first to its last sample, and how they were found."""
+    """Phases of a flight, and the method that found them.
+
+    The intervals do not overlap and reach from its first to its last sample.
+    """
 
     intervals: tuple[Interval, ...]
     method: str
@@ -152,9 +155,9 @@ def flight_phases(flight: Flight, *, settings: GroundSettings | None = None) -> 
 
 @contextmanager
 def _evidence_of(flight: Flight, settings: GroundSettings | None) -> Iterator["_Evidence"]:
-    """The evidence in a flight: kept as long as the flight is, as analyses ask for the ground one after the other.
+    """Yield the evidence in a flight, kept as long as the flight is.
 
-    The motion, which is large, is not.
+    Analyses ask for the ground one after the other. The motion, which is large, is not kept.
     """
     key = id(flight), settings or GroundSettings()
     kept = _KEPT.get(key)
@@ -168,7 +171,10 @@ def _evidence_of(flight: Flight, settings: GroundSettings | None) -> Iterator["_
 
 
 class _Evidence:
-    """What speaks for ground and for flight: the flag if it can be believed, else the detector, computed once."""
+    """Evidence for ground and for flight, computed once.
+
+    It is the flag if it can be believed, else the detector.
+    """
 
     def __init__(self, flight: Flight, settings: GroundSettings) -> None:
         self._flight, self.settings = weakref.ref(flight), settings
@@ -177,7 +183,7 @@ class _Evidence:
 
     @property
     def flight(self) -> Flight:
-        """The flight; whoever asks for evidence holds it."""
+        """Flight that the evidence is of; whoever asks for evidence holds it."""
         flight = self._flight()
         assert flight is not None
         return flight
@@ -196,7 +202,7 @@ class _Evidence:
 
     @cached_property
     def against_flag(self) -> str:
-        """Why the flag is not used; empty when it is."""
+        """Reason why the flag is not used; empty when it is."""
         if self.contact is None:
             return "no weight on wheels"
         proves, denies = held(self.contact, self.grid_ns)
@@ -267,14 +273,17 @@ def _labels(evidence: _Evidence) -> NDArray[np.int64]:
     label[evidence.airborne] = AIRBORNE
     flights = runs(label == AIRBORNE)
     gaps = zip([0, *(end for _, end in flights)], [*(start for start, _ in flights), len(label)], strict=True)
-    for start, end in gaps:  # what lies between two flights, before the first and after the last
+    for start, end in gaps:  # the parts between two flights, before the first and after the last
         if end > start and ground[start:end].any():
             _mark_runs(label, speed, start, end)
     return label
 
 
 def _mark_runs(label: NDArray[np.int64], speed_mps: FloatArray, start: int, end: int) -> None:
-    """Mark landing roll and take-off run in rows [start, end) between flights; the slowest row parts a touch-and-go."""
+    """Mark landing roll and take-off run in rows [start, end) between flights.
+
+    The slowest row parts a touch-and-go.
+    """
     slowest = start + int(np.argmin(np.nan_to_num(speed_mps[start:end], nan=0.0)))
     if start > 0 and speed_mps[start] >= SLOWEST_RUN_MPS:
         last, least = start, RUN_SHARE * speed_mps[start]
@@ -289,7 +298,10 @@ def _mark_runs(label: NDArray[np.int64], speed_mps: FloatArray, start: int, end:
 
 
 def _up_to_the_ground(denied: BoolArray, ground: BoolArray) -> BoolArray:
-    """Flight by the flag; the instants between its last sample on the ground and its first off it belong to it."""
+    """Tell where the flag shows flight.
+
+    The instants between its last sample on the ground and its first off it count as flight.
+    """
     airborne = denied.copy()
     for start, end in runs(~denied & ~ground):
         is_between = start > 0 and ground[start - 1] and end < len(denied) and denied[end]
@@ -299,9 +311,10 @@ def _up_to_the_ground(denied: BoolArray, ground: BoolArray) -> BoolArray:
 
 
 def _between_lift_off_and_touch_down(motion: Motion, ground: BoolArray, detection: Detection) -> BoolArray:
-    """Widen sure flight to where the altitude leaves and meets that of the ground proven before and after.
+    """Widen sure flight to where its altitude leaves and meets that of the ground.
 
-    A little above it, and slower than it ever was in sure flight, it does not fly yet: it is carried to its launch.
+    The ground is the one proven before and after. A little above it, and slower than it ever was in sure flight, it
+    does not fly yet: it is carried to its launch.
     """
     sure, slow = detection.airborne, lasting(motion.speed_mps < detection.speed_limit_mps, CARRIED_S)
     airborne = np.zeros(len(ground), dtype=bool)
@@ -325,6 +338,9 @@ def _between_lift_off_and_touch_down(motion: Motion, ground: BoolArray, detectio
 
 
 def _low_rows(altitude_m: FloatArray, ground_m: FloatArray, slow: BoolArray) -> NDArray[np.intp]:
-    """Rows no more than LIFTED_M above the mean altitude of the ground, CARRIED_M where they are slow."""
+    """Return rows no more than LIFTED_M above the mean altitude of the ground.
+
+    Slow rows may be CARRIED_M above it.
+    """
     height_m = largest_over_sources(altitude_m - known_mean(ground_m)[:, None])
     return np.flatnonzero(height_m <= np.where(slow, CARRIED_M, LIFTED_M))

@@ -1,4 +1,7 @@
-"""Values of a table at other times: joined on time with a stated largest gap, never by row number."""
+"""Values of a table at other times: joined on time, never by row number.
+
+The largest gap is stated.
+"""
 
 from collections.abc import Callable, Iterable
 from typing import Literal
@@ -73,14 +76,20 @@ def join(
 
 
 def values_at(table: Table, name: str, at_ns: Int64Array, *, largest_gap_s: float) -> FloatArray:
-    """One number field at other times, shape (m,), NaN where not known: :func:`join` of a single field."""
+    """Return one number field at other times, shape (m,), NaN where not known.
+
+    It is :func:`join` of a single field.
+    """
     if name not in table.columns:
         return np.full(len(at_ns), np.nan)
     return join(table, at_ns, [name], largest_gap_s=largest_gap_s).values(name)
 
 
 def _wrap_of(table: Table, name: str) -> Wrap | None:
-    """How the angles of a field that goes all the way round are wrapped; None for plain numbers."""
+    """Return the function that wraps the angles of a field; None for plain numbers.
+
+    Only the angles of a field that goes all the way round are wrapped.
+    """
     field = field_of(table.topic, name)
     if field is None or field.unit != "deg":
         return None
@@ -122,7 +131,7 @@ def _held(table: Table, name: str, at_ns: Int64Array, gap_ns: int, choice: Choic
     if not known.size:
         return Column(np.zeros(len(at_ns), dtype=column.values.dtype), np.zeros(len(at_ns), dtype=bool))
     time_ns = table.time_ns[known]
-    before = np.searchsorted(time_ns, at_ns, side="right") - 1  # of repeated times the last
+    before = np.searchsorted(time_ns, at_ns, side="right") - 1  # the last of repeated times
     row, present = _clipped(before, len(known)), before >= 0
     if choice == "nearest":
         after = _clipped(before + 1, len(known))

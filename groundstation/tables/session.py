@@ -1,4 +1,4 @@
-"""A session of several vehicles as one input: their own dead reckoning, and what they measured between them.
+"""Session of several vehicles: their own dead reckoning, and ranges between them.
 
 Vehicles, satellites and ground points come and go: one is there while its table has rows. Times are float seconds
 since the start of the session. Positions are in one frame for all: ECEF, or a local north-east-down frame.
@@ -18,7 +18,10 @@ NO_SLOT = -1
 
 
 def _freeze(table: Any) -> None:
-    """Make every array of a dataclass read-only; text stays text, everything else becomes float64."""
+    """Make every array of a dataclass read-only.
+
+    Text stays text, everything else becomes float64.
+    """
     for item in fields(table):
         value = getattr(table, item.name)
         if isinstance(value, np.ndarray):
@@ -27,7 +30,7 @@ def _freeze(table: Any) -> None:
 
 @dataclass(frozen=True)
 class DeadReckoning:
-    """What one aircraft's INS and barometric altimeter say, at its own epochs.
+    """Readings of one aircraft's INS and barometric altimeter, at its own epochs.
 
     Parameters
     ----------
@@ -63,7 +66,9 @@ class DeadReckoning:
 
 @dataclass(frozen=True)
 class Odometry:
-    """What the wheels of one ground vehicle say: speed and rate of turn, each held until the next epoch.
+    """Readings of the wheels of one ground vehicle: speed and rate of turn.
+
+    Each is held until the next epoch.
 
     Parameters
     ----------
@@ -115,7 +120,9 @@ class GroundPoint:
 
 @dataclass(frozen=True)
 class Ranges:
-    """One-way pseudo-ranges over the link, and bearings where the sensor has them; one row a measurement.
+    """One-way pseudo-ranges over the link, with bearings where the sensor has them.
+
+    One row is one measurement.
 
     Parameters
     ----------
@@ -209,7 +216,10 @@ class SatelliteRanges:
 
 @dataclass(frozen=True)
 class Heights:
-    """Heights from another instrument than the one that damps the vertical channel; above the session's reference."""
+    """Heights above the session's reference from a separate instrument.
+
+    It is another one than that which damps the vertical channel.
+    """
 
     time_s: FloatArray
     aircraft: NDArray[np.str_]
@@ -231,7 +241,7 @@ class Heights:
 
 @dataclass(frozen=True)
 class Session:
-    """Everything the cooperative estimators are given.
+    """Everything that the cooperative estimators take.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Vehicles in space whose antennas measure two-way ranges: poses and ranges of logs, joined into one session.
+"""Vehicles whose antennas measure two-way ranges: poses and ranges joined into a session.
 
 Topics ``truth.<vehicle>`` hold the poses, ``link.<antenna>-<antenna>`` the ranges; which antenna is whose, and where it
 stands on its vehicle, is told beside the logs. The frame is local, north-east-down.
@@ -46,7 +46,10 @@ class Poses:
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     def n_from_b(self, time_s: FloatArray) -> FloatArray:
-        """Rotations from body to north-east-down at other times, shape (m, 3, 3); attitude is interpolated."""
+        """Return rotations from body to north-east-down at other times, shape (m, 3, 3).
+
+        Attitude is interpolated.
+        """
         angles = [np.deg2rad(np.interp(time_s, self.time_s, column)) for column in self.attitude_deg.T]
         (sr, sp, sh), (cr, cp, ch) = np.sin(angles), np.cos(angles)
         rows = [
@@ -59,7 +62,10 @@ class Poses:
 
 @dataclass(frozen=True)
 class Antenna:
-    """Antenna of a vehicle (``arm_m`` forward, right, down of its place) or, without an arm, a ground point."""
+    """Antenna of a vehicle, or a ground point, which has no arm.
+
+    ``arm_m`` is forward, right and down of the vehicle's place.
+    """
 
     owner: str
     arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -67,7 +73,10 @@ class Antenna:
 
 @dataclass(frozen=True)
 class AntennaLog:
-    """A log with the antennas behind the two names of its link topics, and its vehicles by the names of the log."""
+    """Log with the antennas behind the two names of its link topics, and its vehicles.
+
+    Vehicles are keyed by the names of the log.
+    """
 
     flight: Flight
     antennas: tuple[Mapping[str, Antenna], Mapping[str, Antenna]]

@@ -1,4 +1,7 @@
-"""The logs of several aircraft become one session on one clock, with what could not be used as findings."""
+"""Logs of several aircraft made into one session on one clock.
+
+Parts that could not be used become findings.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -32,10 +35,10 @@ Truth = Mapping[str, tuple[FloatArray, FloatArray]]
 
 @dataclass(frozen=True)
 class ClockRow:
-    """How the clock of one log stood: log time less that of the group, from the times of transmission.
+    """Offset of the clock of one log: log time less that of the group.
 
-    ``offset_s`` is that of its longest stretch between leaps, None without ranges; ``is_corrected`` says whether it
-    was taken off.
+    It comes from the times of transmission. ``offset_s`` is that of its longest stretch between leaps, None without
+    ranges; ``is_corrected`` says whether it was taken off.
     """
 
     aircraft: str
@@ -76,13 +79,13 @@ class AssembledSession:
 
     @property
     def duration_s(self) -> float:
-        """From the first to the last dead reckoning."""
+        """Seconds from the first to the last dead reckoning."""
         return max((float(one.time_s[-1]) for one in self.session.vehicles if len(one)), default=0.0)
 
 
 @dataclass
 class _Members:
-    """The logs that are still in the session, by the name of their aircraft, and what was found of the others."""
+    """Logs that are still in the session, by aircraft, and findings on the others."""
 
     flights: dict[str, Flight]
     findings: list[Finding] = field(default_factory=list)
@@ -140,7 +143,7 @@ def session_from_flights(
 
 
 def _named(flights: Iterable[Flight]) -> _Members:
-    """Flights by the name of their aircraft, sorted; of several of one aircraft the longest stays."""
+    """Sort flights by the name of their aircraft; of several of one aircraft keep the longest."""
     found: dict[str, list[Flight]] = {}
     for flight in flights:
         found.setdefault(aircraft_named(flight.metadata, flight.source_name), []).append(flight)
@@ -164,7 +167,7 @@ def _on_one_clock(members: _Members, settings: SessionSettings) -> tuple[dict[st
 
 
 def _with_tracks(members: _Members, placed: Mapping[str, PlacedLog], step_s: float) -> dict[str, InsRows]:
-    """What dead reckoning is made of, for every log that has any."""
+    """Return the INS rows for dead reckoning of every log that has any."""
     rows = {}
     for name in list(members.flights):
         try:
@@ -179,7 +182,10 @@ def _with_tracks(members: _Members, placed: Mapping[str, PlacedLog], step_s: flo
 
 
 def _together(members: _Members, spans: Mapping[str, tuple[int, int]]) -> None:
-    """Keep the largest set of logs that overlap, one with another; of equally large ones the first."""
+    """Keep the largest set of logs that overlap, one with another.
+
+    Among equally large sets the first one is kept.
+    """
     left = sorted(members.flights, key=lambda name: spans[name])
     groups: list[list[str]] = []
     end = 0
@@ -239,7 +245,7 @@ def _point(stations: Stations, place: int) -> GroundPoint:
 
 
 def _ranks(flights: Mapping[str, Flight], stations: Stations) -> dict[str, int]:
-    """Ranks as the stations file says, else as the aircraft broadcast them last."""
+    """Return the ranks that the stations file states, else those the aircraft broadcast last."""
     ranks: dict[str, int] = {}
     for flight in flights.values():
         for topic in topics_of_kind("link", flight.topics()):
@@ -253,7 +259,10 @@ def _ranks(flights: Mapping[str, Flight], stations: Stations) -> dict[str, int]:
 def _satellites(
     flights: Mapping[str, Flight], placed: Mapping[str, PlacedLog], start_ns: int, settings: SessionSettings
 ) -> SatelliteRanges:
-    """Pseudo-ranges to satellites; the estimators leave out and count what is no number."""
+    """Return the pseudo-ranges to satellites, invalid ones included.
+
+    The estimators leave out and count what is no number.
+    """
     times: list[Int64Array] = []
     values: list[FloatArray] = []
     names: list[tuple[str, str, int]] = []

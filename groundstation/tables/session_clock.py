@@ -1,10 +1,11 @@
-"""One clock for the logs of a session: UTC where it can be trusted, the link's times of transmission where not.
+"""One clock for the logs of a session.
 
-A pseudo-range is the time of arrival on the receiver's clock less the time of transmission on the sender's, in metres.
-So log time - pseudo-range / c - time of transmission is how far the clock of a log stands from that of the link. It is
-constant while nothing leaps; a leap of the log's clock is a step of it.
+It is UTC where that can be trusted, otherwise the link's times of transmission. A pseudo-range is the time of arrival
+on the receiver's clock less the time of transmission on the sender's, in metres. So log time - pseudo-range / c - time
+of transmission is how far the clock of a log stands from that of the link. It is constant while nothing leaps; a leap
+of the log's clock is a step of it.
 
-What it ignores: the drift of a recorder's clock between two leaps (20 ppm are 72 ms in an hour), and a delay that the
+It ignores the drift of a recorder's clock between two leaps (20 ppm are 72 ms in an hour), and a delay that the
 recorder has for the link and not for the INS.
 """
 
@@ -25,7 +26,7 @@ MOST_LINK_S = 4e9  # later than that is no time
 
 @dataclass(frozen=True)
 class LogClock:
-    """How the clock of one log stands to that of the link, stretch by stretch between its leaps.
+    """Offset of the clock of one log from that of the link, per stretch between its leaps.
 
     Parameters
     ----------
@@ -49,12 +50,15 @@ class LogClock:
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     def stretch_of(self, record_index: Int64Array) -> Int64Array:
-        """Stretch of rows of the log; what stands before the first range belongs to the first."""
+        """Return the stretch of rows of the log; rows before the first range belong to the first."""
         place = np.searchsorted(self.first_record, record_index, side="right") - 1
         return np.asarray(np.clip(place, 0, None), dtype=np.int64)
 
     def is_certain(self, record_index: Int64Array) -> BoolArray:
-        """Where rows are not between two stretches: nothing tells on which side of the leap those are."""
+        """Tell which rows are not between two stretches.
+
+        Nothing tells on which side of the leap the others are.
+        """
         if len(self.first_record) < 2:
             return np.ones(len(record_index), dtype=bool)
         stretch = self.stretch_of(record_index)
@@ -69,7 +73,7 @@ class LogClock:
 
 @dataclass(frozen=True)
 class PlacedLog:
-    """What to take off the times of a log so that they are those of the session.
+    """Time to take off the times of a log so that they are those of the session.
 
     Parameters
     ----------
@@ -105,7 +109,7 @@ def travel_ns(pseudorange_m: FloatArray) -> Int64Array:
 
 
 def clock_of(flight: Flight, leap_s: float) -> LogClock:
-    """Hold the clock of a log against the link's; see the module.
+    """Compare the clock of a log with the link's; see the module.
 
     Parameters
     ----------
@@ -137,7 +141,7 @@ def clock_of(flight: Flight, leap_s: float) -> LogClock:
 
 
 def _median(values: Int64Array) -> int:
-    """Median without a float between: UTC in nanoseconds has more digits than float64."""
+    """Return the median without floats: UTC in nanoseconds has more digits than float64."""
     return int(np.sort(values)[len(values) // 2])
 
 
@@ -149,7 +153,9 @@ def _running_median(values: Int64Array) -> Int64Array:
 
 
 def group_offset_ns(clocks: Sequence[LogClock], limit_s: float) -> tuple[int, int]:
-    """Offset that most clocks share, and how many do; of equally many the first. Clocks without ranges do not count.
+    """Return the offset that most clocks share, and how many share it.
+
+    In a tie the first one counts. Clocks without ranges do not count.
 
     Examples
     --------

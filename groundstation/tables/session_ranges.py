@@ -1,4 +1,4 @@
-"""The ranges of a session out of the link topics of its logs, and what is wrong with some of them."""
+"""Ranges of a session from the link topics of its logs, and the faults of some of them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,10 @@ LEAST_RESIDUALS = 5  # fewer ranges say nothing of a station's place
 
 @dataclass(frozen=True)
 class _Link:
-    """One direction of one link: time of transmission, session nanoseconds; pseudo-range; slot."""
+    """One direction of one link.
+
+    It has times of transmission in session nanoseconds, pseudo-ranges and slots.
+    """
 
     receiver: str
     source: str
@@ -129,7 +132,7 @@ def _far_stations(
     points: Sequence[GroundPoint],
     settings: SessionSettings,
 ) -> tuple[set[str], list[Finding]]:
-    """Stations that no range agrees with: their place, or their name, is wrong."""
+    """Find stations that no range agrees with: their place, or their name, is wrong."""
     tracks = {vehicle.name: vehicle for vehicle in vehicles}
     far, findings = set(), []
     for point in points:

@@ -1,8 +1,8 @@
-"""Ground robots with odometry and cameras as a session: their logs, joined by the name of the robot.
+"""Session of ground robots with odometry and cameras, whose logs are joined by robot.
 
 The frame is local, x of the motion capture north. Every robot starts at its true pose of the first time at which all
-robots have odometry and truth; from then on truth only judges. Odometry is averaged over ``bin_s``. What a camera
-gives as range is the distance along its optical axis: it is divided by the cosine of the bearing.
+robots have odometry and truth; from then on truth only judges. Odometry is averaged over ``bin_s``. The range of a
+camera is the distance along its optical axis: it is divided by the cosine of the bearing.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,13 +21,16 @@ from groundstation.tables.table import Flight, Table
 
 POSE = "position_north_m", "position_east_m", "true_heading_deg"
 LARGEST_BEARING_DEG = 80.0
-LONGEST_HOLD_S = 1.5  # of a reading of the odometry, before it is a gap
+LONGEST_HOLD_S = 1.5  # longest hold of an odometry reading; a longer one is a gap
 SEES, BLIND = 1, 2  # ranks
 
 
 @dataclass(frozen=True)
 class RobotSettings:
-    """What the assembly assumes: step of the odometry, sigmas of one reading (their growth is the filters')."""
+    """Assumptions of the assembly: step of the odometry, sigmas of one reading.
+
+    Their growth is the filters' concern.
+    """
 
     bin_s: float = number(0.2, 0.01, 10.0)
     range_sigma_m: float = number(0.01, 1e-4)
@@ -39,7 +42,10 @@ class RobotSettings:
 
 @dataclass(frozen=True)
 class RobotSession:
-    """A session of robots with what judges it: vehicle to (time_s (n,), position_m (n, 3))."""
+    """Session of robots, with the truth to judge it by.
+
+    The truth is by vehicle: time_s (n,), position_m (n, 3).
+    """
 
     session: Session
     truth: Mapping[str, tuple[FloatArray, FloatArray]]
@@ -49,7 +55,7 @@ class RobotSession:
 
 @dataclass
 class _Robot:
-    """What the logs of one robot hold, wherever it was written."""
+    """Contents of the logs of one robot, wherever they were written."""
 
     name: str
     odometry: Table | None = None
@@ -100,7 +106,10 @@ def session_of_robots(
 
 
 def blinded(session: Session, robots: Sequence[str]) -> Session:
-    """The session with the landmarks taken from some robots; their rank is then below that of the others."""
+    """Return the session without the landmarks that some robots see.
+
+    The rank of these robots is then below that of the others.
+    """
     points = {point.name for point in session.points}
     table = session.ranges
     lost = np.isin(table.receiver, list(robots)) & np.isin(table.source, list(points))
@@ -156,7 +165,10 @@ def _first_ns(robot: _Robot) -> int:
 
 
 def _pose(robot: _Robot, zero_ns: int) -> tuple[FloatArray, FloatArray]:
-    """Time in seconds, and north, east and unwrapped heading in radians, where all are numbers."""
+    """Return time in seconds, and north, east and unwrapped heading in radians.
+
+    Rows are left out where one of them is no number.
+    """
     assert robot.truth is not None
     good = robot.truth.valid(*POSE)
     time_s = (robot.truth.time_ns[good] - zero_ns) / NS_PER_S
@@ -205,7 +217,7 @@ def _ranges(
     settings: RobotSettings,
     findings: list[Finding],
 ) -> Ranges:
-    """What the cameras saw, in order of time; sightings of nobody are counted."""
+    """Return the sightings of the cameras, in order of time; sightings of nobody are counted."""
     rows: list[tuple[FloatArray, FloatArray, FloatArray, str, str]] = []
     unknown, steep, count = 0, 0, 0
     for robot in robots:

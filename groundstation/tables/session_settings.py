@@ -1,4 +1,4 @@
-"""What the assembly of a session is given besides the logs: ground stations, ranks, and what it may assume."""
+"""Settings of the assembly of a session: ground stations, ranks, assumptions."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -11,7 +11,10 @@ from groundstation.base.toml_settings import check_ranges, number, required_numb
 
 @dataclass(frozen=True)
 class Station:
-    """A ground reference point on the WGS-84 ellipsoid; ``position_sigma_m`` holds along each horizontal axis."""
+    """Ground reference point on the WGS-84 ellipsoid.
+
+    ``position_sigma_m`` holds along each horizontal axis.
+    """
 
     name: str
     latitude_deg: float = required_number(-90.0, 90.0)
@@ -49,7 +52,7 @@ class Stations:
 
 @dataclass(frozen=True)
 class SessionSettings:
-    """What the assembly of a session assumes of its logs.
+    """Assumptions of the assembly of a session about its logs.
 
     Parameters
     ----------

@@ -19,11 +19,11 @@ LEVEL = "latitude_deg", "longitude_deg"
 SPEED = "velocity_north_mps", "velocity_east_mps"
 HEIGHTS = {"altitude_ellipsoid_m": "", "altitude_msl_m": "the height above mean sea level, tens of metres from it"}
 LONGEST_BARO_GAP_S = 10.0
-SAME_EPOCH = 1e-3  # of a step
+SAME_EPOCH = 1e-3  # share of a step
 
 
 class NoTrackError(Exception):
-    """A log without dead reckoning; the reason."""
+    """Error: a log has no dead reckoning, for the reason given."""
 
 
 def aircraft_named(metadata: Mapping[str, str], source_name: str) -> str:
@@ -33,7 +33,7 @@ def aircraft_named(metadata: Mapping[str, str], source_name: str) -> str:
 
 @dataclass(frozen=True)
 class InsRows:
-    """The rows of an INS that dead reckoning is made of, in order of session time (nanoseconds, absolute).
+    """Rows of an INS for dead reckoning, in order of session time (nanoseconds, absolute).
 
     ``remark`` says what stands for the height where the INS has none above the ellipsoid.
     """
@@ -83,7 +83,10 @@ def ins_rows(flight: Flight, placed: PlacedLog, step_s: float) -> InsRows:
 
 
 def dead_reckoning(name: str, rows: InsRows, start_ns: int, origin: LocalFrame | None) -> DeadReckoning:
-    """Dead reckoning in ECEF, or in the local frame of an origin; ``start_ns`` is session time zero."""
+    """Make dead reckoning in ECEF, or in the local frame of an origin.
+
+    ``start_ns`` is session time zero.
+    """
     table, velocity = rows.table, rows.velocity_mps
     time_s = (rows.time_ns - start_ns) / NS_PER_S
     latitude, longitude = (table.values(column) for column in LEVEL)
@@ -100,7 +103,10 @@ def dead_reckoning(name: str, rows: InsRows, start_ns: int, origin: LocalFrame |
 
 
 def _spaced(time_ns: Int64Array, step_s: float) -> BoolArray:
-    """Rows whose time lies in another step than that of the row before; rows of equal time leave one."""
+    """Tell which rows lie in another time step than the row before.
+
+    Rows of equal time leave one.
+    """
     if not len(time_ns):
         return np.zeros(0, dtype=bool)
     step_ns = max(int(step_s * NS_PER_S), 1)

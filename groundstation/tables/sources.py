@@ -1,4 +1,7 @@
-"""Which source of a kind to use where several logs of one flight have one: an order, and why the first is first."""
+"""Choice among sources of a kind when several logs of one flight have one.
+
+There is an order, and a reason why the first is first.
+"""
 
 from dataclasses import dataclass
 
@@ -10,7 +13,7 @@ from groundstation.tables.ins_kind import AIDED, HALF
 from groundstation.tables.table import Flight, Table
 
 TOGETHER = "together"  # key of the metadata of a flight of several logs
-WHOLE_SHARE = 0.8  # of the longest: a source that covers less is for want of a better one
+WHOLE_SHARE = 0.8  # least cover as a share of the longest: a source with less is used for want of a better one
 FASTEST_HZ = 10.0  # a faster source says no more of a motion
 SURER = 1.5  # times: a smaller difference of the stated sigma is none
 NEEDS = {"gnss": ("velocity_north_mps", "velocity_east_mps"), "ins": ("roll_deg", "pitch_deg")}
@@ -20,7 +23,7 @@ NEVER_A_FIX = "GNSS never had a fix"
 
 @dataclass(frozen=True)
 class Ranked:
-    """A source with what its place among the others rests on."""
+    """Source with the facts that its place among the others rests on."""
 
     topic: str
     has_needed: bool
@@ -31,14 +34,15 @@ class Ranked:
 
 
 def is_joined(flight: Flight) -> bool:
-    """Whether a flight is of several logs."""
+    """Tell whether a flight is made of several logs."""
     return TOGETHER in flight.metadata
 
 
 def said_of(flight: Flight, topic: str, key: str) -> str:
-    """What the head of the log that a topic is of says under a key; empty where it says nothing.
+    """Return the metadata of a topic's log under a key; empty where there is none.
 
-    Of a flight of several logs each speaks for its own topics: those of the second end in ``.b``, as its keys begin.
+    In a flight of several logs each log speaks for its own topics: those of the second end in ``.b``, as its keys
+    begin.
     """
     label = topic.rpartition(".")[2] if is_joined(flight) else ""
     return flight.metadata.get(f"{label}.{key}" if len(label) == 1 and label.isalpha() else key, "")
@@ -47,9 +51,9 @@ def said_of(flight: Flight, topic: str, key: str) -> str:
 def sources_of_kind(flight: Flight, kind: str) -> tuple[str, ...]:
     """Topics of a kind, the one to use first.
 
-    Of a flight of one log in the order of their names. Of a flight of several logs: those with velocity (GNSS) or
-    attitude (INS), that cover most of the flight, an INS that GNSS does not correct, the smaller stated sigma, the
-    higher rate up to ``FASTEST_HZ``, the earlier log.
+    In a flight of one log they are in the order of their names. In a flight of several logs the order is: those with
+    velocity (GNSS) or attitude (INS), that cover most of the flight, an INS that GNSS does not correct, the smaller
+    stated sigma, the higher rate up to ``FASTEST_HZ``, the earlier log.
     """
     topics = topics_of_kind(kind, flight.topics())
     if not is_joined(flight) or len(topics) < 2:
@@ -58,9 +62,10 @@ def sources_of_kind(flight: Flight, kind: str) -> tuple[str, ...]:
 
 
 def why_without_gnss(flight: Flight, what: str) -> str:
-    """Reason why GNSS has no velocity, or no position: ``no GNSS velocity in the log``, or that it never had a fix.
+    """Explain why GNSS has no velocity or no position.
 
-    A receiver that logs its satellites or its kind of fix and never a place or a velocity had none.
+    The reason is ``no GNSS velocity in the log``, or that it never had a fix. A receiver that logs its satellites or
+    its kind of fix and never a place or a velocity had none.
     """
     tables = [flight[topic] for topic in topics_of_kind("gnss", flight.topics()) if len(flight[topic])]
     told = [table for table in tables if table.has("satellites_used") or table.has("fix")]
@@ -96,7 +101,7 @@ def ranked(flight: Flight, kind: str) -> list[Ranked]:
 
 
 def why_first(kind: str, order: list[Ranked]) -> str:
-    """Why the first of several sources is first, by what tells it from the second."""
+    """Explain why the first of several sources is first: how it differs from the second."""
     first, *others = order
     if not others:
         return "the only one"
@@ -115,7 +120,7 @@ def why_first(kind: str, order: list[Ranked]) -> str:
 
 
 def _ranked(table: Table, kind: str, said: str) -> Ranked:
-    """``said``: what its log says of the INS in it, where its samples say nothing."""
+    """Rank a source; ``said`` is what its log says of the INS where the samples say nothing."""
     needed = NEEDS.get(kind, ())
     known = table.take(table.valid(*needed)) if table.has(*needed) else table
     time_s = known.time_ns / NS_PER_S

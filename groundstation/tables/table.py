@@ -23,7 +23,9 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, repr=False)
 class Table:
-    """Samples of one topic, in order of corrected time. ``table["roll_deg"]`` is a column, ``"gdop" in table`` asks.
+    """Samples of one topic, in order of corrected time.
+
+    ``table["roll_deg"]`` is a column; ``"gdop" in table`` tells whether there is one.
 
     Parameters
     ----------
@@ -59,7 +61,9 @@ class Table:
         return name in self.columns
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """A column of the log as it is read: numbers as of :meth:`values`, text as of :meth:`text`, shape (n,).
+        """Return a column of the log as it is read, shape (n,).
+
+        Numbers as :meth:`values` gives them, text as :meth:`text` does.
 
         Raises
         ------
@@ -74,20 +78,21 @@ class Table:
         return f"<{type(self).__name__} {self.topic}: {len(self)} rows of {', '.join(self.columns)}>"
 
     def _absent(self, name: str) -> None:
-        """Refuse a name that no field has; one that this log merely lacks is absent throughout."""
+        """Refuse a name that no signal has; a field that this log merely lacks is absent."""
         if not is_field_name(name):
             names = dict.fromkeys((*self.columns, *(field.name for field in TOPICS.get(kind_of(self.topic), ()))))
             raise UnknownNameError(f"table {self.topic}", name, names)
 
     def has(self, *names: str) -> bool:
-        """Whether every named field is there with at least one present value."""
+        """Tell whether every named field is there with at least one present value."""
         return all(name in self.columns and bool(self.columns[name].mask.any()) for name in names)
 
     def values(self, name: str) -> FloatArray:
-        """Field as float64, shape (n,), NaN where absent (also where the device wrote NaN, and if the log lacks it).
+        """Return a field as float64, shape (n,), NaN where it is absent.
 
-        NaN also where a measured quantity is further outside its physical range than that range is wide (1e308 m/s,
-        infinity): nothing is computed with it. Quality figures (dilutions, sigmas) are given as they are.
+        It is absent also where the device wrote NaN, and if the log lacks the field. It is NaN also where a measured
+        quantity is further outside its physical range than that range is wide (1e308 m/s, infinity): nothing is
+        computed with it. Quality figures (dilutions, sigmas) are given as they are.
 
         Raises
         ------
@@ -109,7 +114,7 @@ class Table:
         return np.where(absurd, np.nan, out) if absurd.any() else out
 
     def valid(self, *names: str) -> BoolArray:
-        """Where every named field is present and finite, shape (n,)."""
+        """Tell where every named field is present and finite, shape (n,)."""
         mask = np.ones(len(self), dtype=bool)
         for name in names:
             mask &= np.isfinite(self.values(name))
@@ -134,15 +139,19 @@ class Table:
         )
 
     def trusted(self) -> Self:
-        """The rows that the source itself trusts: called valid, of whole integrity, alignment left out; unsaid counts
-        as trusted."""
+        """Return the rows that the source itself trusts.
+
+        They are called valid, of whole integrity, and not of alignment. Where the source says nothing, the row counts
+        as trusted.
+        """
         bad = (self.values("valid") == 0.0) | (self.values("integrity_ok") == 0.0) | (self.text("mode") == "align")
         return self.take(~bad) if bad.any() else self
 
     def unique_times(self) -> Self:
-        """The table without repeated times: of several samples of one time the first present value of each field.
+        """Return the table without repeated times.
 
-        Two messages of a log may give parts of one topic at the same time.
+        Among several samples of one time, the first present value of each field stays. Two messages of a log may give
+        parts of one topic at the same time.
         """
         keep = np.ones(len(self), dtype=bool)
         keep[1:] = np.diff(self.time_ns) > 0
@@ -291,7 +300,7 @@ class Flight:
         return tuple(sorted(self.tables))
 
     def without(self, kind: str) -> "Flight":
-        """The flight without the topics of a kind; its clock stays as it is."""
+        """Return the flight without the topics of a kind; its clock stays as it is."""
         return replace(self, tables={name: one for name, one in self.tables.items() if kind_of(name) != kind})
 
     def seconds(self, time_ns: Int64Array) -> FloatArray:
@@ -310,7 +319,10 @@ class Flight:
 
 
 def _first_present(column: Column, first: NDArray[np.intp], group: NDArray[np.intp]) -> Column:
-    """The first present value of each group of rows, whose first rows are ``first``; absent where there is none."""
+    """Return the first present value of each group of rows; absent where there is none.
+
+    ``first`` are the first rows of the groups.
+    """
     if column.present is None:
         return column.take(first)
     rows = np.flatnonzero(column.present)
@@ -321,7 +333,10 @@ def _first_present(column: Column, first: NDArray[np.intp], group: NDArray[np.in
 
 
 class Tables(Mapping[str, TimedTable]):
-    """The tables of a flight by topic, each with the flight's clock. An unknown topic is told with those near to it."""
+    """Tables of a flight by topic, each with the flight's clock.
+
+    The error for an unknown topic lists similar names.
+    """
 
     def __init__(self, flight: Flight) -> None:
         self._flight = flight

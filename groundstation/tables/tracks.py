@@ -1,4 +1,7 @@
-"""Tracks that an estimator made of a flight: a role by which others judge or use them without knowing the estimator."""
+"""Tracks that an estimator made of a flight.
+
+They are a role: others judge or use them without knowing the estimator.
+"""
 
 from collections.abc import Iterator, Mapping
 from typing import Protocol, runtime_checkable
@@ -12,14 +15,17 @@ from groundstation.tables.table import Table
 
 @runtime_checkable
 class HasTracks(Protocol):
-    """Workings of an analysis that hold tracks."""
+    """Role of the workings of an analysis that hold tracks."""
 
     def tracks(self, start_ns: int) -> Iterator[tuple[str, Table]]:
-        """Name and table of each track, by names of the fields of an INS; ``start_ns`` is the start of the flight."""
+        """Yield name and table of each track, with the field names of an INS.
+
+        ``start_ns`` is the start of the flight.
+        """
 
 
 def ins_table(time_ns: Int64Array, columns: Mapping[str, FloatArray]) -> Table:
-    """Fields of an INS, by whose names angles are known as such where they are interpolated."""
+    """Make a table with the fields of an INS, by whose names angles are interpolated as such."""
     order = np.argsort(time_ns, kind="stable")
     found = {name: Column(values[order], np.isfinite(values[order])) for name, values in columns.items()}
     index = np.arange(len(time_ns), dtype=np.int64)

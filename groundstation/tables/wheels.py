@@ -1,4 +1,4 @@
-"""Weight on wheels and landed flags: what is logged about ground contact, and whether it can be believed."""
+"""Weight on wheels and landed flags, and whether they can be believed."""
 
 from dataclasses import dataclass
 
@@ -56,11 +56,11 @@ def contact_of(flight: Flight) -> Contact | None:
 
 
 def held(contact: Contact, time_ns: Int64Array) -> tuple[BoolArray, BoolArray]:
-    """Where the flag proves contact and where it denies it, two arrays of the shape of ``time_ns``.
+    """Tell where the flag proves contact and where it denies it.
 
-    Contact needs a sample on either side that says so, each within the hold (one side only past the ends of the flag):
-    between the last sample on the ground and the first in the air the lift-off may have been anywhere. Denial is the
-    newest sample within the hold.
+    Both masks have the shape of ``time_ns``. Contact needs a sample on either side that says so, each within the hold
+    (one side only past the ends of the flag): between the last sample on the ground and the first in the air the
+    lift-off may have been anywhere. Denial is the newest sample within the hold.
     """
     count = len(contact.time_ns)
     after = np.searchsorted(contact.time_ns, time_ns, side="left")
@@ -74,7 +74,7 @@ def held(contact: Contact, time_ns: Int64Array) -> tuple[BoolArray, BoolArray]:
 
 
 def disbelief(contact: Contact, motion: Motion, grid_ns: Int64Array) -> str:
-    """Why the flag cannot be right, empty when nothing speaks against it.
+    """Explain why the flag cannot be right; empty when nothing speaks against it.
 
     While a flag says ground without a break, nothing rises 30 m (and 2 % of the distance) above the lowest point of
     that stretch and moves there for ten seconds.
@@ -95,7 +95,10 @@ def disbelief(contact: Contact, motion: Motion, grid_ns: Int64Array) -> str:
 
 
 def _height_above_lowest(motion: Motion, altitude_m: FloatArray, rows: slice) -> FloatArray:
-    """Height above the lowest point of a stretch less the slope of ground, the least of the sources, shape (rows,)."""
+    """Return the height above the lowest point of a stretch, shape (rows,).
+
+    The slope of ground is taken off; the least of the sources counts.
+    """
     heights = []
     for source in altitude_m[:, rows]:
         if np.isfinite(source).any():

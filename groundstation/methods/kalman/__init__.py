@@ -1,1 +1,4 @@
-"""One Kalman core for every estimator: prediction and update at the cost of their entries, gates, smoothers."""
+"""One Kalman core for every estimator: prediction, update, gates, smoothers.
+
+Prediction and update cost as much as the matrices have entries.
+"""

@@ -1,4 +1,7 @@
-"""What the compiled loops of the filter are handed: arrays under names. Letters as in ``kernels``; no numba here."""
+"""Named arrays that the compiled loops of the filter take.
+
+The letters are those of ``kernels``. Nothing here needs numba.
+"""
 
 from typing import NamedTuple
 
@@ -16,7 +19,7 @@ NO_STEP = -1
 
 
 class Pattern(NamedTuple):
-    """Where a transition has entries: the rows that are not those of the identity.
+    """Entries of a transition: the rows that are not those of the identity.
 
     Row ``rows[t]`` has the columns ``columns[starts[t] : starts[t + 1]]``; ``rows`` (t,) increase, ``starts`` (t + 1,).
     """
@@ -41,7 +44,7 @@ class Dynamics(NamedTuple):
 
 
 class Lines(NamedTuple):
-    """Rows of the measurement matrix, r of them, and how well each is measured.
+    """Rows of the measurement matrix, r of them, with the noise of each.
 
     ``variance`` as a measurement is weighted, ``believed`` as a single one is believed to err; measurements of one
     epoch that follow each other and whose rows are of one ``kind`` are judged together: all are used or none.
@@ -56,7 +59,10 @@ class Lines(NamedTuple):
 
 
 class Schedule(NamedTuple):
-    """What happens at each of n epochs, in this order: the step, the jump, the measurements one after the other."""
+    """Events at each of n epochs, in this order: the step, the jump, the measurements.
+
+    The measurements come one after the other.
+    """
 
     step: Int64Array  # (n,) which of the distinct steps leads there; NO_STEP: none
     jump: Int64Array  # (n,) which row of ``jumps`` is added to the variances; NO_STEP: none
@@ -66,11 +72,12 @@ class Schedule(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """When a measurement is rejected, and when it is the filter that is wrong and is opened again.
+    """Rules by which a measurement is rejected and the filter is opened again.
 
-    ``gate``: largest y^2 over (h p h' + believed variance). ``patience`` (kinds,): so many rejections in a row of one
-    kind; then ``opened`` (kinds, n) is added to the variances, and where ``is_by_innovation`` the square of the
-    innovations to those of the states measured.
+    The filter is opened when it is the filter that is wrong, and not the measurements. ``gate``: largest y^2 over (h p
+    h' + believed variance). ``patience`` (kinds,): so many rejections in a row of one kind; then ``opened`` (kinds, n)
+    is added to the variances, and where ``is_by_innovation`` the square of the innovations to those of the states
+    measured.
     """
 
     gate: float
@@ -80,8 +87,11 @@ class Rules(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """What is known to move one state besides F: a share ``mix`` (n, c, c) of itself in the other right-hand sides,
-    and ``push`` (n, c). Both empty: nothing."""
+    """Known motion of one state besides F.
+
+    A share ``mix`` (n, c, c) of the state moves it in the other right-hand sides, and ``push`` (n, c) moves it. Where
+    both are empty there is no such motion.
+    """
 
     state: int
     mix: FloatArray
@@ -89,7 +99,10 @@ class Drive(NamedTuple):
 
 
 class Now(NamedTuple):
-    """Where the filter stands; changed in place, so that a run may go on where another ended."""
+    """Current state of the filter.
+
+    It is changed in place, so that a run may go on where another ended.
+    """
 
     x: FloatArray  # (c, n)
     p: FloatArray  # (n, n)
@@ -97,7 +110,7 @@ class Now(NamedTuple):
 
 
 class Room(NamedTuple):
-    """What the filter works in; contents mean nothing before and after."""
+    """Working arrays of the filter; contents mean nothing before and after."""
 
     w: FloatArray  # (n, n)
     g: FloatArray  # (n,)
@@ -106,7 +119,10 @@ class Room(NamedTuple):
 
 
 class Back(NamedTuple):
-    """What a smoother works in, see ``smoother_runs``; contents mean nothing before and after."""
+    """Working arrays of a smoother, see ``smoother_runs``.
+
+    Contents mean nothing before and after.
+    """
 
     a: FloatArray  # (c, n)
     A: FloatArray  # (n, n)
@@ -116,7 +132,7 @@ class Back(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What a run writes down; an array of no length is left out (but not y, S, mark).
+    """Arrays that a run fills; an array of no length is left out (but not y, S, mark).
 
     ``y``, ``S`` are those of the measurement when it is used, all before it used already; those called judged, when its
     group is judged.

@@ -1,7 +1,7 @@
-"""Kalman filter and smoother of any linear system with scalar measurements, at the cost of its entries.
+"""Kalman filter and smoother of any linear system with scalar measurements.
 
-The frozen types hold arrays; the loops over them are compiled (``runs``, ``smoother_runs``). A compiled loop of another
-folder may call their parts (``kernels``) itself.
+It costs as much as the matrices have entries. The frozen types hold arrays; the loops over them are compiled (``runs``,
+``smoother_runs``). A compiled loop of another folder may call their parts (``kernels``) itself.
 """
 
 from dataclasses import dataclass, field
@@ -111,7 +111,7 @@ def _place_within(epoch: Int64Array) -> Int64Array:
 
 @dataclass(frozen=True)
 class Gate:
-    """When measurements are rejected and when the filter is opened again.
+    """Rules by which measurements are rejected and the filter is opened again.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class Gate:
     is_by_innovation: bool = False
 
     def rules(self, kinds: int, size: int) -> Rules:
-        """As the compiled loops want it."""
+        """Return the rules as the compiled loops want them."""
         patience = np.array(np.broadcast_to(np.asarray(self.patience, dtype=np.int64), kinds))
         opened = np.array(np.broadcast_to(np.asarray(self.opened, dtype=np.float64), (kinds, size)), order="C")
         return Rules(float(self.sigmas) ** 2, frozen(patience), frozen(opened), self.is_by_innovation)
@@ -139,7 +139,10 @@ class Gate:
 
 @dataclass(frozen=True)
 class Start:
-    """State before the first epoch: ``x`` (n,) or (n, c), ``P`` (n, n), and rejections in a row of an earlier run."""
+    """State before the first epoch: ``x`` (n,) or (n, c), ``P`` (n, n).
+
+    It also has the rejections in a row of an earlier run.
+    """
 
     x: FloatArray
     P: FloatArray
@@ -156,7 +159,7 @@ class Start:
 
 @dataclass(frozen=True)
 class Kept:
-    """What a run writes down; smoothing needs all of the first three."""
+    """Choice of the arrays that a run keeps; smoothing needs all of the first three."""
 
     states: bool = True
     covariances: bool = True
@@ -167,7 +170,9 @@ class Kept:
 
 @dataclass(frozen=True)
 class FilterRun:
-    """History of a filter over n epochs and m measurements; arrays that were not kept have no length.
+    """History of a filter over n epochs and m measurements.
+
+    Arrays that were not kept have no length.
 
     Parameters
     ----------
@@ -208,19 +213,22 @@ class FilterRun:
 
     @cached_property
     def rejected(self) -> int:
-        """How many measurements the gate kept out."""
+        """Number of measurements that the gate kept out."""
         return int((self.mark == REJECTED).sum())
 
     @cached_property
     def rejected_by_kind(self) -> Int64Array:
-        """The same for each kind, shape (kinds,)."""
+        """Number of rejected measurements of each kind, shape (kinds,)."""
         lines = self.measurements.lines
         kind = lines.kind[self.measurements.row[self.mark == REJECTED]]
         return np.bincount(kind, minlength=_kinds(lines)).astype(np.int64)
 
     @cached_property
     def nis(self) -> FloatArray:
-        """Squared innovation over its variance of every measurement used, shape (used, c): chi-square of 1 each."""
+        """Squared innovation over its variance of every measurement used, shape (used, c).
+
+        Each has a chi-square distribution with one degree of freedom.
+        """
         used = self.mark == USED
         return np.asarray(self.record.y[used] ** 2 / self.record.S[used, None])
 
@@ -242,7 +250,7 @@ def run_filter(
     drive: Drive | None = None,
     kept: Kept | None = None,
 ) -> FilterRun:
-    """Filter measurements over epochs; where none is used the states are forecast.
+    """Filter measurements over epochs; without any the states are forecast.
 
     Parameters
     ----------
@@ -341,7 +349,7 @@ def _room(n: int, m: int, size: int, channels: int, kept: Kept) -> Record:
 def forecast(
     transition: Transition, step: Int64Array, start: FloatArray, known: FloatArray, every: int, drive: Drive
 ) -> FloatArray:
-    """Carry many starts forward together: what one state of each builds up.
+    """Carry many starts forward together, and return what one state of each builds up.
 
     Parameters
     ----------

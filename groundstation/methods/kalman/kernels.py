@@ -1,4 +1,6 @@
-"""Compiled parts of the Kalman filter: predict, innovate, update. Functions on arrays that other compiled loops call.
+"""Compiled parts of the Kalman filter: predict, innovate, update.
+
+They are functions on arrays that other compiled loops call.
 
 Letters, the same in all of this folder:
 
@@ -17,7 +19,7 @@ w        room, shape (n, n)
 =======  ==========================================================================================
 
 ``states`` is 0, 1, ... n - 1: as a tuple where the compiler shall know how many there are (a small system: its loops
-are unrolled), as an array where it need not. Whether F and Q are dense is read off their dimensions when a function is
+are unrolled), as an array where it need not. The dimensions of F and Q tell whether they are dense, when a function is
 compiled. Everything is changed in place; room is handed in, nothing is allocated.
 
 Source: R. E. Kalman, A new approach to linear filtering and prediction problems, J. Basic Engineering 82, 1960;
@@ -34,7 +36,10 @@ from groundstation.methods.kalman.arrays import FloatArray, Pattern, States
 def predict_covariance(
     states: States, pattern: Pattern, F: FloatArray, step: int, p: FloatArray, w: FloatArray
 ) -> None:
-    """p <- F p F'. Sparse, it costs 1.5 n products for each entry of F. One half is computed and mirrored."""
+    """Predict the covariance: p <- F p F'.
+
+    A sparse F costs 1.5 n products for each entry. One half is computed and mirrored.
+    """
     n = len(states)
     if F.ndim == 3:
         for i in range(n):
@@ -81,7 +86,7 @@ def predict_covariance(
 
 @inlined
 def predict_states(states: States, pattern: Pattern, F: FloatArray, step: int, x: FloatArray, w: FloatArray) -> None:
-    """x <- F x, every right-hand side."""
+    """Predict the states: x <- F x, every right-hand side."""
     n = len(states)
     for c in range(x.shape[0]):
         if F.ndim == 3:
@@ -105,7 +110,10 @@ def predict_states(states: States, pattern: Pattern, F: FloatArray, step: int, x
 
 @inlined
 def add_noise(states: States, rows: Int64Array, columns: Int64Array, Q: FloatArray, step: int, p: FloatArray) -> None:
-    """p <- p + Q; of a sparse Q every entry off the diagonal is added on both sides of it."""
+    """Add process noise: p <- p + Q.
+
+    Every entry of a sparse Q off the diagonal is added on both sides of it.
+    """
     if Q.ndim == 3:
         for i in range(len(states)):
             for j in range(len(states)):
@@ -152,7 +160,7 @@ def update_covariance(
     g: FloatArray,
     K: FloatArray,
 ) -> float:
-    """Fill the gain, update p with a scalar measurement, and return the variance S of its innovation.
+    """Update p with a scalar measurement, fill the gain, return the innovation's variance S.
 
     Parameters
     ----------
@@ -214,6 +222,6 @@ def update_covariance(
 
 @inlined
 def correct_states(states: States, K: FloatArray, y: float, x: FloatArray, c: int) -> None:
-    """x <- x + K y, right-hand side c."""
+    """Correct the states: x <- x + K y, right-hand side c."""
     for i in range(len(states)):
         x[c, i] += K[i] * y

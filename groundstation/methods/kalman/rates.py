@@ -1,4 +1,7 @@
-"""Systems given by a sparse matrix of rates, x' = A x + white noise: their transitions, and states carried forward."""
+"""Systems given by a sparse matrix of rates, x' = A x + white noise.
+
+Here are their transitions, and states carried forward by them.
+"""
 
 from dataclasses import dataclass
 
@@ -13,7 +16,7 @@ ORDER = 4
 
 @dataclass(frozen=True)
 class Rates:
-    """Where A of x' = A x has entries: n states, ``rows`` and ``columns`` (m,)."""
+    """Places of the entries of A in x' = A x: n states, ``rows`` and ``columns`` (m,)."""
 
     size: int
     rows: Int64Array
@@ -24,7 +27,10 @@ class Rates:
             object.__setattr__(self, name, frozen(np.ascontiguousarray(getattr(self, name), dtype=np.int64)))
 
     def reach(self) -> tuple[Int64Array, Int64Array]:
-        """Rows and columns where I + A + ... + A^4 may have entries; rows that stay the identity's are left out."""
+        """Return rows and columns where I + A + ... + A^4 may have entries.
+
+        Rows that stay the identity's are left out.
+        """
         own, power = np.zeros((self.size, self.size), dtype=bool), np.eye(self.size, dtype=bool)
         own[self.rows, self.columns] = True
         total = power.copy()
@@ -36,7 +42,9 @@ class Rates:
         return frozen(np.ascontiguousarray(rows)), frozen(np.ascontiguousarray(columns))
 
     def transition(self, values: FloatArray, seconds: FloatArray, density: FloatArray) -> Transition:
-        """Transition over each of k steps; a white noise enters half before and half after it (trapezoidal rule).
+        """Return the transition over each of k steps.
+
+        A white noise enters half before and half after the step (trapezoidal rule).
 
         Parameters
         ----------
@@ -64,7 +72,9 @@ class Rates:
         return Transition.sparse(self.size, rows, columns, entries, diagonal, diagonal, noise, noise)
 
     def carried(self, values: FloatArray, step_s: float, every: int, start: FloatArray) -> FloatArray:
-        """A state carried forward in equal steps, as after every ``every`` of them, shape (steps // every, n).
+        """Carry a state forward in equal steps.
+
+        The result is the state after every ``every`` of them, shape (steps // every, n).
 
         Parameters
         ----------

@@ -1,4 +1,7 @@
-"""Compiled loop of the filter over epochs: gates, rejections, reopening, what is written down. Letters: ``kernels``."""
+"""Compiled loop of the filter over epochs: gates, rejections, reopening, records.
+
+The letters are those of ``kernels``.
+"""
 
 import numpy as np
 
@@ -46,7 +49,10 @@ def open_again(
     S: FloatArray,
     mark: Marks,
 ) -> None:
-    """Widen the covariance for measurements ``begin`` to ``end``, which were rejected too often."""
+    """Widen the covariance for measurements that were rejected too often.
+
+    They are those from ``begin`` to ``end``.
+    """
     for i in range(len(opened)):
         p[i, i] += opened[i]
     if is_by_innovation:
@@ -75,7 +81,10 @@ def run_filter(
     room: Room,
     out: Record,
 ) -> int:
-    """Run the filter over epochs; ``z`` (m, c) are the measurements, NaN absent. Return how often it was opened."""
+    """Run the filter over epochs, and return how often it was opened.
+
+    ``z`` (m, c) are the measurements, NaN absent.
+    """
     n, channels = len(states), z.shape[1]
     pattern, F, noise_rows, noise_columns, before, after = dynamics
     step, jump, jumps, first, row = schedule
@@ -211,7 +220,7 @@ def run_forecast(
     dragged: FloatArray,
     built_up: FloatArray,
 ) -> None:
-    """Carry the states of many starts forward together and write down one of them: what it builds up.
+    """Carry the states of many starts forward together, and record what one of them builds up.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
-"""Compiled exponentials of a sparse matrix of rates, x' = A x: as transitions of the filter, and applied to a state.
+"""Compiled exponentials of a sparse matrix of rates, x' = A x.
 
-Both to the fourth order of the step: the caller keeps |A| x seconds small ((|A| t)^5 / 120 of the state is left out).
+One function gives them as transitions of the filter, another applies them to a state. Both are good to the fourth order
+of the step: the caller keeps |A| x seconds small ((|A| t)^5 / 120 of the state is left out).
 
 Source: C. Moler, C. Van Loan, Nineteen dubious ways to compute the exponential of a matrix, SIAM Review 45, 2003,
 method 1: good for small steps and nothing else.
@@ -25,7 +26,9 @@ def exponentials(
     scratch: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Fill ``out`` (k, e) with the entries of exp(A t) at ``at_rows``, ``at_columns`` (e,), for each of k matrices A.
+    """Fill ``out`` (k, e) with entries of exp(A t), for each of k matrices A.
+
+    The entries are those at ``at_rows``, ``at_columns`` (e,).
 
     Parameters
     ----------
@@ -70,7 +73,9 @@ def carry_by_rates(
     scratch: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Carry a state forward in equal steps, each with rates of its own, without forming a matrix.
+    """Carry a state forward in equal steps without forming a matrix.
+
+    Each step has rates of its own.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""Smoothers over a filter's run: fixed interval, fixed lag, and the covariance between two epochs of a lag."""
+"""Smoothers over a filter's run: fixed interval, fixed lag, covariances of a lag.
+
+The covariances are those between the two epochs of a lag.
+"""
 
 from dataclasses import dataclass, fields
 
@@ -11,7 +14,10 @@ from groundstation.methods.kalman.filter import FilterRun
 
 @dataclass(frozen=True)
 class Smoothed:
-    """Smoothed states (n, states, c) and their variances (n, states), NaN outside the interval asked for."""
+    """Smoothed states (n, states, c) and their variances (n, states).
+
+    They are NaN outside the interval asked for.
+    """
 
     x: FloatArray
     variance: FloatArray
@@ -40,7 +46,10 @@ def smooth(run: FilterRun, begin: int = 0, end: int | None = None) -> Smoothed:
 
 
 def smooth_lags(run: FilterRun, begin: Int64Array, end: Int64Array) -> FloatArray:
-    """Smooth epoch ``begin[i]`` with the data up to ``end[i]``, for each i: states alone, shape (s, states, c)."""
+    """Smooth epoch ``begin[i]`` with the data up to ``end[i]``, for each i.
+
+    The result is the states alone, shape (s, states, c).
+    """
     from groundstation.methods.kalman import smoother_runs
 
     past = np.empty((len(begin), *run.x.shape[1:]))
@@ -49,7 +58,9 @@ def smooth_lags(run: FilterRun, begin: Int64Array, end: Int64Array) -> FloatArra
 
 
 def lag_covariances(run: FilterRun, begin: Int64Array, end: Int64Array) -> tuple[FloatArray, FloatArray]:
-    """Covariance of epoch ``begin[i]`` given the data up to ``end[i]``, and how errors travel between, for each i.
+    """Return the covariance of epoch ``begin[i]`` given the data up to ``end[i]``, for each i.
+
+    The second result tells how errors travel from one epoch to the other.
 
     Returns
     -------
@@ -65,7 +76,7 @@ def lag_covariances(run: FilterRun, begin: Int64Array, end: Int64Array) -> tuple
 
 
 def _history(run: FilterRun) -> tuple[States, Dynamics, Schedule, Lines, Record, Back]:
-    """What the smoothers go back over, and room.
+    """Return what the smoothers go back over, and their working arrays.
 
     Raises
     ------

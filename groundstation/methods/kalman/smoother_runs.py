@@ -1,4 +1,6 @@
-"""Compiled loops of the smoothers, backwards over what the filter wrote down. Letters as in ``kernels``, and
+"""Compiled loops of the smoothers, backwards over the filter's record.
+
+The letters are those of ``kernels``, and
 
 ===  =====================================================================================
 a    lambda of the book, shape (c, n): what the later data say about the state, in units 1/x
@@ -40,7 +42,10 @@ def absorb_covariance(
     A: FloatArray,
     u: FloatArray,
 ) -> None:
-    """A <- (I - K h)' A (I - K h) + h' h / S, gain ``K[m]``: only rows and columns of h change. ``u`` (n,) is room."""
+    """Add a measurement to A: A <- (I - K h)' A (I - K h) + h' h / S, gain ``K[m]``.
+
+    Only rows and columns of h change. ``u`` (n,) is room.
+    """
     n = len(states)
     total = 1.0 / s
     for i in range(n):
@@ -74,7 +79,10 @@ def absorb_states(
     s: float,
     a: FloatArray,
 ) -> None:
-    """a <- (I - K h)' a - h' y / S, every right-hand side; of a ``y`` without length: as if it were zero."""
+    """Add a measurement to a: a <- (I - K h)' a - h' y / S, every right-hand side.
+
+    A ``y`` without length counts as zero.
+    """
     for c in range(a.shape[0]):
         total = 0.0
         for i in range(len(states)):
@@ -89,7 +97,7 @@ def absorb_states(
 def carry_covariance_back(
     states: States, pattern: Pattern, F: FloatArray, step: int, A: FloatArray, w: FloatArray
 ) -> None:
-    """A <- F' A F. ``w`` (n, n) is room."""
+    """Carry A back over a step: A <- F' A F. ``w`` (n, n) is room."""
     n = len(states)
     if F.ndim == 3:
         for i in range(n):
@@ -135,7 +143,10 @@ def carry_covariance_back(
 
 @inlined
 def carry_states_back(states: States, pattern: Pattern, F: FloatArray, step: int, a: FloatArray, w: FloatArray) -> None:
-    """a <- F' a, every right-hand side. The first row of ``w`` is room."""
+    """Carry a back over a step: a <- F' a, every right-hand side.
+
+    The first row of ``w`` is room.
+    """
     n = len(states)
     rows, starts, columns = pattern
     for c in range(a.shape[0]):
@@ -171,7 +182,9 @@ def run_smoother(
     xs: FloatArray,
     variance: FloatArray,
 ) -> None:
-    """Smooth epochs ``begin`` to ``end`` with all data in between and no later ones (fixed interval).
+    """Smooth epochs ``begin`` to ``end`` with all data in between (fixed interval).
+
+    No later data is used.
 
     Parameters
     ----------
@@ -223,7 +236,10 @@ def run_fixed_lag(
     end: Int64Array,
     past: FloatArray,
 ) -> None:
-    """Smooth epoch ``begin[i]`` with the data up to ``end[i]``, for each i: states alone, ``past`` (s, states, c)."""
+    """Smooth epoch ``begin[i]`` with the data up to ``end[i]``, for each i.
+
+    ``past`` (s, states, c) is filled with the states alone.
+    """
     n, channels = len(states), record.x.shape[2]
     pattern, F = dynamics.pattern, dynamics.F
     step, bounds, row = schedule.step, schedule.first, schedule.row
@@ -261,7 +277,9 @@ def run_lag_covariance(
     smoothed: FloatArray,
     closed: FloatArray,
 ) -> None:
-    """Covariance of epoch ``begin[i]`` given the data up to ``end[i]``, and how errors travel between, for each i.
+    """Fill the covariance of epoch ``begin[i]`` given the data up to ``end[i]``, for each i.
+
+    ``closed`` tells how errors travel from one epoch to the other.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""Transitions between epochs: sparse in one pattern, blocks side by side, or full matrices of a handful of states."""
+"""Transitions between epochs: sparse in one pattern, blocks side by side, or dense.
+
+Dense ones are for a handful of states.
+"""
 
 from dataclasses import dataclass
 from typing import Self
@@ -50,7 +53,9 @@ class Transition:
         noise: ArrayLike | None = None,
         noise_before: ArrayLike | None = None,
     ) -> Self:
-        """Transition with m entries in one pattern for all steps; a row without an entry is that of the identity.
+        """Make a transition with m entries in one pattern for all steps.
+
+        A row without an entry is that of the identity.
 
         Parameters
         ----------
@@ -83,7 +88,10 @@ class Transition:
 
     @classmethod
     def blocks(cls, F: FloatArray, Q: FloatArray, count: int) -> Self:
-        """``count`` equal systems side by side without ties: blocks F and Q of each step, shape (s, b, b)."""
+        """Make a transition of ``count`` equal systems side by side without ties.
+
+        F and Q are the blocks of each step, shape (s, b, b).
+        """
         size, (_, _, each) = F.shape[1] * count, F.shape
         place = [np.nonzero(np.any(part != 0.0, axis=0)) for part in (F, np.triu(Q))]
         # a row that is zero in all steps is kept by its diagonal
@@ -96,7 +104,10 @@ class Transition:
 
     @classmethod
     def dense(cls, F: FloatArray, Q: FloatArray) -> Self:
-        """Full matrices of each step, shape (s, n, n); all loops unrolled: for a handful of states."""
+        """Make a transition of full matrices, shape (s, n, n), for a handful of states.
+
+        F and Q are those of each step. All loops are unrolled.
+        """
         nothing = np.zeros(0, dtype=np.int64)
         pattern = Pattern(nothing, np.zeros(1, dtype=np.int64), nothing)
         full = np.ascontiguousarray(F, dtype=np.float64), np.ascontiguousarray(Q, dtype=np.float64)
@@ -127,7 +138,7 @@ def _check_places(which: str, rows: Int64Array, columns: Int64Array, size: int) 
 
 
 def distinct_steps(interval_s: FloatArray, resolution_s: float, most: int) -> tuple[FloatArray, Int64Array]:
-    """Distinct intervals and which of them each is: equal ones share one transition.
+    """Return the distinct intervals, and the number of each: equal ones share a transition.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""The time by which one record of a motion is later than another: windows, their fit, its limits."""
+"""Delay of one record of a motion behind another: windows, their fit, its limits."""

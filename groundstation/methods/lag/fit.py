@@ -1,4 +1,6 @@
-"""The delay between two series of samples, with an interval that holds for errors correlated over seconds.
+"""Delay between two series of samples, with an interval.
+
+The interval holds for errors correlated over seconds.
 
 The other sensor shows the reference as it was ``delay`` seconds ago, beside what its own errors add:
 
@@ -21,14 +23,14 @@ MOST_STEPS, LONGEST_STEP_S, CONVERGED_S = 12, 0.3, 1e-4
 STEPS_WITH_WEIGHTS = 4  # after them the weights stay
 WINDOWS_FOR_SEARCH = 16
 NO_PRIOR = 1e6
-MOVING_SHARE = 0.1  # of the motion of the liveliest component: less may be noise alone
+MOVING_SHARE = 0.1  # least motion as a share of the liveliest component's: less may be noise alone
 At = tuple[float, FloatArray]  # delay, nuisances
 LEAST_RATIO = 1e-9  # directions that one window alone determines leave nothing to be judged by
 
 
 @dataclass(frozen=True)
 class DelayFit:
-    """A delay and how well it is known.
+    """Delay, and its uncertainty.
 
     ``sigma_s`` allows for errors correlated within a window and for the priors; ``modelled_sigma_s`` is what the noise
     model would give; ``freedom`` the number of degrees it rests on; ``motion`` the RMS rate of the reference,
@@ -61,7 +63,10 @@ class DelayFit:
 
 @dataclass(frozen=True)
 class _Step:
-    """One step of Gauss-Newton: design (w, r, 1 + q), what is left (w, r), normal matrix, solution; raw residuals."""
+    """One step of Gauss-Newton: design (w, r, 1 + q), residual (w, r), normal matrix, answer.
+
+    ``residuals`` are the raw ones.
+    """
 
     rows: FloatArray
     left: FloatArray
@@ -150,7 +155,10 @@ def _squares(rows: FloatArray, windows: Windows) -> FloatArray:
 
 
 def _explained(left: FloatArray, seen: FloatArray, shown: FloatArray) -> float:
-    """Share of the other's motion explained, of the worst component that moves; arguments are sums of squares (c,)."""
+    """Return the share of the other's motion explained, of the worst component that moves.
+
+    Arguments are sums of squares (c,).
+    """
     size = np.maximum(seen, shown)
     moving = size >= MOVING_SHARE * np.max(size)
     return float(np.min(1.0 - left[moving] / np.maximum(np.maximum(seen, left)[moving], 1e-300)))
@@ -159,7 +167,10 @@ def _explained(left: FloatArray, seen: FloatArray, shown: FloatArray) -> float:
 def _search(
     reference: Series, windows: Windows, prior: FloatArray, settings: LatencySettings
 ) -> tuple[FloatArray, FloatArray]:
-    """Delays looked at, and the RMS residual at each, the nuisances fitted; on some of the windows."""
+    """Return the delays tried, and the RMS residual at each with the nuisances fitted.
+
+    Some of the windows are enough for it.
+    """
     search_s = np.arange(-settings.search_s, settings.search_s + 1e-9, settings.search_step_s)
     windows = windows.some(WINDOWS_FOR_SEARCH)
     plain = Whitened.plain(windows, settings.degree)
@@ -184,7 +195,10 @@ def _iterated(
     at: At,
     settings: LatencySettings,
 ) -> tuple[At, _Step, bool]:
-    """Gauss-Newton from a delay and nuisances until the delay stands; with a noise model, weighted after each step."""
+    """Iterate Gauss-Newton from a delay and nuisances until the delay stands.
+
+    With a noise model the windows are weighted after each step.
+    """
     delay, theta = at
     for number in range(MOST_STEPS):
         if noise is None:
@@ -203,7 +217,10 @@ def _iterated(
 
 
 def _step(reference: Series, windows: Windows, whitened: Whitened, prior: FloatArray, at: At) -> _Step:
-    """Linearise at a delay and nuisances and solve; the solution is a change of delay, and the nuisances."""
+    """Linearise at a delay and nuisances and solve.
+
+    The solution is a change of delay, and the nuisances.
+    """
     delay, theta = at
     value, rate = reference.at(windows.time_s - delay)
     later = -rate @ np.concatenate([[1.0], theta])
@@ -217,9 +234,10 @@ def _step(reference: Series, windows: Windows, whitened: Whitened, prior: FloatA
 
 
 def _variance(step: _Step, prior: FloatArray, number: int) -> tuple[float, float, float]:
-    """Variance of the delay (0) or a nuisance and its degrees of freedom (Satterthwaite), from the windows' scores.
+    """Return the variance of the delay (0) or a nuisance, and its degrees of freedom.
 
-    The third is the variance that the noise model alone would give.
+    The latter come from the windows' scores (Satterthwaite). The third is the variance that the noise model alone would
+    give.
     """
     inverse = np.linalg.inv(step.normal)
     basis, factor = np.linalg.qr(step.rows)

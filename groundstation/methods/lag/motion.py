@@ -1,4 +1,4 @@
-"""Motion of an aircraft as records of it are compared."""
+"""Motion of an aircraft, in the form in which records of it are compared."""
 
 import numpy as np
 
@@ -8,7 +8,10 @@ SLOW_MPS = 3.0  # the track of a slower aircraft does not show where the nose po
 
 
 def rotation_n_from_b(attitude_deg: FloatArray) -> FloatArray:
-    """Rotations, shape (m, 3, 3), by roll, pitch and heading, shape (m, 3); angles that are not known are zero."""
+    """Return rotations, shape (m, 3, 3), by roll, pitch and heading, shape (m, 3).
+
+    Angles that are not known are zero.
+    """
     roll, pitch, yaw = np.deg2rad(np.nan_to_num(attitude_deg)).T
     (sr, cr), (sp, cp), (sy, cy) = ((np.sin(part), np.cos(part)) for part in (roll, pitch, yaw))
     return np.array(

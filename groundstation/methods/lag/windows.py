@@ -1,4 +1,7 @@
-"""Windows of samples: cut where the reference moves, freed of slow errors, whitened by a noise model."""
+"""Windows of samples where the reference moves, without slow errors, whitened.
+
+A noise model whitens them.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -10,7 +13,7 @@ from groundstation.base.records import BoolArray
 from groundstation.methods.lag.settings import LatencySettings
 
 FloatArray = NDArray[np.float64]
-SIGMA_OF_MEDIAN = 1.4826  # of normal errors: sigma over the median of their sizes
+SIGMA_OF_MEDIAN = 1.4826  # sigma over the median size of normal errors
 CORRELATED_SHARES = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0)  # variance of the correlated over the white noise
 CORRELATION_TIMES_S = (0.5, 1.0, 2.0, 5.0, 10.0, 30.0)
 WINDOWS_FOR_NOISE = 8
@@ -18,10 +21,11 @@ WINDOWS_FOR_NOISE = 8
 
 @dataclass(frozen=True)
 class Series:
-    """Signals of a reference: times (m,) increasing, values (m, b), and what they make of c components.
+    """Signals of a reference: times (m,) increasing, values (m, b).
 
-    ``build`` turns values (..., b) into (..., c, 1 + q), linearly: of the last axis the first is the signal, the others
-    are what a unit of each nuisance adds to it. A step longer than ``gap_max_s`` is not interpolated over.
+    A function makes c components of them. ``build`` turns values (..., b) into (..., c, 1 + q), linearly: of the last
+    axis the first is the signal, the others are what a unit of each nuisance adds to it. A step longer than
+    ``gap_max_s`` is not interpolated over.
     """
 
     time_s: FloatArray
@@ -34,7 +38,10 @@ class Series:
         object.__setattr__(self, "slopes", np.gradient(self.values, self.time_s, axis=0))
 
     def covers(self, time_s: FloatArray, reach_s: float) -> BoolArray:
-        """Where there is no gap from ``reach_s`` before to ``reach_s`` after, shape as ``time_s``."""
+        """Tell where there is no gap from ``reach_s`` before to ``reach_s`` after.
+
+        The mask has the shape of ``time_s``.
+        """
         start = self.time_s[:-1][np.diff(self.time_s) > self.gap_max_s]
         end = self.time_s[1:][np.diff(self.time_s) > self.gap_max_s]
         early, late = time_s - reach_s, time_s + reach_s
@@ -42,10 +49,10 @@ class Series:
         return np.asarray(whole & (early >= self.time_s[0]) & (late <= self.time_s[-1]))
 
     def smoothed(self, nodes: int) -> "Series":
-        """Running means over an odd number of samples; the ends, and what is near gaps, are not to be used.
+        """Return running means over an odd number of samples.
 
-        Without it the noise of single samples shows: interpolation is quieter between samples than at them, and pulls
-        the delay there.
+        Their ends and the samples near gaps are not to be used. Without smoothing the noise of single samples shows:
+        interpolation is quieter between samples than at them, and pulls the delay there.
         """
         if nodes < 2 or len(self.time_s) <= nodes:
             return self
@@ -56,7 +63,10 @@ class Series:
         return replace(self, values=values)
 
     def at(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What is built of the values, and its rate, at times (...): cubic between samples (Catmull-Rom)."""
+        """Return the built signals and their rates at times (...).
+
+        They are cubic between samples (Catmull-Rom).
+        """
         after = np.clip(np.searchsorted(self.time_s, time_s), 1, len(self.time_s) - 1)
         step = (self.time_s[after] - self.time_s[after - 1])[..., None]
         u = (time_s - self.time_s[after - 1])[..., None] / step
@@ -69,7 +79,10 @@ class Series:
 
 @dataclass(frozen=True)
 class Noise:
-    """White noise and, ``share`` times its variance, noise correlated over ``time_s``; ``sigma`` of the white one."""
+    """White noise of ``sigma``, and noise correlated over ``time_s``.
+
+    The latter has ``share`` times the variance of the former.
+    """
 
     sigma: float = 1.0
     share: float = 0.0
@@ -83,9 +96,10 @@ class Noise:
 
 @dataclass(frozen=True)
 class Windows:
-    """Samples of the other sensor, w windows of at most n: times (w, n), values (w, n, c), weights (w, n).
+    """Samples of the other sensor in w windows of at most n.
 
-    Weight 0 fills windows up; one below 1 is that of an outlier.
+    Their shapes are (w, n) for times and weights, (w, n, c) for values. Weight 0 fills windows up; one below 1 is that
+    of an outlier.
     """
 
     time_s: FloatArray
@@ -97,7 +111,7 @@ class Windows:
 
     @property
     def known(self) -> BoolArray:
-        """Which samples there are, shape (w, n)."""
+        """Mask of the samples that exist, shape (w, n)."""
         return np.asarray(self.weight > 0.0)
 
     def take(self, index: NDArray[np.intp] | slice) -> "Windows":
@@ -105,7 +119,7 @@ class Windows:
         return Windows(self.time_s[index], self.values[index], self.weight[index])
 
     def some(self, most: int) -> "Windows":
-        """At most so many of the windows, evenly taken."""
+        """Return at most so many of the windows, evenly taken."""
         return self.take(_even(len(self), most))
 
     def whitener(self, noise: Noise) -> FloatArray:
@@ -127,7 +141,10 @@ class Windows:
 
 @dataclass(frozen=True)
 class Whitened:
-    """Windows made ready for least squares: a whitener (None: 1) and an orthonormal basis of the polynomials in it."""
+    """Windows made ready for least squares: a whitener (None: 1) and a basis.
+
+    The basis is an orthonormal one of the polynomials in them.
+    """
 
     factor: FloatArray | None
     basis: FloatArray
@@ -135,17 +152,17 @@ class Whitened:
 
     @classmethod
     def of(cls, windows: Windows, noise: Noise, degree: int) -> "Whitened":
-        """Of windows and a noise model."""
+        """Make it from windows and a noise model."""
         factor = windows.whitener(noise)
         return cls(factor, np.linalg.qr(factor @ windows.polynomials(degree))[0], windows.known)
 
     @classmethod
     def plain(cls, windows: Windows, degree: int) -> "Whitened":
-        """Without any weights."""
+        """Make it from windows without any weights."""
         return cls(None, np.linalg.qr(windows.polynomials(degree))[0], windows.known)
 
     def rows(self, values: FloatArray) -> FloatArray:
-        """Values (w, n, c, k) whitened and freed of the polynomials: rows (w, n c, k)."""
+        """Return values (w, n, c, k) whitened and freed of the polynomials: rows (w, n c, k)."""
         w, n, c, k = values.shape
         flat = (values * self.known[..., None, None]).reshape(w, n, c * k)
         flat = flat if self.factor is None else self.factor @ flat
@@ -154,15 +171,15 @@ class Whitened:
 
 
 def too_few_windows(settings: LatencySettings) -> str:
-    """Why :func:`cut_windows` gives none."""
+    """Return the reason why :func:`cut_windows` gives none."""
     return f"fewer than two stretches of {settings.window_s:g} s in which both are logged without a gap"
 
 
 def cut_windows(reference: Series, time_s: FloatArray, values: FloatArray, settings: LatencySettings) -> Windows | None:
-    """Windows of the other's samples, times (n,), values (n, c): those in which the reference moves most; or None.
+    """Cut windows of the other sensor where the reference moves most; None if there are none.
 
-    A sample counts where the reference is known ``search_s`` before and after it, and does not lie farther from the
-    reference than that ranges over the flight (a wild value).
+    Samples have times (n,) and values (n, c). A sample counts where the reference is known ``search_s`` before and
+    after it, and does not lie farther from the reference than that ranges over the flight (a wild value).
     """
     known = reference.covers(time_s, settings.search_s) & np.isfinite(values).all(axis=1)
     time_s, values = time_s[known], values[known]
@@ -190,22 +207,26 @@ def cut_windows(reference: Series, time_s: FloatArray, values: FloatArray, setti
 
 
 def reweighted(windows: Windows, left: FloatArray, sigma: float, robust_sigmas: float) -> Windows:
-    """Windows with Huber's weights by what is left of each sample, shape (w, n, c)."""
+    """Return windows with Huber's weights by the residual of each sample, shape (w, n, c)."""
     sizes = np.sqrt(np.mean(np.square(left), axis=2))
     weight = np.minimum(1.0, robust_sigmas * sigma / np.maximum(sizes, 1e-300))
     return replace(windows, weight=np.where(windows.known, weight, 0.0))
 
 
 def spread_of(left: FloatArray) -> float:
-    """Sigma of residuals by their median size, never zero; exact zeros fill windows up."""
+    """Return the sigma of residuals by their median size, never zero.
+
+    Exact zeros, which fill windows up, are left out.
+    """
     sizes = np.abs(left[left != 0.0])
     return max(SIGMA_OF_MEDIAN * float(np.median(sizes)), 1e-9) if sizes.size else 1e-9
 
 
 def noise_of(windows: Windows, left: FloatArray, degree: int) -> Noise:
-    """Most likely noise of what is left (w, n, c), polynomials of unknown size in it; from some of the windows.
+    """Estimate the most likely noise of the residuals (w, n, c), from some of the windows.
 
-    Restricted likelihood on a grid: share of correlated noise, its time, and the share again.
+    The residuals also hold polynomials of unknown size. The method is restricted likelihood on a grid: share of
+    correlated noise, its time, and the share again.
     """
     windows, left = windows.some(WINDOWS_FOR_NOISE), left[_even(len(left), WINDOWS_FOR_NOISE)]
     powers = windows.polynomials(degree)

@@ -1,1 +1,1 @@
-"""Taxi: pairs of INS heading and GNSS velocity on the ground, and why each is used or not."""
+"""Taxi: pairs of INS heading and GNSS velocity on the ground, and the gates on them."""

@@ -1,4 +1,4 @@
-"""The latency of GNSS behind the INS where it is known before the turns of the taxi are looked at."""
+"""Latency of GNSS behind the INS that is known before the turns of the taxi are used."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,10 @@ from groundstation.results.latency import Latencies
 
 @dataclass(frozen=True)
 class KnownDelay:
-    """By how much GNSS is later than the INS, its sigma, and whence: ``aircraft file`` or ``motion``."""
+    """Delay of GNSS behind the INS, its sigma, and its origin.
+
+    The origin is ``aircraft file`` or ``motion``.
+    """
 
     latency_s: float
     sigma_s: float
@@ -18,7 +21,7 @@ class KnownDelay:
 def known_delay(
     pair: tuple[str, str], latencies: Latencies | None, stated_s: float | None, stated_sigma_s: float
 ) -> KnownDelay | None:
-    """The latency to take out of a pair of INS and GNSS; None where nothing is known of it.
+    """Return the latency to take out of a pair of INS and GNSS; None where none is known.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Why a sample is used or not, and the straight segments."""
+"""Gates that accept or reject each sample, and the straight segments."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -20,7 +20,7 @@ CHANGING_MPS2 = 0.5  # a change of speed that is a run's, and not taxi's
 def gate_samples(
     samples: Samples, settings: TaxiLimits, intervals: Sequence[Interval] = (), phases: Phases | None = None
 ) -> Samples:
-    """Say of every epoch why it is used or not, and number the straight segments.
+    """Tell for every epoch why it is used or not, and number the straight segments.
 
     Later reasons give way to earlier ones: excluded, no heading, ground, geometry, integrity, too fast, too slow,
     turning, take-off run, landing roll, outlier, GNSS gap. A forced interval overrides those from ``too fast`` on.
@@ -55,7 +55,10 @@ def gate_samples(
 
 
 def _not_taxi(samples: Samples, phases: Phases) -> Iterator[tuple[str, BoolArray]]:
-    """Epochs of take-off runs and landing rolls, with the slow ones beside them in which the speed still changes."""
+    """Yield the epochs of take-off runs and landing rolls.
+
+    The slow epochs beside them in which the speed still changes belong to them.
+    """
     phase, speed = phases.at(samples.time_s), samples.speed_mps
     earlier_mps = np.interp(samples.time_s - 0.5, samples.time_s, speed)
     later_mps = np.interp(samples.time_s + 0.5, samples.time_s, speed)
@@ -69,7 +72,9 @@ def _not_taxi(samples: Samples, phases: Phases) -> Iterator[tuple[str, BoolArray
 
 
 def intervals_without_epoch(time_s: NDArray[np.float64], intervals: Sequence[Interval]) -> tuple[Interval, ...]:
-    """Intervals, both ends included, that hold none of the times: outside the flight, or in a gap.
+    """Return the intervals, both ends included, that hold none of the times.
+
+    They lie outside the flight, or in a gap.
 
     Parameters
     ----------
@@ -85,16 +90,17 @@ def intervals_without_epoch(time_s: NDArray[np.float64], intervals: Sequence[Int
 
 
 def is_straight_and_fast(samples: Samples, settings: TaxiLimits) -> BoolArray:
-    """Epochs of straight taxi by speed and rate of heading alone, shape (n,)."""
+    """Tell which epochs are straight taxi by speed and rate of heading alone, shape (n,)."""
     speed = samples.speed_mps
     is_straight = np.abs(np.nan_to_num(samples.rate_dps, nan=np.inf)) <= settings.turn_rate_max_dps
     return is_straight & (speed > settings.taxi_speed_min_mps) & (speed <= settings.taxi_speed_max_mps)
 
 
 def _outliers(samples: Samples, settings: TaxiLimits) -> BoolArray:
-    """Differences far from the running median of 5 s, in robust sigmas of the straight and fast samples.
+    """Find differences far from the running median of 5 s.
 
-    Six robust sigmas and at least a floor: no sample of a normal process is ever touched, so coverage is not.
+    The distance is counted in robust sigmas of the straight and fast samples. Six robust sigmas and at least a floor:
+    no sample of a normal process is ever touched, so coverage is not.
     """
     candidate = is_straight_and_fast(samples, settings) & np.isfinite(samples.heading_deg)
     out = np.zeros(len(samples), dtype=bool)

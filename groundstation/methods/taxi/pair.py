@@ -7,7 +7,9 @@ from groundstation.tables.table import Flight
 
 
 def choose_pair(flight: Flight, ins_topic: str = "", gnss_topic: str = "") -> tuple[str, str]:
-    """The INS and GNSS topics to use: the ones asked for, else the first that have what is needed.
+    """Return the INS and GNSS topics to use.
+
+    They are the ones asked for, else the first that have what is needed.
 
     Raises
     ------
@@ -37,5 +39,8 @@ def choose_pair(flight: Flight, ins_topic: str = "", gnss_topic: str = "") -> tu
 
 
 def _is_track(flight: Flight, topic: str) -> bool:
-    """Whether its heading is a receiver's own track: no measurement of where the nose points."""
+    """Tell whether the topic's heading is a receiver's own track.
+
+    A track does not measure where the nose points.
+    """
     return f"{HEADING_IS_TRACK}.{topic}.true_heading_deg" in flight.metadata

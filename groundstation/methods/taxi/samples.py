@@ -1,4 +1,7 @@
-"""Pairs of INS heading and GNSS velocity at the GNSS times of validity, and why each is used or not."""
+"""Pairs of INS heading and GNSS velocity at the GNSS times of validity.
+
+Each has the reason why it is used or not.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -29,7 +32,10 @@ VELOCITY_SIGMA = "velocity sigma"
 
 
 class GroundContact(Protocol):
-    """Ground contact at given times: where it is proven, and by what (empty or ``none...``: by nothing)."""
+    """Ground contact at given times, and the method that proves it.
+
+    Where the method is empty or ``none...`` nothing proves it.
+    """
 
     @property
     def mask(self) -> BoolArray: ...
@@ -38,9 +44,10 @@ class GroundContact(Protocol):
 
 
 class TrueHeading(Protocol):
-    """True heading of every row of an INS topic, degrees, NaN where unknown, and what it was made from.
+    """True heading of every row of an INS topic, degrees, NaN where unknown.
 
-    ``declination_sigma_deg`` is that of an error common to all rows; None for a heading logged as true.
+    The description says what it was made from. ``declination_sigma_deg`` is that of an error common to all rows; None
+    for a heading logged as true.
     """
 
     @property
@@ -144,7 +151,10 @@ def logged_heading(flight: Flight, ins_topic: str) -> HeadingValues:
 
 
 def logged_ground(flight: Flight, time_ns: Int64Array) -> Proof:
-    """Ground contact by logged weight on wheels: the last value before each time; without it nothing is proven."""
+    """Return ground contact by logged weight on wheels: the last value before each time.
+
+    Without it nothing is proven.
+    """
     for topic in topics_of_kind("discrete", flight.topics()):
         table = flight[topic]
         known = table.valid("weight_on_wheels")
@@ -156,10 +166,10 @@ def logged_ground(flight: Flight, time_ns: Int64Array) -> Proof:
 
 
 def window_slope(at: FloatArray, time_s: FloatArray, values: FloatArray, window_s: float) -> FloatArray:
-    """Least-squares slope of ``values`` over a window centred at each time, per second, shape as ``at``.
+    """Return the least-squares slope of ``values`` over a window centred at each time.
 
-    A window with fewer than three samples is widened to the three nearest (raw data: ``window_s`` = 0). NaN where there
-    are fewer than two samples.
+    It is per second and has the shape of ``at``. A window with fewer than three samples is widened to the three nearest
+    (raw data: ``window_s`` = 0). NaN where there are fewer than two samples.
     """
     if len(time_s) < 2:
         return np.full(len(at), np.nan)
@@ -180,10 +190,10 @@ def pair_samples(
     with_later_runs: bool = False,
     gnss_latency_s: float = 0.0,
 ) -> Samples:
-    """Pair each distinct GNSS epoch before lift-off with the INS heading interpolated to its time.
+    """Pair each distinct GNSS epoch before lift-off with the INS heading at its time.
 
-    GNSS times are put back by ``gnss_latency_s``, by which GNSS is later than the INS. ``with_later_runs`` adds
-    the epochs after lift-off at which ground contact is proven: landing roll and taxi in.
+    The heading is interpolated. GNSS times are put back by ``gnss_latency_s``, by which GNSS is later than the INS.
+    ``with_later_runs`` adds the epochs after lift-off at which ground contact is proven: landing roll and taxi in.
 
     The heading is interpolated along the shorter arc between INS samples no farther apart than
     ``heading_gap_max_s``; elsewhere it is NaN. The part before lift-off ends where ground contact, once proven, is
@@ -226,9 +236,10 @@ def pair_samples(
 
 
 def _geometry(gnss: Table, settings: TaxiLimits) -> tuple[FloatArray, str]:
-    """Dilution of precision of each epoch and its name; without any, in motion, the sigma that the receiver states.
+    """Return the dilution of precision of each epoch, and its name.
 
-    That sigma is the dilution of precision times the noise of the ranges' rates. At standstill the noise is measured.
+    Where none is logged it is, in motion, the sigma that the receiver states. That sigma is the dilution of precision
+    times the noise of the ranges' rates. At standstill the noise is measured.
     """
     field = next((name for name in GEOMETRY_FIELDS if gnss.has(name)), "")
     if field:
@@ -244,7 +255,7 @@ def _geometry(gnss: Table, settings: TaxiLimits) -> tuple[FloatArray, str]:
 def _ground_part(
     gnss: Table, on_ground: BoolArray, is_proven: bool, settings: TaxiLimits, with_later_runs: bool
 ) -> tuple[NDArray[np.int64], BoolArray]:
-    """Numbers of the epochs to pair, and which of them are later than lift-off."""
+    """Return the numbers of the epochs to pair, and a mask of those later than lift-off."""
     before = _before_lift_off(gnss, on_ground, is_proven, settings)
     index = np.arange(before.start, before.stop)
     later = np.arange(before.stop, len(gnss))
@@ -281,7 +292,10 @@ def _no_ground_reason(settings: TaxiLimits) -> str:
 def _ins_heading(
     flight: Flight, ins_topic: str, heading_deg: FloatArray, time_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Times and continuous headings of the valid INS rows around the epochs; one row for each time."""
+    """Return times and continuous headings of the valid INS rows around the epochs.
+
+    There is one row for each time.
+    """
     table = flight[ins_topic]
     known = np.isfinite(heading_deg)
     if "valid" in table:
@@ -302,10 +316,10 @@ def _interpolated(at: FloatArray, time_s: FloatArray, heading_deg: FloatArray, g
 
 
 def without_arm(samples: Samples, arm_m: float, error_deg: float = 0.0) -> Samples:
-    """Velocities of the main-gear axle from those of the antenna ``arm_m`` ahead of it.
+    """Return the velocities of the main-gear axle from those of the antenna ahead of it.
 
-    v_axle = v_antenna - omega x arm: a turn to the right moves the antenna to the right of the heading.
-    ``error_deg`` is the rough INS heading error: the arm points along the true heading.
+    The antenna is ``arm_m`` ahead. v_axle = v_antenna - omega x arm: a turn to the right moves the antenna to the right
+    of the heading. ``error_deg`` is the rough INS heading error: the arm points along the true heading.
     """
     if arm_m == 0.0:
         return samples

@@ -1,4 +1,7 @@
-"""Limits by which epochs on the ground are paired and gated; settings of a system have them among others."""
+"""Limits by which epochs on the ground are paired and gated.
+
+The settings of a system have them among others.
+"""
 
 from dataclasses import dataclass
 from typing import Literal, Protocol
@@ -7,7 +10,10 @@ RateKind = Literal["slope", "raw"]
 
 
 class TaxiLimits(Protocol):
-    """What taxi is, and which of its epochs are used; each is explained at ``HeadingSettings``."""
+    """Limits of taxi, and of the epochs that are used.
+
+    Each is explained at ``HeadingSettings``.
+    """
 
     @property
     def taxi_speed_min_mps(self) -> float: ...
@@ -43,7 +49,9 @@ class TaxiLimits(Protocol):
 
 @dataclass(frozen=True)
 class GroundLimits:
-    """Limits of taxi, for other headings than that of an INS; those of the paper are speeds, rate and dilution.
+    """Limits of taxi for other headings than that of an INS.
+
+    Speeds, rate and dilution are those of the paper.
 
     Source: Markelov, Kostishin, Shukalov, Heading correction of an INS before take-off by satellite navigation, 2015.
     """

@@ -1,9 +1,9 @@
-"""The honest interval: the heading error averaged over what the noise may be, given standstill and taxi data.
+"""Honest interval: the heading error averaged over the possible noise.
 
-The width of an interval hangs on the spectral density at zero frequency, which one run shows only dimly. So the
-parameters of the noise model (``noise.py``) are not fixed at a best fit: they have broad priors, their
-posterior is sampled, and the answer is the mixture of the normal distributions that belong to the draws. Short runs
-and short standstills get heavier tails by themselves.
+Standstill and taxi data tell what noise is possible. The width of an interval hangs on the spectral density at zero
+frequency, which one run shows only dimly. So the parameters of the noise model (``noise.py``) are not fixed at a best
+fit: they have broad priors, their posterior is sampled, and the answer is the mixture of the normal distributions that
+belong to the draws. Short runs and short standstills get heavier tails by themselves.
 
 The sampling itself is in ``sampling.py``.
 """
@@ -23,18 +23,19 @@ from groundstation.methods.taxi_error.sampling import find_mode, sample
 
 FloatArray = NDArray[np.float64]
 
-LEAST_WEIGHT, LEAST_VARIANCE_DEG2 = 1e-5, 1e-18  # of a draw, times the mean; below it there is nothing to add
+LEAST_WEIGHT, LEAST_VARIANCE_DEG2 = 1e-5, 1e-18  # draws below this share of the mean weight add nothing
 DRAWS_OF_GROWTH = 200
 NO_SPREAD = np.log(1e-3 / ARCMIN_PER_DEG)
-NOTICED_DEG = 0.03  # of a term told apart: what it differs by along a taxi before the noise model is told of it
+NOTICED_DEG = 0.03  # least change of a term told apart along a taxi for the noise model to have it
 WIDEST_GAP_DEG = 210.0  # between the directions of a taxi that goes there and back
 
 
 @dataclass(frozen=True)
 class StandstillVelocities:
-    """GNSS velocity at standstill, m/s, shapes (n,); ``gap_s`` from its end to the first taxi sample, None: unlinked.
+    """GNSS velocity at standstill, m/s, shapes (n,).
 
-    ``restart`` is the index at which the stretch that is linked to taxi begins, the others standing before it.
+    ``gap_s`` is the time from its end to the first taxi sample, None where the two are not linked. ``restart`` is the
+    index at which the stretch that is linked to taxi begins, the others standing before it.
     """
 
     time_s: FloatArray
@@ -49,7 +50,7 @@ NO_STANDSTILL = StandstillVelocities(np.zeros(0), np.zeros(0), np.zeros(0))
 
 @dataclass(frozen=True)
 class Regressor:
-    """A known shape times an unknown factor with a normal prior, beside the constant error.
+    """Known shape times an unknown factor with a normal prior, beside the constant error.
 
     ``is_apart``: what it leaves in the error is told apart from what was measured.
     """
@@ -62,7 +63,7 @@ class Regressor:
 
 @dataclass(frozen=True)
 class Differences:
-    """Heading differences to be averaged, shapes (n,).
+    """Heading differences to average, shapes (n,).
 
     Parameters
     ----------
@@ -93,9 +94,9 @@ class Differences:
 
 
 class _Found(NamedTuple):
-    """Of k draws: log posterior (k,), coefficients (k, c), variances (k, m, c), the error without terms told apart.
+    """Results of k draws: log posterior (k,), coefficients (k, c), variances (k, m, c).
 
-    ``alone``: error and variance, shape (k, 2), were the terms told apart known to be zero.
+    ``alone`` is error and variance, shape (k, 2), as they would be if the terms told apart were known to be zero.
     """
 
     density: FloatArray
@@ -106,9 +107,9 @@ class _Found(NamedTuple):
 
 @dataclass
 class _Target:
-    """Log posterior density of the noise parameters, with the error and the coefficients integrated out.
+    """Log posterior density of the noise parameters.
 
-    ``apart``: so many regressors at the end are told apart.
+    The error and the coefficients are integrated out. ``apart``: so many regressors at the end are told apart.
     """
 
     standstill: StandstillVelocities
@@ -149,7 +150,7 @@ class _Target:
         self.last = np.array([len(data.time_s)], dtype=np.int64)
 
     def evaluate(self, thetas: FloatArray, checkpoints: NDArray[np.int64]) -> _Found:
-        """What is found for draws of the noise parameters, shape (k, 11)."""
+        """Return the results for draws of the noise parameters, shape (k, 11)."""
         count, width = len(thetas), self.taxi[1].shape[1] - 1
         log_likelihood, estimate = np.empty(count), np.empty((count, width))
         variance, alone = np.empty((count, len(checkpoints), width)), np.empty((count, 2))
@@ -161,7 +162,7 @@ class _Target:
         return _Found(log_likelihood - 0.5 * np.sum(scaled**2, axis=1), estimate, variance, alone)
 
     def whole(self, thetas: FloatArray) -> FloatArray:
-        """All parameters, shape (k, 11), from those that are sampled."""
+        """Return all parameters, shape (k, 11), from the sampled ones."""
         out = np.full((len(thetas), len(PRIOR_MEAN)), PRIOR_MEAN)
         out[:, SPREAD] = NO_SPREAD
         out[:, self.free] = thetas
@@ -172,7 +173,7 @@ class _Target:
 
 
 def _start(differences: Differences, standstill: StandstillVelocities) -> FloatArray:
-    """A first guess of the parameters from plain standard deviations."""
+    """Return a first guess of the parameters from plain standard deviations."""
     theta = PRIOR_MEAN.copy()
     if len(standstill.time_s) > 20:
         steps = np.concatenate([np.diff(standstill.north_mps), np.diff(standstill.east_mps)])
@@ -246,9 +247,10 @@ def error_posterior(
 
 
 def _target_of(differences: Differences, standstill: StandstillVelocities) -> _Target:
-    """Target of the noise: with the terms told apart, at the end, where they differ along the taxi.
+    """Return the target of the noise parameters.
 
-    Directions then disagree by what a crosswind does; without these terms that would be taken for errors of the INS.
+    Where the terms told apart differ along the taxi, they are its last regressors. Directions then disagree by what a
+    crosswind does; without these terms that would be taken for errors of the INS.
     """
     apart = differences.apart
     if all(float(np.ptp(one.values)) * one.prior_sigma < NOTICED_DEG for one in apart):
@@ -258,7 +260,9 @@ def _target_of(differences: Differences, standstill: StandstillVelocities) -> _T
 
 
 def goes_there_and_back(direction_deg: FloatArray) -> bool:
-    """Whether directions of motion leave no wide gap: what turns with the aircraft then shows by itself.
+    """Tell whether directions of motion leave no wide gap.
+
+    An error that turns with the aircraft then shows by itself.
 
     Examples
     --------
@@ -270,7 +274,7 @@ def goes_there_and_back(direction_deg: FloatArray) -> bool:
 
 
 def _left_in_error(differences: Differences, parameters: FloatArray) -> float:
-    """Standard deviation of what the terms told apart leave in the error, degrees.
+    """Return the standard deviation that the terms told apart leave in the error, degrees.
 
     Where a taxi does not go there and back they do not move the number, for they would extrapolate: so all of them that
     the weights of the samples let through is in it, and as the number is linear in the differences, that is what it
@@ -286,17 +290,18 @@ def _left_in_error(differences: Differences, parameters: FloatArray) -> float:
 
 
 def without_apart(differences: Differences) -> Differences:
-    """The same without the regressors that are told apart."""
+    """Return the differences without the regressors that are told apart."""
     return replace(differences, regressors=tuple(one for one in differences.regressors if not one.is_apart))
 
 
 def fixed_noise_estimate(
     differences: Differences, parameters: FloatArray, standstill: StandstillVelocities = NO_STANDSTILL
 ) -> tuple[FloatArray, FloatArray]:
-    """Coefficients and their standard deviations, shapes (c,), averaged over given draws of the noise parameters.
+    """Return coefficients and their standard deviations, shapes (c,), for given noise.
 
-    The error comes first, then the factors of the regressors. For parts of a run (segments, directions) and further
-    regressors (drift), with the noise as found from the whole of it.
+    They are averaged over given draws of the noise parameters. The error comes first, then the factors of the
+    regressors. It serves parts of a run (segments, directions) and further regressors (drift), with the noise as found
+    from the whole run.
     """
     target = _Target(standstill, differences)
     _log_density, coefficients, variance, _alone = target.evaluate(parameters, target.last)
@@ -307,7 +312,10 @@ def fixed_noise_estimate(
 
 
 def misfit(differences: Differences, parameters: FloatArray) -> float:
-    """Mean square of the whitened residuals: 1 where the differences are as noisy as the parameters say, shape ()."""
+    """Return the mean square of the whitened residuals, shape ().
+
+    It is 1 where the differences are as noisy as the parameters say.
+    """
     target = _Target(NO_STANDSTILL, differences)
     width = int(target.taxi[1].shape[1])
     room = noise.room_for(width)
@@ -320,7 +328,10 @@ def misfit(differences: Differences, parameters: FloatArray) -> float:
 
 
 def sample_weights(differences: Differences, parameters: FloatArray) -> FloatArray:
-    """Weight of every sample in the estimate of the error, shape (n,), sum 1, for given noise parameters."""
+    """Return the weight of every sample in the estimate of the error, shape (n,), sum 1.
+
+    The noise parameters are given.
+    """
     target = _Target(NO_STANDSTILL, differences)
     time_s, columns, from_north, from_east, is_start = target.taxi
     history = np.zeros((len(time_s), 1 + noise.STATES))

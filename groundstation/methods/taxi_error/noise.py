@@ -1,4 +1,6 @@
-"""Likelihood of the heading differences and the standstill velocities under one noise model, by a Kalman filter.
+"""Likelihood of heading differences and standstill velocities, by a Kalman filter.
+
+One noise model holds for both.
 
 The model, in words. At standstill each component of the GNSS velocity is white noise plus a first-order
 Gauss-Markov process. On taxi the same processes, turned across the track and divided by the speed, stand in the
@@ -50,10 +52,11 @@ _LOG_2PI = math.log(2.0 * math.pi)
 
 
 class Room(NamedTuple):
-    """What the loops work in, made once for many calls: loops that make no array are found again without numba.
+    """Working arrays of the loops, made once for many calls.
 
-    Of ``taxi_filter``: q, P, x, K, H, the sums of products, innovations, decays and F; of ``solve_normal_equations``:
-    the matrix beside its inverse and the right side; the others are what ``evaluate`` hands from one to the other.
+    So the loops make no array, and are found again without numba. The arrays of ``taxi_filter`` are q, P, x, K, H, the
+    sums of products, innovations, decays and F; those of ``solve_normal_equations`` are the matrix beside its inverse
+    and the right side; the others are what ``evaluate`` hands from one to the other.
     """
 
     q: FloatArray  # (STATES,)
@@ -75,7 +78,7 @@ class Room(NamedTuple):
 
 
 def room_for(width: int, checkpoints: int = 1) -> Room:
-    """Room for ``width`` columns, data and regressors."""
+    """Make working arrays for ``width`` columns, data and regressors."""
     rest = width - 1
     return Room(
         q=np.zeros(STATES),
@@ -108,9 +111,10 @@ def standstill_filter(
     tau: float,
     out: FloatArray,
 ) -> float:
-    """Log likelihood of standstill velocities; leaves mean north, mean east and variance of the last state in ``out``.
+    """Return the log likelihood of standstill velocities.
 
-    ``restart`` is the index at which the filter starts afresh (a second, unconnected stretch).
+    Mean north, mean east and variance of the last state are left in ``out``. ``restart`` is the index at which the
+    filter starts afresh (a second, unconnected stretch).
     """
     log_likelihood = 0.0
     p, g_north, g_east = variance, 0.0, 0.0
@@ -138,7 +142,7 @@ def standstill_filter(
 
 @inlined
 def _oscillator(theta: FloatArray, step_s: float, f: FloatArray) -> None:
-    """Transition of sway and sway rate over a step, exact, into ``f`` of shape (2, 2)."""
+    """Fill ``f``, shape (2, 2), with the exact transition of sway and sway rate over a step."""
     natural = 2.0 * math.pi * math.exp(theta[FREQUENCY])
     zeta = min(math.exp(theta[DAMPING]), DAMPING_MAX)
     decay, damped = zeta * natural, natural * math.sqrt(1.0 - zeta * zeta)
@@ -281,11 +285,12 @@ def generalised_weights(
     innovation: FloatArray,
     weights: FloatArray,
 ) -> None:
-    """Weight of every sample in the generalised least-squares mean, into ``weights`` of shape (n,), sum 1.
+    """Fill ``weights``, shape (n,), sum 1, with each sample's weight in the estimated mean.
 
-    The weights are the row sums of the inverse covariance: the gradient of half the quadratic form of a constant,
-    taken backwards through the filter whose ``history`` (S and K) is given. Letters as in ``taxi_filter``; r is the
-    gradient with respect to the state. ``innovation`` of shape (n,) is room to work in.
+    The mean is that by generalised least squares. The weights are the row sums of the inverse covariance: the gradient
+    of half the quadratic form of a constant, taken backwards through the filter whose ``history`` (S and K) is given.
+    Letters as in ``taxi_filter``; r is the gradient with respect to the state. ``innovation`` of shape (n,) is room to
+    work in.
     """
     count, motion = len(time_s), math.exp(theta[MOTION])
     H, x, r, keep, F = room.H, room.x[0], room.K, room.keep, room.F
@@ -332,10 +337,11 @@ def solve_normal_equations(
     inverse: FloatArray,
     room: Room,
 ) -> float:
-    """Solve the normal equations with normal priors; returns log determinant plus residual sum of squares.
+    """Solve the normal equations with normal priors.
 
-    ``information`` has shape (c, c), column 0 the data; ``mean`` (c - 1,) and ``inverse`` (c - 1, c - 1) are written.
-    A prior precision of 0 is a flat prior. Gauss-Jordan: the matrix is positive definite and small.
+    The result is log determinant plus residual sum of squares. ``information`` has shape (c, c), column 0 the data;
+    ``mean`` (c - 1,) and ``inverse`` (c - 1, c - 1) are written. A prior precision of 0 is a flat prior. Gauss-Jordan:
+    the matrix is positive definite and small.
     """
     width = len(prior_mean)
     work, right = room.matrix, room.right
@@ -385,7 +391,9 @@ def evaluate(
     alone: FloatArray,
     room: Room,
 ) -> None:
-    """Log likelihood, estimate and its variance for every row of ``thetas``, shape (k, 11).
+    """Fill log likelihood, estimate and its variance for every row of ``thetas``.
+
+    ``thetas`` has the shape (k, 11).
 
     Parameters
     ----------

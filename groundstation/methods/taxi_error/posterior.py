@@ -14,7 +14,9 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ErrorPosterior:
-    """Posterior of the heading error: a mixture of normals, one for each draw of the noise parameters.
+    """Posterior of the heading error: a mixture of normals.
+
+    There is one for each draw of the noise parameters.
 
     Parameters
     ----------
@@ -57,7 +59,7 @@ class ErrorPosterior:
 
     @property
     def apart_sigma_deg(self) -> float:
-        """Standard deviation of what the regressors told apart leave in the error."""
+        """Standard deviation that the regressors told apart leave in the error."""
         return float(np.sqrt(self.weight @ np.maximum(self.sigma_deg**2 - self.measured_sigma_deg**2, 0.0)))
 
     def typical(self) -> FloatArray:
@@ -91,7 +93,10 @@ class ErrorPosterior:
         )
 
     def growth_half_width_deg(self, probability: float = 0.95, extra_sigma_deg: float = 0.0) -> FloatArray:
-        """Half width of the interval after ``growth_samples``, shape (m,), noise and terms told apart as at the end."""
+        """Return the half width of the interval after ``growth_samples``, shape (m,).
+
+        The noise and the terms told apart are those at the end.
+        """
         extra_deg = np.hypot(self.apart_sigma_deg, extra_sigma_deg)
         upper = 0.5 * (1.0 + probability)
         columns = np.hypot(self.growth_sigma_deg, extra_deg).T
@@ -103,7 +108,10 @@ class ErrorPosterior:
         return even_draws(self.parameters, self.weight, count)
 
     def draws_of_ordinary_parts(self, count: int = 40) -> FloatArray:
-        """The same, parts of a run taken to have no more of their own than usual: what they say beyond that shows."""
+        """Return draws in which parts of a run have no more error of their own than usual.
+
+        So an unusual error of a part shows.
+        """
         draws = self.even_draws(count)
         draws[:, SPREAD] = PRIOR_MEAN[np.array(SPREAD)]
         return draws

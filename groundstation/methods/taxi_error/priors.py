@@ -1,4 +1,7 @@
-"""Priors of the parameters of the noise model: log-normal, broader than every family of simulated runs."""
+"""Priors of the parameters of the noise model.
+
+They are log-normal, and broader than every family of simulated runs.
+"""
 
 import numpy as np
 
@@ -23,4 +26,4 @@ PRIOR: dict[str, tuple[float, float]] = {
 }
 PRIOR_MEAN = np.log([PRIOR[name][0] for name in noise.PARAMETER_NAMES])
 PRIOR_SIGMA = np.array([PRIOR[name][1] for name in noise.PARAMETER_NAMES])
-SPREAD = (noise.SEGMENT, noise.WANDER)  # what parts of a run have of their own
+SPREAD = (noise.SEGMENT, noise.WANDER)  # errors that parts of a run have of their own

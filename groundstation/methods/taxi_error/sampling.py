@@ -17,16 +17,19 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]
 
-T_DEGREES = 6.0  # of the multivariate t that draws: heavier tails than any posterior met
-ROUNDS, LEAST_IN_ROUND = 20, 50  # of draws: each proposal learns from all rounds before it
+T_DEGREES = 6.0  # degrees of freedom of the multivariate t: heavier tails than any posterior met
+ROUNDS, LEAST_IN_ROUND = 20, 50  # rounds of draws: each proposal learns from all rounds before it
 MOST_TIMES, LEAST_EFFECTIVE_DRAWS = 3, 60.0  # so many times the draws asked for, until so many carry the weight
-FIRST_SHARE = 0.1  # of the first proposal's covariance in all that follow
+FIRST_SHARE = 0.1  # share of the first proposal's covariance in all later ones
 HEAVIEST_IN_FIT, HEAVIEST = 100.0, 0.5  # weight of one draw: times the mean; times the mean and the root of all draws
 TINIEST = 1e-12  # distance of a point of the sequence from 0 and 1
 
 
 def _gradient(log_density: LogDensity, theta: FloatArray, scale: FloatArray) -> tuple[float, FloatArray]:
-    """Minus the log density and its gradient by central differences, all points in one call."""
+    """Return minus the log density and its gradient by central differences.
+
+    All points are evaluated in one call.
+    """
     step = 1e-4 * scale
     size = len(theta)
     points = theta + np.vstack([np.zeros(size), np.diag(step), -np.diag(step)])
@@ -37,7 +40,9 @@ def _gradient(log_density: LogDensity, theta: FloatArray, scale: FloatArray) -> 
 def find_mode(
     log_density: LogDensity, start: FloatArray, scale: FloatArray, most_steps: int = 60
 ) -> tuple[FloatArray, bool]:
-    """Maximum of the log density by the BFGS method with step halving, in units of the prior sigmas.
+    """Maximise the log density by the BFGS method with step halving.
+
+    Steps are in units of the prior sigmas.
 
     Source: J. Nocedal, S. Wright, Numerical Optimization, second edition, 2006, algorithm 6.1. Letters: H inverse of
     the second derivatives, s step, y change of the gradient.
@@ -94,7 +99,10 @@ def _curvature(log_density: LogDensity, mode: FloatArray) -> FloatArray:
 
 
 def _covariance(hessian: FloatArray, scale: FloatArray) -> FloatArray:
-    """Inverse of the curvature; no direction wider than the prior nor narrower than a thousandth of it."""
+    """Return the inverse of the curvature.
+
+    No direction is wider than the prior nor narrower than a thousandth of it.
+    """
     scaled = hessian * np.outer(scale, scale)
     values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
     inverse = (vectors / np.clip(values, 1.0, 1e6)) @ vectors.T
@@ -121,7 +129,7 @@ class _Proposal:
         return np.asarray(self.center + spread[:, None] * (normal @ self.factor.T))
 
     def log_density(self, points: FloatArray) -> FloatArray:
-        """Up to a constant common to all proposals."""
+        """Return the log density up to a constant common to all proposals."""
         whitened = np.linalg.solve(self.factor, (points - self.center).T)
         size = len(self.center)
         tail = -0.5 * (T_DEGREES + size) * np.log1p(np.sum(whitened**2, axis=0) / T_DEGREES)
@@ -129,12 +137,17 @@ class _Proposal:
 
 
 def _root(covariance: FloatArray) -> FloatArray:
-    """Upper triangular factor: the last parameter depends on one normal number alone."""
+    """Return the upper triangular factor.
+
+    The last parameter then depends on one normal number alone.
+    """
     return np.asarray(np.linalg.cholesky(covariance[::-1, ::-1])[::-1, ::-1], dtype=np.float64)
 
 
 def _even_places(first: int, count: int, shift: FloatArray) -> FloatArray:
-    """Points ``first`` to ``first + count`` of an additive recurrence in the unit cube, shape (count, d).
+    """Return points of an additive recurrence in the unit cube, shape (count, d).
+
+    They are points ``first`` to ``first + count``.
 
     Source: M. Roberts, The unreasonable effectiveness of quasirandom sequences, 2018 (the generalised golden ratio).
     """
@@ -146,7 +159,7 @@ def _even_places(first: int, count: int, shift: FloatArray) -> FloatArray:
 
 
 def _weights(log_weight: FloatArray) -> FloatArray:
-    """Weights of sum 1, none so large that one draw makes the answer.
+    """Return weights of sum 1, none so large that one draw makes the answer.
 
     Source: E. Ionides, Truncated importance sampling, Journal of Computational and Graphical Statistics 17 (2008).
     """
@@ -156,7 +169,10 @@ def _weights(log_weight: FloatArray) -> FloatArray:
 
 
 def _next_proposal(first: _Proposal, points: FloatArray, weight: FloatArray) -> _Proposal:
-    """A proposal fitted to weighted draws, with a share of the first one, which is never too narrow."""
+    """Fit a proposal to weighted draws, with a share of the first one.
+
+    The first one is never too narrow.
+    """
     fitted = np.minimum(weight, HEAVIEST_IN_FIT / len(weight))
     fitted = fitted / fitted.sum()
     center = fitted @ points

@@ -4,7 +4,10 @@ from groundstation.results.arrays.typed import Arrays, Counts, Floats
 
 
 class AcceptanceGrowth(Arrays, figure="acceptance_growth", digits={"hours": 4, "*_nmi": 4}):
-    """Errors of all flights by hours of navigation, with the order statistic that bounds 95 % of them."""
+    """Errors of all flights by hours of navigation, with 50 % and 95 % bounds and 2 dRMS.
+
+    The 95 % bound is an order statistic.
+    """
 
     hours: Floats
     flights: Counts

@@ -1,4 +1,7 @@
-"""Arrays of navigation between vehicles: a session, its plans, and steering; positions in metres of the session."""
+"""Arrays of navigation between vehicles: session, plans, steering.
+
+Positions are in metres of the session.
+"""
 
 from groundstation.results.arrays.typed import Arrays, Counts, Flags, Floats, Texts, column
 
@@ -88,7 +91,7 @@ class SessionPoints(Arrays, figure="session_points"):
 
 
 class SessionErrors(Arrays, figure="session_errors"):
-    """Worst computed 2 sigma_r and RMS error of all aircraft of a session over time, default algorithm."""
+    """Worst computed 2 sigma_r and RMS error of all aircraft over time, default algorithm."""
 
     time_s: Floats
     two_sigma_r_m: Floats
@@ -132,7 +135,7 @@ class ControlPoints(Arrays, figure="control_points"):
 
 
 class PlacementPoints(Arrays, figure="placement_points"):
-    """Where each design puts the points."""
+    """Places of the points in each design."""
 
     design: Texts
     label: Texts = column("name")

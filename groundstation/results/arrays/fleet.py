@@ -4,9 +4,10 @@ from groundstation.results.arrays.typed import Arrays, Counts, Flags, Floats, Te
 
 
 class FleetTrend(Arrays, figure="trend"):
-    """Control charts: a row per flight, quantity and aircraft with enough flights that have a time, in order of time.
+    """Control charts: a row per flight, quantity and aircraft, in order of time.
 
-    ``level`` is the median between change points, ``low`` and ``high`` are the control limits.
+    They hold aircraft with enough flights that have a time. ``level`` is the median between change points, ``low`` and
+    ``high`` are the control limits.
     """
 
     aircraft: Texts
@@ -47,7 +48,7 @@ class FleetChecks(Arrays, figure="calibration_checks"):
 
 
 class FleetInstallationFlights(Arrays, figure="installation_flights"):
-    """Flights of every installation: what the flights before each had taught, its answers, its residual."""
+    """Flights of every installation: knowledge from earlier flights, answers, residual."""
 
     place: Counts
     aircraft: Texts

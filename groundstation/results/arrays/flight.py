@@ -1,4 +1,7 @@
-"""Arrays of any flight: its course, phases and states, what the ledger counted; times are flight seconds."""
+"""Arrays of any flight: course, phases, states, counts of the ledger.
+
+Times are flight seconds.
+"""
 
 from groundstation.results.arrays.typed import Arrays, Counts, Floats, Texts
 
@@ -8,7 +11,7 @@ class Overview(
     figure="overview",
     digits={"latitude_deg": 7, "longitude_deg": 7, "altitude_m": 1, "pressure_altitude_m": 1, "*": 2},
 ):
-    """The flight thinned, for the map and profiles; what only some logs have is optional."""
+    """Thinned flight for the map and profiles; fields that only some logs have are optional."""
 
     time_s: Floats
     latitude_deg: Floats
@@ -44,7 +47,7 @@ class GnssLanes(Arrays, figure="gnss_lanes", digits={"start_s": 2, "end_s": 2}):
 
 
 class StateLanes(Arrays, figure="state_lanes", digits={"start_s": 2, "end_s": 2}):
-    """What the log says of flight mode, arming and ground contact, each a lane."""
+    """Flight mode, arming and ground contact as logged, a lane each."""
 
     lane: Texts
     start_s: Floats
@@ -64,7 +67,7 @@ class LedgerRows(
         "last_s": 2,
     },
 ):
-    """What was counted of each topic."""
+    """Counts of each topic."""
 
     topic: Texts
     rows: Counts

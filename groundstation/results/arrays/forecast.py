@@ -1,4 +1,7 @@
-"""Arrays of the forecast through GNSS outages; a column a method where methods are compared."""
+"""Arrays of the forecast through GNSS outages.
+
+Where methods are compared, each has a column.
+"""
 
 from groundstation.results.arrays.typed import Arrays, ByName, Counts, Floats, Part, column, family
 
@@ -40,7 +43,10 @@ class ForecastFan(Arrays, figure="forecast_fan", digits=_DIGITS):
 
 
 class ForecastClassic(Arrays, figure="forecast_classic", digits=_DIGITS):
-    """Error east of the whole rest of the flight from four starts, measured and forecast (the paper's figure 2)."""
+    """Error east of the rest of the flight from four starts, measured and forecast.
+
+    It is the paper's figure 2.
+    """
 
     start_s: Floats
     time_s: Floats

@@ -8,7 +8,7 @@ class HeadingSamples(
     figure="heading_samples",
     digits={"time_s": 3, "ground_speed_mps": 3, "heading_deg": 4, "track_deg": 4, "difference_deg": 4, "weight": 3},
 ):
-    """Every GNSS epoch from first motion to lift-off, used or not and why."""
+    """GNSS epochs from first motion to lift-off, with the reason why each is used or not."""
 
     time_s: Floats
     segment: Counts
@@ -23,7 +23,7 @@ class HeadingSamples(
 
 
 class HeadingLanes(Arrays, figure="heading_lanes", digits={"start_s": 3, "end_s": 3}):
-    """Runs of equal gate, from first motion on."""
+    """Runs of epochs with the same gate, from first motion on."""
 
     start_s: Floats
     end_s: Floats
@@ -31,7 +31,10 @@ class HeadingLanes(Arrays, figure="heading_lanes", digits={"start_s": 3, "end_s"
 
 
 class HeadingRunning(Arrays, figure="heading_running", digits={"time_s": 3}):
-    """The paper's running figures, and the honest half width held between the steps it was computed at."""
+    """Running figures of the paper, and the honest half width.
+
+    The half width is held between the steps it was computed at.
+    """
 
     time_s: Floats
     cycles: Counts

@@ -24,7 +24,7 @@ class StateSeries:
 
 
 class StatesOfChannel(Part):
-    """Estimated states of one channel with their sigmas, what was measured, and the smoothed errors."""
+    """Estimated states of one channel with sigmas, the measurements, and the smoothed errors."""
 
     measured_position_m: Floats = column("measured_{}_position_m")
     measured_velocity_mps: Floats = column("measured_{}_velocity_mps")
@@ -45,7 +45,7 @@ class StatesOfChannel(Part):
     normalised_innovation: Floats
 
     def state(self, name: str) -> StateSeries:
-        """A state with its sigma; what was not measured or smoothed is NaN throughout."""
+        """Return a state with its sigma; NaN throughout where it was not measured or smoothed."""
         unknown = np.full(len(self.position_m), np.nan)
         measured = {"position": self.measured_position_m, "velocity": self.measured_velocity_mps}
         smoothed = {"position": self.smoothed_position_m, "velocity": self.smoothed_velocity_mps}
@@ -101,7 +101,10 @@ class InertialObservability(Arrays, figure="inertial_observability", digits=_TIM
 
 
 class InertialTrack(Arrays, figure="inertial_track", digits={**_TIME, "*_deg": 7}):
-    """Track of the INS and of GNSS; where the filter ran, of the INS minus its estimated and its smoothed error."""
+    """Tracks of the INS, of GNSS, and of the INS minus its estimated and its smoothed error.
+
+    The last two are known where the filter ran.
+    """
 
     time_s: Floats
     ins_latitude_deg: Floats

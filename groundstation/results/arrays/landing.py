@@ -92,7 +92,7 @@ class RangesPath(Arrays, figure="landing_ranges_path", digits=_THREE):
 
 
 class RangesSpace(Arrays, figure="landing_ranges_space", digits=_THREE):
-    """Where the aircraft and the points of a landing by ranges are."""
+    """Positions of the aircraft and of the points in a landing by ranges."""
 
     time_s: Floats
     label: Texts = column("name")

@@ -1,4 +1,7 @@
-"""Arrays of the magnetic deviation; headings and deviations in degrees, fields in nanotesla."""
+"""Arrays of the magnetic deviation.
+
+Headings and deviations are in degrees, fields in nanotesla.
+"""
 
 from groundstation.results.arrays.typed import Arrays, ByName, Counts, Flags, Floats, Part, Texts, family
 from groundstation.results.magnetic import MethodName

@@ -8,7 +8,10 @@ _PLACE = {"place_north_m": 2, "place_east_m": 2}
 class ReferenceErrors(
     Arrays, figure="reference_errors", digits={"time_s": 3, "*_error_m": 4, "*_error_mps": 4, "*_error_deg": 4}
 ):
-    """Errors of every subject over time with the sigmas that it and the reference claim together."""
+    """Errors of every subject over time, with the sigmas that it and the reference claim.
+
+    The two claims are taken together.
+    """
 
     subject: Texts
     time_s: Floats
@@ -39,7 +42,10 @@ class ReferenceTrack(Arrays, figure="reference_track", digits={"time_s": 3, **_P
 
 
 class ReferenceChecks(Arrays, figure="reference_checks", digits={"z": 4}):
-    """Samples of every claim, as many as are independent: error over sigma, and whether the claim holds."""
+    """Samples of every claim, as many as are independent: error over sigma, and the outcome.
+
+    The outcome says whether the claim holds.
+    """
 
     subject: Texts
     quantity: Texts

@@ -1,4 +1,7 @@
-"""Typed arrays: a class per figure whose fields are its columns, so that the type checker finds a renamed one."""
+"""Typed arrays: one class per figure, whose fields are its columns.
+
+So the type checker finds a renamed column.
+"""
 
 import re
 import typing
@@ -34,18 +37,24 @@ P = TypeVar("P")
 
 
 def column(name: str) -> Any:
-    """Field whose column has another name; ``{}`` in the name of a :class:`Part`'s stands for that of the part."""
+    """Declare a field whose column has another name.
+
+    ``{}`` in a name of a :class:`Part` stands for the name of the part.
+    """
     return field(metadata={"name": name})
 
 
 def family(name: str) -> Any:
-    """Field of columns :data:`ByName`; ``{}`` in the name stands for what they differ in."""
+    """Declare a field of columns :data:`ByName`.
+
+    ``{}`` in the name stands for the part in which they differ.
+    """
     return field(metadata={"name": name})
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(column, family, field))
 class Part:
-    """Columns that a figure has several times: of the channel north and of the channel east.
+    """Columns that a figure has several times, as for the channels north and east.
 
     The field of a figure that holds one gives it its name: ``north`` for ``north_tilt_arcsec``.
     """
@@ -56,7 +65,9 @@ class Part:
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(column, family, field))
 class Arrays(FigureData):
-    """Arrays of one figure, each a field; a field that may be None is a column that the figure may lack.
+    """Arrays of one figure, each a field.
+
+    A field that may be None is a column that the figure may lack.
 
     Parameters
     ----------
@@ -93,7 +104,7 @@ class Arrays(FigureData):
 
     @classmethod
     def of(cls, figure: FigureData) -> Self:
-        """Typed columns of a figure as it was saved; columns that it does not know are left out.
+        """Read the typed columns of a saved figure; columns that it does not know are left out.
 
         Raises
         ------
@@ -114,17 +125,17 @@ class Arrays(FigureData):
         return made
 
     def of_one(self, *of: str) -> Self:
-        """The same arrays under the name of one of several figures of a kind."""
+        """Return the same arrays under the name of one of several figures of a kind."""
         made = self._each(lambda values: values)
         vars(made)["name"] = self.figure.format(*of)
         return made
 
     def where(self, chosen: Any) -> Self:
-        """The same figure with some of its rows: a mask, positions or a slice."""
+        """Return the figure with some of its rows: a mask, positions or a slice."""
         return self._each(lambda values: values[chosen])
 
     def with_breaks(self, after: Any, **filled: Any) -> Self:
-        """The same figure with a row inserted behind each position in ``after``.
+        """Return the figure with a row inserted behind each position in ``after``.
 
         It has no values (NaN, False, 0, no text) but for the columns in ``filled``.
         """
@@ -152,7 +163,7 @@ def found_in(figures: typing.Iterable[FigureData], kind: type[T]) -> T | None:
 
 
 class MissingColumnError(GroundstationError):
-    """A figure as it was saved lacks a column, which holds numbers, flags or text by its ``kind``."""
+    """Error: a saved figure lacks a column, which holds numbers, flags or text by ``kind``."""
 
     def __init__(self, figure: str, column: str, kind: type[np.generic]) -> None:
         super().__init__(f"arrays/{figure}.parquet", f"no column {column}", next_step="run the log again")
@@ -160,7 +171,10 @@ class MissingColumnError(GroundstationError):
 
 
 def joined(parts: typing.Sequence[P]) -> P:
-    """Figures of one type as one, their rows one behind the other; a column that one of them lacks is left out."""
+    """Join figures of one type, their rows one behind the other.
+
+    A column that one of them lacks is left out.
+    """
     first = parts[0]
     values = {
         name: _joined([getattr(one, name) for one in parts])
@@ -182,7 +196,7 @@ def _values(one: Any) -> dict[str, Any]:
 
 
 def _changed(value: Any, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Any:
-    """The arrays of a field, each changed."""
+    """Change the arrays of a field, each by the same function."""
     if value is None:
         return None
     if isinstance(value, Mapping):
@@ -207,7 +221,7 @@ def _make_typed(one: Any) -> None:
 
 @dataclass(frozen=True)
 class _Field:
-    """A field of a figure or part: name, that of its columns, what it holds, and whether it may be None."""
+    """Field of a figure or part: name, name of its columns, type, and whether it may be None."""
 
     name: str
     pattern: str
@@ -242,7 +256,7 @@ def _named(one: Any, of: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _made(kind: type, figure: FigureData, of: str, taken: set[str]) -> Any:
-    """Figure or part from columns by their names; ``taken`` gathers these."""
+    """Make a figure or part from columns by their names; ``taken`` gathers these."""
     found: dict[str, Any] = {}
     families = []
     for part in _fields(kind):
@@ -268,7 +282,7 @@ def _made(kind: type, figure: FigureData, of: str, taken: set[str]) -> Any:
 
 
 def _empty(kind: type) -> Any:
-    """A figure or part whose columns have no rows; those that it may lack are left out."""
+    """Make a figure or part whose columns have no rows; optional columns are left out."""
     columns: dict[str, Any] = {}
     for part in _fields(kind):
         if part.is_optional:
