@@ -1,4 +1,7 @@
-"""An acceptance as chapters: limits, INS, flights, configuration, signatures; in the order of its standard's layout."""
+"""Chapters of an acceptance, in the order that its standard lays down.
+
+Limits, INS, flights, configuration, signatures.
+"""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What could not be assessed: subjects and reasons in plain words."""
+"""Subjects that could not be assessed, and the reasons in plain words."""
 
 from groundstation.chapters.generic import titled
 from groundstation.chapters.parts import Note, Section
@@ -23,7 +23,10 @@ SUBJECTS = {
 
 
 def reason_of(results: FlightResults, analysis: str) -> str:
-    """Why an analysis could not be carried out, in plain words; empty where nothing is said about it."""
+    """Return why an analysis could not be carried out, in plain words.
+
+    Empty where the results give no reason.
+    """
     reasons = results.reasons(analysis)
     return explained(analysis, reasons[0]) if reasons else ""
 

@@ -1,4 +1,4 @@
-"""Which chapter tells which answer, in the order of the report."""
+"""Chapters by the answers they present, in the order of the report."""
 
 from collections.abc import Iterable
 
@@ -57,7 +57,9 @@ def answer_chapters(results: FlightResults) -> tuple[Section, ...]:
 
 
 def chapters_of(results: FlightResults) -> tuple[Section, ...]:
-    """The chapters on the answers of a flight, a session or a plan: their own, then a generic one for every other.
+    """Return the chapters on the answers of a flight, a session or a plan.
+
+    First those written for an answer, then a generic one for each other answer.
 
     A chapter of a flight without its answer says why there is none.
     """
@@ -76,12 +78,12 @@ def _generic(results: FlightResults) -> tuple[Section | None, ...]:
 
 
 def chapter_of(results: FlightResults, answer: Answer) -> Section:
-    """The chapter that tells an answer: its own, else the generic one."""
+    """Return the chapter on an answer: its own, else the generic one."""
     own = (one.build(results) for one in (*FLIGHT_CHAPTERS, *SESSION_CHAPTERS) if isinstance(answer, one.answers))
     return next((section for section in own if section is not None), None) or generic(results, answer)
 
 
 def without_chapter(results: FlightResults) -> tuple[Answer, ...]:
-    """The answers that no chapter of its own tells."""
+    """Return the answers that have no chapter of their own."""
     told = tuple(kind for chapter in (*FLIGHT_CHAPTERS, *SESSION_CHAPTERS, *PLAN_CHAPTERS) for kind in chapter.answers)
     return tuple(answer for answer in results.answers.values() if not isinstance(answer, told))

@@ -1,4 +1,4 @@
-"""A chapter with the answers it tells."""
+"""Chapter with the types of the answers it presents."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -9,12 +9,15 @@ from groundstation.results.flight import FlightResults
 
 
 class Chapter(NamedTuple):
-    """A chapter of its own: the answers it tells, and what builds it; None where it has nothing to say."""
+    """Chapter written for certain answers: their types, and the function that builds it.
+
+    ``build`` returns None where there is nothing to say.
+    """
 
     answers: tuple[type[Answer], ...]
     build: Callable[[FlightResults], Section | None]
 
     @property
     def name(self) -> str:
-        """The analysis whose answer it tells first."""
+        """Name of the analysis whose answer it presents first."""
         return self.answers[0].analysis

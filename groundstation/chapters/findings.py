@@ -1,4 +1,7 @@
-"""Chapter: what a user must know about the flight, most severe first, and what could not be assessed."""
+"""Chapter on findings: what a user must know about the flight, most severe first.
+
+And what could not be assessed.
+"""
 
 from collections.abc import Sequence
 
@@ -18,7 +21,9 @@ HEADS = (Head("Severity"), Head("Finding"), Head("Where"), Head("Count", True))
 
 
 def findings(results: FlightResults) -> Section:
-    """The chapter: warnings and failures, remarks in the appendix; no findings is an answer too.
+    """Return the chapter on findings: warnings and failures, remarks in the appendix.
+
+    A flight without findings has the chapter too, which then says so.
 
     What the front tells is left out: verdicts, and what could not be assessed.
     """
@@ -32,7 +37,7 @@ def findings(results: FlightResults) -> Section:
 
 
 def _one_of_each(remarks: Sequence[Finding]) -> list[Finding]:
-    """The first remark of every kind, with the topics and the sum of the counts of all of that kind."""
+    """Return the first remark of every kind, with all topics and the summed count of the kind."""
     kinds: dict[str, list[Finding]] = {}
     for remark in remarks:
         kinds.setdefault(remark.code, []).append(remark)

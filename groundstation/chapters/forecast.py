@@ -1,4 +1,7 @@
-"""Chapter: the forecast (system 2): how good it is by method and horizon, and whether its sigma is honest."""
+"""Chapter on the forecast (system 2).
+
+How good it is by method and horizon, and whether its sigma is honest.
+"""
 
 from collections.abc import Iterable
 
@@ -31,7 +34,7 @@ LEAD = (
 
 
 def forecast(results: FlightResults) -> Section | None:
-    """The chapter; None when the flight was not assessed and no reason is known."""
+    """Return the chapter; None when the flight was not assessed and no reason is known."""
     answer, ins = results.answer(ForecastResult), results.answer(InertialResult)
     if answer is None:
         return without_answer(results, "forecast", TITLE, LEAD)

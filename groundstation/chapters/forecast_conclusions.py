@@ -1,4 +1,4 @@
-"""What the chapter on the forecast comes to, in sentences: skill, honesty of the sigma, windows."""
+"""Conclusions of the chapter on the forecast: skill, honesty of the sigma, windows."""
 
 from collections.abc import Mapping, Sequence
 
@@ -80,7 +80,7 @@ def _uncalibrated(answer: ForecastResult) -> str:
 
 
 def _misfit(shares: Mapping[float, float], every: Sequence[float]) -> str:
-    """Where the band is too narrow or too wide; empty where it fits."""
+    """Return at which horizons the band is too narrow or too wide; empty where it fits."""
     narrow = [lead for lead, share in shares.items() if share < HONEST[0]]
     wide = [lead for lead, share in shares.items() if share > HONEST[1]]
     told = [
@@ -100,7 +100,10 @@ def _too_few(answer: ForecastResult) -> set[float]:
 
 
 def _windows(answer: ForecastResult) -> Note | None:
-    """Whether the windows of Neusypin 2003 help on this flight: beside the last estimate of their own model."""
+    """Return whether the windows of Neusypin 2003 help on this flight.
+
+    They are compared with the last estimate of their own model.
+    """
     windows, last = rows_of(answer, "windows"), _separate_last(answer)
     shared = sorted(set(windows) & set(last))
     if not shared:
@@ -116,7 +119,10 @@ def _windows(answer: ForecastResult) -> Note | None:
 
 
 def _separate_last(answer: ForecastResult) -> dict[float, float]:
-    """RMS of the last estimate of two separate channels by horizon, whichever model the settings forecast by."""
+    """Return the RMS of the last estimate of two separate channels, by horizon.
+
+    The same whichever model the settings forecast by.
+    """
     found = {float(row.horizon_min): row.rms_m / (1.0 - row.gain) for row in answer.coupled if row.gain < 1.0}
     return found or {lead: row.rms_m for lead, row in rows_of(answer, "last_estimate").items()}
 

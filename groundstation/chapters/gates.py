@@ -1,4 +1,4 @@
-"""The gates of an answer and the settings it was found with, as every chapter tells them."""
+"""Gates and settings of an answer, in the same form in every chapter."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -81,7 +81,7 @@ def limit_text(gate: Gate) -> str:
 
 
 def setting_facts(settings: Mapping[str, float | str | bool], table: str = "") -> Facts | None:
-    """The settings an answer was found with, spelled as in a settings file; None where there are none.
+    """Return the settings behind an answer, spelled as in a settings file; None without any.
 
     Examples
     --------

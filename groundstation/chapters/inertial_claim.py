@@ -1,4 +1,7 @@
-"""What the INS errors and the forecast answer at a glance: how fast the INS drifts, and how far a forecast can go."""
+"""Claims of the INS errors and of the forecast.
+
+How fast the INS drifts, and how far a forecast can go.
+"""
 
 from groundstation.chapters.parts import Claim, Mark, Rank, Tone
 from groundstation.chapters.wording import is_number, number
@@ -41,14 +44,20 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
 
 
 def drift_of(answer: InertialResult) -> tuple[float | None, str]:
-    """How fast the position error grows, nmi/h, and by what measure: the median where an older version saved no fit."""
+    """Return how fast the position error grows, nmi/h, and the measure of it.
+
+    The measure is the median where an older version saved no fit.
+    """
     if answer.radial_error_rate_fit_nmiph is None:
         return answer.radial_error_rate_50_nmiph, "median"
     return answer.radial_error_rate_fit_nmiph, "time-position fit"
 
 
 def is_start_unknown(answer: InertialResult) -> bool:
-    """Whether nothing shows when navigation began; answers saved by older versions did not ask."""
+    """Tell whether the start of navigation is unknown.
+
+    False for answers of older versions, which did not look for it.
+    """
     return answer.navigation_start is not None and answer.navigation_start.time_s is None
 
 
@@ -60,7 +69,10 @@ def growth(answer: InertialResult) -> str:
 
 
 def forecast_claim(answer: ForecastResult, sentences: tuple[str, ...], tone: Tone) -> Claim | None:
-    """Error of the shipped forecast after an hour, or as near to it as the flight goes; None without an error."""
+    """Return the error of the shipped forecast after an hour; None without an error.
+
+    Of the longest horizon up to an hour, or of the shortest where all are longer.
+    """
     rows = [row for row in answer.skill if is_number(row.rms_m)]
     shipped = {row.horizon_min: row for row in rows if row.method == answer.default_method}
     if not shipped:

@@ -1,4 +1,7 @@
-"""Chapter: the heading error with what earlier flights of the same INS taught, beside that of the taxi alone."""
+"""Chapter on the heading error with what earlier flights of the same INS taught.
+
+Beside the heading error of the taxi alone.
+"""
 
 from collections.abc import Sequence
 
@@ -16,7 +19,7 @@ HEADS = (Head("Number"), Head("This taxi alone", True), Head("With earlier fligh
 
 
 def installation(results: FlightResults) -> Section | None:
-    """The chapter; None without an answer."""
+    """Return the chapter; None without an answer."""
     answer = results.answer(InstallationResult)
     if answer is None:
         return None
@@ -38,19 +41,19 @@ def installation(results: FlightResults) -> Section | None:
 
 
 def parts(answer: InstallationResult) -> tuple[Part, ...]:
-    """What a report shows of a learned answer."""
+    """Return the parts of a report on a learned answer."""
     if answer.why_not:
         return (nothing_learned(answer),)
     return kept((Note(sentence(answer)), _both(answer), _installed(answer.installed), _doubts(answer)))
 
 
 def not_learned(answer: InstallationResult) -> str:
-    """Why nothing was learned, in one line."""
+    """Return in one line why nothing was learned."""
     return f"Nothing learned of the installation: {typeset(answer.why_not)}"
 
 
 def nothing_learned(answer: InstallationResult) -> Note:
-    """That as a note."""
+    """Return why nothing was learned, as a note."""
     return Note(f"{not_learned(answer)}.", "unknown")
 
 
@@ -66,7 +69,10 @@ def what_to_enter(answer: InstallationResult, step_deg: float) -> str:
 
 
 def sources(answer: InstallationResult) -> str:
-    """What the interval is made of: "this taxi ± 6′, wind ± 4′, installation of serial S from 7 flights ± 3′"."""
+    """Return the parts of the interval in words.
+
+    For example "this taxi ± 6′, wind ± 4′, installation of serial S from 7 flights ± 3′".
+    """
     return _parts(answer.interval_parts, answer)
 
 

@@ -1,4 +1,7 @@
-"""The chapter on recorded approaches: how each was flown, where it touched down, and what shows accuracy."""
+"""Chapter on recorded approaches.
+
+How each was flown, where it touched down, and what shows accuracy.
+"""
 
 from groundstation.chapters.gates import limit_text, setting_facts, state_of
 from groundstation.chapters.parts import (
@@ -46,7 +49,7 @@ HOW = (
 
 
 def landing(results: FlightResults) -> Section | None:
-    """The chapter; None without approaches."""
+    """Return the chapter; None without approaches."""
     answer = results.answer(LandingResult)
     if answer is None:
         return None
@@ -86,7 +89,7 @@ def _claim(answer: LandingResult) -> Claim | None:
 
 
 def _why(one: Approach) -> str:
-    """From which gates the approach was stabilised, and the criteria that failed."""
+    """Return the verdict of each gate height, with the criteria that failed."""
     told = []
     for at in one.stabilised:
         failed = [gate.title for gate in at.gates if gate.state == "failed"]
@@ -176,7 +179,7 @@ def _approach(one: Approach) -> list[Part | None]:
 
 
 def _told(one: Approach) -> str:
-    """What a reader must know before the figures."""
+    """Return what a reader must know before the figures."""
     told = [_accuracy(error) for error in one.position_errors[:2]]
     if one.protection is not None:
         told.append(

@@ -1,4 +1,7 @@
-"""Chapters of a plan and the top of its report: what is planned, and what its chapters say above all."""
+"""Chapters of a plan, and the top of its report.
+
+What is planned, and the conclusions of its chapters.
+"""
 
 from groundstation.base.failures import attempt
 from groundstation.base.findings import worst
@@ -28,12 +31,15 @@ MARKS = {
 
 
 def is_plan(results: FlightResults) -> bool:
-    """Whether the results tell of a plan and not of something flown."""
+    """Tell whether the results are those of a plan, not of something flown."""
     return any(isinstance(answer, PlanAnswer) for answer in results.answers.values())
 
 
 def plan_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -> Front:
-    """The top of a plan's report: headline of its first chapter, and what every chapter has above its parts."""
+    """Return the top of a plan's report.
+
+    The headline of its first chapter, and what every chapter has above its parts.
+    """
     built = (attempt("chapter", chapter.name, chapter.build, results) for chapter in PLAN_CHAPTERS)
     sections = [section for section in built if section is not None]
     above = [part for section in sections for part in section.above]

@@ -1,4 +1,7 @@
-"""Chapter: where the numbers come from. Time of run, host and versions stand in manifest.json alone."""
+"""Chapter on where the numbers come from.
+
+Time of run, host and versions stand in manifest.json alone.
+"""
 
 from groundstation.chapters.cooperative import is_session
 from groundstation.chapters.parts import Facts, Note, Part, Section
@@ -18,7 +21,7 @@ CHECKS = (
 
 
 def provenance(results: FlightResults) -> Section:
-    """The chapter."""
+    """Return the chapter."""
     flight_id = clean(results.flight_id)
     if is_plan(results):
         store = ("Scenario as given", "plan.toml", "the file that this plan was made from")

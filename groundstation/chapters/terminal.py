@@ -1,4 +1,4 @@
-"""Sections as plain text for a terminal: aligned columns, nothing that a terminal takes for a command."""
+"""Sections as plain text for a terminal: aligned columns, no control sequences."""
 
 from groundstation.base.text_columns import columns
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Mark, Note, Part, Section
@@ -40,7 +40,10 @@ def part_text(part: Part | None) -> str:
 
 
 def grid_text(grid: Grid) -> str:
-    """A table under its title; without rows nothing, without heads that have a title no line of heads."""
+    """Return a table under its title; empty without rows.
+
+    No line of heads where no head has a title.
+    """
     if not grid.rows:
         return ""
     heads = [[head.title for head in grid.heads]] if any(head.title for head in grid.heads) else []

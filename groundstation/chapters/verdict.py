@@ -1,4 +1,4 @@
-"""The claim of the heading correction: the verdict in a word, what to enter, why, and the figures it rests on."""
+"""Claim of the heading correction: the verdict, what to enter, why, and the figures."""
 
 import re
 from collections.abc import Mapping
@@ -48,7 +48,10 @@ def claim(heading: HeadingResult) -> Claim:
 
 
 def what_to_enter(heading: HeadingResult) -> str:
-    """The number to type with its sign and the digits of the entry step; never one where there is nothing to type."""
+    """Return the number to type, with its sign and the digits of the entry step.
+
+    Words instead of a number where nothing is to be typed.
+    """
     if heading.verdict == "advisory":
         return f"Good to {half_width(heading.confidence95_deg)} only: taxi the other way, or state the wind"
     if heading.verdict != "accept":
@@ -60,7 +63,7 @@ def what_to_enter(heading: HeadingResult) -> str:
 
 
 def reasons(heading: HeadingResult) -> tuple[str, ...]:
-    """Why the verdict is what it is, what failed beside it, and the error in words."""
+    """Return why the verdict is what it is, failed side checks, and the error in words."""
     why = typeset(
         re.split(r": enter |\. Not to be entered|\. To be entered", heading.verdict_reason)[0]
     )  # told by the headline
@@ -74,7 +77,10 @@ def half_width(ends: tuple[float, float]) -> str:
 
 
 def steady_terms(heading: HeadingResult) -> tuple[str, ...]:
-    """What of the interval this taxi, the wind and the installation make, and what it is of; none where not known."""
+    """Return the shares of this taxi, the wind and the installation in the interval.
+
+    And whose error it is: the airframe's or the platform's. Empty where the steady sideslip is not known.
+    """
     if not is_number(heading.steady_sigma_deg):
         return ()
     power = UNEVEN_POWER if heading.settings.get("aircraft.taxi_power") == "uneven" else SAME_EVERYWHERE
@@ -99,7 +105,7 @@ def _parts(heading: HeadingResult) -> str:
 
 
 def _typed(heading: HeadingResult) -> str:
-    """Which of the two numbers is typed, and the other one with its own half width."""
+    """Return which of the two numbers is typed, and the other with its own half width."""
     ends = heading.platform_confidence95_deg
     if ends is None or not all(map(is_number, ends)):
         return ""

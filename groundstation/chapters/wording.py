@@ -1,4 +1,4 @@
-"""Numbers and marks as a reader meets them: true minus signs, units, an em dash for what is absent."""
+"""Numbers and marks in text: true minus signs, units, an em dash for what is absent."""
 
 import math
 import re
@@ -25,7 +25,7 @@ def clean(text: str) -> str:
 
 
 def is_number(value: Any) -> TypeGuard[float]:
-    """Whether a JSON value is a finite number (a bool is none)."""
+    """Tell whether a JSON value is a finite number (a bool is none)."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
@@ -49,7 +49,7 @@ def number(value: Any, places: int, unit: str = "", signed: bool = False) -> str
 
 
 def percent(share: Any, places: int = 0) -> str:
-    """A share as per cent.
+    """Return a share in per cent.
 
     Examples
     --------
@@ -60,12 +60,14 @@ def percent(share: Any, places: int = 0) -> str:
 
 
 def significant(value: Any, digits: int = 3) -> str:
-    """A number of unknown kind with so many significant digits, plain notation where that is readable.
+    """Return a number of unknown kind with so many significant digits.
+
+    Plain notation where that is readable.
 
     Examples
     --------
     >>> significant(0.0123456), significant(12345.6), significant(20.0), significant(-3), significant(1.2e-9)
-    ('0.0123', '12\u202f346', '20', '−3', '1.2e−9')
+    ('0.0123', '12 346', '20', '−3', '1.2e−9')
     """
     if not is_number(value):
         return ABSENT

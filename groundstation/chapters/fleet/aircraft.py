@@ -96,7 +96,7 @@ def unaided_figures(fleet: FleetResults, quantity: str) -> dict[str, Any]:
 
 
 def median_rate(fleet: FleetResults) -> tuple[float | None, int]:
-    """Median over the unaided flights of their rate, nautical miles per hour, and how many these are."""
+    """Return the median rate of the unaided flights, nmi/h, and the number of these flights."""
     rate = fleet.flights[RATE][fleet.flights["ins_kind"] == "unaided"]
     rate = rate[np.isfinite(rate)]
     return (float(np.median(rate)), len(rate)) if len(rate) else (None, 0)

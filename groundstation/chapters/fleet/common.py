@@ -1,4 +1,7 @@
-"""What the chapters of the fleet report share: words for quantities, aircraft, times and counts."""
+"""Words that the chapters of the fleet report share.
+
+For quantities, aircraft, times and counts.
+"""
 
 import math
 from collections.abc import Mapping
@@ -33,12 +36,14 @@ def figure_of(quantity: str, value: float | None) -> str:
 
 
 def bounded(value: float | None, places: int, unit: str = "", *, signed: bool = False) -> str:
-    """A number as it is written, or that it is beyond all reason: digits without end would burst a column.
+    """Return a number as text, or "> 1 000 000" for one beyond reason.
+
+    Digits without end would burst a column.
 
     Examples
     --------
     >>> bounded(0.456, 2, "m"), bounded(-1e15, 2, "°"), bounded(None, 2)
-    ('0.46\u202fm', '< −1\u202f000\u202f000°', '—')
+    ('0.46 m', '< −1 000 000°', '—')
     """
     if not is_number(value) or abs(value) <= BEYOND_REASON:
         return number(value, places, unit, signed=signed)
@@ -51,7 +56,7 @@ def span_of(bounds: tuple[float, float] | None, places: int, unit: str) -> str:
 
 
 def aircraft_name(name: str, most: int = 40) -> str:
-    """The name of an aircraft, shortened where it is very long, or that the log has none."""
+    """Return the name of an aircraft, shortened where very long; "not named" without one."""
     name = clean(name) or NOT_NAMED
     return name if len(name) <= most else name[: most - 1] + "…"
 

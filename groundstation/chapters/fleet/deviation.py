@@ -1,4 +1,4 @@
-"""Chapter: the magnetic deviation that flights found, those of one aircraft beside each other."""
+"""Chapter on the magnetic deviation found in flights, by aircraft."""
 
 from groundstation.chapters.fleet.common import aircraft_name, bounded
 from groundstation.chapters.magnetic import TONES

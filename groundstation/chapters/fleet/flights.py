@@ -32,7 +32,10 @@ LINKED = (("recording", "rrd"), ("mcap", "mcap"))
 
 @dataclass(frozen=True)
 class FlightLine:
-    """A flight in the table: its cells but the last, remarks, links (text, address relative to the fleet's page)."""
+    """Flight in the table: its cells but the last, remarks and links.
+
+    A link is a text and an address relative to the fleet's page.
+    """
 
     report: str
     cells: Sequence[Cell]
@@ -41,13 +44,16 @@ class FlightLine:
 
 
 def lines(fleet: FleetResults) -> list[FlightLine]:
-    """Flights in the order of the fleet: every one, or of more than :data:`MOST_LINES` those of note, then the last."""
+    """Return the flights in the order of the fleet, at most :data:`MOST_LINES`.
+
+    Of more flights: those with remarks, then the latest.
+    """
     noted = remarks_of(fleet)
     return _lines(fleet, _shown(fleet, noted), noted)
 
 
 def by_number(fleet: FleetResults, rows: NDArray[np.intp], numbers: NDArray[np.int64]) -> Section:
-    """The chapter as a recording has it: some flights with the numbers by which they stand on its timeline."""
+    """Return the chapter for a recording: some flights with their numbers on its timeline."""
     shown = _lines(fleet, rows, remarks_of(fleet))
     cells = [
         (line.cells[0], str(place), *line.cells[1:], _joined(line.remarks))
@@ -66,7 +72,7 @@ def _lines(fleet: FleetResults, rows: NDArray[np.intp], noted: Mapping[str, Sequ
 
 
 def caption_of(fleet: FleetResults) -> str:
-    """What stands above the table: what its columns mean, and which flights are not in it."""
+    """Return the caption of the table: the meaning of its columns, and which flights it omits."""
     if len(fleet) <= MOST_LINES:
         return CAPTION
     some = (
@@ -104,7 +110,7 @@ def verdict_mark(verdict: str) -> Mark:
 
 
 def remarks_of(fleet: FleetResults) -> dict[str, list[Mark]]:
-    """What is out of the ordinary about flights, by flight id, the most severe first."""
+    """Return what is out of the ordinary about flights, by flight id, most severe first."""
     found: dict[str, list[Mark]] = {}
 
     def note(flight_id: Any, tone: Tone, text: str) -> None:

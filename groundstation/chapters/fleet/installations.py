@@ -1,4 +1,7 @@
-"""Chapter: how each INS sits in its aircraft and how the aircraft crabs, as the flights teach it one by one."""
+"""Chapter on how each INS sits in its aircraft and how the aircraft crabs.
+
+Learned from the flights one by one.
+"""
 
 from collections.abc import Sequence
 

@@ -36,12 +36,15 @@ def build(fleet: FleetResults) -> Section | None:
 
 
 def drawn(fleet: FleetResults) -> list[FleetSkill]:
-    """The rows of methods at horizons at which they err."""
+    """Return the rows with an error above zero, by method and horizon."""
     return [row for row in fleet.skill if row.rms_m > 0.0]
 
 
 def shipped_method(fleet: FleetResults) -> str:
-    """The method that most flights ship, the first in the order of the methods where several do; empty without any."""
+    """Return the method that most flights ship; empty without any.
+
+    The first in the order of the methods where several are equal.
+    """
     names, counts = np.unique(fleet.skill_flights.method, return_counts=True)
     return str(names[int(np.argmax(counts))]) if len(names) else ""
 

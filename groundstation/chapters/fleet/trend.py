@@ -65,7 +65,7 @@ def charted(fleet: FleetResults, quantity: str) -> list[str]:
 
 
 def changes_of(fleet: FleetResults, quantity: str, name: str) -> list[tuple[int, ChangePoint]]:
-    """Changes of level of a quantity of an aircraft, with the numbers they have in table and chart."""
+    """Return changes of level of a quantity of an aircraft, numbered as in table and chart."""
     numbered = enumerate(fleet.change_points, 1)
     return [(place, one) for place, one in numbered if (one.aircraft, one.quantity) == (name, quantity)]
 

@@ -1,4 +1,7 @@
-"""What the plots of several chapters share: labels, spans of time, roles of lanes, whether a column has values."""
+"""Parts that the plots of several chapters share.
+
+Labels, spans of time, roles of lanes, whether a column has values.
+"""
 
 from collections.abc import Iterable, Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""Plots of a comparison: what two flights have in common over each other."""
+"""Plots of a comparison: curves of two flights over each other."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -33,7 +33,10 @@ class HasRows(Protocol):
 
 @dataclass(frozen=True)
 class Side:
-    """One of two flights: its letter, A or B, its forecast method, and its start after that of A."""
+    """One of two flights: its letter, its forecast method, and its start.
+
+    The letter is A or B, the start is in seconds after that of A.
+    """
 
     letter: str
     flight: HasRows
@@ -42,18 +45,21 @@ class Side:
 
     @property
     def role(self) -> Role:
-        """Of its lines."""
+        """Role of its lines."""
         return "ins" if self.letter == "A" else "gnss"
 
     @property
     def emphasis(self) -> Emphasis:
-        """Of its lines: where both agree, A is seen behind B."""
+        """Emphasis of its lines: A is bold, so that it is seen behind B where both agree."""
         return "bold" if self.letter == "A" else "usual"
 
 
 @dataclass(frozen=True)
 class TimeLine:
-    """What is drawn of a flight over its time, with half of its 95 % band; None where there is no band."""
+    """Curve of a flight over its time, with half of its 95 % band.
+
+    The half is None where there is no band.
+    """
 
     time_s: Floats
     values: Floats | None
@@ -61,7 +67,7 @@ class TimeLine:
 
 
 class Overlay(Generic[T]):
-    """A line of both flights: its figure, what is read of it, its axis and title."""
+    """Curve that both flights have: its figure, its columns, its axis and title."""
 
     def __init__(self, kind: type[T], key: str, read: Callable[[T], TimeLine], axis: str, title: str) -> None:
         self.name, self.axis, self.title = f"{kind.figure}-{key}", axis, title
@@ -124,7 +130,10 @@ OVERLAYS: tuple[Overlay[Any], ...] = (
 
 
 def tracks(sides: Sequence[Side]) -> Plot | None:
-    """Tracks of both flights on one map, or each from its own origin where they are far from each other."""
+    """Return the tracks of both flights on one map.
+
+    Each from its own origin where they are far from each other.
+    """
     drawn = []
     for side in sides:
         data = side.flight.rows_of(Overview)

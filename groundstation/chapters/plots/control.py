@@ -1,4 +1,4 @@
-"""Plots of a planned session: ways from above, accuracy and geometry with time, laws of control."""
+"""Plots of a planned session: ways from above, accuracy and geometry with time, laws."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Plots of the flight at a glance: track map, altitude, speed, phases and the state of GNSS."""
+"""Plots of the flight at a glance: track map, altitude, speed, phases and state of GNSS."""
 
 from collections.abc import Sequence
 
@@ -213,7 +213,10 @@ _TWO: tuple[Role, Role] = ("ins", "gnss")
 
 
 def states(results: FlightResults) -> Plot | None:
-    """Flight modes, arming and ground contact as the log tells them, a row for each state; None when it tells none."""
+    """Return flight modes, arming and ground contact as logged, a row for each state.
+
+    None when the log has none of them.
+    """
     data = results.rows_of(StateLanes)
     if data is None:
         return None

@@ -63,7 +63,10 @@ def _last(values: Floats) -> float:
 
 
 def calibration(results: FlightResults) -> Plot | None:
-    """Shares inside the 50, 68 and 95 % bands by horizon, and NEES with its limits, of the shipped method."""
+    """Return shares inside the 50, 68 and 95 % bands, and NEES, by horizon.
+
+    Of the shipped method; NEES with its limits.
+    """
     answer = results.answer(ForecastResult)
     mine = [] if answer is None else [row for row in answer.calibration if row.method == answer.default_method]
     mine = sorted((row for row in mine if np.isfinite(row.horizon_min)), key=lambda row: row.horizon_min)
@@ -107,7 +110,10 @@ def _nees(rows: list[CalibrationRow]) -> Panel:
 
 
 def hindcast_map(results: FlightResults) -> Plot | None:
-    """Radial error by start and horizon, the shipped method beside the raw INS, on one scale of colour."""
+    """Return the radial error by start and horizon, shipped method beside raw INS.
+
+    Both on one scale of colour.
+    """
     data = results.rows_of(ForecastMap)
     if data is None:
         return None

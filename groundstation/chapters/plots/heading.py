@@ -1,4 +1,7 @@
-"""Plots of the taxi stage: difference over time, density, convergence, heading and track, estimates by segment."""
+"""Plots of the taxi stage.
+
+Difference over time, density, convergence, heading and track, estimates by segment.
+"""
 
 from typing import Any
 
@@ -44,7 +47,10 @@ LANE_MM, ROW_MM = 4.6, 5.2
 
 
 def taxi_windows(samples: HeadingSamples) -> Windows:
-    """Spans of flight time that the taxi plots show, one for each ground run that was used; of all where none was."""
+    """Return the spans of flight time that the taxi plots show, one for each ground run used.
+
+    Spans of all ground runs where none was used.
+    """
     time, used = samples.time_s, samples.is_used
     return windows(time[used] if used.any() else time)
 
@@ -160,7 +166,10 @@ def density(results: FlightResults) -> Plot | None:
 
 
 def taxi(results: FlightResults) -> Plot | None:
-    """Heading, track and speed during the taxi above the lanes that say which gate each epoch met."""
+    """Return heading, track and speed during the taxi, and lanes of the gates.
+
+    The lanes show which gate each epoch met.
+    """
     samples = results.rows_of(HeadingSamples)
     if samples is None:
         return None
@@ -226,7 +235,7 @@ def _lane_states(lanes: HeadingLanes | None, spans: Windows) -> tuple[str, ...]:
 
 
 def forest(results: FlightResults) -> Plot | None:
-    """Estimates by segment and by direction with their intervals, beside the one of the whole run."""
+    """Return estimates by segment and by direction with intervals, and that of the whole run."""
     answer = results.answer(HeadingResult)
     if answer is None or not answer.segments:
         return None
@@ -273,7 +282,10 @@ def _whole_run(answer: HeadingResult, row: int) -> list[AnyMark]:
 
 
 def spectrum(results: FlightResults) -> Plot | None:
-    """Spectral density of the residuals beside the noise model that the honest interval rests on."""
+    """Return the spectral density of the residuals and the noise model of the interval.
+
+    The honest interval rests on that model.
+    """
     data = results.rows_of(HeadingSpectrum)
     if data is None:
         return None

@@ -1,4 +1,7 @@
-"""Plots of the INS errors: each state with its band, innovations, observability, and the track before and after."""
+"""Plots of the INS errors: states with bands, innovations, observability, track.
+
+The track before and after correction.
+"""
 
 import numpy as np
 
@@ -120,7 +123,7 @@ def _range(one: StateSeries) -> tuple[float | None, float | None]:
 
 
 def outages(data: InertialStates) -> Spans:
-    """Spans of time in which the filter forecast."""
+    """Return the spans of time in which the filter forecast."""
     gone, time = data.is_forecast, data.time_s
     edges = np.flatnonzero(np.diff(np.concatenate([[0], gone.astype(np.int8), [0]])))
     start, end = time[edges[::2]], time[np.minimum(edges[1::2], len(time) - 1)]
@@ -182,7 +185,7 @@ def innovations(results: FlightResults) -> Plot | None:
 
 
 def observability(results: FlightResults) -> Plot | None:
-    """How well each state is seen as the flight goes on."""
+    """Return how well each state is observed as the flight goes on."""
     data = results.rows_of(InertialObservability)
     if data is None or not any(has_values(values) for values in data.north.states().values()):
         return None

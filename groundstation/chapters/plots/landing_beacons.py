@@ -1,4 +1,4 @@
-"""Plot of landing by locators: deviations along the approach with their bands, and the limits of the categories."""
+"""Plot of landing by locators: deviations with bands, limits of the categories."""
 
 import numpy as np
 

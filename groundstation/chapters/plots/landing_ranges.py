@@ -1,4 +1,7 @@
-"""Plots of landing by ranges: points and path, accuracy along it with the categories' limits, simulated errors."""
+"""Plots of landing by ranges: points and path, accuracy along it, simulated errors.
+
+The accuracy with the limits of the categories.
+"""
 
 import numpy as np
 
@@ -62,7 +65,10 @@ def _view(answer: RangeLanding, data: RangesSpace, across: Floats, *, has_names:
 
 
 def accuracy(results: FlightResults) -> Plot | None:
-    """Horizontal, lateral and vertical 95 % figures along the path, with the limits of the categories."""
+    """Return horizontal, lateral and vertical 95 % figures along the path.
+
+    With the limits of the categories.
+    """
     found = _data(results, RangesPath)
     if found is None:
         return None

@@ -1,4 +1,4 @@
-"""Plot of the chapter on latency: what is left between sensor and INS against the latency tried."""
+"""Plot of latency: what is left between sensor and INS against the latency tried."""
 
 import numpy as np
 

@@ -1,4 +1,7 @@
-"""Plots of the magnetic deviation: by heading, on the part held out, the figure flown, its branches, the modulus."""
+"""Plots of the magnetic deviation.
+
+By heading, on the part held out, the figure flown, its branches, the modulus.
+"""
 
 import numpy as np
 
@@ -71,7 +74,10 @@ def deviation(results: FlightResults) -> Plot | None:
 
 
 def held_out(results: FlightResults) -> Plot | None:
-    """Error of the magnetic heading where no fit has seen, before and after the recommended correction."""
+    """Return the error of the magnetic heading on samples that no fit used.
+
+    Before and after the recommended correction.
+    """
     answer, data = results.answer(MagneticResult), results.rows_of(MagneticSamples)
     if answer is None or data is None or not (mine := data.part == "held out").any():
         return None
@@ -195,7 +201,10 @@ def modulus(results: FlightResults) -> Plot | None:
 
 
 def ground_runs(results: FlightResults) -> Plot | None:
-    """Error by magnetic heading: every run with its bar, its epochs behind it, the curve where there is one."""
+    """Return the error by magnetic heading: a bar for every run, epochs, fitted curve.
+
+    Epochs lie behind the bars; no curve where none was fitted.
+    """
     answer = results.answer(GroundDeviation)
     used = [run for run in answer.used if run.error_deg is not None] if answer else []
     if not used:

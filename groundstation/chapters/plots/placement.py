@@ -17,7 +17,10 @@ TOP_SHARE = 90.0  # per cent of the map's values that keep their own colour
 
 
 def accuracy_map(results: FlightResults) -> Plot | None:
-    """Accuracy at the fixed point over places of the last point, with what is kept out and where the points stand."""
+    """Return accuracy at the fixed point over places of the last point.
+
+    With areas that are kept out and the places of the points.
+    """
     answer, data = results.answer(PlacementPlan), results.rows_of(PlacementMap)
     if answer is None or data is None:
         return None
@@ -66,7 +69,7 @@ def _keep_out(rings: PlacementKeepOut) -> Outlines:
 
 
 def _stand(points: PlacementPoints, answer: PlacementPlan) -> list[AnyMark]:
-    """The points of the recommended design, and where those that are placed were given."""
+    """Return the points of the recommended design, and where placed ones were given."""
     x, y = points.east_m / M_PER_KM, points.north_m / M_PER_KM
     given = (points.design == GIVEN) & points.is_placed
     marks: list[AnyMark] = [

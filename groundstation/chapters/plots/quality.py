@@ -1,4 +1,4 @@
-"""Plot of the chapter on data quality: where data are present and where they are missing, by topic."""
+"""Plot of data quality: where data are present and where they are missing, by topic."""
 
 import numpy as np
 

@@ -1,4 +1,7 @@
-"""Plots of the comparison with a reference: errors in the band claimed, plan view, claimed against seen."""
+"""Plots of the comparison with a reference.
+
+Errors in the band claimed, plan view, claimed against seen.
+"""
 
 from dataclasses import dataclass
 
@@ -28,7 +31,10 @@ def role_of(subject: str) -> Role:
 
 
 def errors(results: FlightResults, of: str) -> Plot | None:
-    """Errors of one subject and quantity over time, in the band of 95 % that it and the reference claim."""
+    """Return errors of one subject and quantity over time, in their claimed 95 % band.
+
+    The band that subject and reference claim together.
+    """
     subject, _, quantity = of.partition(" ")
     data = results.rows_of(ReferenceErrors)
     if data is None:

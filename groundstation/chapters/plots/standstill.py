@@ -1,4 +1,4 @@
-"""Plots of the standstill stage: errors of the velocity components, density of the mean speed."""
+"""Plots of the standstill stage: velocity errors, density of the mean speed."""
 
 import numpy as np
 
@@ -22,7 +22,10 @@ def _assessed(results: FlightResults) -> Standstill | None:
 
 
 def components(results: FlightResults) -> Plot | None:
-    """Velocity components at standstill over time and against each other (figure 2a of the paper)."""
+    """Return velocity components at standstill over time and against each other.
+
+    Figure 2a of the paper.
+    """
     data = results.rows_of(StandstillVelocity)
     if data is None:
         return None

@@ -1,4 +1,4 @@
-"""What the plots of the fleet report share: roles of aircraft, rows of names, axes of dates."""
+"""Parts that the plots of the fleet report share: roles, rows of names, axes of dates."""
 
 from collections.abc import Mapping, Sequence
 
@@ -17,7 +17,7 @@ HALF_A_DAY_S = 43_200.0
 
 
 def roles_of(fleet: FleetResults) -> dict[str, Role]:
-    """A role for each aircraft; one for all where there are more aircraft than roles of a series."""
+    """Return a role for each aircraft; one for all where aircraft outnumber the roles."""
     names = [name for name in fleet.aircraft if name]
     alike: tuple[Role, ...] = ("ins",)
     own = SERIES if len(names) <= len(SERIES) else alike * len(names)
@@ -31,7 +31,7 @@ def rows_shown(counts: Mapping[str, int], most: int = MOST_ROWS) -> list[str]:
 
 
 def left_out(shown: int, total: int, noun: str = "aircraft") -> str:
-    """The sentence of a caption about what a plot leaves out; empty where it leaves out nothing."""
+    """Return the sentence of a caption on aircraft left out of a plot; empty without any."""
     return "" if shown >= total else f" The {shown} of {number(total, 0)} {noun} with the most flights."
 
 

@@ -1,4 +1,7 @@
-"""Plots: density of the heading error of every flight, overlaid with the fitted normal (figure 3 of the paper)."""
+"""Plots of the density of the heading error of every flight.
+
+Overlaid with the fitted normal (figure 3 of the paper).
+"""
 
 import numpy as np
 from numpy.typing import NDArray
