@@ -3,10 +3,6 @@
 A name gives words and unit. A number or a text is a fact, a tuple of rows a grid, a dataclass facts under a title of
 their own. ``verdict`` with ``verdict_reason``, ``gates``, ``remarks`` and ``settings`` are presented as in every
 chapter.
-
-A name gives words and unit. A number or a text is a fact, a tuple of rows a grid, a dataclass facts under a title of
-their own. ``verdict`` with ``verdict_reason``, ``gates``, ``remarks`` and ``settings`` are told as every chapter tells
-them.
 """
 
 import inspect

@@ -2,9 +2,6 @@
 
 A chapter builds them from the answers, once. HTML, typst, Markdown and the terminal are renderers of them; they alone
 escape.
-
-A chapter builds them from the answers, once. HTML, typst, Markdown and the terminal are renderers of them; escaping
-happens there, for everything.
 """
 
 from collections.abc import Iterable, Sequence
@@ -76,9 +73,8 @@ class Grid(Part):
 class Facts(Part):
     """Pairs of a label and a value, each with an optional remark.
 
-    ``compact`` sets many short ones in columns.
-
-    ``settings_of`` names the table of a settings file that the pairs are keys and values of.
+    ``compact`` sets many short ones in columns. ``settings_of`` names the table of a settings file whose keys and
+    values the pairs are.
     """
 
     kind: ClassVar[str] = "facts"
