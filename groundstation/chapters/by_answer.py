@@ -59,9 +59,8 @@ def answer_chapters(results: FlightResults) -> tuple[Section, ...]:
 def chapters_of(results: FlightResults) -> tuple[Section, ...]:
     """Return the chapters on the answers of a flight, a session or a plan.
 
-    First those written for an answer, then a generic one for each other answer.
-
-    A chapter of a flight without its answer says why there is none.
+    First those written for an answer, then a generic one for each other answer. A chapter of a flight without its
+    answer says why there is none.
     """
     listed = PLAN_CHAPTERS if is_plan(results) else SESSION_CHAPTERS if is_session(results) else FLIGHT_CHAPTERS
     return tuple(section for section in (*_built(listed, results), *_generic(results)) if section is not None)

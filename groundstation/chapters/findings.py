@@ -23,9 +23,8 @@ HEADS = (Head("Severity"), Head("Finding"), Head("Where"), Head("Count", True))
 def findings(results: FlightResults) -> Section:
     """Return the chapter on findings: warnings and failures, remarks in the appendix.
 
-    A flight without findings has the chapter too, which then says so.
-
-    What the front tells is left out: verdicts, and what could not be assessed.
+    A flight without findings has the chapter too, which then says so. What the front tells is left out: verdicts, and
+    what could not be assessed.
     """
     found = [item for item in grouped(results.findings) if not item.code.endswith(TOLD_ABOVE)]
     grave = [item for item in found if item.severity != "info"]

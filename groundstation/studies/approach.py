@@ -1,8 +1,8 @@
-"""Monte Carlo behind the localizer as a reference: does the 95 % interval of the error of positions hold the truth?
+"""Monte Carlo study of the localizer as a reference for position errors.
 
-The family is that of docs/approaches.md, written down before it was run: finals on any course anywhere, INS errors of
-some hundred metres, positions in steps of 153 m, an ILS of category I within its tolerances. The other families each
-break one assumption.
+Does the 95 % interval of the error of positions hold the truth? The family is that of docs/approaches.md, written down
+before it was run: finals on any course anywhere, INS errors of some hundred metres, positions in steps of 153 m, an ILS
+of category I within its tolerances. The other families each break one assumption.
 """
 
 from collections.abc import Callable
@@ -36,7 +36,7 @@ ASSUMED = LandingSettings()
 
 @dataclass(frozen=True)
 class Family:
-    """A family of approaches: what it does to those of the plain one, and the settings they are judged with."""
+    """Family of approaches: its change to those of the plain family, and its settings."""
 
     name: str
     what: str
@@ -154,7 +154,10 @@ def drawn(rng: np.random.Generator) -> ApproachScenario:
 
 
 def site_of(scenario: ApproachScenario, rng: np.random.Generator) -> SiteData:
-    """What a site file says of the runway: bearing to 0.05 deg, threshold to 1 m, the nominal width."""
+    """Return the runway as a site file states it.
+
+    Bearing to 0.05 deg, threshold to 1 m, the nominal width.
+    """
     runway = scenario.runway
     north_m, east_m = rng.normal(0.0, 1.0, 2)
     told = Runway(

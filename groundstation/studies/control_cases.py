@@ -1,4 +1,4 @@
-"""The published figures of control and placement, each with the plan that stands for it.
+"""Published figures of control and placement, each with the plan for it.
 
 Source: O. N. Skrypnik, thesis on navigation between aircraft, 2010, chapters 5 (control) and 6.2 (placement).
 """
@@ -24,7 +24,10 @@ CORRELATED_S = (0.0, 1.0, 10.0)
 
 @dataclass(frozen=True)
 class Case:
-    """One published figure: of which plan, what is read off its answer, and what is written there; NaN: a direction."""
+    """One published figure: its plan, its value, and the function that reads ours.
+
+    A value of NaN: only a direction is published.
+    """
 
     name: str
     plan: str
@@ -59,7 +62,10 @@ def least_sigma_m(answer: ControlPlan, axis: str) -> float:
 
 
 def _ratio(answer: ControlPlan, name: str) -> float:
-    """A measure of geometry at the end under the law of the source's local criterion over that without control."""
+    """Return a measure of geometry at the end, under control over that without control.
+
+    Under the law of the source's local criterion, the determinant.
+    """
     laws = answer.law("determinant"), answer.law(UNCONTROLLED)
     return float(getattr(laws[0], name) / getattr(laws[1], name))
 
@@ -97,7 +103,10 @@ CASES: tuple[Case, ...] = (
 
 
 def placements() -> dict[str, SessionPlan]:
-    """The third point of an approach, for fixed points along the path and for correlated range errors, by name."""
+    """Return plans of an approach that place its third point, by name.
+
+    For fixed points along the path and for correlated range errors.
+    """
     base = scenario(THIRD)
     found = {}
     for before_m in FIXED_BEFORE_M:

@@ -1,4 +1,4 @@
-"""The published figures of navigation between aircraft, each with the session that stands for it."""
+"""Published figures of navigation between aircraft, each with the session for it."""
 
 from dataclasses import dataclass, fields
 from typing import Literal

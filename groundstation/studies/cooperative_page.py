@@ -38,7 +38,10 @@ def measured(case: Case, outcomes: Sequence[Outcome]) -> tuple[float, float]:
 
 
 def is_near(case: Case, value: float) -> bool | None:
-    """Whether a figure lies within a factor of two of the published one; None where none was published."""
+    """Tell whether a figure lies within a factor of two of the published one.
+
+    None where none was published.
+    """
     if np.isnan(case.low):
         return None
     return bool(case.low / FACTOR <= value <= case.high * FACTOR)

@@ -79,7 +79,9 @@ class Case:
 
 
 def study_cases(seed: int) -> tuple[Case, ...]:
-    """All cases of a study; their seeds grow from ``FIRST_SEED``, none of them used for tuning.
+    """Return all cases of a study; their seeds grow from ``FIRST_SEED``.
+
+    None of the seeds was used for tuning.
 
     Examples
     --------
@@ -163,7 +165,7 @@ def matched_noise(ins: InsClass, gnss: GnssNoise) -> InsNoise:
 
 
 def epochs_of(case: Case, batch: ErrorBatch, row: int) -> Epochs:
-    """What the filter is given of one simulated flight: INS minus GNSS at every epoch."""
+    """Return the filter's input of one simulated flight: INS minus GNSS at every epoch."""
     position = batch.position_error_m[row] - batch.gnss_position_error_m[row]
     velocity = batch.velocity_error_mps[row] - batch.gnss_velocity_error_mps[row]
     if not case.uses_velocity:
@@ -176,7 +178,10 @@ def epochs_of(case: Case, batch: ErrorBatch, row: int) -> Epochs:
 
 
 def model_of(case: Case, batch: ErrorBatch, row: int) -> ChannelModel:
-    """The channel model of a flight: the truth's own gravity and radius, or those of its mean place."""
+    """Return the channel model of a flight.
+
+    With the truth's own gravity and radius, or those of the flight's mean place.
+    """
     if case.family.truth == "channel":
         return ChannelModel(MPS2_PER_G, RADIUS_M, case.noise.beta_per_s)
     place: tuple[FloatArray, FloatArray] = (batch.latitude_deg[row], batch.altitude_m[row])

@@ -1,4 +1,7 @@
-"""Tables of the forecast study: RMS, ratios and findings with intervals over flights, held-out scores, honesty."""
+"""Tables of the forecast study.
+
+RMS, ratios and findings with intervals over flights, held-out scores, honesty.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +36,9 @@ _ALL = SETS_OF_STARTS.index("all")
 
 @dataclass(frozen=True)
 class Resampled:
-    """Mean squares of one case over all flights, and over flights drawn again with replacement.
+    """Mean squares of one case over all flights, and over bootstrap draws of flights.
+
+    Flights are drawn with replacement.
 
     Parameters
     ----------
@@ -50,7 +55,10 @@ class Resampled:
 
     @classmethod
     def of(cls, outcomes: Sequence[Outcome], seed: int) -> "Resampled":
-        """Draw ``DRAWS`` times as many flights as there are; the same draws for every case of as many flights."""
+        """Return a case with ``DRAWS`` bootstrap draws of its flights.
+
+        Cases with equally many flights get the same draws. The draws are the same for every case of as many flights.
+        """
         each = np.stack([outcome.mean_square_m2 for outcome in outcomes])
         count = len(each)
         weights = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), DRAWS) / count
@@ -73,14 +81,17 @@ def interval(values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def finding(low: float, high: float) -> str:
-    """What an interval of a ratio of errors says."""
+    """Return the conclusion from an interval of a ratio of errors; empty without one."""
     if np.isnan(low):
         return ""
     return BETTER if high < 1.0 else WORSE if low > 1.0 else UNDECIDED
 
 
 def rms_table(cases: dict[str, Resampled]) -> FigureData:
-    """RMS of every method in every case, at all starts and at the paper's four, with 95 % limits."""
+    """Tabulate the RMS of every method in every case, with 95 % limits.
+
+    At all starts, and at the paper's four.
+    """
     rows = []
     for case, sample in cases.items():
         for place, starts in enumerate(SETS_OF_STARTS):
@@ -93,7 +104,10 @@ def rms_table(cases: dict[str, Resampled]) -> FigureData:
 
 
 def ratio_table(cases: dict[str, Resampled]) -> FigureData:
-    """RMS of windows and smoothed start over that of the last estimate, with 95 % limits and what they say."""
+    """Tabulate the RMS of windows and smoothed start over that of the last estimate.
+
+    With 95 % limits and the conclusion.
+    """
     rows = []
     for case, sample in cases.items():
         for place, starts in enumerate(SETS_OF_STARTS):
@@ -107,7 +121,10 @@ def ratio_table(cases: dict[str, Resampled]) -> FigureData:
 
 
 def later_table(cases: dict[str, Resampled]) -> FigureData:
-    """RMS from the latest of the four starts whose horizon fits over RMS from the first, with 95 % limits."""
+    """Tabulate RMS from the latest start over RMS from the first, with 95 % limits.
+
+    The latest of the four starts whose horizon fits.
+    """
     rows = []
     for case, sample in cases.items():
         for method in (REFERENCE, "windows"):
@@ -124,7 +141,10 @@ def later_table(cases: dict[str, Resampled]) -> FigureData:
 
 
 def cure_table(windows: Resampled, cure: Resampled) -> FigureData:
-    """The paper's windows under coloured GNSS error over the last estimate with R inflated, on the same flights."""
+    """Tabulate the paper's windows over the last estimate with R inflated.
+
+    Under coloured GNSS error, on the same flights.
+    """
     ratio = windows.rms_m("windows") / cure.rms_m(REFERENCE)
     rows = [
         (STUDY_HORIZONS_MIN[at], float(windows.rms_m("windows")[0, at]), float(cure.rms_m(REFERENCE)[0, at]), *found)
@@ -219,7 +239,10 @@ def _flights_within(known: Sequence[Honesty]) -> FloatArray:
 
 
 def gate_table(outcomes: dict[str, tuple[Outcome, ...]]) -> FigureData:
-    """Share of the position measurements that the gate rejected: mean over flights and largest."""
+    """Tabulate the share of the position measurements that the gate rejected.
+
+    Mean over flights, and largest.
+    """
     shares = {case: np.array([outcome.rejected_share for outcome in several]) for case, several in outcomes.items()}
     rows = [(case, float(share.mean()), float(share.max())) for case, share in shares.items()]
     names = ("case", "rejected_share", "largest_rejected_share")

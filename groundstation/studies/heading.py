@@ -1,4 +1,7 @@
-"""Monte Carlo behind the heading correction: accuracy, coverage, gates, and the figures of the paper again."""
+"""Monte Carlo study of the heading correction.
+
+Accuracy, coverage, gates, and the figures of the paper again.
+"""
 
 import time
 

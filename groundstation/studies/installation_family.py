@@ -1,4 +1,7 @@
-"""Fleets of docs/installation-family.md: aircraft with mountings, factors and winds, and what their flights show."""
+"""Fleets of docs/installation-family.md.
+
+Aircraft with mountings, factors and winds, and what their flights show.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +32,7 @@ LIMIT_DEG = 1.0 / 3.0
 
 @dataclass(frozen=True)
 class FamilyOfFleets:
-    """One family: what its flights know, and what is different."""
+    """One family: the knowledge of its flights, and what is different."""
 
     name: str
     alignment: str = "stored heading"
@@ -60,7 +63,10 @@ FAMILIES: tuple[FamilyOfFleets, ...] = (
 
 @dataclass(frozen=True)
 class FlownFlight:
-    """A flight of a fleet: what it shows, the truth, and since how many flights another unit flies (0: none does)."""
+    """Flight of a fleet: what it shows, and the truth.
+
+    ``since_change``: for how many flights another unit has flown, 0 where none has.
+    """
 
     lesson: Lesson
     taxi: TaxiOfPool
@@ -70,7 +76,10 @@ class FlownFlight:
 
 
 def draw_fleet(number: int, seed: int, pool: Sequence[TaxiOfPool], aircraft: int = AIRCRAFT) -> list[list[FlownFlight]]:
-    """Draw the aircraft of a family (its number in :data:`FAMILIES`), each with its flights in order of time."""
+    """Draw the aircraft of a family, each with its flights in order of time.
+
+    ``number`` is that of the family in :data:`FAMILIES`.
+    """
     return [_aircraft(number, seed, place, pool) for place in range(aircraft)]
 
 
@@ -162,7 +171,7 @@ def _alone_half_width(taxi: TaxiOfPool, stated: tuple[float, float], told_mps: f
 
 
 def _units(change: str, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Which of two units flies each flight."""
+    """Draw which of two units flies each flight."""
     from_flight, odd = int(rng.integers(2, 5)), int(rng.integers(1, 5))
     either = rng.integers(0, 2, FLIGHTS)
     flights = np.arange(FLIGHTS)

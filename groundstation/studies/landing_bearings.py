@@ -1,4 +1,7 @@
-"""Landing by locators in the study: errors along the approach by propagation and by drawn bearings."""
+"""Landing by locators in the study.
+
+Errors along the approach by propagation and by drawn bearings.
+"""
 
 import numpy as np
 
@@ -75,7 +78,10 @@ def _share_95(error: FloatArray) -> float:
 
 
 def bearing_spans() -> FigureData:
-    """Where accuracy of each category is met by the source's formulas, as stretches before the threshold."""
+    """Tabulate where each category is met by the source's formulas.
+
+    As stretches before the threshold.
+    """
     before = np.arange(0.0, 8000.0, SPAN_STEP_M)
     slope = float(np.tan(np.deg2rad(GLIDE_DEG)))
     rows = []

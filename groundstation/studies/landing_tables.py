@@ -1,4 +1,7 @@
-"""Tables of the landing study: published figures with ours beside them, noise, order of the variants, honesty."""
+"""Tables of the landing study: published figures with ours beside them.
+
+Noise, order of the variants, honesty.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -42,7 +45,7 @@ def error_95_m(row: AccuracyRow, axis: Axis) -> float:
 
 
 def holds(claim: PublishedCategory, error_m: float) -> bool:
-    """Whether an error agrees with a claim."""
+    """Tell whether an error agrees with a claim."""
     limits = {one.name: one.vertical_m if claim.axis == "vertical" else one.horizontal_m for one in CATEGORIES}
     if not claim.category:
         return error_m > max(limits.values())
@@ -78,7 +81,10 @@ def _sigmas(row: AccuracyRow) -> tuple[float, float, float]:
 
 
 def variation_table(answers: Mapping[str, RangeLanding]) -> FigureData:
-    """What noise, correlation, baro and control do to the approach with the moving point."""
+    """Tabulate the effect of noise, correlation, baro and control.
+
+    On the approach with the moving point.
+    """
     rows = []
     for name, answer in answers.items():
         threshold, touchdown = answer.at(THRESHOLD), answer.at(TOUCHDOWN)

@@ -1,4 +1,7 @@
-"""Tables of the magnetic study: errors of every method, the claim and its limit, honesty of sigmas, refusals."""
+"""Tables of the magnetic study.
+
+Errors of every method, the claim and its limit, honesty of sigmas, refusals.
+"""
 
 import re
 from collections import Counter
@@ -31,9 +34,10 @@ _PLACE = re.compile(r": at # s # deg at # deg of bank")
 
 @dataclass(frozen=True)
 class Sample:
-    """Outcomes of one point, run by run, and weights to draw them again, shape (1 + draws, runs): first every run once.
+    """Outcomes of one point, run by run, and bootstrap weights, shape (1 + draws, runs).
 
-    Runs are the independent units; the weights are the same at every point.
+    The first row of weights counts every run once. Runs are the independent units; the weights are the same at every
+    point.
     """
 
     outcomes: tuple[Outcome, ...]
@@ -95,7 +99,7 @@ def judged_sample(runs: Sequence[RunOutcome], seed: int) -> Sample:
 
 
 def accepted(sample: Sample, seed: int) -> Sample:
-    """Those that the estimator accepted."""
+    """Return the sample of the runs that the estimator accepted."""
     kept = tuple(outcome for outcome in sample.outcomes if outcome.verdict == "accept")
     return Sample(kept, resampling(len(kept), seed) if kept else np.zeros((1 + DRAWS, 0)))
 
@@ -104,9 +108,10 @@ def accepted(sample: Sample, seed: int) -> Sample:
 
 
 def sweep_table(sweep: Sweep, samples: dict[Setup, Sample]) -> FigureData:
-    """RMS error of every method over the points of a sweep, whole and without A, with 95 % limits over flights.
+    """Tabulate the RMS error of every method over the points of a sweep.
 
-    ``fitted`` flights count; ``inside2`` is the share of the headings on which the error is within 2 stated sigma.
+    Whole and without A, with 95 % limits over flights. ``fitted`` flights count; ``inside2`` is the share of the
+    headings on which the error is within 2 stated sigma.
     """
     rows = []
     for value, setup in sweep.points:
@@ -129,7 +134,10 @@ def sweep_table(sweep: Sweep, samples: dict[Setup, Sample]) -> FigureData:
 
 
 def ratio_table(sweeps: Sequence[Sweep], samples: dict[Setup, Sample]) -> FigureData:
-    """Error of the iron fit, and of one branch, over that of the branch table, without A, on the same flights."""
+    """Tabulate errors of the iron fit and of one branch over that of the branch table.
+
+    Without A, on the same flights.
+    """
     rows = []
     for sweep in sweeps:
         for value, setup in sweep.points:
@@ -146,14 +154,17 @@ def ratio_table(sweeps: Sequence[Sweep], samples: dict[Setup, Sample]) -> Figure
 
 
 def finding(low: float, high: float) -> str:
-    """What an interval of a ratio of errors says."""
+    """Return the conclusion from an interval of a ratio of errors; empty without one."""
     if np.isnan(low):
         return ""
     return BETTER if high < 1.0 else WORSE if low > 1.0 else UNDECIDED
 
 
 def residual_table(sample: Sample) -> FigureData:
-    """What every method leaves on whole flights: on every heading, and on the held-out part against truth and INS."""
+    """Tabulate the error that every method leaves on whole flights.
+
+    On every heading, and on the held-out part against truth and INS.
+    """
     rows = []
     for method in METHODS:
         whole, shape = (sample.of_method(method, whole=is_whole) for is_whole in (True, False))
@@ -174,9 +185,10 @@ def residual_table(sample: Sample) -> FigureData:
 
 
 def claim_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> FigureData:
-    """Bank error of one branch and of the average of opposite ones: by formula and flown without noise.
+    """Tabulate the bank error of one branch and of the average of opposite ones.
 
-    ``left`` is the share of one branch's error that the average keeps; published are the figures of the design.
+    By formula, and flown without noise. ``left`` is the share of one branch's error that the average keeps; published
+    are the figures of the design.
     """
     rows = []
     for place, (bank, setup) in enumerate(CLAIM.points):
@@ -198,7 +210,10 @@ def claim_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> Fig
 
 
 def power_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> FigureData:
-    """Exponent of the bank with which the average's bias grows, and the bank at which it passes the limit."""
+    """Tabulate the exponent of the bank with which the average's bias grows.
+
+    And the bank at which it passes the limit.
+    """
     banks = np.array(EXACT_BANKS_DEG)
     weigher = samples[CLAIM.points[0][1]]
     formula = np.stack([weigher.rms(np.array([run.biases.average_deg[k] for run in runs])) for k in range(len(banks))])
@@ -228,7 +243,10 @@ def power_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> Fig
 
 
 def honesty_table(sample: Sample) -> FigureData:
-    """Shares of the flights whose error against the truth is within 1, 2, 3 stated sigma, with 95 % limits."""
+    """Tabulate the shares of the flights with an error within 1, 2, 3 stated sigma.
+
+    Errors are against the truth; with 95 % limits.
+    """
     rows: list[tuple[object, ...]] = []
     for method in JUDGED_METHODS:
         for place, letter in enumerate(LETTERS):
@@ -261,7 +279,10 @@ MEASURES = {
 
 
 def _inside(ratio: FloatArray) -> tuple[float, ...]:
-    """How many are known, the shares within the limits with exact intervals, and the RMS of the ratio."""
+    """Return count, shares within the limits with exact intervals, and RMS of the ratio.
+
+    The count is that of known ratios.
+    """
     known = np.abs(ratio[np.isfinite(ratio)])
     parts: list[float] = [len(known)]
     for limit in RATIO_LIMITS:
@@ -274,7 +295,7 @@ def _inside(ratio: FloatArray) -> tuple[float, ...]:
 
 
 def verdict_table(judged: Sample, sweeps: Sequence[Sweep], samples: dict[Setup, Sample]) -> FigureData:
-    """What became of the flights of every point, and the reason that most of the others were not accepted for.
+    """Tabulate the verdicts at every point, and the commonest reason against acceptance.
 
     ``modulus_refused`` counts assessable flights on which the estimator's limits refuse the modulus fit.
     """
@@ -296,7 +317,10 @@ def verdict_table(judged: Sample, sweeps: Sequence[Sweep], samples: dict[Setup, 
 
 
 def incomplete_table(runs: Sequence[RunOutcome]) -> FigureData:
-    """Figures that are not complete: how many were refused or accepted, by reason (# stands for a number)."""
+    """Tabulate how many incomplete figures were refused or accepted, by reason.
+
+    In a reason, # stands for a number.
+    """
     rows = []
     flown = [run.incomplete for run in runs if run.incomplete]
     for kind in flown[0] if flown else ():
@@ -311,7 +335,7 @@ def incomplete_table(runs: Sequence[RunOutcome]) -> FigureData:
 
 
 def reasons_of(outcomes: Iterable[Outcome]) -> Counter[str]:
-    """How often each reason was given: the first one of each flight, without its numbers."""
+    """Count each reason: the first one of each flight, without its numbers."""
     return Counter(plain_reason(outcome.reason) for outcome in outcomes)
 
 

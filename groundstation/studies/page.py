@@ -1,4 +1,4 @@
-"""What every study hands back: tables, and a page of sections, told as those of a report are."""
+"""Result of every study: tables, and a page of sections like those of a report."""
 
 import sys
 from collections.abc import Sequence
@@ -13,7 +13,10 @@ from groundstation.results.figures import FigureData
 
 @dataclass(frozen=True)
 class StudyResult:
-    """What a study found: tables (arrays with units in their names) and its page, the heading section first."""
+    """Result of a study: tables (arrays with units in their names) and its page.
+
+    The heading section comes first.
+    """
 
     name: str
     tables: tuple[FigureData, ...]
