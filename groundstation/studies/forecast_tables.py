@@ -57,7 +57,7 @@ class Resampled:
     def of(cls, outcomes: Sequence[Outcome], seed: int) -> "Resampled":
         """Return a case with ``DRAWS`` bootstrap draws of its flights.
 
-        Cases with equally many flights get the same draws. The draws are the same for every case of as many flights.
+        Cases with equally many flights get the same draws.
         """
         each = np.stack([outcome.mean_square_m2 for outcome in outcomes])
         count = len(each)

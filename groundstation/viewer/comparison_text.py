@@ -1,4 +1,4 @@
-"""The text panel of a comparison: the chapters of its page."""
+"""Text panel of a comparison: the chapters of its page."""
 
 from groundstation.chapters.comparison import answers, findings, opening, settings
 from groundstation.chapters.markdown import markdown, part_markdown

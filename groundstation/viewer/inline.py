@@ -1,4 +1,4 @@
-"""The recording inside a notebook, in the viewer of the package rerun-notebook."""
+"""Recording inside a notebook, in the viewer of the package rerun-notebook."""
 
 import contextlib
 import importlib.util
@@ -14,16 +14,16 @@ from groundstation.viewer.inner import NOTEBOOK, NOTEBOOK_ASSET, NOTEBOOK_ASSET_
 
 
 def is_notebook() -> bool:
-    """Whether this process is the kernel of a Jupyter notebook."""
+    """Tell whether this process is the kernel of a Jupyter notebook."""
     ipython = sys.modules.get("IPython")
     return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
 
 
 def inline_viewer(flight: Flight, results: FlightResults, *, width: int | str, height: int | str) -> Any:
-    """A viewer for a notebook cell with the recording of one flight in it: the same logging as into a file.
+    """Return a viewer for a notebook cell with the recording of one flight in it.
 
-    The viewer's own files come from this machine, not from the Internet, unless the environment
-    (``NOTEBOOK_ASSET``) says otherwise.
+    The recording is logged as into a file. The viewer's own files come from this machine, not from the Internet, unless
+    the environment (``NOTEBOOK_ASSET``) says otherwise.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""Names an operator reads, and entity paths no log can break: whatever a file calls its columns, both stay legible."""
+"""Names for people, and entity paths that no log can break.
+
+Whatever a file calls its columns, both stay legible.
+"""
 
 import re
 from collections.abc import Iterable
@@ -24,7 +27,9 @@ WORDS: dict[str, str] = {
 
 
 def clean_text(text: str, limit: int = MAX_LABEL_CHARACTERS) -> str:
-    """One printable line of a text from a log: control and direction marks become spaces, the rest is cut at ``limit``.
+    """Return a text from a log as one printable line, cut at ``limit``.
+
+    Control and direction marks become spaces.
 
     Examples
     --------
@@ -36,9 +41,10 @@ def clean_text(text: str, limit: int = MAX_LABEL_CHARACTERS) -> str:
 
 
 def path_parts(names: Iterable[str]) -> list[str]:
-    """Entity path parts of names, in their order and each unique: letters, digits, ``_``, ``-`` and ``.`` alone.
+    """Return entity path parts of names, in their order and each unique.
 
-    Separators, control characters and markup become ``_``; names that would then clash are numbered.
+    Letters, digits, ``_``, ``-`` and ``.`` alone. Separators, control characters and markup become ``_``; names that
+    would then clash are numbered.
 
     Examples
     --------
@@ -95,7 +101,9 @@ def label(field: str) -> str:
 
 
 def source_label(name: str) -> str:
-    """Name of a topic or field that is not ours: as the source spells it, for that is the name people search for.
+    """Return the name of a topic or field that is not ours, as the source spells it.
+
+    People search for that name.
 
     Examples
     --------

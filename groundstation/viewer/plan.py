@@ -1,4 +1,4 @@
-"""The Rerun recording of a plan."""
+"""Rerun recording of a plan."""
 
 from collections.abc import Callable
 from functools import partial
@@ -28,7 +28,9 @@ PLAN_TABS: dict[str, Callable[[Recorder, FlightResults], rrb.Container | None]] 
 
 
 def write_plan_recording(path: Path, results: FlightResults) -> None:
-    """Write the recording of a plan, blueprint embedded; see :func:`recording.write_recording`.
+    """Write the recording of a plan with its blueprint.
+
+    See :func:`recording.write_recording`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Send columns of one flight to Rerun, always on both timelines: what every tab logs with."""
+"""Recorder of one flight for Rerun: every tab logs with it, on both timelines."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ LEVELS = {"info": "INFO", "warn": "WARN", "fail": "ERROR"}
 
 @dataclass(frozen=True)
 class Line:
-    """How one series looks: its name with unit, colour and width in points."""
+    """Appearance of one series: its name with unit, colour and width in points."""
 
     name: str
     colour: Colour
@@ -76,10 +76,10 @@ class Recorder:
         *,
         is_stepped: bool = False,
     ) -> None:
-        """Log series that share their rows: ``values`` of shape (n, k), NaN where a line is interrupted.
+        """Log series that share their rows.
 
-        ``breaks``, shape (n - 1,), tells after which rows the lines end; a row of NaN is put there. Stepped lines hold
-        each value until the next one.
+        ``values`` has the shape (n, k), NaN where a line is interrupted. ``breaks``, shape (n - 1,), tells after which
+        rows the lines end; a row of NaN is put there. Stepped lines hold each value until the next one.
         """
         if breaks is not None:
             time_ns, values = break_line(time_ns, values, breaks)
@@ -102,7 +102,10 @@ class Recorder:
         breaks: BoolArray,
         limit: int,
     ) -> int:
-        """Log series as :meth:`lines` does, of long ones some ``limit`` rows (see :func:`series.thin`); rows kept."""
+        """Log series as :meth:`lines` does, thinned to ``limit`` rows; return the rows kept.
+
+        See :func:`series.thin`; ``limit`` is approximate.
+        """
         rows = thin(values, breaks, limit)
         self.lines(path, time_ns[rows], values[rows], lines, breaks[rows[:-1]])
         return len(rows)
@@ -116,10 +119,11 @@ class Recorder:
         line: Line,
         breaks: BoolArray | None = None,
     ) -> None:
-        """Log a filled band of ``half_width`` on either side of a line, shapes (n,), empty where one of them is NaN.
+        """Log a filled band of ``half_width`` on either side of a line, shapes (n,).
 
-        Rerun fills one sigma of a measurement: its variance is the half width squared, whatever share the name says
-        that the band holds. Axes are scaled by the line alone. Entities are drawn in the order of their names.
+        Empty where one of them is NaN. Rerun fills one sigma of a measurement: its variance is the half width squared,
+        whatever share the name says that the band holds. Axes are scaled by the line alone. Entities are drawn in the
+        order of their names.
         """
         edges = np.column_stack([centre, half_width])
         if breaks is not None:
@@ -150,7 +154,10 @@ class Recorder:
         return (slice(start, start + ROWS_PER_CALL) for start in range(0, len(time_ns), ROWS_PER_CALL))
 
     def lane(self, path: str, time_ns: Int64Array, states: Sequence[str], colours: Mapping[str, Colour]) -> None:
-        """Log one lane of states, each holding until the next row; an empty state ends the one before."""
+        """Log one lane of states, each until the next row.
+
+        An empty state ends the one before.
+        """
         shown = [clean_text(state) for state in states]
         shades = for_states((state for state in shown if state), colours)
         self.static(path, rr.StateConfiguration(values=list(shades), colors=list(shades.values())))

@@ -1,4 +1,7 @@
-"""The Rerun recording of one flight, into a file or into a running viewer: the same logging with another sink."""
+"""Rerun recording of one flight, into a file or into a running viewer.
+
+Both log the same; only the sink differs.
+"""
 
 import hashlib
 import re
@@ -123,7 +126,7 @@ def stream_recording(flight: Flight, results: FlightResults, *, connect_url: str
 
 
 def _expect_viewer(url: str) -> None:
-    """Raise when nobody listens: Rerun itself would find out after a minute of waiting."""
+    """Raise when nobody listens; Rerun itself would notice after a minute of waiting."""
     parts = urlsplit(url)
     try:
         socket.create_connection((parts.hostname or "", parts.port or DEFAULT_PORT), timeout=CONNECT_SECONDS).close()
@@ -134,7 +137,10 @@ def _expect_viewer(url: str) -> None:
 
 
 def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResults) -> rrb.Blueprint:
-    """Log everything to a stream that has its sink, send the layout, wait until it is out; returns the layout."""
+    """Log everything to a stream that has its sink, and send the layout.
+
+    Waits until all is out; returns the layout.
+    """
     recorder = Recorder(stream, flight.start_ns, flight.has_utc)
     stream.send_recording_name(clean_text(results.flight_id))
     attempt("properties", "results", send_properties, stream, results)
@@ -144,7 +150,7 @@ def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResul
 
 
 def tabs_of(recorder: Recorder, flight: Flight, results: FlightResults) -> Iterator[Tab]:
-    """Tabs of a flight but for the log, in their order: the name of each and what logs it."""
+    """Return the tabs of a flight except the log, in order: name and function of each."""
     yield "overview", partial(overview, recorder, results)
     yield "quality", partial(quality, recorder, flight, results)
     for tab, analyses in ANSWER_TABS:
@@ -170,7 +176,10 @@ def _without_tab(results: FlightResults) -> list[Answer]:
 def send_layout(
     stream: rr.RecordingStream, tabs: Sequence[rrb.Container], *, timeline: str = FLIGHT_TIME
 ) -> rrb.Blueprint:
-    """Send the layout of a recording, its panels closed and its time standing still, and wait until all is out."""
+    """Send the layout of a recording, and wait until all is out.
+
+    Its panels are closed and its time stands still.
+    """
     blueprint = rrb.Blueprint(
         rrb.Tabs(contents=tabs, active_tab=0),
         rrb.TimePanel(state="collapsed", timeline=timeline, play_state="paused"),
@@ -185,7 +194,9 @@ def send_layout(
 
 
 def application_id(flight_id: str) -> str:
-    """Application id of a flight: its own, for Rerun binds a layout to it and flights differ in their topics.
+    """Return the application id of a flight.
+
+    Each flight has its own: Rerun binds a layout to it, and flights differ in their topics.
 
     Examples
     --------
@@ -200,7 +211,10 @@ def application_id(flight_id: str) -> str:
 
 @contextmanager
 def open_stream(identity: str) -> Iterator[rr.RecordingStream]:
-    """Open a stream in strict mode, without Rerun's own timelines; closed, file footer written, on leaving."""
+    """Open a stream in strict mode, without Rerun's own timelines.
+
+    On leaving it is closed and the file footer written.
+    """
     strict = rr.strict_mode()
     rr.set_strict_mode(True)  # else the SDK drops data with a mere warning
     stream = rr.RecordingStream(application_id(identity), recording_id=clean_text(identity), send_properties=False)

@@ -1,4 +1,4 @@
-"""The Rerun recording of a session of several aircraft."""
+"""Rerun recording of a session of several aircraft."""
 
 from functools import partial
 from pathlib import Path
@@ -18,7 +18,9 @@ from groundstation.viewer.tabs.cooperative import cooperative
 
 
 def write_session_recording(path: Path, assembled: AssembledSession, results: FlightResults) -> None:
-    """Write the recording of a session, blueprint embedded; see :func:`recording.write_recording`.
+    """Write the recording of a session with its blueprint.
+
+    See :func:`recording.write_recording`.
 
     Parameters
     ----------

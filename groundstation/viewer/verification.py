@@ -1,4 +1,7 @@
-"""Look whether recordings are sound before they are served: Rerun may end the process that reads a damaged one."""
+"""Check of recordings before they are served.
+
+Rerun may end the process that reads a damaged one.
+"""
 
 import os
 import subprocess
@@ -36,7 +39,7 @@ def damaged(recordings: Sequence[Path]) -> dict[Path, str]:
 
 
 def _fault(batch: Sequence[Path]) -> str:
-    """What is wrong with any of a few recordings, in a line; empty when all are sound."""
+    """Return the fault of any of a few recordings in a line; empty when all are sound."""
     command = [str(viewer_executable()), "rrd", "verify", *(str(path.absolute()) for path in batch)]
     environment = os.environ | {"RUST_LOG": "off", "NO_COLOR": "1"}
     try:

@@ -1,4 +1,7 @@
-"""Control of a session: the aircraft moving in space under the recommended law, the law, accuracy and geometry."""
+"""Tab on control of a session: the aircraft in space under the recommended law.
+
+The law, accuracy and geometry.
+"""
 
 import numpy as np
 import rerun as rr

@@ -1,4 +1,7 @@
-"""Cooperative: the aircraft of a session in space with their ellipsoids and links, errors, geometry, links in time."""
+"""Tab on cooperative navigation: the aircraft of a session in space.
+
+With their ellipsoids and links; errors, geometry, links in time.
+"""
 
 from collections.abc import Sequence
 
@@ -44,7 +47,7 @@ def cooperative(recorder: Recorder, points: Sequence[GroundPoint], results: Flig
 
 
 def _sources(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
-    """Sources that each aircraft hears with time: the page has them in its table."""
+    """Log the number of sources that each aircraft hears; the page has them in its table."""
     data = results.rows_of(CooperativeGeometry)
     if data is None or not np.isfinite(data.sources).any():
         return []

@@ -1,4 +1,7 @@
-"""INS errors: what the filter says of position, velocity, tilt and drift of each channel, and how far to trust it."""
+"""Tab on INS errors: position, velocity, tilt and drift of each channel.
+
+As the filter estimates them, and how far to trust it.
+"""
 
 from collections.abc import Sequence
 
@@ -40,7 +43,10 @@ PAGES: tuple[tuple[str, str, tuple[tuple[str, ...], ...]], ...] = (
 
 
 def inertial(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
-    """Log the tab of the INS errors; None when the flight was not assessed: the overview says why."""
+    """Log the tab of the INS errors; None when the flight was not assessed.
+
+    The overview says why.
+    """
     section = chapter(results)
     if section is None or results.answer(InertialResult) is None:
         return None
@@ -67,7 +73,10 @@ def _page(
 
 
 def _lanes(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    """When the filter had GNSS and when it forecast, under the flight phase that the overview logged."""
+    """Log when the filter had GNSS and when it forecast.
+
+    Under the flight phase that the overview logged.
+    """
     states, answer = results.rows_of(InertialStates), results.answer(InertialResult)
     if states is None or answer is None:
         return []

@@ -1,4 +1,7 @@
-"""Landing by ranges: the approach in space with the corridors of the categories, accuracy and errors with time."""
+"""Tab on landing by ranges: the approach in space with the corridors of the categories.
+
+Accuracy and errors with time.
+"""
 
 import numpy as np
 import rerun as rr

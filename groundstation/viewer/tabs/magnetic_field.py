@@ -1,4 +1,4 @@
-"""Magnetic: the field as a sphere before and after."""
+"""Field of the magnetic tab as a sphere, before and after."""
 
 import numpy as np
 import rerun as rr
@@ -20,9 +20,10 @@ PARALLELS_DEG = (-60.0, -30.0, 0.0, 30.0, 60.0)
 
 
 def sphere(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    """The field along the body axes on the model's sphere, as read and freed of the iron, in microtesla.
+    """Log the field along the body axes on the model's sphere, in microtesla.
 
-    What the modulus differs by from the model's is drawn many times larger: iron of one per cent would not be seen.
+    As read, and freed of the iron. What the modulus differs by from the model's is drawn many times larger: iron of one
+    per cent would not be seen.
     """
     figure = results.rows_of(MagneticField)
     if figure is None:
