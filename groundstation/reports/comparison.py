@@ -1,4 +1,4 @@
-"""The page of a comparison: what differs between two flights, and their figures over each other."""
+"""Page of a comparison: the differences of two flights, and their figures over each other."""
 
 from collections.abc import Callable, Sequence
 

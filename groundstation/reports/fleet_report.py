@@ -1,4 +1,7 @@
-"""The report of a folder of flights: one self-contained HTML file with every flight, and its PDF on demand."""
+"""Report of a folder of flights: one self-contained HTML file, and its PDF on demand.
+
+With every flight.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -62,12 +65,15 @@ def fleet_document(fleet: FleetResults) -> Document:
 
 
 def on_paper(document: Document) -> Document:
-    """The same with long tables cut."""
+    """Return the document with long tables cut."""
     return replace(document, sections=[shortened(one, MOST_ROWS_ON_PAPER, PAGE) for one in document.sections])
 
 
 def fleet_report_html(document: Document, fleet: FleetResults) -> str:
-    """Render the report of a fleet as a complete HTML document, its flights in a table with links."""
+    """Render the report of a fleet as a complete HTML document.
+
+    Its flights are a table with links.
+    """
     script = (TEMPLATES / "fleet.js").read_text(encoding="utf-8").strip()
     return render(
         "fleet.html.j2",

@@ -1,4 +1,7 @@
-"""The report of one flight: one self-contained HTML file, and its PDF on demand, made from the saved results alone."""
+"""Report of one flight: one self-contained HTML file, and its PDF on demand.
+
+Made from the saved results alone.
+"""
 
 import re
 from collections.abc import Callable, Mapping
@@ -41,10 +44,10 @@ class Written:
 
 
 def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], *, with_pdf: bool = False) -> Written:
-    """Write report.html into a flight folder; with a magnetic deviation its table and steer card too.
+    """Write report.html into a flight folder, and exports of a magnetic deviation.
 
-    A part that fails by a defect is left out, and summary.json and the report tell it: those that failed elsewhere
-    until then, too.
+    The exports are its table and steer card. A part that fails by a defect is left out, and summary.json and the report
+    tell it: those that failed elsewhere until then, too.
 
     Parameters
     ----------
@@ -78,7 +81,9 @@ def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], 
 
 
 def add_pdf(folder: Path, answer_types: Mapping[str, type[Answer]]) -> Written:
-    """Write report.pdf beside the page of a flight folder, parameters as of :func:`write_flight_report`.
+    """Write report.pdf beside the page of a flight folder.
+
+    Parameters as of :func:`write_flight_report`.
 
     The page and all else stay as they are, unless a part fails by a defect now: then both are written and tell it.
     """
@@ -128,16 +133,16 @@ def _put_pdf(document: Document, pdf: Path) -> str:
 
 
 def flight_document(saved: SavedFlight) -> Document:
-    """Put the report of one saved flight, a session of several or a plan, together, its figures drawn."""
+    """Put together the report of one saved flight, session or plan, its figures drawn."""
     kind = PLAN if is_plan(saved.results) else SESSION if is_session(saved.results) else "Flight report"
     top = attempt("chapter", "front", front, saved.results) or Front(saved.results.flight_id)
     return Document(kind, saved.results.flight_id, top, flight_sections(saved))
 
 
 def flight_report_html(document: Document, beside: str = "manifest.json") -> str:
-    """Render the report of a flight as a complete HTML document; its figures are drawn live where scripts may run.
+    """Render the report of a flight as a complete HTML document.
 
-    ``beside`` is the file that the foot of the page leads to.
+    Its figures are drawn live where scripts may run. ``beside`` is the file that the foot of the page leads to.
     """
     parts = (part for section in document.sections for part in section.parts)
     drawn = [part.svg for part in parts if isinstance(part, Drawing)]

@@ -1,4 +1,7 @@
-"""index.json and index.csv: a row for each flight and session of a folder, and for each log that gave none."""
+"""index.json and index.csv: a row for each flight and session of a folder.
+
+And for each log that gave none.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -21,9 +24,10 @@ KINDS: tuple[Kind, ...] = ("flight", "session", "failed", "skipped")
 
 @dataclass(frozen=True, kw_only=True)
 class IndexRow:
-    """One flight or session, or a log that gave none: every row has all columns in this order, None where none applies.
+    """One flight or session, or a log that gave none.
 
-    In place of ``answers`` stand those of the analyses of a flight, by the names of their columns; a session has none.
+    Every row has all columns in this order, None where one does not apply. In place of ``answers`` stand those of the
+    analyses of a flight, by the names of their columns; a session has none.
     """
 
     kind: Kind
@@ -55,9 +59,10 @@ def columns_of(answers: Sequence[str]) -> tuple[str, ...]:
 
 
 def index_row(saved: SavedFlight, kind: Kind = "flight", answers: Mapping[str, Any] | None = None) -> IndexRow:
-    """Build the row of one flight or session from what it saved; links are relative to the folder of flights.
+    """Build the row of one flight or session from its saved results.
 
-    A link is None when the flight folder lacks the file at the time of the call.
+    Links are relative to the folder of flights. A link is None when the flight folder lacks the file at the time of the
+    call.
 
     Raises
     ------
@@ -89,7 +94,7 @@ def index_row(saved: SavedFlight, kind: Kind = "flight", answers: Mapping[str, A
 
 
 def reasons_of(results: FlightResults) -> tuple[str, ...]:
-    """What was not assessable, each with its reason."""
+    """Return what was not assessable, each with its reason."""
     return tuple(f"{entry.analysis}: {entry.reason}" for entry in results.not_assessable)
 
 

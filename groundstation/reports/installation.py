@@ -1,7 +1,8 @@
-"""Where the report of a flight shows what earlier flights taught: it is filled in once all of them are known.
+"""Place in the report of a flight for what earlier flights taught.
 
-The report of a flight is written when the flight is run; earlier flights may arrive later. It therefore has two places,
-between marks that nothing from a log can write, and only what stands between them changes.
+It is filled in once all of them are known. The report of a flight is written when the flight is run; earlier flights
+may arrive later. It therefore has two places, between marks that nothing from a log can write, and only what stands
+between them changes.
 """
 
 import re

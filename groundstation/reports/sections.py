@@ -31,9 +31,10 @@ APPENDICES: dict[str, Build] = {"provenance": provenance, "sources": sources}
 
 
 def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
-    """The chapters of a flight: the flight itself, what to do next, its answers, the best first, its data; appendices.
+    """Return the chapters of a flight, numbered, then the appendices.
 
-    Of a session of several aircraft, and of a plan: those on its answers, its findings, its source.
+    The flight itself, what to do next, its answers, the best first, its data. Of a session of several aircraft, and of
+    a plan: those on its answers, its findings, its source.
 
     A chapter that has nothing to say is left out, one of nothing but figures without arrays, and one that fails.
     """
@@ -42,7 +43,7 @@ def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
 
 
 def told_sections(saved: SavedFlight) -> tuple[list[Section], list[Section]]:
-    """The chapters of :func:`flight_sections` and their appendices as they are told, no figure drawn."""
+    """Return the chapters of :func:`flight_sections` and their appendices, no figure drawn."""
     results = saved.results
     is_flight = not (is_session(results) or is_plan(results))
     told = (
@@ -62,21 +63,27 @@ def _built(builds: Mapping[str, Build], results: FlightResults) -> tuple[Section
 
 
 def _numbered(sections: Sequence[Section], saved: SavedFlight, numbers: Iterable[object]) -> tuple[Section, ...]:
-    """The sections as a page shows them, those without parts left out."""
+    """Return the sections as on a page, numbered, without those that have no parts."""
     drawn = (attempt("chapter", section.key, on_a_page, section, saved) for section in sections)
     shown = (section for section in drawn if section is not None and section.parts)
     return tuple(replace(section, number=str(number)) for section, number in zip(shown, numbers, strict=False))
 
 
 def _workings(section: Section, configuration: Mapping[str, Any]) -> Section:
-    """What a chapter leaves to the appendix; of the settings those that were set."""
+    """Return the part of a chapter that belongs in the appendix.
+
+    Of the settings only those that the user set.
+    """
     every = (*section.parts, *section.appendix) if section.is_open else section.appendix
     parts = kept(_as_set(part, configuration) for part in every)
     return Section(f"{section.key}-workings", f"{section.title}: workings", "", parts)
 
 
 def _as_set(part: Part, configuration: Mapping[str, Any]) -> Part | None:
-    """Settings cut down to those that the user set, None where there is none; any other part as it is."""
+    """Cut settings down to those that the user set, None where there is none.
+
+    Any other part stays as it is.
+    """
     if not isinstance(part, Facts) or not part.settings_of:
         return part
     given = configuration.get(part.settings_of)
@@ -85,7 +92,10 @@ def _as_set(part: Part, configuration: Mapping[str, Any]) -> Part | None:
 
 
 def on_a_page(section: Section, saved: SavedFlight) -> Section:
-    """The section as a report shows it: its figures drawn, of the files beside the report those that are there."""
+    """Return the section for a report: its figures drawn.
+
+    Of the files beside the report it names those that exist.
+    """
     drawn = drawn_by(PLOTS, section, saved.results)
     parts = (
         _of_files_there(part, saved.folder) if isinstance(part, Note) and part.files else part for part in drawn.parts

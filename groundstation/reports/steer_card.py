@@ -1,4 +1,7 @@
-"""What a flight leaves beside its report for the cockpit: the deviation as a table and as a steer card on A6 paper."""
+"""Exports for the cockpit: the deviation as a table and as a steer card on A6 paper.
+
+Beside the report of a flight.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +24,10 @@ MOST_LETTERS, MOST_OF_A_REASON = 40, 150
 
 @dataclass(frozen=True)
 class CardLine:
-    """To fly a magnetic heading, steer that reading; the deviation to add with its sigma."""
+    """Line of a steer card: to fly a magnetic heading, steer that reading.
+
+    With the deviation to add and its sigma.
+    """
 
     heading: str
     steer: str
@@ -32,7 +38,7 @@ class CardLine:
 
 @dataclass(frozen=True)
 class SteerCard:
-    """The card as it is printed.
+    """Steer card as printed.
 
     Parameters
     ----------
@@ -55,9 +61,9 @@ class SteerCard:
 
 
 def write_exports(saved: SavedFlight, *, with_card: bool = True) -> tuple[tuple[Path, ...], str]:
-    """Write deviation.csv and steer_card.pdf of a flight that has a magnetic deviation; others lose an old one.
+    """Write deviation.csv and steer_card.pdf of a flight that has a magnetic deviation.
 
-    Without ``with_card`` a card that is there stays.
+    Other flights lose old ones. Without ``with_card`` a card that is there stays.
 
     Returns
     -------
@@ -108,7 +114,7 @@ def steer_card(results: FlightResults, answer: MagneticResult) -> SteerCard:
 
 
 def _state(answer: MagneticResult) -> tuple[Mark, str]:
-    """The verdict; anything but accept is told largely."""
+    """Return the verdict; any but accept is printed large."""
     reason = _shorter(typeset(answer.verdict_reason), MOST_OF_A_REASON)
     if answer.verdict == "accept":
         return Mark("good", "Accepted"), reason

@@ -1,6 +1,7 @@
-"""A plot as a matplotlib figure: the frames, ticks, legends and labels of the page's picture, and all samples.
+"""Plot as a matplotlib figure, with all samples.
 
-matplotlib is used through its object-oriented interface alone: no pyplot, no global figure.
+Frames, ticks, legends and labels are those of the page's picture. matplotlib is used through its object-oriented
+interface alone: no pyplot, no global figure.
 """
 
 import io
@@ -74,7 +75,10 @@ STYLE: dict[str, Any] = {
 
 
 class NotebookFigure(Figure):
-    """A matplotlib figure that a notebook shows without pyplot, on white whatever the notebook's ground."""
+    """Matplotlib figure that a notebook shows without pyplot.
+
+    On white, whatever the background of the notebook.
+    """
 
     def _repr_png_(self) -> bytes:
         buffer = io.BytesIO()
@@ -101,7 +105,10 @@ def figure_of(plot: Plot) -> NotebookFigure:
 
 @contextmanager
 def _style() -> Iterator[None]:
-    """Set matplotlib's look to the report's for a while; a user's matplotlibrc does not reach it."""
+    """Set matplotlib's look to the report's for a while.
+
+    The user's matplotlibrc has no effect.
+    """
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(STYLE)  # type: ignore[arg-type]
@@ -129,7 +136,7 @@ class _Places(Locator):
 
 
 class _Texts(Formatter):
-    """What stands at the places of a locator."""
+    """Formatter of the texts at the places of a locator."""
 
     def __init__(self, places: _Places) -> None:
         self.places = places

@@ -169,7 +169,7 @@ def _spans(mark: Spans, axes: Axes, box: Box, look: Look) -> None:
 
 
 def _ranges(start: Floats, end: Floats, rows: Any) -> list[tuple[float, float]]:
-    """Starts and lengths of some rows, those that are known."""
+    """Return starts and lengths of the known rows."""
     known = rows & np.isfinite(start) & np.isfinite(end)
     return list(zip(start[known].tolist(), (end - start)[known].tolist(), strict=True))
 
@@ -213,7 +213,7 @@ def _symbol_look(symbol: Symbol, colour: str, *, is_hollow: bool = False) -> Loo
 
 
 def _reaching_out(lines: Sequence[Line2D], axes: Axes, box: Box) -> None:
-    """Have symbols cut a little beyond the frame, not at its edge."""
+    """Clip symbols a little beyond the frame, not at its edge."""
     x, y = BEYOND_PT / box.width, BEYOND_PT / box.height
     for line in lines:
         line.set_clip_box(TransformedBbox(Bbox([[-x, -y], [1.0 + x, 1.0 + y]]), axes.transAxes))

@@ -1,4 +1,7 @@
-"""Places of frames in a picture: room for what is written around them, columns that agree, windows; points."""
+"""Places of frames in a picture.
+
+Room for the texts around them, columns that agree, windows; in points.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -27,7 +30,10 @@ _Rooms: TypeAlias = list[list[float]]  # of each panel, by rows
 
 @dataclass(frozen=True)
 class Box:
-    """One frame: a window of a panel. Places are points from the upper left corner of the picture."""
+    """One frame: a window of a panel.
+
+    Places are points from the upper left corner of the picture.
+    """
 
     panel: Panel
     left: float
@@ -64,7 +70,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Placed:
-    """One panel: its frames from the left and what is written above and beside them."""
+    """One panel: its frames from the left, and the texts above and beside them."""
 
     panel: Panel
     boxes: tuple[Box, ...]
@@ -117,7 +123,10 @@ def placed(plot: Plot) -> tuple[tuple[Placed, ...], float]:
 
 
 def _with_room(plot: Plot) -> tuple[list[list[_Told]], _Rooms, _Rooms, _Rooms]:
-    """All panels, room left and right of them and their widths; maps leave room for the numbers that they come to."""
+    """Return all panels, the room left and right of them and their widths.
+
+    Maps leave room for the numbers of their final axes.
+    """
     rows = _told(plot)
     for _ in range(2):
         lefts, rights = _columns(plot, rows)
@@ -151,7 +160,10 @@ def _told(plot: Plot) -> list[list[_Told]]:
 
 
 def _chain(plot: Plot, row: int, column: int) -> range:
-    """Rows whose panel in a column shares its horizontal axis with that of a row, from the top."""
+    """Return the rows whose panel in a column shares its horizontal axis with that of a row.
+
+    From the top.
+    """
     first = last = row
     while first and plot.rows[first - 1].shares_x and column < len(plot.rows[first - 1].panels):
         first -= 1
@@ -195,14 +207,20 @@ def scale_of(panel: Panel) -> Cells | None:
 
 
 def _has_scale(row: Row, column: int) -> bool:
-    """Tell whether the scale of cells stands beside a panel: of several alike in a row beside the last."""
+    """Tell whether the scale of cells stands beside a panel.
+
+    Of several alike in a row beside the last.
+    """
     here = [scale_of(panel) for panel in row.panels[column : column + 2]]
     alike = [(one.low, one.high, one.title, one.is_log) for one in here if one is not None]
     return here[0] is not None and (len(alike) < 2 or alike[0] != alike[1])
 
 
 def _columns(plot: Plot, rows: list[list[_Told]]) -> tuple[_Rooms, _Rooms]:
-    """Room left and right of each panel: equal for those above each other, rows alike in their panels."""
+    """Return the room left and right of each panel, equal for panels above each other.
+
+    Only for rows with equal panels.
+    """
     keys = [_shares(row) for row in plot.rows]
     lefts = [
         [
@@ -248,7 +266,10 @@ def _widths(plot: Plot, row: int, lefts: _Rooms, rights: _Rooms) -> list[float]:
 
 
 def _maps(plot: Plot, rows: list[list[_Told]], widths: _Rooms) -> list[list[_Told]]:
-    """Panels with both axes of maps at one scale; what shares the axis of a map is shown as far as it is."""
+    """Return the panels, both axes of maps at one scale.
+
+    A panel that shares the axis of a map shows the same range.
+    """
     rows = [list(row) for row in rows]
     for number, row in enumerate(plot.rows):
         for column, told in enumerate(rows[number]):

@@ -18,7 +18,10 @@ MOST_CELLS = 90  # along either axis
 
 
 def cells_shape(mark: Cells, box: Box) -> str:
-    """The cells of a grid: for each colour all that are at least as high, one over the other, so that no seam shows."""
+    """Return the cells of a grid as SVG, for each colour all cells at least as high.
+
+    One over the other, so that no seam shows.
+    """
     columns, rows = thin(len(mark.x), MOST_CELLS), thin(len(mark.y), MOST_CELLS)
     if not len(columns) or not len(rows) or mark.values.shape != (len(mark.y), len(mark.x)):
         return ""
@@ -56,7 +59,10 @@ def span_of_colours(mark: Cells) -> Span:
 
 
 def _blocks(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:
-    """Blocks of cells: first column and that behind the last, first row and that behind the last; no cell twice."""
+    """Return blocks of cells: first column and last + 1, first row and last + 1.
+
+    No cell is in two.
+    """
     padded = np.pad(mask.astype(np.int8), ((0, 0), (1, 1)))
     row, left = np.nonzero(np.diff(padded, axis=1) == 1)
     right = np.nonzero(np.diff(padded, axis=1) == -1)[1]

@@ -1,4 +1,4 @@
-"""The look of a picture: a colour for each role, widths of lines, shades of phases, the scale of cells."""
+"""Look of a picture: colours of roles, widths of lines, shades of phases, scale of cells."""
 
 from groundstation.plots.marks import Dash, Emphasis, Role
 
@@ -81,7 +81,9 @@ def dashes(dash: Dash) -> str:
 
 
 def shade_of(kind: str, role: Role, emphasis: Emphasis = "usual") -> tuple[str, float]:
-    """Colour and opacity of shaded ground: a phase of flight has its own, all else a faint one of its role.
+    """Return colour and opacity of shaded ground.
+
+    A phase of flight has its own, all else a faint one of its role.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Ticks of an axis of dates: hours, days, months or years of UTC, written as ISO 8601 has them."""
+"""Ticks of an axis of dates: hours, days, months or years of UTC, as in ISO 8601."""
 
 import numpy as np
 

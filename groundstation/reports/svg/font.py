@@ -1,4 +1,4 @@
-"""Text in a picture: how wide it is in DejaVu Sans, which characters it may have, how it is written as SVG.
+"""Text in a picture: its width in DejaVu Sans, its characters, its SVG.
 
 The two fonts beside this file are DejaVu Sans 2.37 cut down to Latin, Greek, Cyrillic, arrows, mathematics and signs
 (``python -m fontTools.subset``), without hints. Paper is set in them; a page has a font of the reader's machine, most
@@ -94,7 +94,9 @@ def label(text: Any, most: int = 40) -> str:
 
 
 def lines_of(text: str, room_pt: float, most: int = 2, size_pt: float = SIZE_PT) -> list[str]:
-    """Text broken between words into at most ``most`` lines, each within ``room_pt`` where words allow it.
+    """Break text between words into at most ``most`` lines.
+
+    Each is within ``room_pt`` where words allow it.
 
     Examples
     --------
@@ -127,5 +129,5 @@ def written(
 
 
 def middle(size_pt: float = SIZE_PT) -> float:
-    """From the middle of a line of text down to its base line, points."""
+    """Return the distance from the middle of a line of text down to its base line, points."""
     return 0.5 * CAP_SHARE * size_pt

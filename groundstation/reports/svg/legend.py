@@ -1,4 +1,7 @@
-"""The legend of a panel: a sign and a name for each mark that has one, in lines above it or in a column beside it."""
+"""Legend of a panel: a sign and a name for each mark that has one.
+
+In lines above the panel or in a column beside it.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -64,7 +67,7 @@ def entries_of(panel: Panel) -> tuple[Entry, ...]:
 
 
 def ground(mark: Spans, kind: str) -> Entry:
-    """Shaded ground by its kind, where that is empty by its name."""
+    """Return shaded ground by its kind, or by its name where the kind is empty."""
     return Entry(mark, label(kind or mark.name, MOST_OF_A_NAME), kind)
 
 

@@ -1,4 +1,7 @@
-"""Numbers of a path: hundredths of a point (0.004 mm), each as a step from the one before, in few characters."""
+"""Numbers of a path in few characters.
+
+Hundredths of a point (0.004 mm), each as a step from the one before.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +15,9 @@ Steps = NDArray[np.int64]
 
 
 class _Words(dict[int, str]):
-    """Text of hundredths by their count, with a space before where no minus parts it from the number before.
+    """Texts of numbers in hundredths, by the number.
+
+    With a space before where no minus separates it from the number before.
 
     Source: W3C, Scalable Vector Graphics 2, 9.3.9: the grammar of path data.
     """
@@ -46,7 +51,9 @@ def hundredths(values: Floats) -> Steps:
 
 
 def polyline(x: Floats, y: Floats, starts: NDArray[np.bool_]) -> str:
-    """Path through finite places, a new piece where ``starts`` says; one place alone is a stroke of no length.
+    """Return the path through finite places, with a new piece where ``starts`` is true.
+
+    A single place is a stroke of no length.
 
     Parameters
     ----------
@@ -74,7 +81,10 @@ def polyline(x: Floats, y: Floats, starts: NDArray[np.bool_]) -> str:
 
 
 def _corners(places: Steps, starts: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Rows of the places without which another line would be drawn: no doubles, none on the straight way of others."""
+    """Return the rows of the places that the line needs.
+
+    No doubles, none on the straight line between others.
+    """
     moves = np.ones(len(places), dtype=bool)
     moves[1:] = starts[1:] | np.any(places[1:] != places[:-1], axis=1)
     rows = np.flatnonzero(moves)
@@ -128,7 +138,9 @@ def dots(x: Floats, y: Floats) -> str:
 
 
 def each(counts: NDArray[np.int64]) -> list[str]:
-    """The numbers of a path one by one, given in hundredths; a space stands before one that has no minus.
+    """Return the numbers of a path one by one, from hundredths.
+
+    A space stands before a number without a minus.
 
     Examples
     --------

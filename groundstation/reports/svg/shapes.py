@@ -1,4 +1,7 @@
-"""Marks drawn in a frame, as SVG; samples that are too many are thinned, what has no place is left out."""
+"""Marks drawn in a frame, as SVG.
+
+Too many samples are thinned, samples without a place are left out.
+"""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -35,7 +38,7 @@ LANE_PT, LEAST_LANE_PT, ROUND = 7.0, 0.25, ' style="stroke-linecap:round"'
 
 
 def shape(mark: AnyMark, box: Box) -> str:
-    """A mark as it stands in a frame; empty where nothing of it is to be seen."""
+    """Return a mark as SVG in its frame; empty where no part of it can be seen."""
     draw: Callable[[Any, Box], str] | None = _SHAPES.get(type(mark))
     return draw(mark, box) if draw else ""
 
@@ -111,7 +114,10 @@ def _band(mark: Band, box: Box) -> str:
 
 
 def _kept(places: Floats, box: Box) -> Floats:
-    """Edges of a band no farther out than is needed: what lies beyond the frame has no shape to be seen."""
+    """Clip the edges of a band not far beyond the frame.
+
+    Farther out they cannot be seen.
+    """
     return np.clip(places, box.top - 10.0, box.bottom + 10.0)
 
 
