@@ -1,4 +1,4 @@
-"""The command ``groundstation``: its verbs. Heavy imports happen inside them."""
+"""Command ``groundstation`` with its verbs. Heavy imports happen inside them."""
 
 import io
 import sys
@@ -128,11 +128,11 @@ def run(
     json: Json = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Run everything the data allows: MCAP, heading correction, recording and report of each flight.
+    """Run everything the data allows: MCAP, heading correction, recording and report.
 
-    Flights of several aircraft that ranged to one another over a data link are then analysed as a session.
-
-    An OUT of an earlier run is continued: what it finished with the same logs and settings is not repeated.
+    Each flight gets its own. Flights of several aircraft that ranged to one another over a data link are then analysed
+    as a session. An OUT of an earlier run is continued: what it finished with the same logs and settings is not
+    repeated.
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
@@ -216,7 +216,10 @@ def report(
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
-    """Make the reports and the index again from the saved results, without the logs; or the acceptance of the INS."""
+    """Make the reports and the index again from the saved results, without the logs.
+
+    Or write the acceptance of the INS (--standard).
+    """
     from groundstation.cli import printing
     from groundstation.cli.text import printable
 
@@ -311,9 +314,10 @@ def cooperative(
     json: Json = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Analyse the logs of several aircraft together: positions from ranges over their data link.
+    """Analyse the logs of several aircraft together.
 
-    An OUT of an earlier run is continued: a session with the same logs, stations and settings is not run again.
+    Positions from ranges over their data link. An OUT of an earlier run is continued: a session with the same logs,
+    stations and settings is not run again.
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
@@ -348,7 +352,10 @@ def main(arguments: Any = None) -> None:
 
 
 def _application_for(words: Sequence[str]) -> typer.Typer:
-    """The application with the verb alone that is asked for: Typer makes the parameters of all before it calls one."""
+    """Return the application with only the verb that is asked for.
+
+    Typer makes the parameters of all verbs before it calls one.
+    """
     asked = [verb for verb in app.registered_commands if [*words[:1]] == [_name_of(verb)]]
     if not asked:
         return app

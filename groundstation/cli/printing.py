@@ -1,4 +1,4 @@
-"""How results look on stdout: lines for people, JSON for programs."""
+"""Output of results on stdout: lines for people, JSON for programs."""
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
@@ -73,9 +73,10 @@ def outcomes(
     with_times: bool = False,
     is_plan: bool = False,
 ) -> None:
-    """Print what became of each log: a line each on stdout, in the order of the logs: log, state, flight, answer.
+    """Print the outcome of each log: a line each on stdout, in the order of the logs.
 
-    On stderr what was skipped, by reason, then failures, then totals. Of a plan there is no state and no total.
+    A line has log, state, flight, answer. On stderr what was skipped, by reason, then failures, then totals. Of a plan
+    there is no state and no total.
     """
     if as_json_text:
         tell(as_json([_plain(outcome) for outcome in done]))

@@ -12,7 +12,10 @@ from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
 @contextmanager
 def listener(mode: Literal["auto", "none", "json"]) -> Iterator[Listener]:
-    """Give a listener for progress events; ``auto`` draws a bar only where stderr is a terminal."""
+    """Yield a listener for progress events.
+
+    ``auto`` draws a bar only where stderr is a terminal.
+    """
     if mode == "json":
         yield _as_json
     elif mode == "auto" and sys.stderr.isatty():
@@ -24,7 +27,10 @@ def listener(mode: Literal["auto", "none", "json"]) -> Iterator[Listener]:
 
 
 def _tell_of_compiling() -> None:
-    """Say why the first log of a format takes long, where nothing is compiled yet or nothing can be kept."""
+    """Say why the first log of a format takes long.
+
+    Where nothing is compiled yet or compiled code cannot be kept.
+    """
     from groundstation.base.compile import keeps_nothing
 
     if keeps_nothing():
@@ -49,7 +55,7 @@ def _bar() -> Iterator[Listener]:
     from rich.text import Text
 
     class Rate(TextColumn):
-        """Logs a minute."""
+        """Column with logs per minute."""
 
         def render(self, task: Task) -> Text:
             return Text(f"{60.0 * task.speed:.1f}/min" if task.speed else "")

@@ -1,4 +1,4 @@
-"""The verb ``rules``: what other limits would make of past verdicts."""
+"""Verb ``rules``: past verdicts under other limits."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -50,11 +50,10 @@ def test(
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
-    """List which verdicts would change under other limits, and why, from the gates that the flights saved.
+    """List which verdicts would change under other limits, and why.
 
-    A setting that chooses data or changes what is measured needs the log: it is named; the rest is judged.
-
-    With -v, list every gate with another limit, not only those of changed verdicts.
+    Judged from the gates that the flights saved. A setting that chooses data or changes what is measured needs the log:
+    it is named; the rest is judged. With -v, list every gate with another limit, not only those of changed verdicts.
     """
     from groundstation.cli.text import as_json
     from groundstation.pipeline.verbs.export import require_place
@@ -78,7 +77,10 @@ def test(
 
 
 def rules_text(found: "RulesTest", *, everything: bool = False) -> str:
-    """Text of ``rules test``: changed verdicts with the gates that changed them, what needs the log, totals."""
+    """Return the text of ``rules test``: changed verdicts with their gates, totals.
+
+    And what needs the log.
+    """
     from groundstation.base.text_columns import columns
 
     heads = [

@@ -1,4 +1,4 @@
-"""Printing for all verbs: text that shows and drives no terminal, JSON for programs."""
+"""Printing for all verbs: text that never drives the terminal, JSON for programs."""
 
 import json
 from typing import Any
