@@ -130,9 +130,11 @@ def run(
 ) -> int | None:
     """Run everything the data allows: MCAP, heading correction, recording and report.
 
-    Each flight gets its own. Flights of several aircraft that ranged to one another over a data link are then analysed
-    as a session. An OUT of an earlier run is continued: what it finished with the same logs and settings is not
-    repeated.
+    Each flight gets its own folder.
+
+    Flights of several aircraft that ranged to one another over a data link are then analysed as a session.
+
+    An OUT of an earlier run is continued: what it finished with the same logs and settings is not repeated.
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
@@ -218,7 +220,7 @@ def report(
 ) -> int | None:
     """Make the reports and the index again from the saved results, without the logs.
 
-    Or write the acceptance of the INS (--standard).
+    With --standard, write the acceptance of the INS instead.
     """
     from groundstation.cli import printing
     from groundstation.cli.text import printable
@@ -316,8 +318,9 @@ def cooperative(
 ) -> int | None:
     """Analyse the logs of several aircraft together.
 
-    Positions from ranges over their data link. An OUT of an earlier run is continued: a session with the same logs,
-    stations and settings is not run again.
+    The ranges over their data link give positions.
+
+    An OUT of an earlier run is continued: a session with the same logs, stations and settings is not run again.
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener

@@ -52,8 +52,11 @@ def test(
 ) -> int | None:
     """List which verdicts would change under other limits, and why.
 
-    Judged from the gates that the flights saved. A setting that chooses data or changes what is measured needs the log:
-    it is named; the rest is judged. With -v, list every gate with another limit, not only those of changed verdicts.
+    The gates that the flights saved are judged again, without the logs.
+
+    A setting that chooses data or changes what is measured needs the log: it is named; the rest is judged.
+
+    With -v, list every gate with another limit, not only those of changed verdicts.
     """
     from groundstation.cli.text import as_json
     from groundstation.pipeline.verbs.export import require_place
@@ -79,7 +82,7 @@ def test(
 def rules_text(found: "RulesTest", *, everything: bool = False) -> str:
     """Return the text of ``rules test``: changed verdicts with their gates, totals.
 
-    And what needs the log.
+    With the settings that need the log.
     """
     from groundstation.base.text_columns import columns
 

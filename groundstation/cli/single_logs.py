@@ -56,7 +56,7 @@ def info(
 ) -> int | None:
     """Show what a log is: format, clock, span, topics with rows, rates, fields.
 
-    And its buses (word by word with -v).
+    With what is on its buses (word by word with -v).
     """
     from groundstation.cli import printing
     from groundstation.pipeline.one_flight.convert import why_nothing_is_placed
@@ -110,7 +110,9 @@ def check(
 ) -> int | None:
     """Print the integrity ledger of every topic: rates, coverage, gaps, losses, odd values.
 
-    Writes nothing. With --for, the first line says whether the log can be used for that analysis.
+    Writes nothing.
+
+    With --for, the first line says whether the log can be used for that analysis.
     """
     from groundstation.cli import check_table, printing
     from groundstation.cli.progress import listener

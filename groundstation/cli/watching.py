@@ -80,8 +80,9 @@ def watch(
 ) -> int | None:
     """Run the logs that arrive in a folder, once they have stopped growing, until Ctrl-C.
 
-    Index and fleet page stay current. It may be killed at any moment: the same command continues with what is not
-    finished.
+    Index and fleet page stay current.
+
+    It may be killed at any moment: the same command continues with what is not finished.
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
