@@ -1,4 +1,7 @@
-"""Times as users write them: flight seconds, +mm:ss or ISO UTC, turned into flight seconds."""
+"""Times as users write them, turned into flight seconds.
+
+Flight seconds, +mm:ss or ISO UTC.
+"""
 
 import math
 import re

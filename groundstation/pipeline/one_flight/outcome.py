@@ -1,4 +1,4 @@
-"""What became of one log of a run, for the totals line, the index and the exit code."""
+"""Outcome of one log of a run, for the totals line, the index and the exit code."""
 
 import traceback
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ WORST_FIRST = (1, 4, 3, 0)
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one log, or of a session of several.
+    """Outcome of one log, or of a session of several.
 
     Parameters
     ----------
@@ -80,7 +80,10 @@ class Outcome:
 
 
 def reason_of(name: str, error: Exception) -> tuple[str, str]:
-    """Why a log failed, in one line, and where an error that is ours to mend came from (empty for the others)."""
+    """Return why a log failed, in one line, and the trace of an error that is our defect.
+
+    The trace is empty for other errors.
+    """
     if isinstance(error, GroundstationError):
         return str(error), ""
     if isinstance(error, OSError) and not lack_of_memory(error):

@@ -1,4 +1,4 @@
-"""``list``: the analyses, what each needs, and whether a log has it."""
+"""Verb ``list``: the analyses, what each needs, and whether a log has it."""
 
 import tempfile
 from pathlib import Path
@@ -11,7 +11,9 @@ from groundstation.results.files import load_document
 
 
 def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict[str, Any]]:
-    """List analyses, formats, scenarios and studies; with a log, whether each analysis would run on it and why not.
+    """List analyses, formats, scenarios and studies.
+
+    With a log, tell whether each analysis would run on it and why not.
 
     Raises
     ------

@@ -1,4 +1,7 @@
-"""Checks and descriptions of logs, each in a process of its own: with a limit of time, or isolated."""
+"""Checks and descriptions of logs, each in a process of its own.
+
+With a limit of time, or isolated.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -60,7 +63,7 @@ class _Told:
         return cls(**(vars(checked) | {"usability": usability}))
 
     def checked(self) -> Checked:
-        """The same as it was there."""
+        """Return the check as it was in the other process."""
         found = Checked(**(vars(self) | {"usability": None}))
         if self.usability is None:
             return found
@@ -88,9 +91,10 @@ def check_apart(
     fail_on: str = "none",
     listen: Listener = silent,
 ) -> tuple[Checked, ...]:
-    """Check logs as :func:`groundstation.pipeline.verbs.check.check_many` does, one process after the other.
+    """Check logs, one process after the other.
 
-    Logs of a session, which are judged together, are checked in one process.
+    As :func:`groundstation.pipeline.verbs.check.check_many` does. Logs of a session, which are judged together, are
+    checked in one process.
 
     Raises
     ------
@@ -174,6 +178,6 @@ def _described_apart(job: Job, bounds: Bounds) -> _Described:
 
 
 def _parts(line: str) -> tuple[str, str]:
-    """Where and what, of an error that was told in one line."""
+    """Split an error told in one line into where and what."""
     where, _, what = line.partition(": ")
     return where, what

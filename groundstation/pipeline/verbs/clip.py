@@ -1,4 +1,4 @@
-"""``clip``: a part of a flight as an MCAP of its own and, beside it, its recording."""
+"""Verb ``clip``: a part of a flight as an MCAP of its own, and its recording."""
 
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -40,7 +40,7 @@ CUT_FROM, CUT_SHA256, ZERO = "clip.source", "clip.source_sha256", "clip.zero_s"
 
 @dataclass(frozen=True)
 class Wanted:
-    """What to cut out of a flight.
+    """Part of a flight to cut out.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Wanted:
         return f"{self.start or 'the start'} to {self.end or 'the end'}"
 
     def wants(self, topic: str) -> bool:
-        """Whether a topic is to be kept.
+        """Tell whether a topic is to be kept.
 
         Examples
         --------
@@ -142,7 +142,10 @@ def _expect_free(source: Path, target: Path, with_recording: bool, force: bool) 
 
 @contextmanager
 def _as_mcap(log: Log, folder: Path, limits: Thresholds, wanted: Wanted) -> Iterator[tuple[Log, Path]]:
-    """The log and its MCAP: itself, or one that is gone afterwards; of several power-ups that of the one wanted."""
+    """Yield the log and its MCAP: the log itself, or a temporary file.
+
+    Of several power-ups, that of the one wanted.
+    """
     if log.is_store and not segments_in(log.info()):
         yield log, log.path
         return
@@ -166,7 +169,7 @@ def _wanted_of(logs: Sequence[Log], wanted: Wanted) -> Log:
 
 
 def _may_hold(segment: Segment, wanted: Wanted) -> bool:
-    """Whether a range that is given in UTC lies in a power-up; a range in seconds may lie in any."""
+    """Tell whether a range given in UTC lies in a power-up; one in seconds may lie in any."""
     texts = [text for text in (wanted.start, wanted.end) if text is not None]
     if segment.shift_ns or not texts or not all("T" in text for text in texts):
         return True
@@ -223,9 +226,10 @@ def _cut(log: Log, mcap: Path, target: Path, wanted: Wanted, limits: Thresholds)
 
 
 def _zero_event(wanted: Wanted, disguise: Disguise | None, zero_ns: int, first_ns: int) -> RecordBatch | None:
-    """An event at flight time zero, where topics left out may be what began there; None where none is needed.
+    """Return an event at flight time zero, None where none is needed.
 
-    Analyses count from flight time zero: without it their grid would begin elsewhere.
+    It is needed where a topic that is left out may be what began at zero. Analyses count from flight time zero: without
+    it their grid would begin elsewhere.
     """
     is_whole = disguise is not None and not wanted.topics
     if wanted.start or not (is_whole or (wanted.topics and first_ns > zero_ns)):
@@ -234,7 +238,10 @@ def _zero_event(wanted: Wanted, disguise: Disguise | None, zero_ns: int, first_n
 
 
 def _zero_ns(mcap: Path, info: "StoreInfo") -> int:
-    """Corrected time of flight time zero; where the file lost it, of the first record that is left."""
+    """Return the corrected time of flight time zero.
+
+    Where the file lost it, that of the first record left.
+    """
     from groundstation.store.reader import read
 
     if info.start_ns is not None:
@@ -255,7 +262,10 @@ def _span_ns(wanted: Wanted, zero_ns: int, has_utc: bool) -> tuple[int, int]:
 
 
 def _nothing_in(log: Log, info: "StoreInfo", wanted: Wanted) -> UsageError:
-    """Why a part is empty: no topic is wanted, or the flight has no record of them then."""
+    """Return the error of an empty part.
+
+    No topic is wanted, or the flight has no record of them then.
+    """
     topics = info.ledger.topics
     if topics and not any(wanted.wants(topic) for topic in topics):
         asked = ", ".join(map(repr, wanted.topics))
@@ -270,9 +280,9 @@ def _nothing_in(log: Log, info: "StoreInfo", wanted: Wanted) -> UsageError:
 
 
 def _inside(info: "StoreInfo", zero_ns: int, first_ns: int, part: "Part") -> "StoreInfo":
-    """Facts of the flight without what lies outside the part: damaged spans, what was lost there, and findings on it.
+    """Return the facts of the flight without those of places outside the part.
 
-    Losses without a known place in time stay: they may lie within.
+    Damaged spans, losses there, and findings on them. Losses without a known place in time stay: they may lie within.
     """
     spans = info.ledger.spans
     low_s, high_s = ((end_ns - zero_ns) / NS_PER_S for end_ns in (part.start_ns, part.end_ns))
@@ -295,7 +305,7 @@ def _inside(info: "StoreInfo", zero_ns: int, first_ns: int, part: "Part") -> "St
 
 
 def _mark(damage: Mapping[str, Any]) -> tuple[Any, ...]:
-    """What a loss and its span have in common."""
+    """Return what a loss and its span have in common: kind, topic, count."""
     return damage.get("kind"), damage.get("topic"), damage.get("count")
 
 
@@ -306,7 +316,10 @@ def _mark_of_span(span: DamagedSpan) -> tuple[Any, ...]:
 def _origin(
     source: Source, info: "StoreInfo", zero_ns: int, first_ns: int, part: "Part", wanted: Wanted
 ) -> dict[str, str]:
-    """What the part was cut from; of a part of a part, in terms of the flight that both are of."""
+    """Return the source that the part was cut from.
+
+    For a part of a part, in terms of the original flight.
+    """
     name, sha256 = source.name, source.sha256
     base_s = 0.0
     if CUT_FROM in info.metadata:
@@ -326,7 +339,9 @@ def _origin(
 
 
 def zero_s(metadata: Mapping[str, Any]) -> float:
-    """Flight time, of the flight that a part was cut from, at which the part's own begins; 0 for a whole flight.
+    """Return the flight time at which a part begins, in the flight it was cut from, s.
+
+    0 for a whole flight.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""``cooperative``: the logs of several aircraft, named one by one, as a session."""
+"""Verb ``cooperative``: the logs of several aircraft, named one by one, as a session."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -74,7 +74,7 @@ def _files_of(path: Path) -> list[Path]:
 
 
 def _opened(files: Sequence[Path], configuration: Configuration) -> tuple[tuple[Log, ...], tuple[Outcome, ...]]:
-    """The logs that a reader claims, in the order of their digests; why the others are none."""
+    """Return the logs that a reader claims, by digest, and the outcomes of the others."""
     logs, failed = [], []
     for path in dict.fromkeys(files):
         try:

@@ -1,4 +1,7 @@
-"""Plans from beginning to end: a scenario becomes answers, recording and report in a folder of its own."""
+"""Plans from beginning to end: a scenario becomes answers, recording and report.
+
+In a folder of its own.
+"""
 
 import hashlib
 import platform
@@ -64,7 +67,9 @@ def run_plan(
     with_pdf: bool = False,
     listen: Listener = silent,
 ) -> Outcome:
-    """Make a plan into ``<out>/<name of the scenario>/``; of one that is finished only a PDF that is asked for.
+    """Make a plan into ``<out>/<name of the scenario>/``.
+
+    Of a finished plan only a PDF that is asked for is made.
 
     Parameters
     ----------
@@ -97,13 +102,19 @@ def run_plan(
 
 
 def _keys(plan: Plan[Any], loaded: LoadedPlan[Any]) -> Keys:
-    """Equal keys, equal results: the scenario and the versions go in."""
+    """Return the keys of a plan, made of the scenario and the versions.
+
+    Equal keys give equal results.
+    """
     key = digest_of_parts(plan.name, loaded.name, loaded.text, dict(versions()), platform.python_version())
     return Keys(key, key)
 
 
 def _kept(target: Path, keys: Keys) -> tuple[Resume, bool] | None:
-    """What a finished plan of such keys said, and whether it has its PDF; None where anything else is amiss."""
+    """Return the saved outcome of a finished plan of these keys, and whether it has its PDF.
+
+    None where anything else is amiss.
+    """
     try:
         manifest, findings = load_manifest(target), load_document(target).findings
     except GroundstationError:
@@ -117,7 +128,7 @@ def _kept(target: Path, keys: Keys) -> tuple[Resume, bool] | None:
 def _finished(
     loaded: LoadedPlan[Any], target: Path, kept: tuple[Resume, bool], fail_on: str, with_pdf: bool, watch: Stopwatch
 ) -> Outcome:
-    """The outcome of a finished plan, to which a PDF is added where it is asked for and missing."""
+    """Return the outcome of a finished plan; add its PDF where asked for and missing."""
     resume, has_pdf = kept
     problem = ""
     if with_pdf and not has_pdf:

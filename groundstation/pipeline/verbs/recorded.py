@@ -1,4 +1,4 @@
-"""Recorded robots from their folders: logs through the store into tables, and from these a session to run on."""
+"""Recorded robots from their folders: a session made of logs, store and tables."""
 
 import re
 import tempfile

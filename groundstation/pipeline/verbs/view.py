@@ -1,4 +1,4 @@
-"""``view``: whatever stands for a flight - folder, recording, MCAP or log - opens in the Rerun viewer."""
+"""Verb ``view``: a folder, recording, MCAP or log of a flight in the Rerun viewer."""
 
 import os
 import tempfile
@@ -78,7 +78,10 @@ def look_at(
 
 
 def _sound(recording: Path) -> Path:
-    """A recording that Rerun can read from end to end: a damaged one may end the viewer without a word."""
+    """Return a recording that Rerun can read from end to end.
+
+    A damaged one may end the viewer without a word.
+    """
     from groundstation.viewer.verification import damaged
 
     if recording.stat().st_size <= MOST_VERIFIED_BYTES and (fault := damaged([recording])):
