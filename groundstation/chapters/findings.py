@@ -1,7 +1,4 @@
-"""Chapter on findings: what a user must know about the flight, most severe first.
-
-And what could not be assessed.
-"""
+"""Chapter on findings: what a user must know, most severe first; what was not assessed."""
 
 from collections.abc import Sequence
 

@@ -1,7 +1,4 @@
-"""Top of the report: which flight, its best answer, the others as tiles.
-
-And what could not be assessed.
-"""
+"""Top of the report: which flight, its best answer, others as tiles, what is not assessed."""
 
 from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.timescales import utc_ns_to_iso

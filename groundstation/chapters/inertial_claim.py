@@ -71,7 +71,7 @@ def growth(answer: InertialResult) -> str:
 def forecast_claim(answer: ForecastResult, sentences: tuple[str, ...], tone: Tone) -> Claim | None:
     """Return the error of the shipped forecast after an hour; None without an error.
 
-    Of the longest horizon up to an hour, or of the shortest where all are longer.
+    The horizon is the longest up to an hour, or the shortest where all are longer.
     """
     rows = [row for row in answer.skill if is_number(row.rms_m)]
     shipped = {row.horizon_min: row for row in rows if row.method == answer.default_method}

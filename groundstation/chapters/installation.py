@@ -1,7 +1,4 @@
-"""Chapter on the heading error with what earlier flights of the same INS taught.
-
-Beside the heading error of the taxi alone.
-"""
+"""Chapter on the heading error with and without what earlier flights of the INS taught."""
 
 from collections.abc import Sequence
 

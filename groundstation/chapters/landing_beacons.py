@@ -42,9 +42,9 @@ ROW_CAPTION = (
 
 
 def landing_beacons(results: FlightResults) -> Section | None:
-    """Return the chapter.
+    """Return the chapter; None where no bearings were logged.
 
-    Without an answer it says why where bearings were logged; None where there were none.
+    Where bearings were logged but gave no answer, the chapter says why.
     """
     answer = results.answer(BeaconLanding)
     if answer is None:

@@ -1,6 +1,6 @@
 """Chapter on what to fly, record and check next time.
 
-For every answer that this flight could not give or not decide.
+It covers every answer that this flight could not give or not decide.
 """
 
 from collections.abc import Iterator

@@ -141,7 +141,7 @@ def _damage_row(damage: DamageEntry) -> tuple[str, ...]:
 def _nested(document: Clock | Ledger, title: str) -> Facts | None:
     """Return facts of a document by the names of its fields.
 
-    Those that have no table of their own; empty values are left out.
+    Fields with a table of their own and empty values are left out.
     """
     pairs = [(name, value, "") for name, value in _flat(document) if value.partition("\u202f")[0] not in NOTHING]
     return Facts(title, pairs) if pairs else None

@@ -79,7 +79,8 @@ def half_width(ends: tuple[float, float]) -> str:
 def steady_terms(heading: HeadingResult) -> tuple[str, ...]:
     """Return the shares of this taxi, the wind and the installation in the interval.
 
-    And whose error it is: the airframe's or the platform's. Empty where the steady sideslip is not known.
+    The text also says whose error it is: the airframe's or the platform's. Empty where the steady sideslip is not
+    known.
     """
     if not is_number(heading.steady_sigma_deg):
         return ()

@@ -29,7 +29,7 @@ def listener(mode: Literal["auto", "none", "json"]) -> Iterator[Listener]:
 def _tell_of_compiling() -> None:
     """Say why the first log of a format takes long.
 
-    Where nothing is compiled yet or compiled code cannot be kept.
+    It does where nothing is compiled yet or compiled code cannot be kept.
     """
     from groundstation.base.compile import keeps_nothing
 

@@ -80,9 +80,9 @@ def test(
 
 
 def rules_text(found: "RulesTest", *, everything: bool = False) -> str:
-    """Return the text of ``rules test``: changed verdicts with their gates, totals.
+    """Return the text of ``rules test``: changed verdicts, their gates, totals, open settings.
 
-    With the settings that need the log.
+    Open settings are those that need the log.
     """
     from groundstation.base.text_columns import columns
 

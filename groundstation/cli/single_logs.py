@@ -56,7 +56,7 @@ def info(
 ) -> int | None:
     """Show what a log is: format, clock, span, topics with rows, rates, fields.
 
-    With what is on its buses (word by word with -v).
+    Its buses are shown too, word by word with -v.
     """
     from groundstation.cli import printing
     from groundstation.pipeline.one_flight.convert import why_nothing_is_placed

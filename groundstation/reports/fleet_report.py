@@ -1,6 +1,6 @@
-"""Report of a folder of flights: one self-contained HTML file, and its PDF on demand.
+"""Report of a folder of flights, with every flight: one HTML file, and a PDF on demand.
 
-With every flight.
+The HTML file is self-contained.
 """
 
 from dataclasses import replace

@@ -1,6 +1,6 @@
-"""index.json and index.csv: a row for each flight and session of a folder.
+"""index.json and index.csv: a row for each flight, session and log without a flight.
 
-And for each log that gave none.
+The rows are those of one folder.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -103,8 +103,8 @@ class Svg(str):
 def page_data(figures: Iterable[tuple[Panel, ...]], pictures: Iterable[tuple[Frame, ...]] = ()) -> str:
     """Return the panels of every live figure of a page as JSON for a script element.
 
-    And the frames of every picture. Arrays are base64 of little-endian float32, NaN where a line breaks; equal arrays
-    stand once.
+    The frames of every picture are in it too. Arrays are base64 of little-endian float32, NaN where a line breaks;
+    equal arrays stand once.
     """
     pool: dict[str, int] = {}
 

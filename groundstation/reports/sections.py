@@ -72,7 +72,7 @@ def _numbered(sections: Sequence[Section], saved: SavedFlight, numbers: Iterable
 def _workings(section: Section, configuration: Mapping[str, Any]) -> Section:
     """Return the part of a chapter that belongs in the appendix.
 
-    Of the settings only those that the user set.
+    Settings are cut down to those that the user set.
     """
     every = (*section.parts, *section.appendix) if section.is_open else section.appendix
     parts = kept(_as_set(part, configuration) for part in every)
@@ -92,10 +92,7 @@ def _as_set(part: Part, configuration: Mapping[str, Any]) -> Part | None:
 
 
 def on_a_page(section: Section, saved: SavedFlight) -> Section:
-    """Return the section for a report: its figures drawn.
-
-    Of the files beside the report it names those that exist.
-    """
+    """Return the section for a report: figures drawn, files named that exist beside it."""
     drawn = drawn_by(PLOTS, section, saved.results)
     parts = (
         _of_files_there(part, saved.folder) if isinstance(part, Note) and part.files else part for part in drawn.parts

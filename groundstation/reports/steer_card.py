@@ -1,7 +1,4 @@
-"""Exports for the cockpit: the deviation as a table and as a steer card on A6 paper.
-
-Beside the report of a flight.
-"""
+"""Exports for the cockpit, beside a flight's report: deviation table and steer card (A6)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,9 +21,9 @@ MOST_LETTERS, MOST_OF_A_REASON = 40, 150
 
 @dataclass(frozen=True)
 class CardLine:
-    """Line of a steer card: to fly a magnetic heading, steer that reading.
+    """Line of a steer card: magnetic heading, reading to steer, deviation to add, its sigma.
 
-    With the deviation to add and its sigma.
+    To fly the heading, steer the reading.
     """
 
     heading: str

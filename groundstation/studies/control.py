@@ -99,9 +99,9 @@ def laws_table(plan: SessionPlan, runs: int, seed: int, tell: Progress) -> Figur
 
 
 def placement_table(plans: dict[str, SessionPlan], tell: Progress) -> FigureData:
-    """Tabulate the best third point for each fixed point.
+    """Tabulate the best third point by analysis, by the determinant, by the covariance.
 
-    By analysis, by the determinant, by the covariance.
+    One row per fixed point.
     """
     rows = []
     for name, plan in plans.items():

@@ -64,7 +64,7 @@ def least_sigma_m(answer: ControlPlan, axis: str) -> float:
 def _ratio(answer: ControlPlan, name: str) -> float:
     """Return a measure of geometry at the end, under control over that without control.
 
-    Under the law of the source's local criterion, the determinant.
+    The law is that of the source's local criterion, the determinant.
     """
     laws = answer.law("determinant"), answer.law(UNCONTROLLED)
     return float(getattr(laws[0], name) / getattr(laws[1], name))
@@ -105,7 +105,7 @@ CASES: tuple[Case, ...] = (
 def placements() -> dict[str, SessionPlan]:
     """Return plans of an approach that place its third point, by name.
 
-    For fixed points along the path and for correlated range errors.
+    They vary the fixed point along the path, and the correlation of range errors.
     """
     base = scenario(THIRD)
     found = {}

@@ -1,6 +1,6 @@
 """Runs of the cooperative study: each session simulated, filtered and judged.
 
-Only a small outcome of each is kept.
+A small outcome of each is kept.
 """
 
 import os

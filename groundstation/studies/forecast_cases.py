@@ -180,7 +180,7 @@ def epochs_of(case: Case, batch: ErrorBatch, row: int) -> Epochs:
 def model_of(case: Case, batch: ErrorBatch, row: int) -> ChannelModel:
     """Return the channel model of a flight.
 
-    With the truth's own gravity and radius, or those of the flight's mean place.
+    Gravity and radius are the truth's own, or those of the flight's mean place.
     """
     if case.family.truth == "channel":
         return ChannelModel(MPS2_PER_G, RADIUS_M, case.noise.beta_per_s)

@@ -66,9 +66,9 @@ def matched_run(seed: int, number: int, *, duration_s: int = DURATION_S, uses_ve
 
 
 def consistency_table(seed: int, runs: int = RUNS, *, uses_velocity: bool = True) -> FigureData:
-    """Tabulate mean NEES per state at some times, and mean NIS over all epochs.
+    """Tabulate mean NEES per state at some times, and mean NIS, over ``runs`` flights.
 
-    Over ``runs`` flights; NIS of position and velocity. 1 is honest; limits are those of 99 % of chi-square with
+    NIS is that of position and velocity over all epochs. 1 is honest; limits are those of 99 % of chi-square with
     ``freedom`` degrees of freedom: flights and channels are independent, and so are innovations of one another.
     """
     nees, nis, count = np.zeros(len(TIMES_S)), np.zeros(2), np.zeros(2, dtype=np.int64)

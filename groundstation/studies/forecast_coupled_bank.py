@@ -70,7 +70,7 @@ class SetForecasts:
     def weights(self, replay: Hindcast, judge_m2: FloatArray, prior: FloatArray) -> FloatArray:
         """Return the weight of each set at each start, (k, s), from outages over by then.
 
-        As the weights of ``bank``.
+        The weights are formed like those of ``bank``.
         """
         evidence = np.tile(np.log(prior), (len(replay.start_s), 1))
         for lead_s in JUDGED_S:

@@ -143,7 +143,7 @@ def _after(
 ) -> FloatArray:
     """Return the coverage of the default's 95 % band from the starts ``at``, by horizon.
 
-    Against the GNSS of the same flight without any outage.
+    The reference is the GNSS of the same flight without any outage.
     """
     lead_s = leads_of(LEAD_STEP_S, 60.0 * AFTER_MIN[-1])
     every = start_epochs(flown.epochs, settings.first_start_s, settings.start_step_s)

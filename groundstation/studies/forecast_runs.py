@@ -1,6 +1,6 @@
 """Flights of the forecast study: each simulated, filtered and replayed.
 
-Only a small outcome of each is kept.
+A small outcome of each is kept.
 """
 
 import os
@@ -187,7 +187,7 @@ def _claimed(method: str, run: FilterRun, replay: Hindcast, settings: InertialSe
 def mean_squares(replay: Hindcast) -> FloatArray:
     """Return the mean square of the radial error, shape (methods, sets, horizons).
 
-    Over each set of starts.
+    The mean is over each set of starts.
     """
     leads = leads_at(replay)
     classic = [np.flatnonzero(np.abs(replay.start_s - 3600.0 * hours) < 1.0) for hours in CLASSIC_START_H]

@@ -88,9 +88,9 @@ def finding(low: float, high: float) -> str:
 
 
 def rms_table(cases: dict[str, Resampled]) -> FigureData:
-    """Tabulate the RMS of every method in every case, with 95 % limits.
+    """Tabulate the RMS of every method in every case, at all starts and the paper's four.
 
-    At all starts, and at the paper's four.
+    The values have 95 % limits.
     """
     rows = []
     for case, sample in cases.items():
@@ -106,7 +106,7 @@ def rms_table(cases: dict[str, Resampled]) -> FigureData:
 def ratio_table(cases: dict[str, Resampled]) -> FigureData:
     """Tabulate the RMS of windows and smoothed start over that of the last estimate.
 
-    With 95 % limits and the conclusion.
+    The ratios have 95 % limits and a conclusion.
     """
     rows = []
     for case, sample in cases.items():
@@ -143,7 +143,7 @@ def later_table(cases: dict[str, Resampled]) -> FigureData:
 def cure_table(windows: Resampled, cure: Resampled) -> FigureData:
     """Tabulate the paper's windows over the last estimate with R inflated.
 
-    Under coloured GNSS error, on the same flights.
+    The GNSS error is coloured; the flights are the same.
     """
     ratio = windows.rms_m("windows") / cure.rms_m(REFERENCE)
     rows = [

@@ -234,7 +234,7 @@ def study_crew(
 def gates_table(outcomes: Sequence[CrewOutcome]) -> FigureData:
     """Tabulate the share of runs that fail each required gate, by kind.
 
-    Of the runs that pass the standstill; only gates that any run fails.
+    Only runs that pass the standstill and gates that any run fails count.
     """
     still = [one for one in outcomes if one.passes_standstill]
     names = sorted({name for one in still for name in one.failed})

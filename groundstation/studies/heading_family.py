@@ -279,8 +279,8 @@ def coverage_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
 def segments_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
     """Tabulate coverage with and without steady terms by number of segments.
 
-    For each kind of disturbance. What is the same all along one segment cannot be told from the error by that segment:
-    with more of them, in other directions, their spread shows it.
+    Each kind of disturbance has its own rows. What is the same all along one segment cannot be told from the error by
+    that segment: with more of them, in other directions, their spread shows it.
     """
     kinds = np.array([outcome.case.disturbance.kind for outcome in outcomes])
     segments = np.minimum([len(outcome.case.segments_s) for outcome in outcomes], MOST_SEGMENTS)
@@ -311,7 +311,7 @@ def gates_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
 def time_to_precision_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
     """Tabulate the taxi time that the paper's e needs to stay within its limit.
 
-    By length of run: share that gets there, quartiles.
+    A row for each length of run has the share that gets there, and quartiles.
     """
     lengths = np.array([sum(outcome.case.segments_s) for outcome in outcomes])
     seconds = np.array([np.inf if run.seconds_to_precision is None else run.seconds_to_precision for run in outcomes])

@@ -54,7 +54,7 @@ def precision_table(rng: np.random.Generator, runs: int) -> FigureData:
 def quality_table(rng: np.random.Generator, runs: int) -> FigureData:
     """Tabulate quality (spread of the running mean) on 120-s runs.
 
-    On ordinary ones and with a drift of 2 deg/min.
+    The runs are ordinary ones, and ones with a drift of 2 deg/min.
     """
     count = round(120.0 / STEP_S)
     time_min = np.arange(count) * STEP_S / 60.0
@@ -121,8 +121,8 @@ def standstill_tables(rng: np.random.Generator, runs: int, limit_mps: float = 0.
 def arm_table() -> FigureData:
     """Tabulate the largest effect of an uncorrected antenna arm inside the gates.
 
-    At 1 deg/s and 6 m/s, and the effect of a gentle curve. A turn of given rate for 10 s in a 40-s run at 6 m/s shifts
-    the mean by arm x rate / speed x 10 / 40.
+    The gates are 1 deg/s at 6 m/s; the effect of a gentle curve is given too. A turn of given rate for 10 s in a 40-s
+    run at 6 m/s shifts the mean by arm x rate / speed x 10 / 40.
     """
     arms = np.array([2.0, 5.0, 10.0])
     return FigureData(

@@ -78,10 +78,7 @@ def _share_95(error: FloatArray) -> float:
 
 
 def bearing_spans() -> FigureData:
-    """Tabulate where each category is met by the source's formulas.
-
-    As stretches before the threshold.
-    """
+    """Tabulate where each category is met by the source's formulas, m before the threshold."""
     before = np.arange(0.0, 8000.0, SPAN_STEP_M)
     slope = float(np.tan(np.deg2rad(GLIDE_DEG)))
     rows = []

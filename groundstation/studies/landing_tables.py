@@ -83,7 +83,7 @@ def _sigmas(row: AccuracyRow) -> tuple[float, float, float]:
 def variation_table(answers: Mapping[str, RangeLanding]) -> FigureData:
     """Tabulate the effect of noise, correlation, baro and control.
 
-    On the approach with the moving point.
+    The approach is that with the moving point.
     """
     rows = []
     for name, answer in answers.items():

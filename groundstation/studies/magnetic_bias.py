@@ -1,6 +1,6 @@
 """Bias of one branch and of the average of opposite branches, by formula.
 
-And the power of the bank it grows with.
+The bias grows with a power of the bank.
 """
 
 from dataclasses import dataclass
@@ -19,10 +19,7 @@ EXPONENTS = np.arange(0.5, 4.001, 0.02)  # tried where a floor of noise is fitte
 
 @dataclass(frozen=True)
 class Biases:
-    """RMS over the circle of steady banks minus level flight, shapes (k,).
-
-    By the banks of the study.
-    """
+    """RMS over the circle of steady banks minus level flight, by bank, shapes (k,)."""
 
     one_branch_deg: FloatArray
     average_deg: FloatArray
@@ -35,7 +32,7 @@ class Biases:
 def formula_biases(settings: MagnetometerSettings) -> Biases:
     """Return the biases of one magnetometer at the banks of ``EXACT_BANKS_DEG``.
 
-    In the field of the published figures. No flight: a bank held exactly on every heading, no noise.
+    The field is that of the published figures. No flight: a bank held exactly on every heading, no noise.
     """
     field = np.array(PUBLISHED_FIELD_NT)
     level = deviation_truth(settings, field).compass_error_deg

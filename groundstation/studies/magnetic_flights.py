@@ -79,7 +79,7 @@ class Hangar:
     def _taxi(self, family: MagneticFamilySettings) -> HeadingResult | None:
         """Return system 1's answer of the taxi before the flight.
 
-        Of a taxi with the same azimuth error, without drift.
+        The taxi has the same azimuth error, and no drift.
         """
         sigma = family.heading_error_sigma_deg
         if sigma not in self._taxis:

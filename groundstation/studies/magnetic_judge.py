@@ -1,7 +1,4 @@
-"""Errors that the methods leave on a simulated flight, judged by the truth.
-
-And how honest their sigmas are.
-"""
+"""Errors of the methods on a simulated flight, judged by the truth; honesty of sigmas."""
 
 from dataclasses import dataclass, fields
 
@@ -197,9 +194,9 @@ class Circle:
 
 
 def level_circle(flown: Flown, field_ned_nt: FloatArray) -> Circle:
-    """Return what the magnetometer of a flight would show in level flight.
+    """Return readings of a flight's magnetometer in level flight, with the INS attitude.
 
-    And the attitude with which the INS would level it.
+    The attitude is that with which the INS would level it.
     """
     declination = float(np.rad2deg(np.arctan2(field_ned_nt[1], field_ned_nt[0])))
     heading = CENTRES_DEG

@@ -94,9 +94,9 @@ def _coverage(coverage: FigureData) -> Section:
 
 
 def residual_claim(honesty: FigureData, method: str) -> str:
-    """Return in words whether 95 % of the flights keep 2 stated sigma.
+    """Return in words whether 95 % of the held-out errors stay within 2 stated sigma.
 
-    Of the error on the held-out part.
+    One error for each flight counts.
     """
     row = int(np.flatnonzero(rows_where(honesty, method=method, error_of=HELD_OUT))[0])
     share, high = float(honesty["inside2"][row]), float(honesty["inside2_high"][row])
@@ -253,7 +253,7 @@ def _sweep(sweep: Sweep, tables: dict[str, FigureData]) -> Section:
 def sweep_text(sweep: Sweep, table: FigureData, verdicts: FigureData, ratios: FigureData) -> str:
     """Return in words which method is better where, and how much one branch loses.
 
-    And where sigmas and verdicts fail.
+    The text also says where sigmas and verdicts fail.
     """
     parts = [_comparison(sweep, ratios, IRON, "Without A the iron fit is")]
     branch = rows_where(ratios, sweep=sweep.name, method="one_branch") & np.isfinite(ratios["ratio"])

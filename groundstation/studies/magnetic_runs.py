@@ -1,6 +1,6 @@
 """Runs of the magnetic study: every seed flies all setups, on several processes.
 
-Only a small outcome of each is kept.
+A small outcome of each is kept.
 """
 
 import multiprocessing

@@ -136,7 +136,7 @@ def sweep_table(sweep: Sweep, samples: dict[Setup, Sample]) -> FigureData:
 def ratio_table(sweeps: Sequence[Sweep], samples: dict[Setup, Sample]) -> FigureData:
     """Tabulate errors of the iron fit and of one branch over that of the branch table.
 
-    Without A, on the same flights.
+    The errors are without A; the flights are the same.
     """
     rows = []
     for sweep in sweeps:
@@ -163,7 +163,7 @@ def finding(low: float, high: float) -> str:
 def residual_table(sample: Sample) -> FigureData:
     """Tabulate the error that every method leaves on whole flights.
 
-    On every heading, and on the held-out part against truth and INS.
+    Columns: every heading, and the held-out part against truth and INS.
     """
     rows = []
     for method in METHODS:
@@ -185,10 +185,10 @@ def residual_table(sample: Sample) -> FigureData:
 
 
 def claim_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> FigureData:
-    """Tabulate the bank error of one branch and of the average of opposite ones.
+    """Tabulate the bank error of one branch and of the average, by formula and flown.
 
-    By formula, and flown without noise. ``left`` is the share of one branch's error that the average keeps; published
-    are the figures of the design.
+    The average is that of opposite branches; the flights have no noise. ``left`` is the share of one branch's error
+    that the average keeps; published are the figures of the design.
     """
     rows = []
     for place, (bank, setup) in enumerate(CLAIM.points):
@@ -212,7 +212,7 @@ def claim_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> Fig
 def power_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> FigureData:
     """Tabulate the exponent of the bank with which the average's bias grows.
 
-    And the bank at which it passes the limit.
+    The table also has the bank at which the bias passes the limit.
     """
     banks = np.array(EXACT_BANKS_DEG)
     weigher = samples[CLAIM.points[0][1]]

@@ -128,7 +128,7 @@ def taxi_outcome(name: str, seed: int) -> TaxiOutcome:
 def true_airframe_error(simulated: Simulated) -> Callable[[float], float]:
     """Return the true airframe error, INS heading minus heading of the nose, by flight second.
 
-    As the log shows it after all that was spoilt.
+    The INS heading is that of the log, after all that was spoilt.
     """
     ins, truth = simulated.flight["ins"], simulated.flight["truth"]
     true_deg = np.interp(

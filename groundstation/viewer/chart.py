@@ -166,7 +166,7 @@ class Chart:
     ) -> None:
         """Log lines; with ``at_s`` they are shown from that flight time on.
 
-        Until others take their place.
+        They stay until others take their place.
         """
         strips: list[FloatArray] = []
         shades: list[Colour] = []

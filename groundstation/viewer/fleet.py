@@ -1,6 +1,6 @@
 """Rerun recording of a fleet: fleet.rrd, with one row per flight.
 
-On the timelines ``utc`` and ``flight_number``.
+Its timelines are ``utc`` and ``flight_number``.
 """
 
 from collections.abc import Callable

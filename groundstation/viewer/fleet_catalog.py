@@ -63,9 +63,9 @@ class Catalog:
 def catalog_server(
     flights: Sequence[Path], fleet: Path | None, *, host: str, port: int, sessions: Sequence[Path] = ()
 ) -> Iterator[Catalog]:
-    """Serve recordings until the context is left.
+    """Serve recordings as data sets until the context is left.
 
-    As the data sets ``flights``, ``sessions`` (where any are) and ``fleet``.
+    The data sets are ``flights``, ``sessions`` (where any are) and ``fleet``.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def _behind_a_gate(host: str, port: int) -> Iterator[tuple[Server, str]]:
 def reachable(url: str) -> str:
     """Return the address that others can use.
 
-    For a server on all addresses: the name of its machine.
+    A server on all addresses has the name of its machine.
 
     Examples
     --------
@@ -186,7 +186,7 @@ def _views(path: Path) -> int:
 def _link(dataset: DatasetEntry, fleet: Path, links: dict[str, str], layer: Path) -> None:
     """Point the links in the table of flights into the catalog.
 
-    As a layer over the text that the file holds.
+    The new text is a layer over the text that the file holds.
     """
     text = _text(fleet)
     for name, url in links.items():

@@ -73,8 +73,8 @@ def heading_error_density(recorder: FleetRecorder, fleet: FleetResults) -> list[
 def steps(densities: Densities, order: Int64Array) -> Iterator[tuple[int, FloatArray]]:
     """Yield places in ``order`` to draw at, and the density of all flights up to each.
 
-    At most 200 places, the last among them. Merged by samples, as the density of the whole fleet is: the last step
-    equals it.
+    There are at most 200 places, the last among them. Densities are merged by samples, like that of the whole fleet:
+    the last step equals it.
     """
     places = np.unique(np.linspace(0, len(order) - 1, min(len(order), MOST_STEPS)).round().astype(np.int64))
     total, count, done = np.zeros(len(densities.pooled_per_deg)), 0, 0

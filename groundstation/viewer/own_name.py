@@ -14,7 +14,7 @@ _HOST = re.compile(r"(\[(?P<address>[0-9a-f:.]+)\]|(?P<name>[^:\[\]]+))(:\d*)?")
 def is_own_name(host: str) -> bool:
     """Tell whether a Host header is an address, ``localhost`` or this machine's name.
 
-    With a port or without. An address cannot be made to point elsewhere, so a browser sends one only for a page of that
+    A port may follow. An address cannot be made to point elsewhere, so a browser sends one only for a page of that
     address.
 
     Examples

@@ -34,7 +34,7 @@ def chart_view(
 ) -> rrb.Spatial2DView:
     """Log a panel as a chart under ``path``.
 
-    Over flight time it has a cursor; of a broken axis it shows one window.
+    A chart over flight time has a cursor; one with a broken axis shows one window.
     """
     shown = panel if window is None else _of_window(panel, window)
     x, y = extents.x_span(shown, extents.x_extent(shown.marks)), extents.y_span(shown)
@@ -220,10 +220,7 @@ def _cells(chart: Chart, name: str, several: list[marks.Cells], _: float) -> Non
 
 
 def _told(chart: Chart, name: str, several: list[marks.Told], _: float) -> None:
-    """Log a mark at the aircraft's place at the cursor.
-
-    Only where the description has flight time.
-    """
+    """Log a mark at the aircraft's place at the cursor, where flight time is described."""
     for mark in several:
         if mark.is_time:
             chart.moving(name, mark.value, mark.x, mark.y, Line("", colours.PAPER, HERE))

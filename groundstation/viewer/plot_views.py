@@ -68,9 +68,9 @@ def panels_of(
 def runs_of(recorder: Recorder, told: Plot | None, path: str, *, height: float = 70.0) -> list[list[rrb.View]]:
     """Log the windows of a plot's time axis as charts, and return the views of each.
 
-    Under ``path`` by the number of the window. A time view shows the whole flight or a stretch about the cursor; a run
-    of two minutes in a flight of an hour is a sliver in it. Here it has an axis of its own, with the cursor on it while
-    it lasts.
+    Their paths are under ``path``, by the number of the window. A time view shows the whole flight or a stretch about
+    the cursor; a run of two minutes in a flight of an hour is a sliver in it. Here it has an axis of its own, with the
+    cursor on it while it lasts.
     """
     drawn = [one for one in _named(told, "") if not any(isinstance(mark, Lanes) for mark in one[2].marks)]
     count = max((len(panel.x.windows) for _, _, panel in drawn), default=0)
@@ -282,7 +282,7 @@ def _title(title: str, named: Sequence[Line]) -> str:
 def _lanes(recorder: Recorder, path: str, panel: Panel, title: str) -> rrb.View:
     """Log states over time, each mark as one lane that names every state.
 
-    Including states that the page leaves out.
+    States that the page leaves out are included.
     """
     paths = []
     several = [mark for mark in panel.marks if isinstance(mark, Lanes)]

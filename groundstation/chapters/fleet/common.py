@@ -1,7 +1,4 @@
-"""Words that the chapters of the fleet report share.
-
-For quantities, aircraft, times and counts.
-"""
+"""Words of the fleet report's chapters for quantities, aircraft, times and counts."""
 
 import math
 from collections.abc import Mapping

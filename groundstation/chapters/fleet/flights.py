@@ -46,7 +46,7 @@ class FlightLine:
 def lines(fleet: FleetResults) -> list[FlightLine]:
     """Return the flights in the order of the fleet, at most :data:`MOST_LINES`.
 
-    Of more flights: those with remarks, then the latest.
+    A larger fleet shows the flights with remarks, then the latest.
     """
     noted = remarks_of(fleet)
     return _lines(fleet, _shown(fleet, noted), noted)

@@ -1,6 +1,6 @@
-"""Plots of an acceptance: radial errors over the hours of navigation, and their rates.
+"""Plots of an acceptance: radial errors of all flights over the hours, and their rates.
 
-Of all flights.
+The hours are those of navigation.
 """
 
 from collections.abc import Callable

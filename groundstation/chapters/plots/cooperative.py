@@ -126,7 +126,7 @@ def _is_crowd(answer: CooperativeResult) -> bool:
 def errors(results: FlightResults) -> Plot | None:
     """Return the horizontal error of each aircraft against its computed 2 sigma_r.
 
-    With the error of dead reckoning.
+    The error of dead reckoning is drawn too.
     """
     found = _tracks(results)
     if found is None:
@@ -166,7 +166,7 @@ def _error(data: CooperativeTracks, name: str, algorithm: str, *, legend: bool) 
 def _largest(answer: CooperativeResult, algorithm: str) -> list[str]:
     """Return the aircraft that have a panel, in their order.
 
-    Of very many, those with the largest 2 sigma_r at the end.
+    Very many are cut to those with the largest 2 sigma_r at the end.
     """
     rows = [row for row in answer.vehicles if row.algorithm == algorithm]
     kept = {row.vehicle for row in sorted(rows, key=lambda row: -row.two_sigma_r_m)[:MOST_PANELS]}
@@ -181,7 +181,7 @@ def _ceiling(*values: Floats) -> float:
 def _styles(answer: CooperativeResult) -> dict[str, tuple[Role, str]]:
     """Return role and label of the line of each aircraft.
 
-    Of a crowd only the aircraft with the poorest geometry stands out; it is drawn last.
+    In a crowd, only the aircraft with the poorest geometry stands out; it is drawn last.
     """
     names = answer.vehicle_names
     if not _is_crowd(answer) or not answer.geometry:

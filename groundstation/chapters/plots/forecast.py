@@ -63,9 +63,9 @@ def _last(values: Floats) -> float:
 
 
 def calibration(results: FlightResults) -> Plot | None:
-    """Return shares inside the 50, 68 and 95 % bands, and NEES, by horizon.
+    """Return shares inside the 50, 68 and 95 % bands, and NEES, of the shipped method.
 
-    Of the shipped method; NEES with its limits.
+    Both are by horizon; NEES has its limits.
     """
     answer = results.answer(ForecastResult)
     mine = [] if answer is None else [row for row in answer.calibration if row.method == answer.default_method]

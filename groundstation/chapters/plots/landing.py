@@ -36,7 +36,7 @@ def _parts(results: FlightResults, of: str) -> tuple[Approach, LandingPath] | No
 def deviations(results: FlightResults, of: str) -> Plot | None:
     """Return lateral and vertical deviation over distance.
 
-    With a dot of the guidance and the figures of the categories.
+    One dot of the guidance and the figures of the categories are drawn too.
     """
     found = _parts(results, of)
     if found is None:
@@ -151,7 +151,7 @@ def _from_the_side(one: Approach, own: LandingPath) -> Panel:
 def motion(results: FlightResults, of: str) -> Plot | None:
     """Return sink rate and bank over the time of the approach.
 
-    Only the recording shows them: a page has no room.
+    Only the recording shows this plot: a page has no room.
     """
     found = _parts(results, of)
     if found is None:

@@ -67,7 +67,7 @@ def _view(answer: RangeLanding, data: RangesSpace, across: Floats, *, has_names:
 def accuracy(results: FlightResults) -> Plot | None:
     """Return horizontal, lateral and vertical 95 % figures along the path.
 
-    With the limits of the categories.
+    The limits of the categories are drawn too.
     """
     found = _data(results, RangesPath)
     if found is None:

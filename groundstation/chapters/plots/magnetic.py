@@ -1,7 +1,4 @@
-"""Plots of the magnetic deviation.
-
-By heading, on the part held out, the figure flown, its branches, the modulus.
-"""
+"""Plots of the magnetic deviation: by heading, held out, flown figure, branches, modulus."""
 
 import numpy as np
 

@@ -19,7 +19,7 @@ TOP_SHARE = 90.0  # per cent of the map's values that keep their own colour
 def accuracy_map(results: FlightResults) -> Plot | None:
     """Return accuracy at the fixed point over places of the last point.
 
-    With areas that are kept out and the places of the points.
+    The areas kept out and the places of the points are drawn too.
     """
     answer, data = results.answer(PlacementPlan), results.rows_of(PlacementMap)
     if answer is None or data is None:

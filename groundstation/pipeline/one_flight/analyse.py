@@ -1,6 +1,6 @@
-"""Answers of one flight from its tables: everything the data allows.
+"""Answers of one flight from its tables, and the reason for each answer that is missing.
 
-And the reason for each answer that the data does not allow.
+Everything that the data allows is answered.
 """
 
 from collections.abc import Mapping

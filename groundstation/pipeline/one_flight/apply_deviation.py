@@ -134,9 +134,9 @@ def _other_aircraft(results: FlightResults, deviation: Deviation) -> list[Findin
 def _judged(
     flight: Flight, results: FlightResults, corrected: "CorrectedHeading", settings: "UserSettings"
 ) -> list[Finding]:
-    """Return findings on whether the heading is nearer to that of the flight's INS.
+    """Return findings on whether the corrected heading is nearer to that of the flight's INS.
 
-    Nearer than before the deviation was added.
+    It is compared with the heading before the deviation was added.
     """
     from groundstation.estimators.magnetic.corrected import judge
     from groundstation.tables.phases import flight_phases
@@ -166,7 +166,7 @@ def _judged(
 def ins_error_deg(results: FlightResults, ins_topic: str) -> float:
     """Return the error of the INS heading where it is known.
 
-    At the figure, as taxi shows it, or as turns in flight do.
+    It is known at the figure, from taxi, or from turns in flight.
     """
     from groundstation.estimators.magnetic.alignment import refused
 

@@ -85,7 +85,7 @@ def convert_flight(
 ) -> Converted | tuple[Log, ...]:
     """Write the MCAP of a log of one flight.
 
-    Of a log with several power-ups write nothing, but return a log for each.
+    For a log with several power-ups nothing is written; a log for each is returned.
 
     Parameters and errors are those of :func:`convert_log`.
     """
@@ -322,8 +322,8 @@ def has_other_limits(info: StoreInfo, limits: Thresholds) -> bool:
 def recounted(info: StoreInfo, damages: list[Damage], census: Census) -> StoreInfo:
     """Return the facts of a store file with its topics counted again.
 
-    For a damaged file, or when other thresholds are asked for. What only the log could tell (its clock, the order of
-    its records, what its reader lost) stays as it was found.
+    The file is damaged, or other thresholds are asked for. What only the log could tell (its clock, the order of its
+    records, what its reader lost) stays as it was found.
     """
     counts, before = census.ledger(damages), info.ledger
     ends = broken_off(counts)

@@ -1,7 +1,4 @@
-"""Run of one log from beginning to end: MCAP, answers, recording and report.
-
-In a folder of its own.
-"""
+"""Run of one log into a folder of its own: MCAP, answers, recording and report."""
 
 import os
 import secrets
@@ -92,7 +89,7 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
 def _run_log(log: Log, version: Version, job: Job, watch: Stopwatch) -> Outcome:
     """Run a log, or one power-up of it, into a partial folder.
 
-    Of a log with several power-ups each goes into its own.
+    Each power-up goes into its own.
     """
     partial = partial_folder(job.out)
     try:
@@ -150,7 +147,7 @@ def _require_unchanged(log: Log, version: Version) -> None:
 def _run(log: Log, version: Version, job: Job, partial: Path, watch: Stopwatch) -> Outcome | tuple[Log, ...]:
     """Run one flight into a folder.
 
-    Of a log with several power-ups run nothing, but return a log for each.
+    For a log with several power-ups nothing is run; a log for each is returned.
     """
     from groundstation.results.files import put_failures, save
 
@@ -377,7 +374,7 @@ def is_made(name: str, identity: str) -> bool:
 def optional_files(identity: str) -> tuple[str, ...]:
     """Return the files of a flight folder that not every run makes.
 
-    Those of an earlier run would show other results.
+    Left from an earlier run, they would show other results.
     """
     return f"{identity}.rrd", REPORT, PDF, DEVIATION_CSV, STEER_CARD, corrected_name(identity)
 
@@ -400,7 +397,7 @@ def remove(folder: Path) -> None:
 def place(partial: Path, target: Path) -> None:
     """Move a finished flight folder into place.
 
-    Of a folder that exists only the files of a run are replaced.
+    In a folder that exists, only the files of a run are replaced.
     """
     if not target.exists():
         partial.rename(target)

@@ -362,9 +362,9 @@ def _merged(
 
 
 def _metadata(parts: Sequence[_Part], joining: Joining) -> dict[str, str]:
-    """Return the metadata of all logs: the first's as it is, the others' under their labels.
+    """Return the metadata of all logs, and how they were joined.
 
-    And how they were joined.
+    The first log's keys stay as they are, the others' are under their labels.
     """
     found = dict(parts[0].converted.info.metadata)
     for part in parts[1:]:

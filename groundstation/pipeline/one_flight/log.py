@@ -125,7 +125,7 @@ def digest_of(path: Path) -> str:
 def _files_of(path: Path) -> tuple[Path, ...]:
     """Return the files of a log, including files that are read along with it.
 
-    Of a ROS 2 bag: its metadata and the files named there.
+    A ROS 2 bag has its metadata and the files named there.
     """
     from groundstation.readers.bags.bag import files_of
     from groundstation.readers.sbet import accuracies_beside
@@ -207,7 +207,7 @@ def parts_name(names: Sequence[str]) -> str:
 def _is_store(path: Path, profile: Path | None) -> bool:
     """Tell whether the store reads a file: an MCAP of ours.
 
-    Not another log that has only a part of one spliced into it.
+    A log that has only a part of one spliced into it does not count.
     """
     from groundstation.readers.registry import identify
     from groundstation.store.recognition import is_groundstation_mcap, is_mostly_mcap

@@ -103,7 +103,7 @@ def goes_on(before: PartOfRun, behind: PartOfRun, *, is_beside: bool) -> bool:
 def gap_ns(before: PartOfRun, behind: PartOfRun) -> int:
     """Return the time from the last record of a log to the first of another.
 
-    By UTC where both have it, else by the device.
+    The clock is UTC where both have it, else the device's.
     """
     if before.utc_ns is not None and behind.utc_ns is not None:
         return behind.utc_ns[0] - before.utc_ns[1]

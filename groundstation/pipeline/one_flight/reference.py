@@ -37,7 +37,8 @@ _FIELDS = frozenset(one.name for one in TOPICS[TRUTH])
 class Reference:
     """File that may judge a flight, with its best topic.
 
-    On UTC, or on seconds of a GPS week that the flight must tell. ``damages`` are what its reader could not read.
+    Its times are UTC, or seconds of a GPS week that the flight must tell. ``damages`` are what its reader could not
+    read.
     """
 
     name: str

@@ -41,9 +41,9 @@ def _file_of_run(path: Path, sha256: str = "") -> FileOfRun:
 
 
 def note(folder: Path, written: Iterable[Path], removed: Iterable[str] = ()) -> None:
-    """Record the sizes of files of a finished flight that were made again.
+    """Record the sizes of files of a finished flight that were made again, and files gone.
 
-    And files that are gone. The manifest of an earlier version, which has none, stays without.
+    The manifest of an earlier version, which has none, stays without.
     """
     paths = [path for path in (*written, folder / SUMMARY) if path.is_file()]  # findings on what failed are in it
     sync_files(paths)
@@ -59,7 +59,7 @@ def note(folder: Path, written: Iterable[Path], removed: Iterable[str] = ()) -> 
 def spoiled_files(folder: Path, manifest: Manifest, size_of: SizeOf | None = None) -> frozenset[str]:
     """Return files that are missing or not as the run left them.
 
-    Of a file with a digest, time and size are compared first. ``size_of`` is given where the files are elsewhere: then
+    For a file with a digest, time and size are compared first. ``size_of`` is given where the files are elsewhere: then
     their sizes alone are compared.
     """
     if size_of is not None:

@@ -119,7 +119,7 @@ class Segment:
     def _is_mine(self, damage: Damage) -> bool:
         """Tell whether damage belongs to it.
 
-        By the records around the damage, else by its rows; a cut belongs to the last power-up.
+        The records around the damage decide, else its rows; a cut belongs to the last power-up.
         """
         if damage.between_records is not None:
             return self.first <= damage.between_records[1] - 1 < self.end or damage.between_records[1] == self.first

@@ -81,7 +81,7 @@ class Checked:
     def judged(self, usability: "Usability", fail_on: str) -> "Checked":
         """Return the result with its usability, at the limit where that falls short.
 
-        Of no use is at the limit; of partial use is under ``--fail-on warn``.
+        No use is at the limit; partial use is so under ``--fail-on warn``.
         """
         is_short = usability.state == "no" or (usability.state == "in part" and fail_on == "warn")
         outcome = replace(self.outcome, state="limit_reached") if is_short else self.outcome
@@ -178,7 +178,7 @@ def _for_session(
 ) -> list[Checked]:
     """Return the checks with what their logs can be used for together.
 
-    With the stations beside the first of them.
+    The stations are those beside the first log.
     """
     from groundstation.pipeline.many_flights.found_sessions import STATIONS_TOML
     from groundstation.pipeline.many_flights.session import load_stations

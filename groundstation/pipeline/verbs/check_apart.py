@@ -1,6 +1,6 @@
 """Checks and descriptions of logs, each in a process of its own.
 
-With a limit of time, or isolated.
+The process has a limit of time, or is isolated.
 """
 
 from collections.abc import Mapping, Sequence
@@ -91,10 +91,9 @@ def check_apart(
     fail_on: str = "none",
     listen: Listener = silent,
 ) -> tuple[Checked, ...]:
-    """Check logs, one process after the other.
+    """Check logs as :func:`~groundstation.pipeline.verbs.check.check_many`, in processes.
 
-    As :func:`groundstation.pipeline.verbs.check.check_many` does. Logs of a session, which are judged together, are
-    checked in one process.
+    The processes run one after the other. Logs of a session, which are judged together, are checked in one process.
 
     Raises
     ------

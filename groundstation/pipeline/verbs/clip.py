@@ -144,7 +144,7 @@ def _expect_free(source: Path, target: Path, with_recording: bool, force: bool) 
 def _as_mcap(log: Log, folder: Path, limits: Thresholds, wanted: Wanted) -> Iterator[tuple[Log, Path]]:
     """Yield the log and its MCAP: the log itself, or a temporary file.
 
-    Of several power-ups, that of the one wanted.
+    From several power-ups it takes the one wanted.
     """
     if log.is_store and not segments_in(log.info()):
         yield log, log.path
@@ -318,7 +318,7 @@ def _origin(
 ) -> dict[str, str]:
     """Return the source that the part was cut from.
 
-    For a part of a part, in terms of the original flight.
+    A part of a part names the original flight.
     """
     name, sha256 = source.name, source.sha256
     base_s = 0.0

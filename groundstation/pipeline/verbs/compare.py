@@ -133,9 +133,9 @@ def _load(folder: Path) -> SavedFlight:
 
 
 def session_errors(saved: SavedFlight) -> SessionErrors | None:
-    """Return worst computed 2 sigma_r and RMS error of all aircraft with time.
+    """Return the worst computed 2 sigma_r and the RMS error of all aircraft with time.
 
-    Of the default algorithm; None for a flight.
+    The algorithm is the default one; None for a flight.
     """
     answer, tracks = saved.results.answer(CooperativeResult), saved.rows_of(CooperativeTracks)
     if answer is None or tracks is None:

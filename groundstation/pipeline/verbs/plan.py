@@ -1,7 +1,4 @@
-"""Plans from beginning to end: a scenario becomes answers, recording and report.
-
-In a folder of its own.
-"""
+"""Run of a plan into a folder of its own: scenario to answers, recording and report."""
 
 import hashlib
 import platform
@@ -69,7 +66,7 @@ def run_plan(
 ) -> Outcome:
     """Make a plan into ``<out>/<name of the scenario>/``.
 
-    Of a finished plan only a PDF that is asked for is made.
+    For a finished plan, only a PDF that is asked for is made.
 
     Parameters
     ----------

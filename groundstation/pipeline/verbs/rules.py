@@ -1,6 +1,6 @@
-"""``rules test``: which past verdicts other limits would change, without the logs.
+"""``rules test``: verdicts that other limits would change, from the saved gates.
 
-From the gates that flights saved.
+It needs no logs.
 """
 
 import hashlib
@@ -157,7 +157,7 @@ def learned_in(out: Path) -> dict[str, InstalledFlight]:
 def _learned(flight: InstalledFlight, heading: Rejudged, settings: HeadingSettings) -> Rejudged:
     """Return the verdict on the learned number under other limits.
 
-    From the gates on the taxi as they were judged again.
+    It rests on the gates on the taxi as they were judged again.
     """
     assert flight.answer is not None
     failed = tuple(gate.name for gate in heading.gates_after if gate.required and gate.state != "passed")

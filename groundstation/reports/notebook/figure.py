@@ -75,9 +75,9 @@ STYLE: dict[str, Any] = {
 
 
 class NotebookFigure(Figure):
-    """Matplotlib figure that a notebook shows without pyplot.
+    """Matplotlib figure that a notebook shows without pyplot, on white.
 
-    On white, whatever the background of the notebook.
+    The background of the notebook has no effect.
     """
 
     def _repr_png_(self) -> bytes:

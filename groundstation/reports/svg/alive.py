@@ -1,6 +1,6 @@
-"""Panels of a plot for the page's script, straight from its description.
+"""Panels of a plot for the page's script, and frames of plots that stay pictures.
 
-And frames of plots that stay pictures.
+They come straight from the description of the plot.
 """
 
 from collections.abc import Sequence

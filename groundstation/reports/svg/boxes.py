@@ -162,7 +162,7 @@ def _told(plot: Plot) -> list[list[_Told]]:
 def _chain(plot: Plot, row: int, column: int) -> range:
     """Return the rows whose panel in a column shares its horizontal axis with that of a row.
 
-    From the top.
+    The rows are in order from the top.
     """
     first = last = row
     while first and plot.rows[first - 1].shares_x and column < len(plot.rows[first - 1].panels):
@@ -209,7 +209,7 @@ def scale_of(panel: Panel) -> Cells | None:
 def _has_scale(row: Row, column: int) -> bool:
     """Tell whether the scale of cells stands beside a panel.
 
-    Of several alike in a row beside the last.
+    Several alike in a row have one, beside the last.
     """
     here = [scale_of(panel) for panel in row.panels[column : column + 2]]
     alike = [(one.low, one.high, one.title, one.is_log) for one in here if one is not None]
@@ -219,7 +219,7 @@ def _has_scale(row: Row, column: int) -> bool:
 def _columns(plot: Plot, rows: list[list[_Told]]) -> tuple[_Rooms, _Rooms]:
     """Return the room left and right of each panel, equal for panels above each other.
 
-    Only for rows with equal panels.
+    Rows count together only where their panels are equal.
     """
     keys = [_shares(row) for row in plot.rows]
     lefts = [

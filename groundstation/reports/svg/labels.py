@@ -1,7 +1,4 @@
-"""Places of labels in a frame, each where it covers no other.
-
-Beside points, within outlines, at lines across.
-"""
+"""Places of labels beside points, within outlines, at lines; no label covers another."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -23,7 +20,7 @@ Bounds = tuple[float, float, float, float]
 class Label:
     """Text at a place (x, y), and where its line begins.
 
-    In points from the upper left corner of the picture.
+    Units are points from the upper left corner of the picture.
     """
 
     text: str

@@ -1,6 +1,6 @@
 """Legend of a panel: a sign and a name for each mark that has one.
 
-In lines above the panel or in a column beside it.
+It stands in lines above the panel or in a column beside it.
 """
 
 from collections.abc import Sequence

@@ -17,7 +17,7 @@ Steps = NDArray[np.int64]
 class _Words(dict[int, str]):
     """Texts of numbers in hundredths, by the number.
 
-    With a space before where no minus separates it from the number before.
+    A space comes first where no minus separates it from the number before.
 
     Source: W3C, Scalable Vector Graphics 2, 9.3.9: the grammar of path data.
     """

@@ -32,7 +32,7 @@ _NOT_IN_AN_ID = re.compile(r"[^A-Za-z0-9_-]+")
 def picture_of(plot: Plot) -> Svg:
     """Write a plot as an SVG element for a page, with its panels.
 
-    With its frames where it cannot be drawn live.
+    A plot that cannot be drawn live has its frames instead.
     """
     panels, height = placed(plot)
     key = key_of(plot.name)

@@ -1,6 +1,6 @@
-"""Tab on cooperative navigation: the aircraft of a session in space.
+"""Tab on cooperative navigation: aircraft in space with ellipsoids and links.
 
-With their ellipsoids and links; errors, geometry, links in time.
+Beside them: errors, geometry, and links in time.
 """
 
 from collections.abc import Sequence

@@ -30,7 +30,7 @@ UNSEEN: Colour = (0, 0, 0, 1)  # wholly transparent means "choose a colour" to R
 def heading_error(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Log the density of the differences d as it grows with time.
 
-    Over the final density and the fitted normal.
+    The final density and the fitted normal lie behind it.
     """
     final = results.rows_of(HeadingDistribution)
     if final is None:

@@ -1,6 +1,6 @@
 """Tab on the forecast: what the filter would have said had GNSS been lost.
 
-Beside the GNSS of the same time, and how good the forecast is.
+GNSS of the same time and the errors of the forecast are beside it.
 """
 
 import numpy as np

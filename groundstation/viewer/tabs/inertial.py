@@ -1,6 +1,6 @@
-"""Tab on INS errors: position, velocity, tilt and drift of each channel.
+"""Tab on INS errors: estimates of position, velocity, tilt and drift, and trust in them.
 
-As the filter estimates them, and how far to trust it.
+Each channel has its own.
 """
 
 from collections.abc import Sequence
@@ -75,7 +75,7 @@ def _page(
 def _lanes(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Log when the filter had GNSS and when it forecast.
 
-    Under the flight phase that the overview logged.
+    The flight phase, logged by the overview, is above it.
     """
     states, answer = results.rows_of(InertialStates), results.answer(InertialResult)
     if states is None or answer is None:

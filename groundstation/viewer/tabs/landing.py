@@ -64,7 +64,8 @@ def _place(along_m: FloatArray, across_m: FloatArray, height_m: FloatArray) -> F
 def _space(recorder: Recorder, path: str, flown: LandingPath) -> list[rrb.View]:
     """Log the end of the final between the frames of the categories.
 
-    By positions (grey) and by the guidance. The aircraft moves where the guidance has it, else along the positions.
+    One track is by positions (grey), one by the guidance. The aircraft moves where the guidance has it, else along the
+    positions.
     """
     distance = flown.distance_m
     seen = (distance < SEEN_M) & np.isfinite(flown.height_m) & np.isfinite(flown.across_m)

@@ -1,6 +1,6 @@
-"""Tab on landing by locators: deviations from course and glide path, and the chapter.
+"""Tab on landing by locators: deviations of every approach, and the chapter.
 
-Of every approach.
+Deviations are from course and glide path.
 """
 
 import rerun.blueprint as rrb

@@ -22,8 +22,8 @@ PARALLELS_DEG = (-60.0, -30.0, 0.0, 30.0, 60.0)
 def sphere(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     """Log the field along the body axes on the model's sphere, in microtesla.
 
-    As read, and freed of the iron. What the modulus differs by from the model's is drawn many times larger: iron of one
-    per cent would not be seen.
+    The field is shown as read, and freed of the iron. What the modulus differs by from the model's is drawn many times
+    larger: iron of one per cent would not be seen.
     """
     figure = results.rows_of(MagneticField)
     if figure is None:

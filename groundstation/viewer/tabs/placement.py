@@ -1,6 +1,6 @@
-"""Tab on placement of ground points: the way in space over a map of accuracy, points.
+"""Tab on placement of ground points: way and points over a map of accuracy.
 
-And accuracy along the way.
+The accuracy along the way is beside it.
 """
 
 import numpy as np

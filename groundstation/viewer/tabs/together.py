@@ -1,6 +1,6 @@
-"""Tab on several logs of one flight: both motions over each other, their difference.
+"""Tab on several logs of one flight: both motions, their difference, and the chapter.
 
-And the chapter.
+The motions lie over each other.
 """
 
 import rerun.blueprint as rrb

@@ -144,7 +144,7 @@ def grid_step_m(side_m: float) -> float:
 def grid_unit(side_m: float) -> tuple[str, float]:
     """Return the unit of the grid's labels and its length in metres.
 
-    For a plan that is ``side_m`` across.
+    The plan is ``side_m`` across.
 
     Examples
     --------
