@@ -25,7 +25,7 @@ LONGEST = 32
 
 
 def sections(found: Acceptance) -> tuple[Section, ...]:
-    """The chapters in the order of the standard's layout, those without parts left out."""
+    """Return the chapters in the order of the standard's layout, those without parts left out."""
     build = LAYOUTS[found.standard.layout]
     return tuple(section for section in build(found) if section.parts)
 

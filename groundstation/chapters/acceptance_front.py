@@ -89,7 +89,7 @@ def _told(found: Acceptance, one: Judgement) -> str:
 
 
 def stated(share: float) -> str:
-    """A share as the standard states it, not rounded: 99.99 % is not 100 %.
+    """Return a share as the standard states it, not rounded: 99.99 % is not 100 %.
 
     Examples
     --------
@@ -101,7 +101,7 @@ def stated(share: float) -> str:
 
 
 def at_least(share: float) -> str:
-    """A lower limit, rounded down: one that just misses 95 % must not read 95.0 %.
+    """Return a lower limit, rounded down: one that just misses 95 % must not read 95.0 %.
 
     Examples
     --------
@@ -131,7 +131,7 @@ def _missing(one: Judgement) -> str:
 
 
 def wanted(limit: Limit) -> str:
-    """The bounds of a limit in words.
+    """Return the bounds of a limit in words.
 
     Examples
     --------

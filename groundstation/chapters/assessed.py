@@ -40,6 +40,6 @@ def not_assessed(results: FlightResults) -> tuple[tuple[str, str], ...]:
 
 
 def without_answer(results: FlightResults, analysis: str, title: str, lead: str) -> Section | None:
-    """The chapter of an analysis that has no answer; None where no reason is known."""
+    """Return the chapter of an analysis that has no answer; None where no reason is known."""
     reason = reason_of(results, analysis)
     return Section(analysis, title, lead, (Note(f"Not assessable: {reason}", "unknown"),)) if reason else None

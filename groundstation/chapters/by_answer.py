@@ -50,7 +50,7 @@ SESSION_CHAPTERS: tuple[Chapter, ...] = (Chapter((CooperativeResult,), cooperati
 
 
 def answer_chapters(results: FlightResults) -> tuple[Section, ...]:
-    """The chapters of a flight that have an answer, the best first: the order of a report."""
+    """Return the chapters of a flight with an answer, best first: the order of a report."""
     listed = [chapter for chapter in FLIGHT_CHAPTERS if any(map(results.answer, chapter.answers))]
     every = (section for section in (*_built(listed, results), *_generic(results)) if section is not None)
     return tuple(sorted(every, key=lambda one: Rank.OTHER if one.claim is None else one.claim.rank))
@@ -72,7 +72,7 @@ def _built(chapters: Iterable[Chapter], results: FlightResults) -> tuple[Section
 
 
 def _generic(results: FlightResults) -> tuple[Section | None, ...]:
-    """The generic chapters of answers that have none of their own."""
+    """Return the generic chapters of answers that have none of their own."""
     return tuple(attempt("chapter", one.analysis, generic, results, one) for one in without_chapter(results))
 
 

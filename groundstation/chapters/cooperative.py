@@ -90,7 +90,7 @@ def cooperative(results: FlightResults) -> Section | None:
 
 
 def trusted(answer: CooperativeResult) -> AlgorithmRow:
-    """The algorithm to trust.
+    """Return the algorithm to trust.
 
     The default, unless the truth speaks against it: then, of those that neither diverge nor claim less error than they
     make, the one with the least error, where there is any. One session is too little to choose by its error alone. Dead
@@ -134,7 +134,7 @@ def is_session(results: FlightResults) -> bool:
 
 
 def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -> Front:
-    """The top of a session's report: what was found, or why nothing."""
+    """Return the top of a session's report: what was found, or why nothing."""
     answer = results.answer(CooperativeResult)
     if answer is None:
         why = reason_of(results, "cooperative") or "the logs do not hold what the method needs"

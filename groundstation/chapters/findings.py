@@ -49,7 +49,7 @@ def _joined(alike: Sequence[Finding]) -> Finding:
 
 
 def not_assessable(results: FlightResults) -> Grid | None:
-    """The analyses that could not be carried out, each with its reason; None where all could."""
+    """Return the analyses that could not be carried out, with reasons; None where all could."""
     rows = [(entry.analysis, explained(entry.analysis, entry.reason)) for entry in results.not_assessable]
     return Grid("Not assessable", (Head("Analysis"), Head("Reason")), rows) if rows else None
 

@@ -70,7 +70,7 @@ def short(method: str) -> str:
 
 
 def _heads(first: str, titles: Iterable[str]) -> tuple[Head, ...]:
-    """A head for the names and one for each column of numbers."""
+    """Return a head for the names and one for each column of numbers."""
     return (Head(first), *(Head(title, True) for title in titles))
 
 
@@ -120,7 +120,7 @@ def _default_in_detail(answer: ForecastResult) -> Grid | None:
 
 
 def _calibration(answer: ForecastResult) -> list[Grid]:
-    """A table for each method compared: the shipped one first."""
+    """Return a table for each method compared: the shipped one first."""
     titles = ("Starts", "Independent", "In 50 %", "In 68 %", "In 95 %", "NEES", "95 % limits", "σ scale")
     heads = (*_heads("Horizon", titles), Head("NEES is"))
     caption = (

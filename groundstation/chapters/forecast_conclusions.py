@@ -12,7 +12,7 @@ HEADLINE_MIN = 60.0  # the horizon the conclusion quotes, or the longest there i
 
 
 def conclusions(answer: ForecastResult) -> list[Note]:
-    """A sentence or two for skill, honesty and windows."""
+    """Return a sentence or two for skill, honesty and windows."""
     return [note for note in (_gain(answer), _honesty(answer), _windows(answer)) if note is not None]
 
 
@@ -72,7 +72,7 @@ def _honesty(answer: ForecastResult) -> Note | None:
 
 
 def _uncalibrated(answer: ForecastResult) -> str:
-    """The sentence that opens the judgement of a forecast that is not calibrated."""
+    """Return the sentence that opens the judgement of a forecast that is not calibrated."""
     if answer.is_calibrated:
         return ""
     reason = typeset(answer.calibration_reason).strip().rstrip(".")

@@ -21,7 +21,7 @@ NOTHING = "Recorded, but nothing could be assessed"
 
 
 def front(results: FlightResults) -> Front:
-    """The top of the report."""
+    """Return the top of the report."""
     if is_plan(results):
         return plan_front(results, _pairs_of_plan(results))
     names = [results.metadata.get(key, "") for key in ("aircraft", "flight")]

@@ -19,7 +19,7 @@ CAPTION = "Accept requires every gate except those that only inform."
 
 
 def gate_grid(gates: Sequence[Gate]) -> Grid | None:
-    """The gates of an answer, each with figure, limit and reason; None where there are none."""
+    """Return the gates of an answer, each with figure, limit and reason; None without any."""
     return Grid("Gates", HEADS, [_row(gate) for gate in gates], CAPTION) if gates else None
 
 
@@ -33,7 +33,7 @@ def _row(gate: Gate) -> tuple[Cell, ...]:
 
 
 def failed_to_inform(gates: Sequence[Gate]) -> str:
-    """A sentence that names the failed gates that only inform; empty without one.
+    """Return a sentence that names the failed gates that only inform; empty without one.
 
     Examples
     --------
@@ -50,7 +50,7 @@ def failed_to_inform(gates: Sequence[Gate]) -> str:
 
 
 def state_of(gate: Gate) -> Mark:
-    """The state of a gate; one that only informs does not stand against an accepted answer.
+    """Return the state of a gate; a failed one that only informs is a warning.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def state_of(gate: Gate) -> Mark:
 
 
 def limit_text(gate: Gate) -> str:
-    """A gate's limit with its sense.
+    """Return a gate's limit with its sense.
 
     Examples
     --------

@@ -86,7 +86,7 @@ def figures_over_time(results: FlightResults, analysis: str) -> tuple[str, ...]:
 
 
 def quantity(name: str) -> tuple[str, str]:
-    """A field name as words, and the sign of its unit.
+    """Return a field name as words, and the sign of its unit.
 
     Examples
     --------
@@ -139,7 +139,7 @@ def _fields(holder: Any) -> list[tuple[str, Any]]:
 
 
 def _lead(answer: Answer) -> str:
-    """The first paragraph of the answer's docstring; empty where nobody wrote one."""
+    """Return the first paragraph of the answer's docstring; empty without one."""
     kind = type(answer)
     told = " ".join((inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0]).split())
     return "" if told.startswith(f"{kind.__name__}(") else told  # which a dataclass writes itself

@@ -204,7 +204,7 @@ def _states(answer: InertialResult) -> Grid | None:
 
 
 def _state_row(answer: InertialResult, states: list[StateEstimate | None]) -> tuple[str, ...]:
-    """One state of both channels, None in a channel that lacks it."""
+    """Return one state of both channels, None in a channel that lacks it."""
     known = next(state for state in states if state is not None)
     title = known.title or known.name
     title = f"{title[:1].upper()}{title[1:]}, {unit_sign(known.unit)}"

@@ -55,7 +55,7 @@ def nothing_learned(answer: InstallationResult) -> Note:
 
 
 def what_to_enter(answer: InstallationResult, step_deg: float) -> str:
-    """The number to type, or what to do instead."""
+    """Return the number to type, or what to do instead."""
     if answer.verdict == "advisory":
         return f"Good to ± {_arcmin(answer.half_width_deg)} only: taxi the other way, or state the wind"
     if answer.verdict != "accept":
@@ -74,7 +74,7 @@ def sources(answer: InstallationResult) -> str:
 
 
 def sentence(answer: InstallationResult) -> str:
-    """The learned answer in a sentence or two: verdict, number, half width, its parts."""
+    """Return the learned answer in a sentence or two: verdict, number, half width, parts."""
     what = f"{VERDICTS[answer.verdict].text}: heading error {number(answer.error_deg, 3, '°', signed=True)}"
     enter = f", enter {number(answer.correction_deg, 2, '°', signed=True)}" if is_number(answer.correction_deg) else ""
     taught = (

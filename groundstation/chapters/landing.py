@@ -69,7 +69,7 @@ def landing(results: FlightResults) -> Section | None:
 
 
 def _claim(answer: LandingResult) -> Claim | None:
-    """The last landing, or the last approach of a flight without one."""
+    """Return the last landing, or the last approach of a flight without one."""
     if not answer.approaches:
         return None
     landings = [one for one in answer.approaches if one.outcome == "landing"]
@@ -129,7 +129,7 @@ def _course(one: Approach) -> str:
 
 
 def _verdict(one: Approach) -> Mark:
-    """The worst of both gates."""
+    """Return the worst of both gates."""
     verdicts = [row.verdict for row in one.stabilised]
     worst = next((word for word in ("not stabilised", "stabilised") if word in verdicts), "not measured")
     return Mark(TONES[worst], worst)

@@ -341,7 +341,7 @@ def _iron(iron: PoissonParameters | None) -> Grid | None:
 
 
 def _with_sigmas(values: Vector | None, sigmas: Vector | None, places: int) -> tuple[str, ...]:
-    """The three axes of a vector, each with its sigma; em dashes where it is not known."""
+    """Return the three axes of a vector, each with its sigma; em dashes for unknown sigmas."""
     if values is None or sigmas is None:
         return (ABSENT,) * 3
     return tuple(

@@ -32,7 +32,7 @@ def escaped(text: str) -> str:
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A Markdown table; cells are Markdown already.
+    """Return a Markdown table; cells are Markdown already.
 
     Examples
     --------
@@ -48,7 +48,7 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def markdown(
     section: Section, *, level: int = 1, widest: int = WIDEST_CELL, links: Mapping[str, str] = NO_LINKS
 ) -> str:
-    """A section as a Markdown document, headed by its headline or its title.
+    """Return a section as a Markdown document, headed by its headline or its title.
 
     The parts set small are left out, and figures, but for what stands in their place.
 
@@ -69,7 +69,7 @@ def markdown(
 
 
 def part_markdown(part: Part, *, level: int = 2) -> str:
-    """A part of a section alone."""
+    """Return a part of a section alone, as Markdown."""
     return "\n\n".join(_part(part, level))
 
 

@@ -48,7 +48,7 @@ def provenance(results: FlightResults) -> Section:
 
 
 def source_pairs(source: Source, what: str = "log") -> tuple[tuple[str, str, str], ...]:
-    """The log a flight came from, or the scenario of a plan."""
+    """Return the log a flight came from, or the scenario of a plan."""
     return (
         (what.capitalize(), source.name or ABSENT, f"{number(source.size_bytes, 0)} bytes"),
         (f"SHA-256 of the {what}", source.sha256 or ABSENT, ""),

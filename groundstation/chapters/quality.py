@@ -148,7 +148,7 @@ def _nested(document: Clock | Ledger, title: str) -> Facts | None:
 
 
 def _flat(document: Any, above: str = "") -> list[tuple[str, str]]:
-    """A dataclass as pairs of a title and a value, with what is nested in it."""
+    """Return a dataclass as pairs of a title and a value, nested ones included."""
     out: list[tuple[str, str]] = []
     for one in fields(document):
         value = getattr(document, one.name)

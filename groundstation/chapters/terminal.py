@@ -6,7 +6,7 @@ from groundstation.chapters.wording import clean
 
 
 def terminal(section: Section) -> str:
-    """A section as plain text, headed by its headline or its title.
+    """Return a section as plain text, headed by its headline or its title.
 
     The parts set small are left out, and figures, but for what stands in their place.
 
@@ -29,7 +29,7 @@ def terminal(section: Section) -> str:
 
 
 def part_text(part: Part | None) -> str:
-    """A part of a section alone; empty for one that is left out."""
+    """Return a part of a section alone, as text; empty for one that is left out."""
     if isinstance(part, Figure):
         return part_text(part.instead)
     if isinstance(part, Note):

@@ -33,7 +33,7 @@ NOT_ASSESSABLE = Mark("unknown", "Not assessable")
 
 
 def claim(heading: HeadingResult) -> Claim:
-    """The verdict with the number to type, or why there is none."""
+    """Return the verdict with the number to type, or why there is none."""
     is_late = any(gate.name == "before_take_off" and gate.state == "failed" for gate in heading.gates)
     return Claim(
         Rank.HEADING_OPEN if heading.verdict == "undecided" or is_late else Rank.HEADING,
@@ -89,7 +89,7 @@ def steady_terms(heading: HeadingResult) -> tuple[str, ...]:
 
 
 def _parts(heading: HeadingResult) -> str:
-    """The parts that the interval is made of, each as the half width it would have alone."""
+    """Return the parts of the interval, each as the half width it would have alone."""
     parts = (
         f"{PARTS.get(one.name, one.name)} ± {number(one.half_width_deg * ARCMIN_PER_DEG, 0, '′')}"
         for one in heading.interval_parts
@@ -144,7 +144,7 @@ def _in_words(heading: HeadingResult) -> str:
 
 
 def figures(heading: HeadingResult) -> tuple[tuple[str, str, str], ...]:
-    """The figures that decide, each with what it rests on."""
+    """Return the figures that decide, each with what it rests on."""
     samples, taxi = number(heading.samples, 0), number(heading.taxi_seconds, 0, "s")
     shown, sigma = number(heading.parking_ins_heading_deg, 2, "°"), number(heading.parking_sigma_deg, 2, "°")
     remark = f"95 % interval {interval(heading.confidence95_deg, 3, '°')}"

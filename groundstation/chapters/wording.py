@@ -30,12 +30,12 @@ def is_number(value: Any) -> TypeGuard[float]:
 
 
 def number(value: Any, places: int, unit: str = "", signed: bool = False) -> str:
-    """A number with its unit, rounded, with a true minus; an em dash when there is none.
+    """Return a number with its unit, rounded, with a true minus; an em dash without one.
 
     Examples
     --------
     >>> number(-1.0449, 2, "°"), number(0.4, 1, "m/s", signed=True), number(None, 2, "m")
-    ('−1.04°', '+0.4\u202fm/s', '—')
+    ('−1.04°', '+0.4 m/s', '—')
     """
     if not is_number(value):
         return ABSENT
@@ -84,7 +84,7 @@ def significant(value: Any, digits: int = 3) -> str:
 
 
 def interval(bounds: Any, places: int, unit: str) -> str:
-    """An interval with its unit.
+    """Return an interval with its unit.
 
     Examples
     --------
@@ -150,7 +150,7 @@ def sentence(text: str) -> str:
 
 
 def words(name: str) -> str:
-    """A field name as words: ``largest_gap`` becomes ``largest gap``."""
+    """Return a field name as words: ``largest_gap`` becomes ``largest gap``."""
     return clean(name).replace("_", " ").strip()
 
 
@@ -169,12 +169,12 @@ def named_quantity(name: str) -> tuple[str, str]:
 
 
 def unit_sign(unit: str) -> str:
-    """The sign a unit is printed with: ``deg`` becomes ``°``; what is unknown stays as it is."""
+    """Return the printed sign of a unit: ``deg`` becomes ``°``; unknown ones stay as they are."""
     return UNITS[unit].sign if unit in UNITS else unit
 
 
 def any_value(value: Any, unit: str = "") -> str:
-    """A JSON value of unknown kind in words."""
+    """Return a JSON value of unknown kind in words."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int) and not unit:

@@ -38,7 +38,7 @@ def show(
 
 
 def text_of(one: Checked, everything: bool = False) -> str:
-    """The ledger of one log as text."""
+    """Return the ledger of one log as text."""
     topics = one.ledger.topics
     shown = {name: topic for name, topic in topics.items() if everything or is_canonical(name) or _is_odd(topic)}
     usable = printable(one.usability.text) if one.usability else ""

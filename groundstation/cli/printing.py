@@ -44,7 +44,7 @@ def description(what: Description, *, everything: bool = False) -> str:
 
 
 def _every_word(buses: Sequence[BusWord]) -> str:
-    """A line for each terminal and subaddress, or label."""
+    """Return a line for each terminal and subaddress, or label."""
     rows = [["channel", "bus", "what", "count", "rate Hz", "ICD"]]
     for one in buses:
         rate = "" if one.rate_hz is None else f"{one.rate_hz:.4g}"
@@ -53,7 +53,7 @@ def _every_word(buses: Sequence[BusWord]) -> str:
 
 
 def _every_bus(buses: Sequence[BusWord]) -> str:
-    """A line for each bus, with what the ICD names on it."""
+    """Return a line for each bus, with what the ICD names on it."""
     rows = [["channel", "bus", "words", "kinds", "named", "by the ICD"]]
     for place, found in groupby(buses, key=lambda one: one.place):
         words = list(found)

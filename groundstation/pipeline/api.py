@@ -82,7 +82,7 @@ def open_flight(
 
 
 def open_fleet(out: AnyPath) -> "pd.DataFrame":
-    """The table of a folder of flights that ``run`` made, one row a flight.
+    """Return the table of a folder of flights that ``run`` made, one row a flight.
 
     Raises
     ------

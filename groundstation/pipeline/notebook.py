@@ -86,7 +86,7 @@ class OpenFlight(ABC):
 
     @abstractmethod
     def _saved(self) -> "SavedFlight":
-        """The flight as the report reads it."""
+        """Return the flight as the report reads it."""
 
     @cached_property
     def tables(self) -> Tables:
@@ -98,7 +98,7 @@ class OpenFlight(ABC):
         return Tables(self.flight)
 
     def heading(self) -> HeadingResult:
-        """The heading correction (system 1).
+        """Return the heading correction (system 1).
 
         Raises
         ------
@@ -108,7 +108,7 @@ class OpenFlight(ABC):
         return self.answer(HeadingResult)
 
     def inertial(self) -> InertialResult:
-        """The errors of the INS (system 2); raises as :meth:`heading`."""
+        """Return the errors of the INS (system 2); raises as :meth:`heading`."""
         return self.answer(InertialResult)
 
     def forecast(self) -> ForecastResult:
@@ -123,7 +123,7 @@ class OpenFlight(ABC):
         return self.answer(Latencies)
 
     def magnetic(self) -> MagneticResult:
-        """The deviation of the magnetic heading (system 3); raises as :meth:`heading`."""
+        """Return the deviation of the magnetic heading (system 3); raises as :meth:`heading`."""
         return self.answer(MagneticResult)
 
     def magnetic_ground(self) -> GroundDeviation:
@@ -134,7 +134,7 @@ class OpenFlight(ABC):
         return self.answer(GroundDeviation)
 
     def answer(self, kind: type[A]) -> A:
-        """The answer of any analysis, by its type.
+        """Return the answer of any analysis, by its type.
 
         Raises
         ------
@@ -153,7 +153,7 @@ class OpenFlight(ABC):
         return {name: plot.title for name, plot in self._plots.items()}
 
     def figure(self, name: str) -> Any:
-        """A figure of the report, for matplotlib.
+        """Return a figure of the report, for matplotlib.
 
         Parameters
         ----------
@@ -235,7 +235,7 @@ class OpenFlight(ABC):
         return f"<{type(self).__name__} {self.source.name} ({self.source.reader}){told}>"
 
     def _repr_html_(self) -> str:
-        """The top of the report as a short table: verdict, correction, span, topics."""
+        """Return the top of the report as a short table: verdict, correction, span, topics."""
         from groundstation.chapters.front import front
 
         told = front(self._saved().results)

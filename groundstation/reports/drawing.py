@@ -37,7 +37,7 @@ class Drawing(Part):
 
 
 def plot_of(plots: Mapping[str, Callable[..., Plot | None]], figure: Figure, results: object) -> Plot | None:
-    """The plot of a figure of a chapter; None where there is nothing to show."""
+    """Return the plot of a figure of a chapter; None where there is nothing to show."""
     return plots[figure.name](results, *((figure.of,) if figure.of else ()))
 
 
@@ -57,7 +57,7 @@ def drawn_by(plots: Mapping[str, Callable[..., Plot | None]], section: Section, 
 
 
 def _drawn(plots: Mapping[str, Callable[..., Plot | None]], part: Part, results: object) -> Part | None:
-    """A figure as a drawing, by the name that its chapter gives; any other part as it is."""
+    """Return a figure as a drawing, by its name in the chapter; any other part as it is."""
     if not isinstance(part, Figure):
         return part
     name = ".".join(filter(None, (part.name, part.of)))

@@ -15,7 +15,7 @@ TOP, CHAPTER = "installation-top", "installation"
 
 
 def with_installation(page: str, answer: InstallationResult | None) -> str:
-    """The page of a flight with a learned answer in its places; with none, they are empty."""
+    """Return the page of a flight with a learned answer in its places; empty without one."""
     top = chapter = ""
     if answer is not None:
         top = "" if answer.why_not else render("installation-top.html.j2", text=sentence(answer))

@@ -49,7 +49,7 @@ def live_figures(figures: Sequence[tuple[Panel, ...]], pictures: Sequence[tuple[
 
 
 def digest_of(script: str) -> str:
-    """The SHA-256 of a script as a content security policy names it."""
+    """Return the SHA-256 of a script as a content security policy names it."""
     return base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 

@@ -129,7 +129,7 @@ def _line(row: CardRow) -> CardLine:
 
 
 def _three_digits(heading_deg: float) -> str:
-    """A heading in whole degrees as it is spoken: 000 to 359."""
+    """Return a heading in whole degrees as it is spoken: 000 to 359."""
     return f"{round(heading_deg) % 360:03d}" if is_number(heading_deg) else ABSENT
 
 

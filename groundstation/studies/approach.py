@@ -132,7 +132,7 @@ DIGITS = {
 
 
 def drawn(rng: np.random.Generator) -> ApproachScenario:
-    """A member of the plain family."""
+    """Return a member of the plain family."""
     runway = TrueRunway(float(rng.uniform(-60, 60)), float(rng.uniform(-179, 179)), float(rng.uniform(0, 360)))
     flown = Flown(
         start_distance_m=float(rng.uniform(12_000.0, 26_000.0)),
@@ -173,7 +173,7 @@ def site_of(scenario: ApproachScenario, rng: np.random.Generator) -> SiteData:
 
 
 def measured(scenario: ApproachScenario, site: SiteData, settings: LandingSettings) -> PositionError | None:
-    """The error of the positions of an approach, None where it is not measured."""
+    """Return the error of the positions of an approach, None where it is not measured."""
     simulated: SimulatedApproach = simulate_approach(scenario)
     known = Known(flight_phases(simulated.flight), site=site)
     try:

@@ -130,7 +130,7 @@ def _is_published(before_m: float) -> bool:
 
 
 def page(tables: Sequence[FigureData], runs: int, seed: int) -> tuple[Section, ...]:
-    """The study in sections."""
+    """Return the study in sections."""
     published, laws, placed = tables
     return (
         section(

@@ -38,7 +38,7 @@ class Case:
 
 
 def scenario(name: str) -> SessionPlan:
-    """A shipped plan of a session."""
+    """Return a shipped plan of a session."""
     return load_plan(SESSION_PLAN, name).scenario
 
 
@@ -118,7 +118,7 @@ def placements() -> dict[str, SessionPlan]:
 
 
 def with_fixed_point(base: SessionPlan, before_m: float) -> SessionPlan:
-    """An approach that begins so that an epoch of it falls on a point of the path.
+    """Return an approach that begins so that an epoch of it falls on a point of the path.
 
     The way is moved along itself by less than a step.
     """

@@ -127,14 +127,14 @@ def study_cases(seed: int) -> tuple[Case, ...]:
 
 
 def full_case(name: str, title: str, ins_class: str, route: RouteKind, seed: int) -> Case:
-    """A case of full truth, filtered with the noise of its class as shipped."""
+    """Return a case of full truth, filtered with the noise of its class as shipped."""
     family = FamilySettings(ins=ins_class, route=route, gnss=RECEIVER)
     noise = load_class(ins_class)
     return Case(name, title, family, seed, noise, uses_velocity=True, is_calibrated=True, is_held_out=True)
 
 
 def own_case(name: str, route: RouteKind, seed: int) -> Case:
-    """A case of a route nothing was tuned on, every flight with an instrument of its own."""
+    """Return a case of a route nothing was tuned on, each flight with its own instrument."""
     title = f"navigation grade, {route.replace('_', ' ')}, each flight its own instrument"
     case = full_case(name, title, "navigation", route, seed)
     return replace(case, family=replace(case.family, each_its_own=True), is_new=True)
@@ -148,7 +148,7 @@ def differences_of(batch: ErrorBatch, row: int, epochs: Epochs) -> Differences:
 
 
 def matched_noise(ins: InsClass, gnss: GnssNoise) -> InsNoise:
-    """The filter's noise for which channel truth of a class is exactly true."""
+    """Return the filter's noise for which channel truth of a class is exactly true."""
     return InsNoise(
         name=f"{ins.name}, matched",
         position_m=ins.initial_position_m,

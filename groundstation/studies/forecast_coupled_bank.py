@@ -85,7 +85,7 @@ class SetForecasts:
 
 
 def coarse_differences(differences: Differences, coarse: Coarse) -> Differences:
-    """The differences over coarse epochs, with the motion of the INS there."""
+    """Return the differences over coarse epochs, with the motion of the INS there."""
     time_s, own_s = coarse.epochs.time_s, differences.epochs.time_s
     latitude, altitude, north, east = (np.interp(time_s, own_s, part) for part in differences.motion_known)
     return replace(

@@ -23,7 +23,7 @@ CONFIRMED = {BETTER: "confirmed", WORSE: "refuted", UNDECIDED: "neither shown"}
 def page(
     cases: Sequence[Case], tables: dict[str, FigureData], runs: int, calibrated_runs: int, default_method: str
 ) -> tuple[Section, ...]:
-    """The study in sections."""
+    """Return the study in sections."""
     return (
         section(
             "Study: forecast of INS errors",

@@ -159,7 +159,7 @@ def replay_flight(case: Case, batch: ErrorBatch, row: int, is_calibrated: bool, 
 
 
 def _with_coupled(replay: Hindcast, case: Case, batch: ErrorBatch, row: int, settings: InertialSettings) -> Hindcast:
-    """The replay with the last estimate of the coupled model beside the others."""
+    """Return the replay with the last estimate of the coupled model beside the others."""
     run = run_coupled(differences_of(batch, row, epochs_of(case, batch, row)), case.noise, settings)
     forecast = hindcast_coupled(run, replay.at, replay.lead_s, settings)
     variance = coupled_variance(run, replay.at, replay.lead_s)

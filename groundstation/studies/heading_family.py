@@ -175,7 +175,7 @@ def run_families(
 
 
 def runs_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
-    """One row for each run: parameters that matter, error, interval, verdict."""
+    """Tabulate one row for each run: parameters that matter, error, interval, verdict."""
 
     def column(value: Callable[[RunOutcome], float | str | bool]) -> NDArray[np.generic]:
         return np.array([value(outcome) for outcome in outcomes])

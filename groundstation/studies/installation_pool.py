@@ -112,7 +112,7 @@ def draw_pool(
 
 
 def pool_figure(pool: Sequence[TaxiOfPool]) -> FigureData:
-    """The pool as a table."""
+    """Return the pool as a table."""
     columns = {
         name: np.array([getattr(one, name) for one in pool], dtype=np.float64)
         for name in ("error_deg", "sigma_deg", "half_width_deg", "track_deg")

@@ -74,7 +74,7 @@ FLOWN = ("three-points-axis", "three-points-offset", "three-points-near", "movin
 
 
 def approach(name: str) -> RangeApproach:
-    """A shipped approach."""
+    """Return a shipped approach."""
     return load_plan(LANDING_PLAN, name).scenario
 
 

@@ -16,13 +16,13 @@ THRESHOLD = "threshold"
 
 
 def table(name: str, columns: Sequence[str], rows: Sequence[Sequence[object]], digits: int = 2) -> FigureData:
-    """A table of rows."""
+    """Return a table of rows."""
     arrays = {column: np.array([row[place] for row in rows]) for place, column in enumerate(columns)}
     return FigureData(name, arrays, dict.fromkeys(columns, digits))
 
 
 def figure_of(answer: RangeLanding, figure: Figure) -> float:
-    """One sigma that an answer holds."""
+    """Return one sigma that an answer holds."""
     if figure == "touchdown_up":
         return answer.at(TOUCHDOWN).sigma_up_m
     return {"least_along": answer.least_along_m, "least_right": answer.least_right_m}.get(figure, answer.least_up_m)
@@ -40,7 +40,7 @@ def sigma_table(answers: Mapping[str, RangeLanding]) -> FigureData:
 
 
 def error_95_m(row: AccuracyRow, axis: Axis) -> float:
-    """The 95 % figure of an axis."""
+    """Return the 95 % figure of an axis."""
     return {"lateral": row.lateral_95_m, "horizontal": row.horizontal_95_m}.get(axis, row.vertical_95_m)
 
 

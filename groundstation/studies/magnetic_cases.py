@@ -150,7 +150,7 @@ SWEEPS = (BANK, DIP, NOISE, ATTITUDE, COVERAGE, DRIFT, AZIMUTH)
 
 
 def setups(sweeps: Sequence[Sweep] = SWEEPS) -> tuple[Setup, ...]:
-    """Every setup of some sweeps and of the claim once.
+    """Return every setup of some sweeps and of the claim once.
 
     Examples
     --------
@@ -173,7 +173,7 @@ INCOMPLETE: dict[str, Callable[[float], Legs]] = {
 
 
 def with_figure(legs: Legs, figure: Legs) -> Legs:
-    """The legs of a family's flight with another first figure."""
+    """Return the legs of a family's flight with another first figure."""
     return (*legs[:FIRST_TURN], *figure, *legs[FIRST_TURN + 2 :])
 
 

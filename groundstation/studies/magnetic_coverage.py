@@ -20,7 +20,7 @@ Cell = tuple[str, str, Sequence[Outcome]]
 
 
 def first_cells(judged: Sample, sweeps: Sequence[Sweep], samples: Mapping[Setup, Sample]) -> Iterable[Cell]:
-    """The whole flights of the first family, and the points of its sweeps."""
+    """Return the whole flights of the first family, and the points of its sweeps."""
     yield FIRST, "whole flights", judged.outcomes
     for sweep in sweeps:
         for value, setup in sweep.points:

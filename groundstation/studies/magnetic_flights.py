@@ -55,7 +55,7 @@ class Hangar:
         return judge(flown, heading=heading, phases=phases)
 
     def flown(self, scenario: Scenario, setup: Setup) -> Flown:
-        """The level part of a flight."""
+        """Return the level part of a flight."""
         motion = self._motion(scenario)
         assert scenario.magnetometer is not None
         field = world_field_nt(motion, scenario, scenario.magnetometer)
@@ -108,7 +108,7 @@ def wide_outcome(cell: WideCell, seed: int) -> Outcome:
 
 
 def judged_outcome(family: MagneticFamilySettings, seed: int) -> Outcome:
-    """A whole flight of a family."""
+    """Return a whole flight of a family."""
     return wide_outcome(WideCell(family), seed)
 
 

@@ -248,7 +248,7 @@ def _by_iron(circle: Circle, parameters: PoissonParameters | None) -> FloatArray
 
 
 def _coefficients(flown: Flown, field_ned_nt: FloatArray) -> FloatArray:
-    """A to E of level flight, shape (5,), as the truth has them."""
+    """Return A to E of level flight, shape (5,), as the truth has them."""
     ins = flown.scenario.ins
     truth = deviation_truth(
         flown.magnetometer,

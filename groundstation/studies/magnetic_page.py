@@ -31,7 +31,7 @@ NOT_A_NUMBER = "-"
 
 
 def page(tables: dict[str, FigureData], runs: int, seed: int, sweeps: Sequence[Sweep] = SWEEPS) -> tuple[Section, ...]:
-    """The study in sections."""
+    """Return the study in sections."""
     return (
         section(
             "Study: magnetic deviation determined in flight",
@@ -368,14 +368,14 @@ def _number(value: float, digits: int) -> str:
 
 
 def _limits(table: FigureData, row: int, stem: str, digits: int = 2) -> str:
-    """A value with its limits; the unit stands last in the columns' names."""
+    """Return a value with its limits; the unit stands last in the columns' names."""
     unit = "_deg" if f"{stem}_deg" in table.columns else ""
     value, low, high = (float(table[f"{stem}{end}{unit}"][row]) for end in ("", "_low", "_high"))
     return NOT_A_NUMBER if np.isnan(value) else f"{value:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
 
 
 def _shares(table: FigureData, row: int, name: str, low: str = "", high: str = "") -> str:
-    """A share with its limits, in per cent."""
+    """Return a share with its limits, in per cent."""
     value = float(table[name][row])
     if np.isnan(value):
         return NOT_A_NUMBER

@@ -71,7 +71,7 @@ class RunOutcome:
 
 
 def jobs_of(runs: int, seed: int, swept_setups: tuple[Setup, ...]) -> list[Job]:
-    """One job for each run; the seed alone decides how each setup is flown."""
+    """Return one job for each run; the seed alone decides how each setup is flown."""
     cells, taxis = tuple(WIDE), tuple(taxi_cells())
     swept, incomplete = (max(2, round(share * runs)) for share in (SWEPT_SHARE, INCOMPLETE_SHARE))
     return [
@@ -132,7 +132,7 @@ def _told(outcome: RunOutcome) -> str:
 
 @contextmanager
 def _mapped(jobs: int) -> Iterator[Callable[[Callable[[Job], RunOutcome], Sequence[Job]], Iterator[RunOutcome]]]:
-    """A map over jobs: in this process for a few, else in processes of one thread each."""
+    """Return a map over jobs: in this process for a few, else in single-threaded processes."""
     workers = min(jobs, os.cpu_count() or 1)
     if jobs < POOLED_FROM or workers < 2:
         yield map

@@ -47,7 +47,7 @@ class Sample:
         object.__setattr__(self, "weights", frozen(self.weights))
 
     def each(self, value: Callable[[Outcome], float]) -> FloatArray:
-        """A figure of every run, shape (runs,), NaN where it has none."""
+        """Return a figure of every run, shape (runs,), NaN where it has none."""
         return np.array([value(outcome) for outcome in self.outcomes], dtype=np.float64)
 
     def rms(self, values: FloatArray) -> FloatArray:
@@ -67,7 +67,7 @@ class Sample:
         return self.each(lambda outcome: float((outcome.rms_deg if whole else outcome.shape_deg)[place]))
 
     def judged(self, method: str, value: Callable[[Judged], float]) -> FloatArray:
-        """A figure of the sigmas of a method on every run."""
+        """Return a figure of the sigmas of a method on every run."""
         return self.each(lambda outcome: value(outcome.judged[method]) if method in outcome.judged else float("nan"))
 
 
@@ -87,13 +87,13 @@ def interval(values: FloatArray) -> tuple[float, float, float]:
 
 
 def samples_of(runs: Sequence[RunOutcome], setups: Sequence[Setup], seed: int) -> dict[Setup, Sample]:
-    """The outcomes of every setup."""
+    """Return the outcomes of every setup."""
     weights = resampling(len(runs), seed)
     return {setup: Sample(tuple(run.swept[place] for run in runs), weights) for place, setup in enumerate(setups)}
 
 
 def judged_sample(runs: Sequence[RunOutcome], seed: int) -> Sample:
-    """The whole flights of the judged family."""
+    """Return the whole flights of the judged family."""
     flown = tuple(run.judged for run in runs if run.judged is not None)
     return Sample(flown, resampling(len(flown), seed))
 
@@ -340,7 +340,7 @@ def reasons_of(outcomes: Iterable[Outcome]) -> Counter[str]:
 
 
 def plain_reason(text: str) -> str:
-    """The first reason of several without numbers and places.
+    """Return the first reason of several without numbers and places.
 
     Examples
     --------

@@ -76,7 +76,7 @@ class TaxiOutcome:
 
 
 def taxi_cells() -> dict[str, TaxiCell]:
-    """The cells by name, in the order of the runs."""
+    """Return the cells by name, in the order of the runs."""
     return {
         "two ways": TaxiCell(TWO_WAYS),
         "one way": TaxiCell((Taxi(800.0, 10.0),)),
@@ -146,7 +146,7 @@ def true_airframe_error(simulated: Simulated) -> Callable[[float], float]:
 
 
 def true_a_deg(simulated: Simulated) -> float:
-    """A of level flight as the truth has it, in the field at the middle of the flight."""
+    """Return A of level flight by the truth, in the field at the middle of the flight."""
     scenario, magnetometer = simulated.scenario, simulated.scenario.magnetometer
     assert magnetometer is not None
     field = world_field_nt(simulated.trajectory, scenario, magnetometer)

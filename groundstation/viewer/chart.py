@@ -134,7 +134,7 @@ class Chart:
         self._frame()
 
     def view(self, name: str = "") -> rrb.Spatial2DView:
-        """The view that shows the chart, named after its axes unless it has a name."""
+        """Return the view that shows the chart, named after its axes unless it has a name."""
         bounds = rrb.VisualBounds2D(x_range=[-LEFT, WIDTH + self.right], y_range=[-TOP, self.height + BOTTOM])
         name = name or f"{self.y.title} by {self.x.title}"
         return rrb.Spatial2DView(name=name, origin=f"/{self.path}", visual_bounds=bounds)

@@ -59,7 +59,7 @@ def flights_text(recorder: FleetRecorder, fleet: FleetResults) -> str:
 
 
 def forecast_text(fleet: FleetResults) -> str:
-    """The skill of the methods over all flights; empty where there is no forecast."""
+    """Return the skill of the methods over all flights; empty where there is no forecast."""
     told = skill.build(fleet)
     return "" if told is None else _text(told, {})
 

@@ -65,7 +65,7 @@ def page_files(executable: Path, environment: Mapping[str, str]) -> dict[str, tu
 
 
 def _told_port(process: "subprocess.Popen[bytes]", log: Path) -> int:
-    """The port of the page, which Rerun logs."""
+    """Return the port of the page, which Rerun logs."""
     deadline = time.monotonic() + PATIENCE_S
     text = ""
     while time.monotonic() < deadline and process.poll() is None:

@@ -63,7 +63,7 @@ def _axis(told: DescribedAxis, span: Span, names: tuple[tuple[float, str], ...])
 
 
 def _of_window(panel: Panel, window: int) -> Panel:
-    """A panel over one of the windows of its axis of time."""
+    """Return a panel over one of the windows of its axis of time."""
     x = panel.x
     low, high = x.windows[window]
     ends = panel.y.ranges[window] if panel.y.ranges else (panel.y.low, panel.y.high)

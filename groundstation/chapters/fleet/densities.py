@@ -46,5 +46,5 @@ def _normals(fleet: FleetResults) -> Grid:
 
 
 def angle(value: float, unit: str = "°") -> str:
-    """An angle as this chapter writes it."""
+    """Return an angle as this chapter writes it."""
     return number(value, 3, unit, signed=True)

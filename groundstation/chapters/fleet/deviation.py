@@ -22,7 +22,7 @@ def build(fleet: FleetResults) -> Section | None:
 
 
 def usable(fleet: FleetResults) -> list[DeviationRow]:
-    """The deviations of the flights that are not rejected."""
+    """Return the deviations of the flights that are not rejected."""
     return [row for row in fleet.deviations if row.verdict != "reject"]
 
 

@@ -104,7 +104,7 @@ def _line(row: dict[str, Any], remarks: Sequence[Mark]) -> FlightLine:
 
 
 def verdict_mark(verdict: str) -> Mark:
-    """A verdict as it stands in a cell."""
+    """Return a verdict as it stands in a cell."""
     mark = VERDICTS.get(verdict) or Mark("unknown", clean(verdict) or "not assessable")
     return Mark(mark.tone, mark.text.lower())
 

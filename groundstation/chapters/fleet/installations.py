@@ -52,7 +52,7 @@ def rows_of(fleet: FleetResults, place: int) -> NDArray[np.intp]:
 
 
 def name_of(row: InstallationRow) -> str:
-    """An installation in words."""
+    """Return an installation in words."""
     return f"{aircraft_name(row.aircraft, 24)}, serial {clean(row.ins_serial)[:24]}"
 
 

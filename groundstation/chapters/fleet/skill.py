@@ -50,7 +50,7 @@ def shipped_method(fleet: FleetResults) -> str:
 
 
 def headline(fleet: FleetResults) -> FleetSkill | None:
-    """The shipped method after an hour, or at its longest horizon before that."""
+    """Return the shipped method after an hour, or at its longest horizon before that."""
     mine = [row for row in fleet.skill if row.method == shipped_method(fleet)]
     exact = [row for row in mine if row.horizon_min == HEADLINE_MIN]
     found = exact or mine
@@ -58,7 +58,7 @@ def headline(fleet: FleetResults) -> FleetSkill | None:
 
 
 def method_title(name: str) -> str:
-    """A method in words."""
+    """Return a method in words."""
     return METHODS.get(name, clean(name))
 
 

@@ -28,7 +28,7 @@ class HasRows(Protocol):
     """A flight with its arrays."""
 
     def rows_of(self, kind: type[T]) -> T | None:
-        """The typed arrays of a figure, None when the flight has none."""
+        """Return the typed arrays of a figure, None when the flight has none."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Overlay(Generic[T]):
         self._kind, self._read = kind, read
 
     def of(self, flight: HasRows) -> TimeLine | None:
-        """The line of a flight, None where it has no number."""
+        """Return the line of a flight, None where it has no number."""
         rows = flight.rows_of(self._kind)
         line = None if rows is None else self._read(rows)
         return line if line is not None and has_values(line.values) else None
@@ -163,7 +163,7 @@ def tracks(sides: Sequence[Side]) -> Plot | None:
 
 
 def overlay(sides: Sequence[Side], told: Overlay[Any]) -> Plot | None:
-    """A line of both flights over the flight time of A, with its band."""
+    """Return a line of both flights over the flight time of A, with its band."""
     drawn = [(side, line) for side in sides if (line := told.of(side.flight)) is not None]
     if not drawn:
         return None

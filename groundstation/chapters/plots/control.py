@@ -102,7 +102,7 @@ def _law(name: str, mine: Flags, time: Floats, values: Floats) -> Curve:
 
 
 def law(results: FlightResults) -> Plot | None:
-    """Every control with time under every law, with its bounds."""
+    """Return every control with time under every law, with its bounds."""
     found = _data(results, ControlPaths)
     if found is None or not found[0].controls:
         return None

@@ -40,7 +40,7 @@ STEEP = 20.0  # a dilution so many times its median is drawn on a logarithmic ax
 
 
 def _tracks(results: FlightResults) -> tuple[CooperativeResult, CooperativeTracks, str] | None:
-    """The answer, its tracks and the algorithm that is drawn."""
+    """Return the answer, its tracks and the algorithm that is drawn."""
     answer, data = results.answer(CooperativeResult), results.rows_of(CooperativeTracks)
     return None if answer is None or data is None else (answer, data, trusted(answer).algorithm)
 

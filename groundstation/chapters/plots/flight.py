@@ -28,7 +28,7 @@ GNSS_ROLES: dict[str, Role] = {"good": "answer", "integrity lost": "bad", "no GN
 
 
 def track_map(results: FlightResults) -> Plot | None:
-    """The track in local coordinates, with the taxi enlarged and the used stretches marked."""
+    """Return the track in local coordinates, the taxi enlarged, the used stretches marked."""
     data = results.rows_of(Overview)
     if data is None:
         return None
@@ -178,7 +178,7 @@ def _phases(phases: PhaseSpans) -> Spans:
 
 
 def _first_known(*listed: tuple[Floats | None, str]) -> tuple[Floats, str]:
-    """The first of some columns that has a value, else the first, and its name."""
+    """Return the first of some columns that has a value, else the first, and its name."""
     there = [(values, name) for values, name in listed if values is not None]
     return next(((values, name) for values, name in there if np.isfinite(values).any()), there[0])
 

@@ -24,7 +24,7 @@ def _shipped(results: FlightResults) -> str:
 
 
 def method_roles(default: str) -> dict[str, Role]:
-    """A role for every method; the raw INS and the shipped one have those of their meaning."""
+    """Return a role for every method; raw INS and shipped method have roles of their own."""
     others = (name for name in METHODS if name not in ("raw_ins", default))
     return {**dict(zip(others, OTHERS, strict=False)), "raw_ins": "ins", default: "answer"}
 

@@ -83,7 +83,7 @@ def difference(results: FlightResults) -> Plot | None:
 
 
 def _running(running: HeadingRunning) -> list[AnyMark]:
-    """The running mean with e and its honest interval."""
+    """Return the running mean with e and its honest interval."""
     time, mean, e = running.time_s, running.mean_deg, running.precision_deg
     honest = running.honest_half_width_deg
     marks: list[AnyMark] = []
@@ -266,7 +266,7 @@ def forest(results: FlightResults) -> Plot | None:
 
 
 def _whole_run(answer: HeadingResult, row: int) -> list[AnyMark]:
-    """The estimate of the whole run through all rows, and its own row."""
+    """Return the estimate of the whole run through all rows, and its own row."""
     error, bounds = answer.error_deg, answer.confidence95_deg
     if not is_number(error):
         return []

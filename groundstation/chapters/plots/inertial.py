@@ -46,7 +46,7 @@ STATES = {
 
 
 def state(results: FlightResults, name: str) -> Plot | None:
-    """A state of both channels: measured, estimated, smoothed, with the 95 % band."""
+    """Return a state of both channels: measured, estimated, smoothed, with the 95 % band."""
     data = results.rows_of(InertialStates)
     if data is None or not _are_known(data, name):
         return None

@@ -98,7 +98,7 @@ def _reach(guided: Floats, placed: Floats, before: np.ndarray) -> float:
 
 
 def final(results: FlightResults, of: str) -> Plot | None:
-    """The final from above, and from the side."""
+    """Return the final from above, and from the side."""
     found = _parts(results, of)
     if found is None:
         return None

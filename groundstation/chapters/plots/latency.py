@@ -13,7 +13,7 @@ MOST_PAIRS = len(SERIES)
 
 
 def search(results: FlightResults) -> Plot | None:
-    """The residual of every pair against the latency tried; None without the arrays."""
+    """Return the residual of every pair against the latency tried; None without the arrays."""
     answer, data = results.answer(Latencies), results.rows_of(LatencySearch)
     if answer is None or data is None:
         return None

@@ -105,7 +105,7 @@ def held_out(results: FlightResults) -> Plot | None:
 
 
 def track(results: FlightResults) -> Plot | None:
-    """The figures as flown, told apart by branch."""
+    """Return the figures as flown, with the branches in their own roles."""
     answer, data = results.answer(MagneticResult), results.rows_of(Overview)
     turns = [turn for turn in answer.turns if turn.state == "used"] if answer else []
     if data is None or not turns:

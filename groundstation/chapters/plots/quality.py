@@ -47,7 +47,7 @@ def gaps(results: FlightResults) -> Plot | None:
 
 
 def _gaps(holes: GapRows, order: tuple[str, ...], least_s: float) -> Lanes:
-    """The longest gaps of each topic, each wide enough to be seen."""
+    """Return the longest gaps of each topic, each wide enough to be seen."""
     rows = [np.flatnonzero(holes.topic == name) for name in order]
     kept = [mine[np.sort(np.argsort(-holes.length_s[mine], kind="stable")[:MOST_GAPS])] for mine in rows]
     shown = np.concatenate(kept) if kept else np.zeros(0, dtype=np.intp)

@@ -26,7 +26,7 @@ LARGEST_IN_METRES = 3000.0
 
 
 def role_of(subject: str) -> Role:
-    """The role of a subject; the corrected INS is the answer."""
+    """Return the role of a subject; the corrected INS is the answer."""
     return ROLES.get(subject.partition(".")[0], "answer")
 
 

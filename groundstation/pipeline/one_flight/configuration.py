@@ -88,7 +88,7 @@ class UserSettings:
     session: "SessionSettings"
 
     def of(self, kind: type[S]) -> S:
-        """The settings of that type."""
+        """Return the settings of that type."""
         return next(found for found in self.analyses.values() if isinstance(found, kind))
 
 

@@ -69,7 +69,7 @@ class Job:
         return keys_of(finished.source, self.configuration, digests=digests)
 
     def of_parts(self, parts: Sequence[PartOfRun], *, add_suffix: bool = False) -> "Job":
-        """The job of running consecutive logs as one flight."""
+        """Return the job of running consecutive logs as one flight."""
         first = Path(parts[0].path)
         path = self.path if self.path.absolute() == first else first
         return replace(

@@ -190,7 +190,7 @@ def behind_it(log: Log, before: PartOfRun, path: Path) -> PartOfRun | None:
 
 
 def _tail(file: "LogFile") -> bytes:
-    """The last bytes of a file."""
+    """Return the last bytes of a file."""
     with file.open() as stream:
         stream.seek(max(0, file.size - _LOOKED_AT))
         return stream.read()

@@ -275,7 +275,7 @@ def _is_aided(flight: "Flight", topic: str) -> bool:
 
 
 def _on_utc(reference: Reference, span_ns: tuple[int, int]) -> "Table":
-    """The table on UTC; of seconds of a week, in the week in which it overlaps the log most."""
+    """Return the table on UTC; seconds of a week go to the week that overlaps the log most."""
     if not reference.is_weekly:
         return reference.table
     tables = [

@@ -187,7 +187,7 @@ def digest_of_parts(*parts: Any) -> str:
 
 
 def _layouts_of(configuration: Configuration) -> list[str]:
-    """The content of the profile, the ICDs and the references; the name of a shipped ICD.
+    """Return the content of profile, ICDs and references; the name of a shipped ICD.
 
     Whether a reference is expected counts: without one of its time a log is then refused, else it is run.
     """

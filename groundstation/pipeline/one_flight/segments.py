@@ -104,7 +104,7 @@ class Segment:
         return Finding("info", "log.power_up", text, place=f"record {self.first}")
 
     def _cut(self, batch: RecordBatch) -> RecordBatch:
-        """The rows of a batch that belong to it."""
+        """Return the rows of a batch that belong to it."""
         inside = (batch.record_index >= self.first) & (batch.record_index < self.end)
         return batch if inside.all() else batch.take(inside)
 
@@ -130,7 +130,7 @@ class Segment:
 
 
 def segments_of(several: Sequence[PowerUpClock]) -> tuple[Segment, ...]:
-    """The power-ups that a survey found in a log."""
+    """Return the power-ups that a survey found in a log."""
     return tuple(
         Segment(
             number,

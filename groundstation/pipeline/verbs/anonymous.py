@@ -52,7 +52,7 @@ XYZ = "xyz"
 
 
 def _number(text: str) -> str:
-    """A number as it was written; empty where it is none."""
+    """Return a number as it was written; empty where it is none."""
     try:
         return text.strip() if math.isfinite(float(text)) else ""
     except ValueError:
@@ -128,7 +128,7 @@ class Disguise:
         return f"N{digest[:6]}"
 
     def topic(self, topic: str) -> str | None:
-        """The name a topic gets; None for one that is left out."""
+        """Return the name a topic gets; None for one that is left out."""
         if not is_canonical(topic) or kind_of(topic) in LEFT_OUT:
             return None
         kind, _, name = topic.partition(".")
@@ -165,7 +165,7 @@ class Disguise:
         return replace(damage, place="", what=damage.kind, topic=self.topic(damage.topic) or "")
 
     def _device_time(self, column: Column) -> Column:
-        """The recorder's own time: moved where it is a date."""
+        """Return the recorder's own time: moved where it is a date."""
         if self.start_utc_ns is None:
             return column
         values = column.values.astype(np.int64)

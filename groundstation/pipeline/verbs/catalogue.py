@@ -50,7 +50,7 @@ def _session_analyses() -> list[dict[str, Any]]:
 
 
 def _of_a_session(folder: Path) -> list[dict[str, Any]]:
-    """The analyses of a session, each with whether it ran and the reason why not."""
+    """Return the analyses of a session, each with whether it ran and why not."""
     found = load_document(folder)
     reasons = {entry.analysis: entry.reason for entry in found.not_assessable}
     return [
@@ -60,7 +60,7 @@ def _of_a_session(folder: Path) -> list[dict[str, Any]]:
 
 
 def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
-    """The analyses, each with whether it would run on a log and the reason why not."""
+    """Return the analyses, each with whether it would run on a log and why not."""
     from groundstation.base.errors import UsageError
     from groundstation.pipeline.one_flight.analyse import answers_of
     from groundstation.pipeline.one_flight.configuration import Configuration

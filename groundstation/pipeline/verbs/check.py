@@ -114,7 +114,7 @@ def check_many(
 
 
 def require_logs(paths: Sequence[Path], purpose: str) -> tuple[list[Path], bool]:
-    """The logs that are named, and whether the purpose is that of a session.
+    """Return the logs that are named, and whether the purpose is that of a session.
 
     Raises
     ------
@@ -202,14 +202,14 @@ def _check_or_reason(
 
 
 def unread(path: Path, reason: str, trace: str = "") -> Checked:
-    """The check of a log that could not be read."""
+    """Return the check of a log that could not be read."""
     return Checked(Outcome(str(path), "failed", reason, trace=trace), {}, Ledger(), Clock(), ())
 
 
 def checked_with_flight(
     log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool
 ) -> tuple[Checked, "Flight | None"]:
-    """The check of a log and, where it is wanted and anything can be read, its tables."""
+    """Return the check of a log and, where wanted and readable, its tables."""
     read = _stored if log.is_store else _recorded
     checked, flight = read(log, limits, fail_on, with_flight=with_flight)
     return checked, None if checked.outcome.state == "failed" else flight

@@ -149,7 +149,7 @@ def describe_apart(path: Path, profile: Path | None, icds: tuple[str, ...], boun
 
 
 def suggest_icd_apart(path: Path, bounds: Bounds) -> str:
-    """The draft of an ICD that a process of its own makes of a log.
+    """Return the draft of an ICD that a process of its own makes of a log.
 
     Raises
     ------

@@ -159,7 +159,7 @@ def _as_mcap(log: Log, folder: Path, limits: Thresholds, wanted: Wanted) -> Iter
 
 
 def _wanted_of(logs: Sequence[Log], wanted: Wanted) -> Log:
-    """The power-up that is asked for by its number, or by a range in UTC."""
+    """Return the power-up that is asked for by its number, or by a range in UTC."""
     segments = [log.segment for log in logs if log.segment is not None]
     numbers = [one.number for one in segments if wanted.power_up in (0, one.number) and _may_hold(one, wanted)]
     if len(numbers) == 1:

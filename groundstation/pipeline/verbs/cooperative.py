@@ -65,7 +65,7 @@ def run_session(
 
 
 def _files_of(path: Path) -> list[Path]:
-    """A log, the MCAP of a flight folder, or those of the flights of a session."""
+    """Return a log, the MCAP of a flight folder, or those of the flights of a session."""
     if not path.exists():
         raise UsageError(str(path), "no such file")
     if is_session(path):

@@ -141,7 +141,7 @@ def _buses(contents: "BusContents | None", log: Log) -> tuple[BusWord, ...]:
 
 
 def suggest_icd(path: Path) -> str:
-    """The beginning of an ICD, as YAML, from what is on the buses of a log.
+    """Return the beginning of an ICD, as YAML, from what is on the buses of a log.
 
     Raises
     ------

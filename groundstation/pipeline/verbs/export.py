@@ -131,7 +131,7 @@ def saved_flight(folder: Path) -> "SavedFlight":
 
 
 def _compared_ins(saved: "SavedFlight") -> str:
-    """The INS whose errors were estimated; empty where none was."""
+    """Return the INS whose errors were estimated; empty where none was."""
     inertial = answer_of(saved.results.answers, InertialResult)
     return "" if inertial is None else inertial.ins_topic
 

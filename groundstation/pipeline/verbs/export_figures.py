@@ -69,7 +69,7 @@ def _refuse_saved(place: Path) -> None:
 
 
 def _with_utc(figure: FigureData, start_utc_ns: int | None) -> FigureData:
-    """The figure with UTC before its columns of flight seconds, empty where these are unknown."""
+    """Return the figure with UTC before its columns of flight seconds, empty if unknown."""
     if start_utc_ns is None:
         return figure
     told = {UTC_OF[name]: _utc(numbers(figure, name), start_utc_ns) for name in UTC_OF if name in figure.columns}

@@ -23,7 +23,7 @@ class KeptRuns(Generic[R]):
         self._runs: dict[str, dict[int, R]] = {}
 
     def get(self, name: str, number: int) -> R | None:
-        """The outcome of a run that ended before.
+        """Return the outcome of a run that ended before.
 
         Raises
         ------

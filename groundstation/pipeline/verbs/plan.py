@@ -44,12 +44,12 @@ class ShippedScenario:
 
 
 def plan_of(name: str) -> Plan[Any]:
-    """The kind of plan of that name."""
+    """Return the kind of plan of that name."""
     return next(plan for plan in PLANS if plan.name == name)
 
 
 def shipped_scenarios(name: str) -> tuple[ShippedScenario, ...]:
-    """The scenarios of a kind of plan that come with the package."""
+    """Return the scenarios of a kind of plan that come with the package."""
     plan = plan_of(name)
     return tuple(ShippedScenario(one, load_plan(plan, one).scenario.title) for one in plan_names(plan))
 

@@ -130,7 +130,7 @@ def rules_name(configuration: Configuration) -> str:
 
 
 def csv_of(found: RulesTest) -> str:
-    """The table of every gate with another limit or state."""
+    """Return the table of every gate with another limit or state."""
     columns: dict[str, Any] = {}
     for field in fields(RulesRow):
         values = [getattr(row, field.name) for row in found.rows]

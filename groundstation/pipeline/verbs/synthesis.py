@@ -167,7 +167,7 @@ def study_to(
 def _resumed(
     name: str, study: "Callable[..., StudyResult]", folder: Path, minutes: float | None, *, afresh: bool
 ) -> "Callable[..., StudyResult]":
-    """A study with the runs kept in a folder."""
+    """Return a study with the runs kept in a folder."""
     from functools import partial
     from shutil import rmtree
 

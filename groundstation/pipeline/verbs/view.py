@@ -90,7 +90,7 @@ def _sound(recording: Path) -> Path:
 
 
 def _recording(path: Path) -> Path:
-    """A recording, or that of a folder: of a flight, of all flights, of a comparison."""
+    """Return a recording, or that in a folder of a flight, of all flights, of a comparison."""
     recording = file_in(path, ".rrd", FLEET_RECORDING, COMPARISON_RECORDING) if path.is_dir() else path
     with told_in_a_line(str(recording)), recording.open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:

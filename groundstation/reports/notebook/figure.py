@@ -211,7 +211,7 @@ def _ticks(axis: Axis, span: Span, ticks: Sequence[tuple[float, str]] | None, *,
 
 
 def _legend(axes: Axes, entries: Sequence[Entry], corner: Corner, offset_pt: tuple[float, float]) -> None:
-    """One line or one column of a legend, off the upper right corner of a frame."""
+    """Draw one line or one column of a legend, off the upper right corner of a frame."""
     inches = axes.get_figure(root=True).dpi_scale_trans  # type: ignore[union-attr]
     shift = ScaledTranslation(offset_pt[0] / POINTS_PER_INCH, offset_pt[1] / POINTS_PER_INCH, inches)
     columns = len(entries) if corner == "lower right" else 1

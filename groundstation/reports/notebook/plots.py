@@ -28,7 +28,7 @@ LEFT_OUT = {"forecast", "heading", "overview", "quality", "standstill"}
 
 
 def plots_of(saved: SavedFlight) -> dict[str, Plot]:
-    """Every plot of a flight's report by its name, in the order of the report."""
+    """Return every plot of a flight's report by its name, in the order of the report."""
     sections = (section for part in told_sections(saved) for section in part)
     figures = [part for section in sections for part in section.parts if isinstance(part, Figure)]
     return {name_of(one): plot for one in figures if (plot := _told(one, saved)) is not None}

@@ -69,7 +69,7 @@ def draw(mark: AnyMark, axes: Axes, box: Box, place: int) -> None:
 
 
 def handle_of(entry: Entry) -> Any:
-    """The sign of an entry of a legend."""
+    """Return the sign of an entry of a legend."""
     mark, colour = entry.mark, colours.COLOURS[entry.mark.role]
     if isinstance(mark, Spans):
         shade, alpha = colours.shade_of(entry.kind, mark.role, mark.emphasis)

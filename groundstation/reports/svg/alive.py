@@ -69,7 +69,7 @@ def panels_of(panels: Sequence[Placed], height_pt: float) -> tuple[live.Panel, .
 
 
 def _held(curve: live.Curve) -> live.Curve:
-    """The curve with numbers that the page holds."""
+    """Return the curve with numbers that the page holds."""
     x, y, upper = (np.clip(values, -LARGEST, LARGEST) for values in (curve.x, curve.y, curve.upper))
     return replace(curve, x=x, y=y, upper=upper)
 

@@ -102,7 +102,7 @@ class _Told:
 
 
 def placed(plot: Plot) -> tuple[tuple[Placed, ...], float]:
-    """All panels with their places, row by row, and the height of the picture in points."""
+    """Return all panels with their places, row by row, and the height of the picture, points."""
     rows, lefts, rights, widths = _with_room(plot)
     found: list[Placed] = []
     y = 4.0
@@ -187,7 +187,7 @@ def widest(ticks: Sequence[Tick]) -> float:
 
 
 def title_lines(title: str, room_pt: float) -> list[str]:
-    """The title of an upright axis in as many lines as it needs."""
+    """Return the title of an upright axis in as many lines as it needs."""
     return lines_of(label(title, MOST_OF_A_TITLE), room_pt) if title else []
 
 
@@ -202,7 +202,7 @@ def _title_pt(panel: Panel, height_pt: float) -> float:
 
 
 def scale_of(panel: Panel) -> Cells | None:
-    """The cells whose scale stands beside a panel, None without any."""
+    """Return the cells whose scale stands beside a panel, None without any."""
     return next((mark for mark in panel.marks if isinstance(mark, Cells)), None)
 
 

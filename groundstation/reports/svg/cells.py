@@ -39,12 +39,12 @@ def cells_shape(mark: Cells, box: Box) -> str:
 
 
 def colour_of_step(step: int) -> str:
-    """One of the colours of a scale, from the lowest."""
+    """Return one of the colours of a scale, from the lowest."""
     return "#" + "".join(f"{part:02x}" for part in viridis((step + 0.5) / STEPS))
 
 
 def _levels(mark: Cells, values: Floats) -> NDArray[np.int64]:
-    """The number of the colour of each cell, -1 for none."""
+    """Return the number of the colour of each cell, -1 for none."""
     shares = np.clip(span_of_colours(mark).shares(values), 0.0, 1.0)
     if mark.is_log:
         shares = np.where(values <= 0.0, 0.0, shares)
@@ -54,7 +54,7 @@ def _levels(mark: Cells, values: Floats) -> NDArray[np.int64]:
 
 
 def span_of_colours(mark: Cells) -> Span:
-    """The scale of the colours of cells with its ends."""
+    """Return the scale of the colours of cells with its ends."""
     return span_of("log" if mark.is_log else "linear", mark.low, mark.high, NO_PLACES, is_tight=True)
 
 
@@ -76,7 +76,7 @@ def _blocks(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:
 
 
 def scale_beside(mark: Cells, box: Box) -> str:
-    """The scale of colours right of a frame, with its ticks and title."""
+    """Return the scale of colours right of a frame, with its ticks and title."""
     span = span_of_colours(mark)
     left, step = box.right + TO_BAR_PT, box.height / STEPS
     parts = []

@@ -59,7 +59,7 @@ def with_alpha(colour: str, alpha: float) -> str:
 
 
 def opacity(of: str, share: float) -> str:
-    """The attribute of an opacity, none of what is opaque.
+    """Return the attribute of an opacity, none of what is opaque.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def opacity(of: str, share: float) -> str:
 
 
 def dashes(dash: Dash) -> str:
-    """The attribute of a dashed line, none of a solid one.
+    """Return the attribute of a dashed line, none of a solid one.
 
     Examples
     --------

@@ -91,7 +91,7 @@ def beside_pt(entries: Sequence[Entry]) -> float:
 
 
 def drawn_line(entries: Sequence[Entry], right: float, y: float) -> str:
-    """A line of a legend that ends at ``right``, its middle at ``y``; points."""
+    """Return a line of a legend that ends at ``right``, its middle at ``y``; points."""
     x = right - sum(entry.width_pt for entry in entries) + BETWEEN_PT
     parts = []
     for entry in entries:

@@ -65,7 +65,7 @@ def _curve(mark: Curve, box: Box) -> str:
 
 
 def stepped(x: Floats, y: Floats, starts: Any) -> tuple[Floats, Floats, Any]:
-    """A line that holds each value about its place, and where its pieces begin."""
+    """Return a line that holds each value about its place, and where its pieces begin."""
     wide, high, begins = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=bool)]
     bounds = [*np.flatnonzero(starts).tolist(), len(x)]
     for first, last in pairwise(bounds):

@@ -103,7 +103,7 @@ def _plain(value: float, places: int) -> str:
 
 
 def _powered(value: float, exponent: int, places: int) -> str:
-    """A number as a multiple of a power of ten."""
+    """Return a number as a multiple of a power of ten."""
     if value == 0.0:
         return "0"
     power = f"·10{str(exponent).translate(RAISED)}"

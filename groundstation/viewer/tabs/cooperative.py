@@ -62,7 +62,7 @@ def _sources(recorder: Recorder, answer: CooperativeResult, results: FlightResul
 
 
 def _links(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
-    """A lane each for the worst links: ranging, gated, silent."""
+    """Log a lane each for the worst links: ranging, gated, silent."""
     data = results.rows_of(CooperativeLinks)
     if data is None:
         return []

@@ -58,7 +58,7 @@ def flight_space(
 
 
 def _eye(place: FloatArray, size_m: float) -> rrb.EyeControls3D:
-    """An eye that sees the whole track from the south-west and above."""
+    """Return an eye that sees the whole track from the south-west and above."""
     low, high = place.min(axis=0), place.max(axis=0)
     middle, across = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 3.0 * size_m)
     return rrb.EyeControls3D(position=middle + across * EYE, look_target=middle, eye_up=(0.0, 0.0, 1.0))

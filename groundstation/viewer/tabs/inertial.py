@@ -65,7 +65,7 @@ def inertial(recorder: Recorder, results: FlightResults) -> rrb.Container | None
 def _page(
     recorder: Recorder, results: FlightResults, name: str, of: str, figures: Sequence[tuple[str, ...]]
 ) -> rrb.Container | None:
-    """A page of plots, north on the left and east on the right."""
+    """Return a page of plots, north on the left and east on the right."""
     plots = (plot_of(figure, results, *which) for figure, *which in figures)
     views = [view for one in plots for view in panels_of(recorder, one, of=of)]
     columns = [rrb.Vertical(contents=side) for side in (views[::2], views[1::2])]

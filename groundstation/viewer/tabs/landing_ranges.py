@@ -99,7 +99,7 @@ def _ranges(
     ground: list[tuple[str, FloatArray]],
     moving: FloatArray,
 ) -> None:
-    """A line from every point to the aircraft."""
+    """Log a line from every point to the aircraft."""
     ends = [np.broadcast_to(where, flown.shape) for _, where in ground] + ([moving] if len(moving) else [])
     strips = np.stack([np.stack([end, flown], axis=1) for end in ends], axis=1)
     drawn = rr.LineStrips3D.from_fields(colors=[colours.DIM], radii=rr.Radius.ui_points(RANGE))

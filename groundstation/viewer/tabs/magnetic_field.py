@@ -50,7 +50,7 @@ def sphere(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
 
 
 def _known_ut(field: BodyField) -> FloatArray:
-    """The rows that have a field, shape (n, 3)."""
+    """Return the rows that have a field, shape (n, 3)."""
     values = np.column_stack([field.forward_nt, field.right_nt, field.down_nt]) / NT_PER_UT
     return values[np.isfinite(values).all(axis=1)]
 
@@ -65,7 +65,7 @@ def _radius_ut(results: FlightResults, field_ut: FloatArray) -> float:
 
 
 def _exaggerated(field: FloatArray, radius: float, factor: float) -> FloatArray:
-    """The same directions, distances from the sphere times a factor; shape (n, 3)."""
+    """Return the same directions, distances from the sphere times a factor; shape (n, 3)."""
     length = np.maximum(np.linalg.norm(field, axis=1, keepdims=True), 1e-12)
     return np.asarray(field / length * (radius + factor * (length - radius)), dtype=np.float32)
 

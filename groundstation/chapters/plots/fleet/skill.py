@@ -40,7 +40,7 @@ def growth(fleet: FleetResults) -> Plot:
 
 
 def flights(fleet: FleetResults) -> Plot:
-    """The shipped method on every flight, and how honest its band is."""
+    """Return the shipped method on every flight, and how honest its band is."""
     horizons = np.unique(fleet.skill_flights.horizon_min)
     horizon = HEADLINE_MIN if HEADLINE_MIN in horizons else float(horizons[-1])
     return Plot(
