@@ -32,7 +32,7 @@ def reason_of(results: FlightResults, analysis: str) -> str:
 
 
 def not_assessed(results: FlightResults) -> tuple[tuple[str, str], ...]:
-    """Subject and reason of every analysis that could not be carried out."""
+    """Return the subject and reason of every analysis that could not be carried out."""
     return tuple(
         (SUBJECTS.get(one.analysis) or titled(words(one.analysis)), typeset(in_plain_words(one.reason)))
         for one in results.not_assessable

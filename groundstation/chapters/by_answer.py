@@ -67,7 +67,7 @@ def chapters_of(results: FlightResults) -> tuple[Section, ...]:
 
 
 def _built(chapters: Iterable[Chapter], results: FlightResults) -> tuple[Section | None, ...]:
-    """Chapters with something to say; one that fails is left out."""
+    """Return chapters with something to say; one that fails is left out."""
     return tuple(attempt("chapter", one.name, one.build, results) for one in chapters)
 
 

@@ -66,7 +66,7 @@ def control(results: FlightResults) -> Section | None:
 
 
 def title_of(law: str) -> str:
-    """Name of a law for people."""
+    """Return the name of a law for people."""
     return LAWS.get(law, law)
 
 

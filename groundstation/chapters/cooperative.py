@@ -115,7 +115,7 @@ def _is_safe(row: AlgorithmRow) -> bool:
 
 
 def title_of(algorithm: str) -> str:
-    """Name of an algorithm for people."""
+    """Return the name of an algorithm for people."""
     return TITLES.get(algorithm, words(algorithm))
 
 

@@ -59,7 +59,7 @@ def forecast(results: FlightResults) -> Section | None:
 
 
 def short(method: str) -> str:
-    """Name of a method for the head of a column.
+    """Return the name of a method for the head of a column.
 
     Examples
     --------

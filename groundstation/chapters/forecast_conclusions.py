@@ -17,7 +17,7 @@ def conclusions(answer: ForecastResult) -> list[Note]:
 
 
 def rows_of(answer: ForecastResult, method: str) -> dict[float, SkillRow]:
-    """Skill rows of a method by horizon, those that have an error."""
+    """Return skill rows of a method by horizon, those that have an error."""
     return {
         float(row.horizon_min): row
         for row in answer.skill
@@ -26,7 +26,7 @@ def rows_of(answer: ForecastResult, method: str) -> dict[float, SkillRow]:
 
 
 def title_of(method: str) -> str:
-    """Title of a method for people."""
+    """Return the title of a method for people."""
     return METHODS.get(method, method)
 
 
@@ -91,7 +91,7 @@ def _misfit(shares: Mapping[float, float], every: Sequence[float]) -> str:
 
 
 def _too_few(answer: ForecastResult) -> set[float]:
-    """Horizons at which the shipped method has too few independent starts for a judgement."""
+    """Return the horizons at which the shipped method has too few independent starts."""
     return {
         float(row.horizon_min)
         for row in answer.calibration
@@ -141,7 +141,7 @@ def _where(some: Sequence[float], every: Sequence[float]) -> str:
 
 
 def listed(values: Sequence[float]) -> str:
-    """Numbers in a row of words.
+    """Return numbers in a row of words.
 
     Examples
     --------

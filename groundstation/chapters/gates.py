@@ -95,7 +95,7 @@ def setting_facts(settings: Mapping[str, float | str | bool], table: str = "") -
 
 
 def _in_toml(settings: Mapping[str, float | str | bool]) -> dict[str, str]:
-    """Keys and values as typed; a range, kept as its two ends, is an array again."""
+    """Return keys and values as typed; a range, kept as its two ends, is an array again."""
     told = {name: _value(value) for name, value in settings.items()}
     for low in [name for name in told if name.endswith(".low") and f"{name[:-4]}.high" in told]:
         told[low[:-4]] = f"[{told.pop(low)}, {told.pop(f'{low[:-4]}.high')}]"

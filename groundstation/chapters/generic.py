@@ -70,7 +70,7 @@ def generic(results: FlightResults, answer: Answer) -> Section:
 
 
 def figures_over_time(results: FlightResults, analysis: str) -> tuple[str, ...]:
-    """Names of an analysis' figures that have rows and a column ``time_s``.
+    """Return names of an analysis' figures that have rows and a column ``time_s``.
 
     A figure belongs to the analysis whose name its own begins with, of several the longest: ``wind_samples`` to
     ``wind``.

@@ -87,7 +87,7 @@ def _conclusions(answer: InertialResult) -> list[Note]:
 
 
 def _rates(answer: InertialResult) -> tuple[str, str]:
-    """Radial error over time, median and 95 %."""
+    """Return the radial error over time, median and 95 %."""
     median, p95 = answer.radial_error_rate_50_nmiph, answer.radial_error_rate_95_nmiph
     return number(median, 2, "nmi/h"), number(p95, 2, "nmi/h")
 

@@ -13,7 +13,7 @@ HOUR_MIN = 60.0  # the horizon a forecast is judged by at a glance, or the longe
 
 
 def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -> Claim:
-    """Drift of an INS that GNSS does not correct.
+    """Return the drift of an INS that GNSS does not correct.
 
     ``quality`` says in a sentence whether the filter can be trusted; ``is_doubtful`` that its sigmas are too small.
     """
@@ -62,7 +62,7 @@ def is_start_unknown(answer: InertialResult) -> bool:
 
 
 def growth(answer: InertialResult) -> str:
-    """Position error at the ends of the log, and the time between them, in words."""
+    """Return the position error at the ends of the log, and the time between them, in words."""
     minutes = None if answer.compared_hours is None else 60.0 * answer.compared_hours
     first, last = (number(error, 0, "m") for error in (answer.radial_error_first_m, answer.radial_error_last_m))
     return f"{first} at first, {last} after {number(minutes, 0, 'min')}"

@@ -261,7 +261,7 @@ def _turns(answer: MagneticResult) -> Grid | None:
 
 
 def _swings(answer: MagneticResult) -> Grid | None:
-    """Repeated figures beside each other: equipment on and off, load, repeatability."""
+    """Return repeated figures beside each other: equipment on and off, load, repeatability."""
     if len(answer.swings) < 2:
         return None
     rows = [
@@ -310,7 +310,7 @@ def _basis(answer: MagneticResult) -> Facts:
 
 
 def _gyros(alignment: Alignment) -> tuple[tuple[str, str, str], ...]:
-    """Drift of the three gyros before flight, where it was logged."""
+    """Return the drift of the three gyros before flight, where it was logged."""
     values, sigmas = alignment.gyro_drift_deg_per_h, alignment.gyro_drift_sigma_deg_per_h
     if values is None or sigmas is None:
         return ()

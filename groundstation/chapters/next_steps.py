@@ -86,7 +86,7 @@ def _told(texts: dict[str, list[str]]) -> str:
 
 
 def _advice(results: FlightResults) -> Iterator[tuple[str, str, str]]:
-    """Line, advice and what it is for, the most pressing first."""
+    """Yield line, advice and what it is for, the most pressing first."""
     heading, inertial = results.answer(HeadingResult), results.answer(InertialResult)
     if heading is not None:
         for gate in heading.gates:

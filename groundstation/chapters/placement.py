@@ -66,7 +66,7 @@ def placement(results: FlightResults) -> Section | None:
 
 
 def design_title(design: str) -> str:
-    """Name of a design for people.
+    """Return the name of a design for people.
 
     Examples
     --------

@@ -267,7 +267,7 @@ def _relative(answer: ReferenceResult) -> Grid | None:
 
 
 def _figures(answer: ReferenceResult) -> list[tuple[str, str]]:
-    """Subjects and quantities that have a figure of their own, in the order of the errors."""
+    """Return subjects and quantities with a figure of their own, in the order of the errors."""
     found = dict.fromkeys((row.subject, row.quantity) for row in answer.errors)
     return [one for one in found if one[1] == "position" or one[0].partition(".")[0] in ("gnss", "ins", "heading")]
 

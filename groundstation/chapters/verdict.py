@@ -72,7 +72,7 @@ def reasons(heading: HeadingResult) -> tuple[str, ...]:
 
 
 def half_width(ends: tuple[float, float]) -> str:
-    """Half width of an interval in arcminutes, as ± figure."""
+    """Return the half width of an interval in arcminutes, as ± figure."""
     return f"± {number(0.5 * (ends[1] - ends[0]) * ARCMIN_PER_DEG, 0, '′')}"
 
 
@@ -118,7 +118,7 @@ def _typed(heading: HeadingResult) -> str:
 
 
 def sentence(text: str) -> str:
-    """Text with a capital and a full stop.
+    """Return text with a capital and a full stop.
 
     Examples
     --------

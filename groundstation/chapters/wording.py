@@ -14,7 +14,7 @@ HIDDEN = "\ufffd"  # stands for a control, or a mark that turns the direction of
 
 
 def clean(text: str) -> str:
-    """Text of a log in one line, without control and direction characters.
+    """Return text of a log in one line, without control and direction characters.
 
     Examples
     --------
@@ -97,7 +97,7 @@ def interval(bounds: Any, places: int, unit: str) -> str:
 
 
 def step_places(step: Any) -> int:
-    """Decimals needed to write multiples of an entry step.
+    """Return decimals needed to write multiples of an entry step.
 
     Examples
     --------
@@ -110,7 +110,7 @@ def step_places(step: Any) -> int:
 
 
 def clock(seconds: Any) -> str:
-    """Flight time as minutes and seconds, hours when there are any.
+    """Return flight time as minutes and seconds, hours when there are any.
 
     Examples
     --------
@@ -126,7 +126,7 @@ def clock(seconds: Any) -> str:
 
 
 def typeset(text: str) -> str:
-    """Text written for a terminal with the signs of a page: true minus, plus-minus, degree.
+    """Return text of a terminal with the signs of a page: true minus, plus-minus, degree.
 
     Examples
     --------
@@ -138,7 +138,7 @@ def typeset(text: str) -> str:
 
 
 def sentence(text: str) -> str:
-    """Text written for a terminal as a sentence of a page.
+    """Return text written for a terminal as a sentence of a page.
 
     Examples
     --------

@@ -17,7 +17,7 @@ __all__ = ["as_json", "catalogue", "description", "outcomes", "worst_code"]
 
 
 def description(what: Description, *, everything: bool = False) -> str:
-    """Text of ``info``; with ``everything`` each word of the buses has a line, else each bus."""
+    """Return the text of ``info``: a line for each bus, with ``everything`` for each word."""
     head = [[f"{key}:", printable(value)] for key, value in what.facts.items()]
     parts = [columns(head)]
     if what.topics:
@@ -113,7 +113,7 @@ def tell_errors(outcome: Outcome, *, with_traces: bool = False) -> None:
 
 
 def removed(pdfs: Sequence[Path]) -> str:
-    """Line on PDFs of an earlier run that a report without PDFs removed.
+    """Return the line on PDFs of an earlier run that a report without PDFs removed.
 
     Examples
     --------
@@ -125,14 +125,14 @@ def removed(pdfs: Sequence[Path]) -> str:
 
 
 def _names(done: Sequence[Outcome]) -> list[str]:
-    """Logs by the names of their files; by their paths where two files have one name."""
+    """Return logs by the names of their files; by their paths where two files have one name."""
     files = [outcome.source if outcome.is_session else log_name(Path(outcome.source)) for outcome in done]
     paths = {file: {one.source for name, one in zip(files, done, strict=True) if name == file} for file in set(files)}
     return [file if len(paths[file]) == 1 else outcome.source for file, outcome in zip(files, done, strict=True)]
 
 
 def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:
-    """Logs that were skipped: one line for each reason, with at most so many names.
+    """Return logs that were skipped: one line for each reason, with at most so many names.
 
     Examples
     --------
@@ -156,7 +156,7 @@ def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:
 
 
 def totals(done: Sequence[Outcome]) -> str:
-    """Totals line: how many logs, and sessions of several, ended in which state.
+    """Return the totals line: how many logs, and sessions of several, ended in which state.
 
     Examples
     --------
@@ -238,7 +238,7 @@ KINDS = {
 
 
 def catalogue(entries: Sequence[Mapping[str, Any]], is_about_a_log: bool) -> str:
-    """Text of ``list``."""
+    """Return text of ``list``."""
     lines: list[str] = []
     kind = ""
     for entry in entries:

@@ -20,7 +20,7 @@ def say(text: str) -> None:
 
 
 def printable_lines(text: str) -> str:
-    """Text of several lines, each as :func:`groundstation.base.printable.printable` has it.
+    """Return text of several lines, each made printable.
 
     Examples
     --------

@@ -286,7 +286,7 @@ def _file_or_content(settings: Settings | None) -> Path | Mapping[str, Any] | No
 
 
 def _laid_over(document: Mapping[str, Any], sections: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings with some sections changed: mappings key by key, lists as a whole."""
+    """Return settings with some sections changed: mappings key by key, lists as a whole."""
     out = {name: value for name, value in document.items() if name not in ("profile", "icds")}
     for name, value in sections.items():
         known = out.get(name, {})

@@ -32,7 +32,7 @@ def comparison_html(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> s
 
 
 def _figures(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> Section | None:
-    """Figures of both flights over each other, without those that fail."""
+    """Return figures of both flights over each other, without those that fail."""
     sides = (
         Side("A", a, _default_method(a)),
         Side("B", b, _default_method(b), comparison.alignment.offset_s),

@@ -52,7 +52,7 @@ class IndexRow:
 
 
 def columns_of(answers: Sequence[str]) -> tuple[str, ...]:
-    """Names of the columns in order, those of the answers in their place."""
+    """Return names of the columns in order, those of the answers in their place."""
     names = [one.name for one in fields(IndexRow)]
     place = names.index("answers")
     return (*names[:place], *answers, *names[place + 1 :])

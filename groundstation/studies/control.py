@@ -45,7 +45,7 @@ def study_control(runs: int = 100, seed: int = 0, progress: Progress | None = No
 
 
 def published_table(tell: Progress) -> FigureData:
-    """Ours beside the published figures."""
+    """Tabulate our figures beside the published ones."""
     answers: dict[str, ControlPlan] = {}
     for name in dict.fromkeys(case.plan for case in CASES):
         tell(f"plan {name}")

@@ -43,14 +43,14 @@ def scenario(name: str) -> SessionPlan:
 
 
 def measures(answer: ControlPlan) -> ControlMeasures:
-    """Accuracy and geometry with time."""
+    """Return accuracy and geometry with time."""
     found = found_in(answer.figures, ControlMeasures)
     assert found is not None
     return found
 
 
 def least_sigma_m(answer: ControlPlan, axis: str) -> float:
-    """Least sigma along the way under the recommended law."""
+    """Return the least sigma along the way under the recommended law."""
     data = measures(answer)
     two_sigma_m = {
         "north": data.two_sigma_north_m,

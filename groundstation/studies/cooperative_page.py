@@ -48,7 +48,7 @@ def is_near(case: Case, value: float) -> bool | None:
 
 
 def study_table(cases: Sequence[Case], outcomes: dict[str, tuple[Outcome, ...]]) -> FigureData:
-    """Ours beside the published figures, with both verdicts."""
+    """Tabulate our figures beside the published ones, with both verdicts."""
     rows = []
     for case in cases:
         several = outcomes[case.name]

@@ -141,7 +141,7 @@ def own_case(name: str, route: RouteKind, seed: int) -> Case:
 
 
 def differences_of(batch: ErrorBatch, row: int, epochs: Epochs) -> Differences:
-    """Epochs of one simulated flight with the motion of its INS."""
+    """Return epochs of one simulated flight with the motion of its INS."""
     velocity = np.stack([batch.velocity_north_mps[row], batch.velocity_east_mps[row]], axis=1)
     place = (batch.latitude_deg[row], batch.longitude_deg[row], batch.altitude_m[row])
     return Differences("ins", "gnss", epochs, *place, velocity, 0.0, (), batch.heading_deg[row])

@@ -62,7 +62,7 @@ class SetForecasts:
     variance_m2: FloatArray
 
     def mixed(self, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance of the mixture with weights (k, s), shapes (s, l, 2)."""
+        """Return the mean and variance of the mixture with weights (k, s), shapes (s, l, 2)."""
         share = weight[:, :, None, None]
         mean = np.sum(share * self.mean_m, axis=0)
         return mean, np.sum(share * (self.variance_m2 + np.square(self.mean_m - mean)), axis=0)
@@ -156,7 +156,7 @@ def _densities(run: CoupledRun) -> FloatArray:
 
 
 def _grown(run: CoupledRun, values: FloatArray, P: FloatArray) -> FloatArray:
-    """Variance of the position at the leads, shape (l, 2)."""
+    """Return the variance of the position at the leads, shape (l, 2)."""
     nothing = np.zeros(0, np.int64)
     unseen = kalman.Measurements(nothing, np.zeros((0, 0)), nothing, lines_of(run.epochs, run.noise))
     carried = kalman.run_filter(

@@ -63,7 +63,7 @@ class OutageOutcome:
 
 
 def outages_of(time_s: FloatArray, seed: int, run: int) -> list[tuple[float, float]]:
-    """Begin and end of the outages of a flight, seconds."""
+    """Return begin and end of the outages of a flight, seconds."""
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(run, crc32(b"outages"))))
     begin = float(time_s[0]) + FIRST_S
     found: list[tuple[float, float]] = []
@@ -125,7 +125,7 @@ def _through(
     whole: Epochs,
     settings: InertialSettings,
 ) -> FloatArray:
-    """Share of the channels inside the 95 % band of the forecast at the end of each outage."""
+    """Return the share of channels in the forecast's 95 % band at the end of each outage."""
     found = []
     for begin, end in gaps:
         at = np.array([int(np.searchsorted(whole.time_s, begin + 1e-6)) - 1])

@@ -206,7 +206,7 @@ def _classic(cases: Sequence[Case], rms: FigureData) -> Grid:
 
 
 def _cell(table: FigureData, value: str, digits: int, **chosen: str) -> list[str]:
-    """Value and limits at each horizon, empty where there is none."""
+    """Return the value and limits at each horizon, empty where there is none."""
     rows, cells = _rows(table, **chosen), []
     for horizon in STUDY_HORIZONS_MIN:
         at = np.flatnonzero(rows & (table["horizon_min"] == horizon))

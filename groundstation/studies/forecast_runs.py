@@ -202,12 +202,12 @@ def mean_squares(replay: Hindcast) -> FloatArray:
 
 
 def leads_at(replay: Hindcast) -> list[int]:
-    """Index of each horizon of the study among the leads."""
+    """Return the index of each horizon of the study among the leads."""
     return [int(np.argmin(np.abs(replay.lead_s - 60.0 * horizon))) for horizon in STUDY_HORIZONS_MIN]
 
 
 def _honesty(run: FilterRun, replay: Hindcast, since: slice, settings: InertialSettings) -> Honesty:
-    """Errors over sigmas against what GNSS shows: its error at both ends belongs to the claim."""
+    """Return errors over sigmas; GNSS is the reference, its error at both ends is claimed."""
     leads = leads_at(replay)
     parts: list[list[FloatArray]] = []
     for method in JUDGED_NAMES:
@@ -234,13 +234,13 @@ def _honesty(run: FilterRun, replay: Hindcast, since: slice, settings: InertialS
 
 
 def _share_inside(ratio: FloatArray, level: int) -> FloatArray:
-    """Share of the squared ratios (s, h, c) inside a band, per horizon."""
+    """Return the share of the squared ratios (s, h, c) inside a band, per horizon."""
     inside = np.where(np.isfinite(ratio), ratio <= QUANTILES[level] ** 2, np.nan)
     return mean_known(inside.mean(axis=2))
 
 
 def mean_known(values: FloatArray) -> FloatArray:
-    """Mean over the first axis of what is known, NaN where nothing is."""
+    """Return the mean over the first axis of what is known, NaN where nothing is."""
     known = np.isfinite(values)
     count = known.sum(axis=0)
     return np.asarray(np.where(count > 0, np.where(known, values, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan))

@@ -66,16 +66,16 @@ class Resampled:
         return cls(np.tensordot(weights, each, axes=1), count)
 
     def rms_m(self, method: str, starts: int = _ALL) -> FloatArray:
-        """RMS over flights and starts, shape (1 + draws, h)."""
+        """Return the RMS over flights and starts, shape (1 + draws, h)."""
         return np.asarray(np.sqrt(self.mean_square_m2[:, METHOD_NAMES.index(method), starts]))
 
     def ratio(self, method: str, reference: str = REFERENCE, starts: int = _ALL) -> FloatArray:
-        """RMS of a method over that of another, shape (1 + draws, h)."""
+        """Return the RMS of a method over that of another, shape (1 + draws, h)."""
         return np.asarray(self.rms_m(method, starts) / self.rms_m(reference, starts))
 
 
 def interval(values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Value, low and high 95 % limit of resampled values (1 + draws, ...)."""
+    """Return value, low and high 95 % limit of resampled values (1 + draws, ...)."""
     low, high = np.quantile(values[1:], [TAIL, 1.0 - TAIL], axis=0)
     return values[0], low, high
 
@@ -156,7 +156,7 @@ def cure_table(windows: Resampled, cure: Resampled) -> FigureData:
 
 
 def held_out_table(cases: Sequence[Case], samples: dict[str, Resampled]) -> FigureData:
-    """Score of every method on the held-out flights, best first.
+    """Tabulate the score of every method on the held-out flights, best first.
 
     ``score`` is the geometric mean, over cases and horizons (all starts), of RMS over that of the last estimate;
     ``against_best`` the same over the best method, with 95 % limits over flights.
@@ -178,7 +178,7 @@ def held_out_table(cases: Sequence[Case], samples: dict[str, Resampled]) -> Figu
 
 
 def honesty_table(outcomes: dict[str, tuple[Outcome, ...]], flights_at_least: int = 2) -> FigureData:
-    """Coverage of the 50, 68 and 95 % bands and NEES, per case, method and horizon.
+    """Tabulate coverage of the 50, 68 and 95 % bands, and NEES, by case, method and horizon.
 
     ``nees`` is the mean over all starts (1 is honest); ``first`` the mean over the first start of each flight, whose
     99 % limits come from chi-square with two degrees of freedom a flight. Columns ``_model`` are before the sigma is
@@ -229,7 +229,7 @@ def honesty_table(outcomes: dict[str, tuple[Outcome, ...]], flights_at_least: in
 
 
 def _flights_within(known: Sequence[Honesty]) -> FloatArray:
-    """Share of the flights whose NEES lies within its 95 % limits, shape (methods, h)."""
+    """Return the share of flights with NEES in its 95 % limits, shape (methods, h)."""
     inside = []
     for honesty in known:
         freedom = 2.0 * honesty.independent

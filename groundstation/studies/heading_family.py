@@ -240,7 +240,7 @@ def _cells(outcomes: Sequence[RunOutcome]) -> Iterable[Cell]:
 
 
 def coverage_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
-    """Coverage of our interval and of the paper's, and errors, for each cell of the family.
+    """Tabulate coverage of both intervals, and errors, for each cell of the family.
 
     ``coverage_sigma`` is the sampling error of the coverage at 0.95.
     """
@@ -299,7 +299,7 @@ def segments_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
 
 
 def gates_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
-    """Share of runs that pass each required gate, and each verdict's share."""
+    """Tabulate the share of runs that pass each required gate, and each verdict's share."""
     names = list(outcomes[0].gates)
     shares = [float(np.mean([outcome.gates.get(gate) == "passed" for outcome in outcomes])) for gate in names]
     for verdict in ("accept", "advisory", "extend", "reject", "undecided"):

@@ -19,7 +19,7 @@ SWAY_DEG, SWAY_HZ = 0.5, 0.4
 
 
 def coverage_of_e(differences_deg: FloatArray) -> float:
-    """Share of runs, shape (runs, n), true error 0, whose mean +- e holds 0."""
+    """Return the share of runs, shape (runs, n), true error 0, whose mean +- e holds 0."""
     count = differences_deg.shape[1]
     e = NORMAL_95 * np.std(differences_deg, axis=1) / np.sqrt(count - 1)
     return float(np.mean(np.abs(np.mean(differences_deg, axis=1)) <= e))

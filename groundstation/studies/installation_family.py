@@ -150,12 +150,12 @@ def _aircraft(number: int, seed: int, place: int, pool: Sequence[TaxiOfPool]) ->
 
 
 def taxi_sigma(taxi: TaxiOfPool) -> float:
-    """Sigma of a normal distribution with the half width of this taxi alone."""
+    """Return the sigma of a normal distribution with the half width of this taxi alone."""
     return taxi.half_width_deg / NORMAL_95
 
 
 def _verdict(taxi: TaxiOfPool, half_width_deg: float) -> str:
-    """Verdict by this taxi alone."""
+    """Return the verdict by this taxi alone."""
     if set(taxi.failed) - CURED_BY_MORE_DATA:
         return "reject"
     if taxi.failed:
@@ -164,7 +164,7 @@ def _verdict(taxi: TaxiOfPool, half_width_deg: float) -> str:
 
 
 def _alone_half_width(taxi: TaxiOfPool, stated: tuple[float, float], told_mps: float, has_metar: bool) -> float:
-    """Half width of the whole interval by this taxi alone."""
+    """Return the half width of the whole interval by this taxi alone."""
     usual = float(np.hypot(*stated)) * (METAR_MPS if has_metar else ORDINARY_WIND_MPS)
     wind = np.hypot(stated[1] * told_mps if has_metar else 0.0, usual)
     return NORMAL_95 * float(np.sqrt(taxi_sigma(taxi) ** 2 + wind**2 + STEADY_DEG**2))
@@ -185,5 +185,5 @@ def _units(change: str, rng: np.random.Generator) -> NDArray[np.int64]:
 
 
 def _from_right(wind_mps: NDArray[np.float64], track_rad: float) -> float:
-    """Wind across a path from the right, m/s, of a velocity of the air north and east."""
+    """Return the wind across a path from the right, m/s, from its north and east components."""
     return float(wind_mps[0] * np.sin(track_rad) - wind_mps[1] * np.cos(track_rad))

@@ -28,7 +28,7 @@ SPAN_STEP_M = 5.0
 
 
 def bearing_table(runs: int, seed: int) -> FigureData:
-    """95 % of the errors of side, distance and height above the glide path at each distance.
+    """Tabulate 95 % errors of side, distance and height above the glide path by distance.
 
     ``formula``: the source's, on the course, by propagation; ``drawn``: the same formulas fed with drawn bearings;
     ``joint``: all three bearings at once, drawn, as the analysis of a log solves them.

@@ -29,7 +29,7 @@ def figure_of(answer: RangeLanding, figure: Figure) -> float:
 
 
 def sigma_table(answers: Mapping[str, RangeLanding]) -> FigureData:
-    """Published sigmas with ours."""
+    """Tabulate published sigmas with ours."""
     rows = []
     for one in SIGMAS:
         ours = figure_of(answers[one.approach], one.figure)
@@ -53,7 +53,10 @@ def holds(claim: PublishedCategory, error_m: float) -> bool:
 
 
 def category_table(answers: Mapping[str, RangeLanding]) -> FigureData:
-    """Published claims of categories with our 95 % figures at the threshold and at touchdown."""
+    """Tabulate published claims of categories with our 95 % figures.
+
+    Our figures are those at the threshold and at touchdown.
+    """
     rows = []
     for claim in CLAIMS:
         answer = answers[claim.approach]
@@ -65,7 +68,7 @@ def category_table(answers: Mapping[str, RangeLanding]) -> FigureData:
 
 
 def order_table(answers: Mapping[str, RangeLanding]) -> FigureData:
-    """Variants of the source, the worst height at touchdown first."""
+    """Tabulate variants of the source, the worst height at touchdown first."""
     ordered = sorted(answers.items(), key=lambda pair: -pair[1].at(TOUCHDOWN).sigma_up_m)
     rows = []
     for name, answer in ordered:
@@ -99,7 +102,7 @@ def variation_table(answers: Mapping[str, RangeLanding]) -> FigureData:
 
 
 def trial_table(answers: Mapping[str, RangeLanding]) -> FigureData:
-    """NEES and over-confidence of simulated approaches."""
+    """Tabulate NEES and over-confidence of simulated approaches."""
     rows = [
         (
             *(name, "white" if row.filter == WHITE else "as it is", row.before_threshold_m),

@@ -96,7 +96,7 @@ def power_law_above_floor(bank_deg: FloatArray, rms_deg: FloatArray) -> tuple[Fl
 
 
 def bank_at(limit_deg: float, exponent: FloatArray, size: FloatArray) -> FloatArray:
-    """Bank at which a power law passes a limit, degrees.
+    """Return the bank at which a power law passes a limit, degrees.
 
     Examples
     --------

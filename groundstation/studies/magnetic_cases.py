@@ -212,7 +212,7 @@ WIDE: dict[str, WideCell] = {
 
 
 def seed_of(seed: int, run: int) -> int:
-    """Seed of one flight of a study.
+    """Return the seed of one flight of a study.
 
     Examples
     --------

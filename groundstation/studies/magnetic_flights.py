@@ -120,7 +120,7 @@ def _aligned(flight: Flight) -> HeadingResult | None:
 
 
 def _flight(scenario: Scenario, readings: list[Readings]) -> Flight:
-    """Readings as the tables of a flight."""
+    """Return readings as the tables of a flight."""
     zero_ns = scenario.start_utc_ns or 0
     tables = {
         part.topic: Table(

@@ -51,18 +51,18 @@ class Sample:
         return np.array([value(outcome) for outcome in self.outcomes], dtype=np.float64)
 
     def rms(self, values: FloatArray) -> FloatArray:
-        """RMS over the runs that have a figure, shape (1 + draws,)."""
+        """Return the RMS over the runs that have a figure, shape (1 + draws,)."""
         return np.sqrt(self.mean(np.square(values)))
 
     def mean(self, values: FloatArray) -> FloatArray:
-        """Mean over the runs that have a figure, shape (1 + draws,)."""
+        """Return the mean over the runs that have a figure, shape (1 + draws,)."""
         known = np.isfinite(values)
         count = self.weights @ known
         total = self.weights @ np.where(known, values, 0.0)
         return np.where(count > 0.0, total / np.where(count > 0.0, count, 1.0), np.nan)
 
     def of_method(self, method: str, *, whole: bool) -> FloatArray:
-        """RMS error of a method on every run: whole or without A."""
+        """Return the RMS error of a method on every run: whole or without A."""
         place = METHODS.index(method)
         return self.each(lambda outcome: float((outcome.rms_deg if whole else outcome.shape_deg)[place]))
 
@@ -72,13 +72,13 @@ class Sample:
 
 
 def resampling(runs: int, seed: int) -> FloatArray:
-    """Weights of the runs: all once, then drawn with replacement; shape (1 + draws, runs)."""
+    """Return weights of the runs: all once, then bootstrap draws; shape (1 + draws, runs)."""
     drawn = np.random.default_rng(seed).multinomial(runs, np.full(runs, 1.0 / runs), DRAWS)
     return np.concatenate([np.ones((1, runs)), drawn])
 
 
 def interval(values: FloatArray) -> tuple[float, float, float]:
-    """Value, low and high 95 % limit of resampled values (1 + draws,)."""
+    """Return value, low and high 95 % limit of resampled values (1 + draws,)."""
     known = values[1:][np.isfinite(values[1:])]
     if not known.size or not np.isfinite(values[0]):
         return float("nan"), float("nan"), float("nan")
@@ -351,7 +351,7 @@ def plain_reason(text: str) -> str:
 
 
 def rows_where(table: FigureData, **chosen: object) -> BoolArray:
-    """Rows of a table with given values."""
+    """Return rows of a table with given values."""
     return np.asarray(np.logical_and.reduce([table[name] == value for name, value in chosen.items()]), dtype=np.bool_)
 
 

@@ -239,7 +239,7 @@ def _without_switch(flight: Flight, _rng: np.random.Generator) -> Flight:
 
 
 def _taxi_s(flight: Flight) -> tuple[float, float]:
-    """Begin and end of the motion on the ground before the take-off run."""
+    """Return begin and end of the motion on the ground before the take-off run, s."""
     truth, time_s = flight["truth"], flight.time_s("truth")
     speed = np.hypot(truth.values("velocity_north_mps"), truth.values("velocity_east_mps"))
     moving = (speed > 2.0) & (time_s < time_s[np.argmax(speed > 25.0)] - 15.0)

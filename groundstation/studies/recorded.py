@@ -168,7 +168,7 @@ def score(runs: Sequence[AlgorithmRun], sessions: Sequence[Session], truth: Trut
 
 
 def _mean(parts: Sequence[FloatArray]) -> float:
-    """Mean of all that is a number; NaN without any."""
+    """Return the mean of all that is a number; NaN without any."""
     whole = np.concatenate(parts) if parts else np.zeros(0)
     known = whole[np.isfinite(whole)]
     return float(known.mean()) if len(known) else float("nan")

@@ -19,7 +19,7 @@ class LoadedPlan(Generic[ScenarioT]):
 
 
 def plan_names(plan: Plan[ScenarioT]) -> tuple[str, ...]:
-    """Names of the shipped scenarios of a kind of plan."""
+    """Return names of the shipped scenarios of a kind of plan."""
     return _shipped(plan).names()
 
 

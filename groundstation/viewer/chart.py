@@ -50,7 +50,7 @@ class Axis:
     texts: tuple[tuple[float, str], ...] = ()
 
     def share(self, values: FloatArray) -> FloatArray:
-        """Place of values along the axis, 0 to 1; NaN outside of it."""
+        """Return the place of values along the axis, 0 to 1; NaN outside of it."""
         with np.errstate(invalid="ignore"):
             scaled = Span(self.scale, self.low, self.high, self.linear_to).shares(values)
             return np.where((scaled >= -1e-9) & (scaled <= 1.0 + 1e-9), scaled, np.nan)
@@ -60,7 +60,7 @@ class Axis:
         return np.clip(values, min(self.low, self.high), max(self.low, self.high))
 
     def ticks(self) -> tuple[tuple[float, str], ...]:
-        """Round values inside the range, each with its text.
+        """Return round values inside the range, each with its text.
 
         Examples
         --------
@@ -104,7 +104,7 @@ def screen_radius(points: float) -> float:
 
 
 def round_step(step: float) -> float:
-    """Nearest of 1, 2 and 5 times a power of ten.
+    """Return the nearest of 1, 2 and 5 times a power of ten.
 
     Examples
     --------
@@ -140,7 +140,7 @@ class Chart:
         return rrb.Spatial2DView(name=name, origin=f"/{self.path}", visual_bounds=bounds)
 
     def points(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Places in the picture, shape (n, 2); its axes run right and down."""
+        """Return places in the picture, shape (n, 2); its axes run right and down."""
         return np.column_stack([WIDTH * self.x.share(x), self.height * (1.0 - self.y.share(y))])
 
     def legend(self, lines: Sequence[Line], *, is_beside: bool = False) -> None:
@@ -325,7 +325,7 @@ class Chart:
 
 
 def unbroken(points: FloatArray) -> list[FloatArray]:
-    """Pieces of a line between its NaN, of two points or more.
+    """Return pieces of a line between its NaN, of two points or more.
 
     Examples
     --------

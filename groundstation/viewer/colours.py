@@ -155,7 +155,7 @@ def for_states(states: Iterable[str], known: Mapping[str, Colour]) -> dict[str, 
 
 
 def for_series(count: int) -> tuple[Colour, ...]:
-    """Colours of ``count`` series without a meaning of their own, repeating after eight.
+    """Return colours of ``count`` series without a meaning; they repeat after eight.
 
     Examples
     --------

@@ -9,7 +9,7 @@ MOST_ROWS = 100  # of a table: the viewer lays out the whole text again and agai
 
 
 def comparison_text(comparison: Comparison) -> str:
-    """Markdown of the panel."""
+    """Return Markdown of the panel."""
     sections = (answers(comparison), settings(comparison), findings(comparison))
     told = (markdown(shortened(one, MOST_ROWS, "compare.html"), level=2) for one in sections if one is not None)
     return "\n\n".join([*map(part_markdown, opening(comparison)), *told])

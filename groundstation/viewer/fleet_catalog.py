@@ -174,7 +174,7 @@ def _lay_out_table(dataset: DatasetEntry, layout: Path) -> None:
 
 
 def _views(path: Path) -> int:
-    """Number of views in the layout of a recording; none in a damaged one."""
+    """Return the number of views in the layout of a recording; none in a damaged one."""
     try:
         reader = RrdReader(path)
         entities = {chunk.entity_path for store in reader.blueprints() for chunk in reader.stream(store=store)}

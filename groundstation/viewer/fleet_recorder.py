@@ -37,7 +37,7 @@ class FleetRecorder(Recorder):
         super().__init__(stream, 0, self.timed > 0)
 
     def numbers(self, flight_ids: NDArray[np.str_]) -> Int64Array:
-        """Numbers of flights."""
+        """Return numbers of flights."""
         return np.array([self._number[name] for name in flight_ids.tolist()], dtype=np.int64)
 
     def set_flight(self, number: int) -> None:
@@ -48,7 +48,7 @@ class FleetRecorder(Recorder):
             self.stream.set_time(UTC, timestamp=self.starts[number - 1])
 
     def indexes(self, time_ns: Int64Array) -> list[rr.TimeColumn]:
-        """Time columns of flights that all have a time, or all have none."""
+        """Return time columns of flights that all have a time, or all have none."""
         columns = [rr.TimeColumn(FLIGHT_NUMBER, sequence=time_ns)]
         if len(time_ns) and time_ns[0] <= self.timed:
             columns.append(rr.TimeColumn(UTC, timestamp=self.starts[time_ns - 1]))
@@ -91,6 +91,6 @@ class FleetRecorder(Recorder):
         return columns
 
     def _parts(self, time_ns: Int64Array) -> list[Int64Array]:
-        """Rows of flights with a time, and of those without."""
+        """Return rows of flights with a time, and of those without."""
         has_time = time_ns <= self.timed
         return [rows for rows in (np.flatnonzero(has_time), np.flatnonzero(~has_time)) if len(rows)]

@@ -65,7 +65,7 @@ def forecast_text(fleet: FleetResults) -> str:
 
 
 def failed_text(fleet: FleetResults) -> str:
-    """Table of the logs that gave no flight, and why."""
+    """Return the table of the logs that gave no flight, and why."""
     return _text(rest.not_in_fleet(fleet), {}, "index.csv")
 
 

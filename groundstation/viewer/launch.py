@@ -65,7 +65,7 @@ def viewer_environment(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def _web_port(host: str) -> int:
-    """Rerun's usual port for the page, or any free one when another viewer has it."""
+    """Return Rerun's usual port for the page, or any free one when another viewer has it."""
     try:
         with socket.socket() as listener:
             listener.bind((host, WEB_PORT))

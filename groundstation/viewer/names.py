@@ -66,7 +66,7 @@ def path_parts(names: Iterable[str]) -> list[str]:
 
 
 def split_unit(field: str) -> tuple[str, str]:
-    """Name of a field without its unit, and the unit as people write it.
+    """Return the name of a field without its unit, and the unit as people write it.
 
     Examples
     --------
@@ -78,7 +78,7 @@ def split_unit(field: str) -> tuple[str, str]:
 
 
 def words(name: str) -> str:
-    """Words of a name in readable spelling.
+    """Return words of a name in readable spelling.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def words(name: str) -> str:
 
 
 def label(field: str) -> str:
-    """Series name of a field, unit last: ``true heading, deg``.
+    """Return the series name of a field, unit last: ``true heading, deg``.
 
     Examples
     --------
@@ -128,7 +128,7 @@ def natural_order(name: str) -> tuple[tuple[str, int], ...]:
 
 
 def topic_label(topic: str) -> str:
-    """Name of a topic for tab and view titles.
+    """Return the name of a topic for tab and view titles.
 
     Examples
     --------

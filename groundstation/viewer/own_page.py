@@ -31,7 +31,7 @@ _RANGE = re.compile(r"bytes=(\d+)-(\d*)$")
 
 
 def page_files(executable: Path, environment: Mapping[str, str]) -> dict[str, tuple[str, bytes]]:
-    """Files of Rerun's web viewer: for each path its media type and content (43 MB in all).
+    """Return files of Rerun's web viewer: media type and content by path (43 MB in all).
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ def send_properties(stream: rr.RecordingStream, results: FlightResults) -> None:
 
 
 def properties_of(results: FlightResults) -> dict[str, dict[str, Value]]:
-    """Properties by name: the flight, then every answer.
+    """Return properties by name: the flight, then every answer.
 
     An answer gives its numbers, flags and words; of an interval (``confidence95_deg``) both ends (``..._low_deg``,
     ``..._high_deg``), of what it holds in turn the same one level down. What is not known is left out.

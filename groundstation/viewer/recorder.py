@@ -47,12 +47,12 @@ class Recorder:
         self.stream, self.start_ns, self.has_utc = stream, start_ns, has_utc
 
     def time_ns(self, flight_seconds: ArrayLike) -> Int64Array:
-        """Corrected time of flight seconds, to the nanosecond."""
+        """Return the corrected time of flight seconds, to the nanosecond."""
         offsets = np.rint(np.asarray(flight_seconds, dtype=np.float64) * NS_PER_S).astype(np.int64)
         return offsets + np.int64(self.start_ns)
 
     def indexes(self, time_ns: Int64Array) -> list[rr.TimeColumn]:
-        """Time columns of the rows on every timeline the flight has."""
+        """Return time columns of the rows on every timeline the flight has."""
         columns = [rr.TimeColumn(FLIGHT_TIME, duration=(time_ns - self.start_ns).astype("timedelta64[ns]"))]
         if self.has_utc:
             columns.append(rr.TimeColumn(UTC, timestamp=time_ns.astype("datetime64[ns]")))
@@ -150,7 +150,7 @@ class Recorder:
             self.stream.send_columns(path, self.indexes(time_ns[part]), scalars.partition([width] * rows))
 
     def _parts(self, time_ns: Int64Array) -> Iterable[slice | Int64Array]:
-        """Rows in parts that one call sends."""
+        """Return rows in parts that one call sends."""
         return (slice(start, start + ROWS_PER_CALL) for start in range(0, len(time_ns), ROWS_PER_CALL))
 
     def lane(self, path: str, time_ns: Int64Array, states: Sequence[str], colours: Mapping[str, Colour]) -> None:

@@ -123,7 +123,7 @@ def thin(values: FloatArray, breaks: BoolArray, limit: int) -> Int64Array:
 
 
 def rows_that_fit(rows: list[int], widths: list[int], scalars: int) -> int:
-    """Largest row limit for which all groups together hold at most ``scalars`` numbers.
+    """Return the largest row limit for which all groups hold at most ``scalars`` numbers.
 
     Short groups stay whole and leave their share to the long ones.
 
@@ -142,7 +142,7 @@ def rows_that_fit(rows: list[int], widths: list[int], scalars: int) -> int:
 
 
 def runs(states: NDArray[np.str_]) -> Int64Array:
-    """Positions at which a state differs from the one before, the first row among them.
+    """Return positions at which a state differs from the one before, the first row among them.
 
     Examples
     --------

@@ -40,7 +40,7 @@ def plot(
 
 
 def lanes(name: str, contents: str | Sequence[str]) -> rrb.StateTimelineView:
-    """State lanes of the entities named."""
+    """Return the state lanes of the entities named."""
     entities = [contents] if isinstance(contents, str) else list(contents)
     return rrb.StateTimelineView(
         name=name, origin="/", contents=[f"+ /{entity}/**" for entity in entities], time_view=whole_flight()
@@ -65,5 +65,5 @@ def told_by_colour(lines: Sequence[Line], unit: str) -> str:
 
 
 def document(name: str, path: str) -> rrb.TextDocumentView:
-    """Text panel."""
+    """Return a text panel."""
     return rrb.TextDocumentView(name=name, origin=f"/{path}")

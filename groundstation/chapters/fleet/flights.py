@@ -83,7 +83,7 @@ def caption_of(fleet: FleetResults) -> str:
 
 
 def _shown(fleet: FleetResults, noted: Mapping[str, Sequence[Mark]]) -> NDArray[np.intp]:
-    """Rows of the flights in the table."""
+    """Return rows of the flights in the table."""
     every = np.arange(len(fleet))
     if len(fleet) <= MOST_LINES:
         return every

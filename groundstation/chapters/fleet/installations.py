@@ -47,7 +47,7 @@ def build(fleet: FleetResults) -> Section | None:
 
 
 def rows_of(fleet: FleetResults, place: int) -> NDArray[np.intp]:
-    """Rows of the flights of an installation, in order of time."""
+    """Return rows of the flights of an installation, in order of time."""
     return np.flatnonzero(fleet.installation_flights.place == place)
 
 
@@ -88,7 +88,7 @@ def _between(value: float | None, sigma: float | None) -> str:
 
 
 def _others(rows: Sequence[InstallationRow]) -> Grid | None:
-    """Compass, antenna and latency of each installation; None where no flight observed any."""
+    """Return compass, antenna and latency of each installation; None without observations."""
     heads = (
         *(Head("Aircraft"), Head("Serial"), Head("Figure"), Head("Flights", True), Head("Value ± 95 %", True)),
         Head("Changes and odd flights"),

@@ -55,12 +55,12 @@ def _changes(fleet: FleetResults) -> Part:
 
 
 def flights_of(fleet: FleetResults, quantity: str, name: str) -> NDArray[np.intp]:
-    """Rows of the trend of a quantity of an aircraft."""
+    """Return rows of the trend of a quantity of an aircraft."""
     return np.flatnonzero((fleet.trend.quantity == quantity) & (fleet.trend.aircraft == name))
 
 
 def charted(fleet: FleetResults, quantity: str) -> list[str]:
-    """Aircraft with a trend of a quantity."""
+    """Return aircraft with a trend of a quantity."""
     return sorted(set(fleet.trend.aircraft[fleet.trend.quantity == quantity].tolist()))
 
 

@@ -196,7 +196,7 @@ def overlay(sides: Sequence[Side], told: Overlay[Any]) -> Plot | None:
 
 
 def growth(sides: Sequence[Side]) -> Plot | None:
-    """RMS of the forecast by horizon, the shipped method and the INS without one."""
+    """Return the RMS of the forecast by horizon, the shipped method and the INS without one."""
     marks = []
     for side in sides:
         data = side.flight.rows_of(ForecastGrowth)

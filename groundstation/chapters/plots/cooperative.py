@@ -50,7 +50,7 @@ def _places(data: CooperativeTracks | SessionPoints) -> Floats:
 
 
 def session_map(results: FlightResults) -> Plot | None:
-    """Tracks from above with their 2 sigma ellipses, and the ground points."""
+    """Return tracks from above with their 2 sigma ellipses, and the ground points."""
     found = _tracks(results)
     if found is None:
         return None
@@ -192,7 +192,7 @@ def _styles(answer: CooperativeResult) -> dict[str, tuple[Role, str]]:
 
 
 def geometry(results: FlightResults) -> Plot | None:
-    """HDOP, determinant and smallest eigenvalue of every aircraft with time."""
+    """Return HDOP, determinant and smallest eigenvalue of every aircraft with time."""
     answer, data = results.answer(CooperativeResult), results.rows_of(CooperativeGeometry)
     if answer is None or data is None:
         return None
@@ -223,7 +223,7 @@ def geometry(results: FlightResults) -> Plot | None:
 
 
 def links(results: FlightResults) -> Plot | None:
-    """Residuals of every range over their own sigma; gated ones stand out."""
+    """Return residuals of every range over their own sigma; gated ones stand out."""
     answer, data = results.answer(CooperativeResult), results.rows_of(CooperativeLinks)
     if answer is None or data is None:
         return None

@@ -30,7 +30,10 @@ def method_roles(default: str) -> dict[str, Role]:
 
 
 def growth(results: FlightResults) -> Plot | None:
-    """RMS error by horizon, a line for each method, the shipped one thick; logarithmic axes."""
+    """Return the RMS error by horizon, a line for each method, on logarithmic axes.
+
+    The line of the shipped method is thick.
+    """
     data, default = results.rows_of(ForecastGrowth), _shipped(results)
     known = [] if data is None else [name for name in METHODS if has_values(data.rms_m.get(name))]
     if data is None or not known or not has_values(data.horizon_min):

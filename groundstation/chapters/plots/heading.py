@@ -56,7 +56,7 @@ def taxi_windows(samples: HeadingSamples) -> Windows:
 
 
 def difference(results: FlightResults) -> Plot | None:
-    """Difference over time with the running mean, its honest interval and e."""
+    """Return the difference over time with the running mean, its honest interval and e."""
     samples, running = results.rows_of(HeadingSamples), results.rows_of(HeadingRunning)
     if samples is None:
         return None
@@ -104,7 +104,7 @@ def _sample_range(value: Floats, used: Flags) -> tuple[float, float]:
 
 
 def convergence(results: FlightResults) -> Plot | None:
-    """Precision e, quality and honest half width as the samples come in, with their limits."""
+    """Return precision e, quality and honest half width as samples come in, with limits."""
     running = results.rows_of(HeadingRunning)
     if running is None:
         return None
@@ -135,7 +135,7 @@ def convergence(results: FlightResults) -> Plot | None:
 
 
 def density(results: FlightResults) -> Plot | None:
-    """Density of the heading error with the fitted normal (figure 3 of the paper)."""
+    """Return the density of the heading error with the fitted normal (figure 3 of the paper)."""
     bars, normal = results.rows_of(HeadingDistribution), results.rows_of(HeadingNormal)
     if bars is None:
         return None

@@ -86,7 +86,7 @@ def _deviation(own: LandingPath, guided: Floats, placed: Floats, dot_m: Floats, 
 
 
 def _distance(own: LandingPath) -> Axis:
-    """Distance before the threshold, flown from left to right."""
+    """Return the distance before the threshold, flown from left to right."""
     far, near = float(np.nanmax(own.distance_m)), float(np.nanmin(own.distance_m))
     return Axis("distance before the threshold, km", low=far / M_PER_KM, high=min(near / M_PER_KM, BEHIND_KM))
 

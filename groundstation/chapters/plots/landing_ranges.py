@@ -27,7 +27,7 @@ def _data(results: FlightResults, kind: type[T]) -> tuple[RangeLanding, T] | Non
 
 
 def space(results: FlightResults) -> Plot | None:
-    """Path and points from above and from the side."""
+    """Return the path and points from above and from the side."""
     found = _data(results, RangesSpace)
     if found is None:
         return None
@@ -106,7 +106,7 @@ def _accuracy(data: RangesPath, title: str, lines: list[tuple[Floats, Role, str]
 
 
 def trials(results: FlightResults) -> Plot | None:
-    """Errors to the right and up of simulated approaches in the band that the filter computes."""
+    """Return errors to the right and up of simulated approaches in the filter's band."""
     found = _data(results, RangesErrors)
     if found is None:
         return None

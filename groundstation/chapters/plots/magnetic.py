@@ -35,13 +35,13 @@ NT_PER_UT = 1e3
 
 
 def heading_axis(step_deg: float = 30.0) -> Axis:
-    """Axis of the magnetic heading as read, a number at every so many degrees."""
+    """Return an axis of the magnetic heading as read, a number at every so many degrees."""
     ticks = tuple(np.arange(0.0, 361.0, step_deg).tolist())
     return Axis("magnetic heading as read, °", "angle", 0.0, 360.0, ticks=ticks)
 
 
 def deviation(results: FlightResults) -> Plot | None:
-    """Deviation against heading by each method, with bands."""
+    """Return the deviation against heading by each method, with bands."""
     curves, table = results.rows_of(MagneticCurves), results.rows_of(MagneticTable)
     if curves is None:
         return None
@@ -147,7 +147,7 @@ def _branch(turn: Turn) -> tuple[str, Role]:
 
 
 def branches(results: FlightResults) -> Plot | None:
-    """Compass error on either branch and their average, declination in it."""
+    """Return the compass error on either branch and their average, declination in it."""
     samples, table = results.rows_of(MagneticSamples), results.rows_of(MagneticTable)
     if samples is None or table is None:
         return None
@@ -171,7 +171,7 @@ def branches(results: FlightResults) -> Plot | None:
 
 
 def modulus(results: FlightResults) -> Plot | None:
-    """Modulus of the field on the figures before and after it is freed of the iron."""
+    """Return the modulus of the field on the figures before and after it is freed of the iron."""
     answer, data = results.answer(MagneticResult), results.rows_of(MagneticModulus)
     if answer is None or data is None:
         return None

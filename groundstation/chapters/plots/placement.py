@@ -61,7 +61,7 @@ def accuracy_map(results: FlightResults) -> Plot | None:
 
 
 def _keep_out(rings: PlacementKeepOut) -> Outlines:
-    """Polygons that are kept out, with their names."""
+    """Return polygons that are kept out, with their names."""
     names = tuple(dict.fromkeys(rings.label.tolist()))
     corners = np.column_stack([rings.east_m, rings.north_m]) / M_PER_KM
     drawn = tuple(corners[rings.label == name] for name in names)
@@ -87,7 +87,7 @@ def _stand(points: PlacementPoints, answer: PlacementPlan) -> list[AnyMark]:
 
 
 def accuracy(results: FlightResults) -> Plot | None:
-    """Two sigma along the way, every design in its colour."""
+    """Return two sigma along the way, every design in its colour."""
     answer, data = results.answer(PlacementPlan), results.rows_of(PlacementAccuracy)
     if answer is None or data is None:
         return None

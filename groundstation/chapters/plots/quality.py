@@ -15,7 +15,7 @@ LANE_MM = 4.6
 
 
 def gaps(results: FlightResults) -> Plot | None:
-    """Strips of data and gaps over flight time; None without a ledger."""
+    """Return strips of data and gaps over flight time; None without a ledger."""
     ledger, holes = results.rows_of(LedgerRows), results.rows_of(GapRows)
     if ledger is None:
         return None

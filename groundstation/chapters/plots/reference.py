@@ -67,7 +67,7 @@ class ErrorAxis:
 
 
 def _error_axes(data: ReferenceErrors, quantity: str) -> tuple[ErrorAxis, ...]:
-    """Axes of a quantity; a sigma claimed of several axes together is shared out among them."""
+    """Return the axes of a quantity; a sigma claimed of several axes is shared among them."""
     if quantity == "position":
         across = NORMAL_95 / np.sqrt(2.0) * data.horizontal_sigma_m
         return (
@@ -131,7 +131,7 @@ def track(results: FlightResults) -> Plot | None:
 
 
 def claims(results: FlightResults) -> Plot | None:
-    """Share of the errors inside the 95 % claimed, with its interval."""
+    """Return the share of the errors inside the 95 % claimed, with its interval."""
     answer = results.answer(ReferenceResult)
     if answer is None or not answer.claims:
         return None

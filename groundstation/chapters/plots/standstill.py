@@ -74,7 +74,10 @@ def _plane(north: Floats, east: Floats, reach: float, still: Standstill | None) 
 
 
 def mean_speed(results: FlightResults) -> Plot | None:
-    """Density of the mean speed over 10 s and 30 s with the limit (figure 2b of the paper)."""
+    """Return the density of the mean speed over 10 s and 30 s with the limit.
+
+    Figure 2b of the paper.
+    """
     data = results.rows_of(StandstillMeanSpeed)
     if data is None:
         return None

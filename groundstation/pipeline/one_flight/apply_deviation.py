@@ -50,7 +50,7 @@ class Applied:
 
 
 def corrected_name(flight_id: str) -> str:
-    """Name of the MCAP with the corrected heading, beside the flight's own."""
+    """Return the name of the MCAP with the corrected heading, beside the flight's own."""
     return f"{flight_id}{CORRECTED}"
 
 

@@ -31,7 +31,7 @@ Settings = Path | Mapping[str, Any]  # a TOML file, or its content
 
 @cache
 def session_tables() -> tuple[str, ...]:
-    """Names of the settings tables of a session."""
+    """Return names of the settings tables of a session."""
     from groundstation.estimators.analyses import SESSION_ANALYSES
 
     return (*(analysis.settings_table for analysis in SESSION_ANALYSES), "session")
@@ -39,7 +39,7 @@ def session_tables() -> tuple[str, ...]:
 
 @cache
 def tables() -> tuple[str, ...]:
-    """Names of all settings tables."""
+    """Return names of all settings tables."""
     from groundstation.estimators.analyses import FLIGHT_ANALYSES
 
     of_flights = dict.fromkeys(analysis.settings_table for analysis in FLIGHT_ANALYSES)
@@ -48,7 +48,7 @@ def tables() -> tuple[str, ...]:
 
 @cache
 def sections() -> tuple[str, ...]:
-    """Names of all that a settings file may hold."""
+    """Return names of all that a settings file may hold."""
     return (*tables(), ISOLATION, *LISTS)
 
 
@@ -211,7 +211,7 @@ class Configuration:
         return Path(self.profile) if self.profile else None
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for the manifest and the MCAP; only what the user set."""
+        """Return plain values for the manifest and the MCAP; only what the user set."""
         document: dict[str, Any] = {name: dict(self.tables[name]) for name in tables() if self.tables.get(name)}
         for name in ("exclude", "force"):
             intervals = [{"from": part.start, "to": part.end, "reason": part.reason} for part in getattr(self, name)]

@@ -53,7 +53,7 @@ def _is_behind(before: PartOfRun, behind: PartOfRun) -> bool:
 
 
 def _joined(logs: Sequence[Log | Path]) -> Log:
-    """Consecutive logs and files as one log."""
+    """Return consecutive logs and files as one log."""
     first = logs[0]
     assert isinstance(first, Log), "a recording begins with a log that can be read"
     paths: list[Path] = []

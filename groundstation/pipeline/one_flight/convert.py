@@ -172,7 +172,7 @@ def _convert_recorded(log: Log, items: Replay, found: "Survey", target: Path, re
 
 
 def _facts_of(log: Log, found: "Survey", laid: Laid) -> StoreInfo:
-    """Facts of the MCAP of a log, with those of the reference that is laid beside it."""
+    """Return facts of the MCAP of a log, with those of the reference that is laid beside it."""
     from importlib import metadata as installed
 
     from groundstation.integrity.ledger_findings import ledger_findings
@@ -205,7 +205,7 @@ def _told_joined(log: Log) -> tuple[Finding, ...]:
 
 
 def _facts_of_parts(log: Log) -> dict[str, str]:
-    """Names and digests of the consecutive files of a flight, as metadata."""
+    """Return names and digests of the consecutive files of a flight, as metadata."""
     if not log.parts:
         return {}
     parts = [{"name": path.name, "sha256": sha256} for path, sha256 in zip(log.parts, log.digests, strict=True)]
@@ -213,7 +213,7 @@ def _facts_of_parts(log: Log) -> dict[str, str]:
 
 
 def parts_told(metadata: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    """Name and digest of each of the consecutive files of a flight, by its metadata."""
+    """Yield the name and digest of each of the consecutive files of a flight, by its metadata."""
     try:
         told = json.loads(metadata.get(PARTS, "[]"))
         yield from ((str(one["name"]), str(one["sha256"])) for one in told)
@@ -293,7 +293,7 @@ def _laid_beside_store(log: Log, info: StoreInfo, references: References) -> Lai
 
 
 def _without_truth(items: Iterable[Item], laid: Laid) -> Iterator[Item]:
-    """Items of a log, without the truth where another takes its place."""
+    """Yield items of a log, without the truth where another takes its place."""
     return (item for item in items if not (laid.batches and isinstance(item, RecordBatch) and item.topic == TRUTH))
 
 

@@ -31,7 +31,7 @@ class Apply:
     sha256: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for the manifest: whose it is."""
+        """Return plain values for the manifest: whose it is."""
         if self.deviation is None:
             return {"from": OWN}
         return {"from": self.deviation.flight_id, "sha256": self.sha256}

@@ -327,7 +327,7 @@ def given_of(log: Log, converted: Converted, identity: str) -> Given:
 
 
 def read_flight(mcap: Path, converted: Converted) -> Flight:
-    """Tables of an MCAP that was just written."""
+    """Return tables of an MCAP that was just written."""
     from groundstation.store.reader import read
     from groundstation.tables.assemble import flight_from_batches
 
@@ -337,7 +337,7 @@ def read_flight(mcap: Path, converted: Converted) -> Flight:
 
 
 def state_of(findings: tuple[Finding, ...], has_lost_data: bool, fail_on: str) -> State:
-    """State of a run from its findings and whether data was lost."""
+    """Return the state of a run from its findings and whether data was lost."""
     if is_incomplete(findings):
         return "incomplete"
     gravest = worst(findings)

@@ -65,7 +65,7 @@ def flight_id(
 
 
 def plain_id(identity: str, sha256: str) -> str:
-    """Name of a flight without the digest that it got because another had the same name.
+    """Return the name of a flight without the digest that keeps it apart from another.
 
     Examples
     --------

@@ -57,7 +57,7 @@ class Job:
             return None
 
     def digest(self) -> str:
-        """Digest of its log, whether it can be read or not; empty where there is none."""
+        """Return the digest of its log, whether it can be read or not; empty where there is none."""
         try:
             return digest_of(as_log(self.path))
         except OSError:

@@ -56,7 +56,7 @@ class _Part:
     relation: LogRelation | None = None
 
     def name(self, topic: str) -> str:
-        """Name of one of its topics in the flight."""
+        """Return the name of one of its topics in the flight."""
         return f"{topic}.{self.label}" if self.label and topic else topic
 
     def time_ns(self, own_ns: Int64Array) -> Int64Array:
@@ -70,7 +70,7 @@ class _Part:
 
 
 def joined_name(logs: Sequence[Log]) -> str:
-    """Name of a flight of several logs."""
+    """Return the name of a flight of several logs."""
     return " + ".join(log.source.name for log in logs)
 
 

@@ -69,7 +69,7 @@ class Log:
         return read_log(self._file, self.profile, self.loaded_icds)
 
     def info(self) -> "StoreInfo":
-        """Facts of an MCAP, or of the one power-up in it that is read."""
+        """Return facts of an MCAP, or of the one power-up in it that is read."""
         from groundstation.store.reader import read_info
 
         if self.segment is not None and self.segment.info is not None:
@@ -113,12 +113,12 @@ def as_log(path: Path) -> Path:
 
 
 def log_name(path: Path) -> str:
-    """Name of a log: that of its file, or of the folder that is a bag of ROS 2."""
+    """Return the name of a log: that of its file, or of the folder that is a bag of ROS 2."""
     return path.resolve().parent.name if _is_metadata(path) else path.name
 
 
 def digest_of(path: Path) -> str:
-    """SHA-256 of a log, over all its files."""
+    """Return the SHA-256 of a log, over all its files."""
     return sha256_of(*_files_of(path))
 
 

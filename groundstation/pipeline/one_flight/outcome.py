@@ -94,7 +94,7 @@ def reason_of(name: str, error: Exception) -> tuple[str, str]:
 
 
 def worst_code(outcomes: "tuple[Outcome, ...]") -> int:
-    """Exit code of several logs: the worst wins, in the order 1, 4, 3, 0.
+    """Return the exit code of several logs: the worst wins, in the order 1, 4, 3, 0.
 
     Examples
     --------

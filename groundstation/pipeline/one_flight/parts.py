@@ -68,7 +68,7 @@ def _zero_ns(tables: Iterable[Table], at: int) -> int:
 
 
 def _places(flight: Flight) -> tuple[tuple[float, float], ...]:
-    """Latitude and longitude at both ends, of the first topic that tells them."""
+    """Return latitude and longitude at both ends, of the first topic that tells them."""
     for topic in (*topics_of_kind("gnss", flight.topics()), *topics_of_kind("ins", flight.topics())):
         table = flight[topic]
         if not all(name in table for name in _PLACES):

@@ -193,7 +193,7 @@ def _as_it_stands(path: Path) -> tuple[Path, int, int]:
 
 @cache
 def _ends_of(path: Path, time_ns: int, size: int) -> tuple[Int64Array, bool]:
-    """First and last time of a file, shape (2,), and whether they are of a GPS week."""
+    """Return first and last time of a file, shape (2,), and whether they are of a GPS week."""
     reference = _load(path, time_ns, size)
     times_ns = reference.table.time_ns
     return np.array([times_ns.min(), times_ns.max()]), reference.is_weekly
@@ -285,7 +285,7 @@ def _on_utc(reference: Reference, span_ns: tuple[int, int]) -> "Table":
 
 
 def _weeks_about(span_ns: tuple[int, int]) -> tuple[int, ...]:
-    """GPS weeks in which a log may lie: that of its middle, and those beside it."""
+    """Return GPS weeks in which a log may lie: that of its middle, and those beside it."""
     middle_ns = (span_ns[0] + span_ns[1]) // 2
     week = (middle_ns + leap_seconds_at(middle_ns) * NS_PER_S - GPS_EPOCH_NS) // WEEK_NS
     return week, week - 1, week + 1

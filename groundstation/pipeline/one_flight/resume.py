@@ -158,7 +158,7 @@ def _version(package: str) -> str:
 
 
 def keys_of(source: Source, configuration: Configuration, *, digests: Sequence[str] = ()) -> Keys:
-    """Keys of the run of a log: its name counts too, as it stands in the results.
+    """Return keys of the run of a log: its name counts too, as it stands in the results.
 
     ``digests`` are those of the consecutive files of one recording.
 
@@ -203,7 +203,7 @@ def _layouts_of(configuration: Configuration) -> list[str]:
 
 
 def _content_of(file: str, expected: str) -> str:
-    """Digest of a file, of all files of a bag, and of what is read along with a reference."""
+    """Return the digest of a file, of a bag's files, and of files read with a reference."""
     try:
         return digest_of(as_log(Path(file)))
     except OSError as error:

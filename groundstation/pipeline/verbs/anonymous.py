@@ -117,7 +117,7 @@ class Disguise:
         return (1 if is_old else -1) * self._drawn[1] * WEEK_NS
 
     def alias(self, name: str) -> str:
-        """Another name for a name, the same for the same seed.
+        """Return another name for a name, the same for the same seed.
 
         Examples
         --------
@@ -135,7 +135,7 @@ class Disguise:
         return f"{kind}.{self.alias(name)}" if kind in NAMED and name else topic
 
     def batch(self, batch: RecordBatch) -> RecordBatch | None:
-        """Records in disguise; None for those of a topic that is left out."""
+        """Return records in disguise; None for those of a topic that is left out."""
         topic = self.topic(batch.topic)
         if topic is None:
             return None
@@ -161,7 +161,7 @@ class Disguise:
         return RecordBatch("event", np.zeros(1, dtype=np.int64), unknown, {"name": name}, at)
 
     def damage(self, damage: Damage) -> Damage:
-        """Damage without texts."""
+        """Return damage without texts."""
         return replace(damage, place="", what=damage.kind, topic=self.topic(damage.topic) or "")
 
     def _device_time(self, column: Column) -> Column:
@@ -206,7 +206,7 @@ class Disguise:
         return None
 
     def _turned(self, columns: Mapping[str, Column]) -> dict[str, Column]:
-        """Positions and covariances about the earth's centre, turned about its axis."""
+        """Return positions and covariances about the earth's centre, turned about its axis."""
         names = [f"position_{axis}_m" for axis in XYZ]
         if not all(name in columns for name in names):
             return {}
@@ -228,7 +228,7 @@ class Disguise:
         return out
 
     def info(self, info: "StoreInfo") -> "StoreInfo":
-        """Facts of the flight without names, places, dates and free text."""
+        """Return facts of the flight without names, places, dates and free text."""
         facts = {}
         for name, value in info.metadata.items():
             fact = self._fact(name, value)

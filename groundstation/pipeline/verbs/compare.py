@@ -166,7 +166,7 @@ def _side(saved: SavedFlight) -> Side:
 
 
 def _origin(saved: SavedFlight) -> str:
-    """Digest of the log a flight came from; of a part, that of the whole."""
+    """Return the digest of the log a flight came from; of a part, that of the whole."""
     return saved.results.metadata.get(CUT_SHA256) or saved.results.source.sha256
 
 
@@ -215,7 +215,7 @@ def _is_main(name: str, methods: set[str]) -> bool:
 
 
 def _answers(summary: Mapping[str, Any]) -> dict[str, tuple[Value, float | None]]:
-    """Answers of a summary by name, each with the sigma it states."""
+    """Return answers of a summary by name, each with the sigma it states."""
     flight, completeness = mapping(summary, "flight"), mapping(summary, "completeness")
     found: dict[str, tuple[Value, float | None]] = {"status": (str(summary.get("status", "")), None)}
     found |= dict(_walk("flight", {"duration_s": flight.get("duration_s")}))
@@ -253,7 +253,7 @@ def _is_pair(value: Any) -> bool:
 
 
 def _pair_path(path: str, key: str) -> str:
-    """Path of the ends of an interval, the place of ``low`` and ``high`` before the unit."""
+    """Return the path of an interval's ends, with ``low`` and ``high`` before the unit."""
     stem, _, unit = key.rpartition("_")
     return f"{path}.{stem}_{{end}}_{unit}" if stem else f"{path}.{key}_{{end}}"
 

@@ -61,7 +61,7 @@ class Description:
     power_ups: tuple[PowerUpTold, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON."""
+        """Return plain values for JSON."""
         plain = asdict(self)
         del plain["has_records"]  # the exit code tells it
         if not self.power_ups:

@@ -93,7 +93,7 @@ def require_place(source: Path, target: Path, force: bool) -> None:
 
 
 def _read(path: Path, configuration: Configuration) -> "tuple[Flight, SavedFlight | None, bool]":
-    """Tables of a flight, what a run saved of it, and whether data were lost on the way."""
+    """Return tables of a flight, its saved results, and whether data were lost on the way."""
     from groundstation.store.reader import read, read_info
     from groundstation.tables.assemble import flight_from_batches
 

@@ -102,7 +102,7 @@ def _miluv(place: Path, files: Sequence[Path]) -> RecordedSet:
 
 
 def _murp(place: Path, files: Sequence[Path]) -> list[RecordedSet]:
-    """Logs of pairs, one set for every run whose number they begin with."""
+    """Return logs of pairs, one set for every run whose number they begin with."""
     runs: dict[str, list[tuple[Path, re.Match[str]]]] = {}
     for path in files:
         if pair := MURP_PAIR.match(path.name):
@@ -154,7 +154,7 @@ def _of_damage(damage: Damage, place: str) -> Finding:
 
 
 def _flights(files: Sequence[Path], findings: list[Finding]) -> list[Flight]:
-    """Tables of all logs, each by way of an MCAP; a file that nobody can read is a finding."""
+    """Return tables of all logs, each by way of an MCAP; an unreadable file is a finding."""
     flights = []
     with tempfile.TemporaryDirectory() as folder:
         for number, path in enumerate(files):

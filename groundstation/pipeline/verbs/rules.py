@@ -77,7 +77,7 @@ class RulesTest:
     unread: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
+        """Return plain JSON values."""
         document: dict[str, Any] = to_json(self)
         return document
 
@@ -148,7 +148,7 @@ def write_rules(found: RulesTest, path: Path) -> None:
 
 
 def learned_in(out: Path) -> dict[str, InstalledFlight]:
-    """Flights with a heading answer that earlier ones taught, by their ids."""
+    """Return flights with a heading answer that earlier ones taught, by their ids."""
     found = installations_in(out)
     flights = () if found is None else (flight for one in found.installations for flight in one.flights)
     return {one.lesson.flight_id: one for one in flights if one.answer is not None and not one.answer.why_not}
@@ -218,7 +218,7 @@ def _not_limits(settings: Any, stored: Mapping[str, Any], limits: frozenset[str]
 
 
 def _flat(settings: Any) -> dict[str, Any]:
-    """Settings as an answer keeps them: a range as its two ends, nothing of what is left out."""
+    """Return settings as an answer keeps them: ranges as two ends, without those left out."""
     out: dict[str, Any] = {}
     for name, value in asdict(settings).items():
         if isinstance(value, tuple):

@@ -126,7 +126,7 @@ class _Places(Locator):
         return self.tick_values(*self.axis.get_view_interval())  # type: ignore[union-attr]
 
     def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
-        """Places between two ends, by the length that the axis has now."""
+        """Return places between two ends, by the length that the axis has now."""
         size = self.axis.axes.bbox  # type: ignore[union-attr]
         pixels = size.height if self.is_upright else size.width
         length_pt = POINTS_PER_INCH * pixels / self.axis.get_figure(root=True).dpi  # type: ignore[union-attr]
@@ -194,12 +194,12 @@ def _frame(figure: Figure, box: Box, height: float) -> Axes:
 
 
 def _place(left: float, bottom: float, wide: float, high: float, height: float) -> tuple[float, float, float, float]:
-    """Shares of a figure from points, which are counted from its upper left corner."""
+    """Return shares of a figure from points, which are counted from its upper left corner."""
     return (MARGIN_PT + left) / WHOLE_WIDTH_PT, 1.0 - bottom / height, wide / WHOLE_WIDTH_PT, high / height
 
 
 def _ticks(axis: Axis, span: Span, ticks: Sequence[tuple[float, str]] | None, *, is_upright: bool) -> None:
-    """Ticks at given places, else where the page has them."""
+    """Set ticks at given places, else where the page has them."""
     axis.set_minor_locator(NullLocator())
     if ticks is None:
         places = _Places(span, is_upright=is_upright)
@@ -228,7 +228,7 @@ def _legend(axes: Axes, entries: Sequence[Entry], corner: Corner, offset_pt: tup
 
 
 def _labels(axes: Axes, box: Box, height: float) -> None:
-    """Labels that stay at their places when the axes are moved."""
+    """Draw labels that stay at their places when the axes are moved."""
     pixels = axes.get_figure(root=True).dpi / POINTS_PER_INCH  # type: ignore[union-attr]
     to_data = axes.transData.inverted()
     for one in labels_of(box):

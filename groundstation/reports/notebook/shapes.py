@@ -107,7 +107,10 @@ def _begins(is_known: Any) -> Any:
 
 
 def _held(x: Floats, *values: Floats) -> tuple[Floats, ...]:
-    """Places and values of lines that hold each value about its place; NaN between pieces."""
+    """Return places and values of step lines; NaN between pieces.
+
+    A step line holds each value about its place.
+    """
     known = np.where(np.isfinite(values).all(axis=0), x, np.nan)
     rows, starts = shown_rows(known, known, len(x))
     wide, _, begins = stepped(x[rows], rows.astype(np.float64), starts)

@@ -50,11 +50,11 @@ class Box:
     y_title: str
 
     def across(self, values: Floats) -> Floats:
-        """Points from the left edge of the picture."""
+        """Return points from the left edge of the picture."""
         return np.asarray(self.left + self.width * self.x.shares(values))
 
     def down(self, values: Floats) -> Floats:
-        """Points from the upper edge of the picture."""
+        """Return points from the upper edge of the picture."""
         return np.asarray(self.top + self.height * (1.0 - self.y.shares(values)))
 
     @property
@@ -182,7 +182,7 @@ def _y_ticks(panel: Panel, span: Span, length_pt: float) -> tuple[Tick, ...]:
 
 
 def widest(ticks: Sequence[Tick]) -> float:
-    """Width of the longest text among ticks, points."""
+    """Return the width of the longest text among ticks, points."""
     return max((width_pt(text) for _, text in ticks), default=0.0)
 
 
@@ -192,7 +192,7 @@ def title_lines(title: str, room_pt: float) -> list[str]:
 
 
 def _left_pt(panel: Panel, ticks: Sequence[Tick], height_pt: float) -> float:
-    """Room left of a panel for its numbers and its title."""
+    """Return the room left of a panel for its numbers and its title."""
     return TICK_PT + TO_TEXT_PT + widest(ticks) + _title_pt(panel, height_pt)
 
 
@@ -250,7 +250,7 @@ def _columns(plot: Plot, rows: list[list[_Told]]) -> tuple[_Rooms, _Rooms]:
 
 
 def _shares(row: Row) -> tuple[float, ...]:
-    """Shares of the width of a row, those of columns without a panel among them."""
+    """Return shares of the width of a row, those of columns without a panel among them."""
     shares = [round(max(panel.share, 1e-3), 3) for panel in row.panels]
     return (*shares, *[1.0] * (row.columns - len(shares)))
 
@@ -285,7 +285,7 @@ def _maps(plot: Plot, rows: list[list[_Told]], widths: _Rooms) -> list[list[_Tol
 
 
 def _gap_pt(told: _Told) -> float:
-    """Room between the windows of a panel, for the numbers of those with a range of their own."""
+    """Return the room between the windows of a panel, for the numbers of their own ranges."""
     has_own = len(set(told.y)) > 1
     return max(WINDOWS_PT, max(map(widest, told.y_ticks[1:])) + 10.0) if has_own else WINDOWS_PT
 

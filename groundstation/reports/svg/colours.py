@@ -48,7 +48,7 @@ STEPS = 20  # colours of a scale
 
 
 def with_alpha(colour: str, alpha: float) -> str:
-    """Colour and opacity as one number.
+    """Return the colour and opacity as one number.
 
     Examples
     --------

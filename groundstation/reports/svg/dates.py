@@ -15,7 +15,7 @@ _STEPS = (
 
 
 def date_ticks(low_s: float, high_s: float, length_pt: float) -> tuple[tuple[float, str], ...]:
-    """Round dates between two moments, seconds since 1970, each with its text.
+    """Return round dates between two moments, seconds since 1970, each with its text.
 
     Examples
     --------

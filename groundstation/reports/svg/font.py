@@ -22,7 +22,7 @@ LINE_SHARE = 1.2  # from one line to the next, over the size
 
 @cache
 def widths(is_bold: bool = False) -> dict[int, float]:
-    """Widths of the characters that the font has, over its size, read off the font file.
+    """Return the widths of the font's characters over its size, read from the font file.
 
     Source: Microsoft, OpenType specification 1.9.1, tables ``cmap`` (format 4), ``hhea``, ``hmtx``.
 
@@ -44,7 +44,7 @@ def widths(is_bold: bool = False) -> dict[int, float]:
 
 
 def _glyphs(data: bytes, start: int) -> dict[int, int]:
-    """Glyphs by character, of the first table of format 4."""
+    """Return glyphs by character, of the first table of format 4."""
     for number in range(struct.unpack_from(">H", data, start + 2)[0]):
         offset = start + struct.unpack_from(">L", data, start + 8 + 8 * number)[0]
         if struct.unpack_from(">H", data, offset)[0] == 4:
@@ -67,7 +67,7 @@ def _glyphs(data: bytes, start: int) -> dict[int, int]:
 
 @lru_cache(4096)
 def width_pt(text: str, size_pt: float = SIZE_PT, is_bold: bool = False) -> float:
-    """Width of a line of text in DejaVu Sans, points.
+    """Return the width of a line of text in DejaVu Sans, points.
 
     Examples
     --------
@@ -81,12 +81,12 @@ def width_pt(text: str, size_pt: float = SIZE_PT, is_bold: bool = False) -> floa
 
 @lru_cache(4096)
 def label(text: Any, most: int = 40) -> str:
-    """Text of a log fit for a picture: characters the font has, one line, bounded length.
+    """Return text of a log fit for a picture: known characters, one line, bounded length.
 
     Examples
     --------
     >>> label("a\\u4e00b"), label("a" * 50, 4)
-    ('a\ufffdb', 'aaa…')
+    ('a�b', 'aaa…')
     """
     known = widths()
     kept = "".join(mark if ord(mark) in known else HIDDEN for mark in clean(str(text))[: 4 * most])
@@ -116,7 +116,7 @@ def lines_of(text: str, room_pt: float, most: int = 2, size_pt: float = SIZE_PT)
 def written(
     text: str, x: float, y: float, anchor: str = "", *, size_pt: float = 0.0, look: str = "", is_upright: bool = False
 ) -> str:
-    """Text as an SVG element, its base line from (x, y) on; ``look`` are further attributes.
+    """Return text as an SVG element, its base line from (x, y) on; ``look`` are attributes.
 
     Upright text reads from below.
     """

@@ -32,12 +32,12 @@ class Label:
 
 
 def labels_of(box: Box) -> tuple[Label, ...]:
-    """Labels of lines across a frame, then those of points and outlines in it."""
+    """Return labels of lines across a frame, then those of points and outlines in it."""
     return (*_beside_lines(box), *_at_places(box))
 
 
 def _beside_lines(box: Box) -> Iterator[Label]:
-    """Labels above level lines and right of upright ones."""
+    """Yield labels above level lines and right of upright ones."""
     for mark in box.panel.marks:
         if not isinstance(mark, Limit) or not mark.label:
             continue

@@ -47,7 +47,7 @@ class Entry:
 
 
 def entries_of(panel: Panel) -> tuple[Entry, ...]:
-    """Entries of a panel, none twice; of shaded ground each kind."""
+    """Return entries of a panel, none twice; of shaded ground each kind."""
     if not panel.legend:
         return ()
     found: dict[tuple[str, str], Entry] = {}
@@ -75,7 +75,7 @@ _MORE = Told(x=NO_PLACES, y=NO_PLACES, value=NO_PLACES, title="")
 
 
 def above(entries: Sequence[Entry], room_pt: float) -> tuple[tuple[Entry, ...], ...]:
-    """Lines of a legend above a panel, each as full as its width allows."""
+    """Return lines of a legend above a panel, each as full as its width allows."""
     lines: list[list[Entry]] = []
     for entry in entries:
         if lines and sum(one.width_pt for one in lines[-1]) + entry.width_pt - BETWEEN_PT <= room_pt:
@@ -86,7 +86,7 @@ def above(entries: Sequence[Entry], room_pt: float) -> tuple[tuple[Entry, ...], 
 
 
 def beside_pt(entries: Sequence[Entry]) -> float:
-    """Room right of a panel for its legend."""
+    """Return the room right of a panel for its legend."""
     return max((entry.width_pt for entry in entries), default=0.0)
 
 
@@ -101,7 +101,7 @@ def drawn_line(entries: Sequence[Entry], right: float, y: float) -> str:
 
 
 def drawn(entry: Entry, x: float, y: float) -> str:
-    """Sign and name of an entry from ``x`` on, their middle at ``y``; points."""
+    """Return the sign and name of an entry from ``x`` on, their middle at ``y``; points."""
     return _sign(entry, x, y) + written(entry.name, x + SIGN_PT + GAP_PT, y + middle())
 
 

@@ -35,7 +35,7 @@ _WORDS = _Words()
 
 
 def words(hundredths: NDArray[np.int64]) -> str:
-    """Numbers of a path one after another.
+    """Return numbers of a path one after another.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def words(hundredths: NDArray[np.int64]) -> str:
 
 
 def hundredths(values: Floats) -> Steps:
-    """Places rounded to hundredths of a point."""
+    """Return places rounded to hundredths of a point."""
     return np.rint(100.0 * np.clip(values, -FAR_PT, FAR_PT)).astype(np.int64)
 
 
@@ -101,7 +101,7 @@ def _corners(places: Steps, starts: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 
 def strokes(start: Floats, end: Floats, y: Floats) -> str:
-    """Path of level strokes from ``start`` to ``end``."""
+    """Return the path of level strokes from ``start`` to ``end``."""
     if not start.size:
         return ""
     left, right, height = hundredths(start), hundredths(end), hundredths(y)
@@ -115,7 +115,7 @@ def strokes(start: Floats, end: Floats, y: Floats) -> str:
 
 
 def boxes(left: Floats, right: Floats, upper: Floats, lower: Floats) -> str:
-    """Path of boxes between places of their edges, whichever of two comes first."""
+    """Return the path of boxes between places of their edges, whichever of two comes first."""
     x, y = hundredths(np.minimum(left, right)), hundredths(np.minimum(upper, lower))
     wide, high = hundredths(np.maximum(left, right)) - x, hundredths(np.maximum(upper, lower)) - y
     moves = np.column_stack([np.diff(x, prepend=0), np.diff(y, prepend=0), wide, high, -wide])
@@ -128,7 +128,7 @@ def boxes(left: Floats, right: Floats, upper: Floats, lower: Floats) -> str:
 
 
 def dots(x: Floats, y: Floats) -> str:
-    """Path of strokes of no length: with round ends they are dots."""
+    """Return the path of strokes of no length: with round ends they are dots."""
     if not x.size:
         return ""
     places = np.column_stack([hundredths(x), hundredths(y)])

@@ -87,7 +87,7 @@ def _y_places(box: Box) -> list[tuple[float, str]]:
 def _places(
     ticks: tuple[Tick, ...], along: Callable[[Floats], Floats], low: float, high: float
 ) -> list[tuple[float, str]]:
-    """Ticks by their points along an edge, those that lie on it."""
+    """Return ticks by their points along an edge, those that lie on it."""
     points = along(np.array([place for place, _ in ticks], dtype=np.float64))
     found = zip(points.tolist(), (text for _, text in ticks), strict=True)
     return [(point, text) for point, text in found if low - 0.1 <= point <= high + 0.1]
@@ -148,7 +148,7 @@ def _labels(box: Box) -> str:
 
 
 def _around(one: Placed) -> str:
-    """Title and legend of a panel, and the scale of its cells."""
+    """Return the title and legend of a panel, and the scale of its cells."""
     first = one.boxes[0]
     parts = []
     y = first.top - 3.0 - 0.5 * legend.LINE_PT

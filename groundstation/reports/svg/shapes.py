@@ -122,7 +122,7 @@ def _kept(places: Floats, box: Box) -> Floats:
 
 
 def _both(x: Floats, low: Floats, high: Floats, most: int) -> tuple[Any, Any]:
-    """Rows of a band: half of them by its lower edge, half by its upper one."""
+    """Return rows of a band: half of them by its lower edge, half by its upper one."""
     known = np.where(np.isfinite(low) & np.isfinite(high), x, np.nan)
     if np.isfinite(known).sum() <= most:
         return shown_rows(known, low, most)

@@ -18,7 +18,7 @@ def symbol(kind: Symbol, x: float, y: float, size_pt: float, colour: str, *, is_
 
 
 def look(kind: Symbol, colour: str, *, is_hollow: bool = False) -> str:
-    """Attributes by which the path of a symbol is painted."""
+    """Return attributes by which the path of a symbol is painted."""
     if kind == "cross":
         return f'fill="none" stroke="{colour}" stroke-width="{CROSS_PT:g}"'
     if kind == "ring" or is_hollow:

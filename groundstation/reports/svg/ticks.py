@@ -20,7 +20,7 @@ Tick = tuple[float, str]
 
 
 def ticks_of(span: Span, length_pt: float, *, is_upright: bool) -> tuple[Tick, ...]:
-    """Places along an axis of some length, each with its text.
+    """Return places along an axis of some length, each with its text.
 
     Examples
     --------
@@ -47,7 +47,7 @@ def ticks_of(span: Span, length_pt: float, *, is_upright: bool) -> tuple[Tick, .
 
 
 def own_ticks(places: Sequence[float]) -> tuple[Tick, ...]:
-    """Numbers at given places, with as many decimals as they need.
+    """Return numbers at given places, with as many decimals as they need.
 
     Examples
     --------
@@ -211,7 +211,7 @@ def _symlog(span: Span, length_pt: float, is_upright: bool) -> tuple[Tick, ...]:
 
 
 def _weight(size: float, linear_to: float) -> int:
-    """Rank of a mark where there is no room for all: zero, decades, fives and twos."""
+    """Return the rank of a mark where there is no room for all: zero, decades, fives and twos."""
     if size == 0.0:
         return 0
     part = size / 10.0 ** math.floor(math.log10(size) + 1e-9)

@@ -38,7 +38,7 @@ def control(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
 
 
 def _space(recorder: Recorder, answer: ControlPlan, paths: ControlPaths, results: FlightResults) -> rrb.View:
-    """Aircraft and points in space, with a line from the judged aircraft to every source."""
+    """Log aircraft and points in space, with a line from the judged aircraft to every source."""
     law, aircraft = paths.law, paths.aircraft
     place = np.column_stack([paths.east_m, paths.north_m, paths.up_m])
     shades = colours.for_series(len(answer.aircraft))

@@ -84,7 +84,7 @@ def _links(recorder: Recorder, answer: CooperativeResult, results: FlightResults
 
 
 def link_spans(time_s: FloatArray, mark: Counts, end_s: float) -> tuple[FloatArray, FloatArray, Texts]:
-    """Stretches in which a link ranges, is gated, or is silent, until the end of the session.
+    """Return stretches in which a link ranges, is gated, or is silent, to the session's end.
 
     Examples
     --------

@@ -65,7 +65,7 @@ def _eye(place: FloatArray, size_m: float) -> rrb.EyeControls3D:
 
 
 def _height_m(figure: Overview) -> FloatArray:
-    """Height above the lowest place; 0 where none is logged."""
+    """Return the height above the lowest place; 0 where none is logged."""
     for logged in (figure.altitude_m, figure.pressure_altitude_m, figure.height_above_airfield_m):
         if logged is not None and np.isfinite(logged).any():
             height = np.where(np.abs(logged) < MOST_HEIGHT_M, logged, np.nan)

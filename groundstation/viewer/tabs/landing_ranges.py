@@ -46,7 +46,7 @@ def landing_ranges(recorder: Recorder, results: FlightResults) -> rrb.Container 
 
 
 def _space(recorder: Recorder, answer: RangeLanding, space: RangesSpace, path: RangesPath) -> rrb.View:
-    """Aircraft and points in space, ranges as lines, corridor frames every half kilometre."""
+    """Log aircraft and points in space, ranges as lines, corridor frames every half kilometre."""
     name, time_s = space.label, space.time_s
     place = np.column_stack([space.along_m, -space.right_m, space.up_m])
     flown = place[name == "aircraft"]
@@ -81,7 +81,7 @@ def _space(recorder: Recorder, answer: RangeLanding, space: RangesSpace, path: R
 
 
 def _corridors(recorder: Recorder, flown: FloatArray) -> None:
-    """Frames of each category's corridor across the path, joined by its edges."""
+    """Log frames of each category's corridor across the path, joined by its edges."""
     for category, shade, part in zip(CATEGORIES, CORRIDORS, path_parts(one.name for one in CATEGORIES), strict=True):
         wide, high = TIMES_LARGER * category.horizontal_m, TIMES_LARGER * category.vertical_m
         corners = np.array([(0.0, wide, high), (0.0, -wide, high), (0.0, -wide, -high), (0.0, wide, -high)])
@@ -119,7 +119,7 @@ def _ellipsoid(recorder: Recorder, path: RangesPath, flown: FloatArray) -> None:
 
 
 def _moving(recorder: Recorder, space: RangesSpace) -> list[rrb.View]:
-    """Speed of the moving point."""
+    """Log the speed of the moving point."""
     rows = space.label == "moving"
     if not rows.any():
         return []

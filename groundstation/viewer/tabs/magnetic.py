@@ -41,7 +41,7 @@ def magnetic(recorder: Recorder, results: FlightResults) -> rrb.Container | None
 
 
 def _applied(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    """Magnetic heading before and after a deviation was applied to the log."""
+    """Log the magnetic heading before and after a deviation was applied to the log."""
     figure = results.rows_of(CorrectedHeadingRows)
     if figure is None:
         return []

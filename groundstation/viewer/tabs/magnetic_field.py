@@ -56,7 +56,7 @@ def _known_ut(field: BodyField) -> FloatArray:
 
 
 def _radius_ut(results: FlightResults, field_ut: FloatArray) -> float:
-    """Strength of the model; without one the median of the readings."""
+    """Return the strength of the model; without one the median of the readings."""
     answer = results.answer(MagneticResult)
     declination = answer.declination if answer else None
     if declination is None or declination.horizontal_nt is None or declination.down_nt is None:
@@ -71,7 +71,7 @@ def _exaggerated(field: FloatArray, radius: float, factor: float) -> FloatArray:
 
 
 def _circles(radius: float) -> list[FloatArray]:
-    """Parallels and four meridians of a sphere."""
+    """Return parallels and four meridians of a sphere."""
     turn = np.linspace(0.0, 2.0 * np.pi, CIRCLE_POINTS)
     circles = []
     for latitude in np.deg2rad(PARALLELS_DEG):

@@ -190,7 +190,7 @@ def repeats_the_time(table_of_topic: Table, field: str) -> bool:
 
 
 def family_of(topic: str, field: str) -> str:
-    """Family of a field: fields of one family share a view.
+    """Return the family of a field: fields of one family share a view.
 
     Examples
     --------
@@ -258,7 +258,7 @@ def _isolates(breaks: BoolArray) -> bool:
 
 
 def columns_of(views: int) -> int:
-    """Columns of a page with so many views.
+    """Return the number of columns of a page with so many views.
 
     Examples
     --------

@@ -58,7 +58,7 @@ def space(
 
 
 def _seen(position_m: FloatArray, origin: LocalFrame | None) -> FloatArray:
-    """East, north, up of positions in the frame of the session."""
+    """Return east, north, up of positions in the frame of the session."""
     plane = position_m if origin is None else origin.from_ecef_m(position_m)
     return np.column_stack([plane[:, 1], plane[:, 0], -plane[:, 2]])
 
@@ -182,7 +182,7 @@ def _residuals(links: CooperativeLinks, rows: Int64Array) -> list[tuple[float, b
 
 
 def shade_of(normal: float, is_used: bool) -> Colour:
-    """Colour of a link whose residual is ``normal`` sigmas.
+    """Return the colour of a link whose residual is ``normal`` sigmas.
 
     Examples
     --------

@@ -121,7 +121,7 @@ def _ellipses(recorder: Recorder, results: FlightResults, origin_deg: FloatArray
 
 
 def bounds_of(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper corner of a plan that shows points, shape (n, 2), with a margin."""
+    """Return lower and upper corner of a plan that shows points, shape (n, 2), with a margin."""
     low, high = points.min(axis=0), points.max(axis=0)
     side = max(float((high - low).max()), SMALLEST_M)
     return low - MARGIN * side, high + MARGIN * side
@@ -155,7 +155,7 @@ def grid_unit(side_m: float) -> tuple[str, float]:
 
 
 def grid(low: FloatArray, high: FloatArray) -> rr.LineStrips2D:
-    """Lines of equal distance east and north; the label of each stands in its middle."""
+    """Return lines of equal distance east and north; the label of each stands in its middle."""
     side = float((high - low).max())
     step, (unit, metres) = grid_step_m(side), grid_unit(side)
     strips, labels = [], []

@@ -14,7 +14,7 @@ CONFIDENCE = 95.0
 
 
 def growth(fleet: FleetResults) -> Plot:
-    """Error of each method against the horizon."""
+    """Return the error of each method against the horizon."""
     rows, shipped = drawn(fleet), shipped_method(fleet)
     methods = list(dict.fromkeys(row.method for row in rows))
     others = (name for name in methods if name not in ("raw_ins", shipped))
