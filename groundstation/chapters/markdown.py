@@ -50,7 +50,7 @@ def markdown(
 ) -> str:
     """Return a section as a Markdown document, headed by its headline or its title.
 
-    The parts set small are left out, and figures, but for what stands in their place.
+    Parts in small type and figures are left out; a figure's replacement stays.
 
     Parameters
     ----------

@@ -171,12 +171,12 @@ class Section:
     """One chapter of the report.
 
     ``key`` is its anchor; ``lead`` says in a sentence which question it answers. ``appendix`` are parts that only a
-    report shows, behind all chapters: settings, workings, how it was computed. ``number`` is what a report counts it
-    by. ``is_open``: the answer came to nothing and ``headline`` says why; a report then tells it among what could not
-    be assessed, and its parts in the appendix.
+    report shows, behind all chapters: settings, workings, how it was computed. ``number`` is its number in a report.
+    ``is_open``: there is no answer and ``headline`` says why; a report then lists it among what could not be assessed,
+    and puts its parts in the appendix.
 
     A page without a front (a text panel, the terminal) begins with ``headline``, the answer in a few words, and
-    ``above``, what the front of a report tells of it.
+    ``above``, its parts in the front of a report.
     """
 
     key: str

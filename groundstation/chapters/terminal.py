@@ -8,7 +8,7 @@ from groundstation.chapters.wording import clean
 def terminal(section: Section) -> str:
     """Return a section as plain text, headed by its headline or its title.
 
-    The parts set small are left out, and figures, but for what stands in their place.
+    Parts in small type and figures are left out; a figure's replacement stays.
 
     Examples
     --------

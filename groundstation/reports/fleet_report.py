@@ -34,9 +34,9 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = False
 
     Notes
     -----
-    The page has a row for every flight, of more than 10 000 for those of note and the last ones; paper has at most 60
-    rows of any table, the flights of note first, and says how many more there are. The page's one script sorts and
-    filters the table of flights; without it the table stands as it is.
+    The page has a row for every flight; of more than 10 000, for those with remarks and the latest. Paper has at most
+    60 rows of any table, flights with remarks first, and says how many more there are. The page's one script sorts and
+    filters the table of flights; without it the table stays as it is.
 
     Raises
     ------

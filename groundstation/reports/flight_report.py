@@ -46,8 +46,8 @@ class Written:
 def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], *, with_pdf: bool = False) -> Written:
     """Write report.html into a flight folder, and exports of a magnetic deviation.
 
-    The exports are its table and steer card. A part that fails by a defect is left out, and summary.json and the report
-    tell it: those that failed elsewhere until then, too.
+    The exports are its table and steer card. A part that fails by a defect is left out; summary.json and the report
+    name it, and those that failed before.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def write_flight_report(folder: Path, answer_types: Mapping[str, type[Answer]], 
     answer_types : mapping of analysis name to dataclass
         What its answers become.
     with_pdf : bool
-        Write report.pdf too. Without it there is none afterwards: that of an earlier run would tell of other results.
+        Write report.pdf too. Without it an old one is removed: it would show other results.
 
     Raises
     ------

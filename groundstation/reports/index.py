@@ -119,7 +119,7 @@ def write_index(out: Path, rows: Iterable[IndexRow], answers: Sequence[str] = ()
     answers : sequence of str
         Names of the columns of the analyses.
     elsewhere : str
-        Where the rows of the flights are, if they are not among ``rows``: told in both files.
+        Where the rows of the flights are, if they are not among ``rows``; written into both files.
     """
     columns = columns_of(answers)
     told = [to_json_exactly(row) for row in sorted(rows, key=_place)]

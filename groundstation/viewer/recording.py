@@ -161,7 +161,7 @@ def tabs_of(recorder: Recorder, flight: Flight, results: FlightResults) -> Itera
 
 
 def logged(tabs: Iterable[Tab], recorder: Recorder, flight: Flight, results: FlightResults) -> list[rrb.Container]:
-    """Log tabs and, behind them, the log, which tells of those that failed and are left out."""
+    """Log tabs, and last the log's tab, which lists those that failed and are left out."""
     shown = [attempt("tab", name, tab) for name, tab in tabs]
     told = replace(results, findings=with_failures(results.findings, failures()))
     shown.append(attempt("tab", "log", log, recorder, flight, told))

@@ -17,8 +17,8 @@ PATIENCE_S = 60.0  # for so many; 2 MB take 0.04 s
 def damaged(recordings: Sequence[Path]) -> dict[Path, str]:
     """Find the recordings that Rerun cannot decode from end to end, each with the reason.
 
-    Rerun's own `rrd verify` looks, in a process of its own: whatever the bytes do to it, this process goes on. Where
-    one of several is damaged, halves are looked at again. A value changed into another that decodes is not found.
+    Rerun's own `rrd verify` reads them in a process of its own, so that a crash does not end this one. Where one of
+    several is damaged, halves are checked again. A value changed into another that decodes is not found.
 
     Raises
     ------

@@ -137,7 +137,7 @@ def remarks_of(fleet: FleetResults) -> dict[str, list[Mark]]:
 
 
 def build(fleet: FleetResults) -> Section:
-    """Build the chapter as paper has it: the flights of note first, the most severe on top."""
+    """Build the chapter for paper: flights with remarks first, the most severe on top."""
     if not len(fleet):
         return Section(KEY, "Flights", LEAD, (Note("No log gave a flight.", "unknown"),))
     every = sorted(lines(fleet), key=_gravity)

@@ -48,13 +48,13 @@ class Outcome:
     failures : tuple of Failure
         The parts that failed.
     is_beside : bool
-        Whether it is of what stands beside the flights, and of no log: the index, the page of all, another store.
+        Whether it is the outcome of no log, but of the index, the page of all flights, or another store.
     power_up : int
         Which of several power-ups in the log, from 1; 0 where the log holds one.
     more : tuple of Outcome
-        What became of the others.
+        Outcomes of the other power-ups.
     parts : tuple of PartOfRun
-        The consecutive logs of the flight: where a log begins and ends tells whether another one goes on from it.
+        The consecutive logs of the flight: their ends show whether another log continues it.
     """
 
     source: str

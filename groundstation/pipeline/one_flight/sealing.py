@@ -23,7 +23,7 @@ def seal(folder: Path, manifest: Manifest, digests: Mapping[str, str] = MappingP
     Parameters
     ----------
     folder : Path
-        That nobody takes for finished yet.
+        A folder that does not count as finished yet.
     manifest : Manifest
     digests : mapping of str to str
         SHA-256 of some of its files, by name.

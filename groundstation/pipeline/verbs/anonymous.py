@@ -84,11 +84,11 @@ class Disguise:
     Parameters
     ----------
     seed : int
-        A secret: who knows or guesses it can undo the shift. ``secrets`` makes one that is not told.
+        A secret: whoever knows or guesses it can undo the shift. The default is drawn by ``secrets``.
     start_utc_ns : int, optional
         First corrected time; None for a flight without UTC, whose times stay.
     change_deg : mapping of topic to (time_ns (n,), degrees (n,))
-        What is added to magnetic headings: declination of the true place less that of the new one.
+        Added to magnetic headings: declination of the true place minus that of the new one.
     """
 
     seed: int = field(default_factory=lambda: secrets.randbits(128))

@@ -51,7 +51,7 @@ class Wanted:
     anonymous : bool
         Without what names the flight (:mod:`groundstation.pipeline.verbs.anonymous`).
     seed : int, optional
-        Of the disguise; None: one that nobody knows.
+        Seed of the disguise; None: a random one.
     power_up : int
         Which of several power-ups in a log, from 1; 0: the only one, or that in which the range in UTC lies.
     """
@@ -91,8 +91,8 @@ def clip(
 ) -> Outcome:
     """Write a part of a flight to ``target`` (.mcap) and, beside it, its recording (.rrd).
 
-    Device times, record indices and the clock's model stay as they are; the ledger is counted anew. What stands in
-    the metadata as ``clip.*`` is told in docs/compare.md.
+    Device times, record indices and the clock's model stay as they are; the ledger is counted again. docs/compare.md
+    describes ``clip.*`` of the metadata.
 
     Parameters
     ----------

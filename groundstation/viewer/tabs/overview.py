@@ -104,7 +104,7 @@ PLOTS = (
 
 
 def overview(recorder: Recorder, results: FlightResults) -> rrb.Container:
-    """Log the overview: whatever there is of track, plots and lanes, and always the summary."""
+    """Log the overview: track, plots and lanes as far as the flight has them, and the summary."""
     recorder.document("summary", front_markdown(front(results)))
     summary = document("Flight", "summary")
     figure = results.rows_of(Overview)

@@ -1,7 +1,7 @@
 """Track in space and from above: a plan that needs no network, and a map on demand.
 
-Rerun's map fetches tiles over the network for the very place flown over, whatever the provider. The plan is therefore
-what opens; the map is behind its own tab, and a hidden tab fetches nothing.
+Rerun's map fetches tiles over the network for the very place flown over, whatever the provider. Therefore the plan
+opens first; the map has its own tab, and a hidden tab fetches nothing.
 """
 
 import numpy as np
