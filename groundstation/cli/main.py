@@ -169,7 +169,7 @@ def run(
         is_isolated=isolate,
         store=store,
     )
-    run_logs = run_together if together else run_each  # logs are joined anew at every run, in this process
+    run_logs = run_together if together else run_each  # logs are joined again at every run, in this process
     try:
         with listener("none" if quiet else progress) as listen:
             outcomes = run_logs(

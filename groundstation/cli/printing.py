@@ -11,7 +11,7 @@ from groundstation.pipeline.one_flight.log import log_name
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
 from groundstation.pipeline.verbs.describe import BusWord, Description
 
-NAMED_SHOWN = 6  # words of a bus that an ICD names, told one by one
+NAMED_SHOWN = 6  # words of a bus that an ICD names, listed one by one
 
 __all__ = ["as_json", "catalogue", "description", "outcomes", "worst_code"]
 

@@ -42,7 +42,7 @@ def _as_json(event: Event) -> None:
     if event.kind == "begin":
         document["total"] = event.total
     line = printable_json(json.dumps(document, ensure_ascii=False)) + "\n"
-    with suppress(OSError):  # nobody reads any more: the run goes on
+    with suppress(OSError):  # the reader of stderr is gone: the run goes on
         sys.stderr.write(line)  # one write: events come from two threads
         sys.stderr.flush()
 

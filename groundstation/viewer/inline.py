@@ -49,7 +49,7 @@ def inline_viewer(flight: Flight, results: FlightResults, *, width: int | str, h
             next_step="pip install 'groundstation[notebook]', or show(inline=False) for a window",
         )
     os.environ.setdefault(NOTEBOOK_ASSET, NOTEBOOK_ASSET_HERE)
-    with contextlib.redirect_stdout(io.StringIO()):  # it tells where it serves, which is nobody's business here
+    with contextlib.redirect_stdout(io.StringIO()):  # it prints its address, which a notebook does not need
         from rerun.notebook import Viewer
 
     from groundstation.viewer.recording import open_stream, send_flight

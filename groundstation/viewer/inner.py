@@ -25,7 +25,7 @@ NOTEBOOK = "rerun_notebook"  # the package that rerun.notebook imports: asked fo
 NOTEBOOK_ASSET = "RERUN_NOTEBOOK_ASSET"  # the environment's word on where the viewer in a cell comes from
 NOTEBOOK_ASSET_HERE = "serve-local"  # from this machine; left out, from the Internet
 SEGMENT = "rerun_segment_id"  # the column of its name in the table of a catalog
-# Further columns of that table: what the catalog itself tells of a recording.
+# Further columns of that table, which the catalog itself adds to a recording.
 OF_THE_CATALOG = (
     *("rerun_layer_names", "rerun_storage_urls", "rerun_last_updated_at", "rerun_num_chunks", "rerun_size_bytes"),
     *("rerun_registration_status", "rerun_registration_time", "rerun_schema_sha256"),

@@ -13,7 +13,7 @@ from groundstation.chapters.wording import ABSENT, number, percent
 from groundstation.results.fleet import FleetResults
 
 MOST_NAMES = 6
-MOST_CHANGES = 3  # told in sentences
+MOST_CHANGES = 3  # each in a sentence
 LONGEST_NAME = 24
 
 

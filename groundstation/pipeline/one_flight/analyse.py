@@ -142,7 +142,7 @@ def answers_of(flight: Flight, configuration: Configuration) -> tuple[Answered, 
     so_far = replace(known, answers=found.answers, workings=found.workings)
     judged = run_analyses(tuple(one for one in FLIGHT_ANALYSES if one.judges), flight, so_far)
     if not topics_of_kind(TRUTH, flight.topics()):
-        judged = replace(judged, not_assessable=())  # nobody asked for it
+        judged = replace(judged, not_assessable=())  # no truth was given: no reason is needed
     return found.joined(judged), known
 
 

@@ -159,7 +159,7 @@ class Configuration:
     lessons: "tuple[Lesson, ...] | None" = None
 
     def __post_init__(self) -> None:
-        self.thresholds  # noqa: B018 -- a slip is told now
+        self.thresholds  # noqa: B018 -- raises now if a value is wrong
         self.rules  # noqa: B018
         self.isolation  # noqa: B018
         if self.tables.keys() - {"thresholds", "rules", ISOLATION}:

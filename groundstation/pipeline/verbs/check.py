@@ -266,7 +266,7 @@ def _stored(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) ->
     if not census.rows:
         raise UnreadableLogError(log.path.name, "no intact record", "", "the file is damaged beyond its index")
     anew = recounted(info, damages, census)
-    if damages or has_other_limits(info, limits):  # else what was found in the log is told as it was
+    if damages or has_other_limits(info, limits):  # else the facts found in the log stay
         info = anew
     facts = facts_of(log, info.metadata, anew.ledger)
     has_lost = any(entry.get("loses_data") for entry in info.damages)

@@ -216,8 +216,8 @@ def _cut(log: Log, mcap: Path, target: Path, wanted: Wanted, limits: Thresholds)
         first_ns = first_ns if zero is None else zero_ns
         inside = _inside(info, zero_ns, first_ns, part)
         metadata = {**info.metadata, **_origin(log.source, info, zero_ns, first_ns, part, wanted)}
-        # Neither name nor digest of the log: the part is a log of its own, and two parts of one log are no twins.
-        # Nor its own name: equal parts are equal to the byte whatever they are called.
+        # Without name and digest of the log: the part is a log of its own, and two parts of one log are not the same.
+        # Without its own name: equal parts are equal to the byte under any name.
         cut = replace(inside, start_ns=first_ns, metadata=metadata)
         cut = cut if disguise is None else disguise.info(cut)
         cut = replace(cut, source_name="" if disguise is None else f"{ANONYMOUS}.mcap", source_sha256="")

@@ -21,7 +21,7 @@ from groundstation.tables.table import Flight
 if TYPE_CHECKING:
     from groundstation.tables.session_settings import Stations
 
-LISTED = 3  # spans told of a shortfall
+LISTED = 3  # spans listed for a shortfall
 
 FLIGHT_PURPOSES: Mapping[str, Analysis] = MappingProxyType({one.name: one for one in FLIGHT_ANALYSES if one.examine})
 SESSION_PURPOSES: Mapping[str, Analysis] = MappingProxyType({one.name: one for one in SESSION_ANALYSES if one.examine})

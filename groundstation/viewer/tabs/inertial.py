@@ -20,7 +20,7 @@ from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.series import runs
 from groundstation.viewer.views import document, lanes
 
-# Of each page the name, what stands before the titles of its axes, and the figures: each has panels north and east.
+# Name of each page, prefixes of its axis titles, and its figures, each with panels north and east.
 PAGES: tuple[tuple[str, str, tuple[tuple[str, ...], ...]], ...] = (
     (
         "Position, velocity, tilt, drift",
