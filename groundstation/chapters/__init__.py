@@ -1,1 +1,4 @@
-"""Chapters: what the answers of a flight say, told once, without markup; :mod:`.by_answer` lists them."""
+"""Chapters: the answers of a flight in words, written once and without markup.
+
+:mod:`.by_answer` lists them.
+"""

@@ -1,4 +1,7 @@
-"""An acceptance as chapters: limits, INS, flights, configuration, signatures; in the order of its standard's layout."""
+"""Chapters of an acceptance, in the order that its standard lays down.
+
+Limits, INS, flights, configuration, signatures.
+"""
 
 from collections.abc import Callable
 
@@ -22,7 +25,7 @@ LONGEST = 32
 
 
 def sections(found: Acceptance) -> tuple[Section, ...]:
-    """The chapters in the order of the standard's layout, those without parts left out."""
+    """Return the chapters in the order of the standard's layout, those without parts left out."""
     build = LAYOUTS[found.standard.layout]
     return tuple(section for section in build(found) if section.parts)
 

@@ -1,4 +1,4 @@
-"""The decision of an acceptance in words: what stands on top of its page."""
+"""Top of the page of an acceptance: its decision in words."""
 
 import math
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ MARKS: dict[Decision, Mark] = {
 
 
 def front(found: Acceptance) -> Front:
-    """What stands on top: the decision, what it rests on, key figures."""
+    """Return the top of an acceptance report: the decision, its basis, key figures."""
     whole, included = _whole(found), found.included
     aircraft = sorted({flight.aircraft for flight in included if flight.aircraft})
     pairs: tuple[tuple[str, Cell], ...] = (
@@ -53,7 +53,7 @@ def front(found: Acceptance) -> Front:
 
 
 def headline(found: Acceptance) -> str:
-    """What was decided, in a line."""
+    """Return the decision in a line."""
     if not found.included:
         return "No flight can be judged"
     judged = [one for one in found.judgements if one.ins == ENSEMBLE and one.decision != "not flown"]
@@ -89,7 +89,7 @@ def _told(found: Acceptance, one: Judgement) -> str:
 
 
 def stated(share: float) -> str:
-    """A share as the standard states it, not rounded: 99.99 % is not 100 %.
+    """Return a share as the standard states it, not rounded: 99.99 % is not 100 %.
 
     Examples
     --------
@@ -101,7 +101,7 @@ def stated(share: float) -> str:
 
 
 def at_least(share: float) -> str:
-    """A lower limit, rounded down: one that just misses 95 % must not read 95.0 %.
+    """Return a lower limit, rounded down: one that just misses 95 % must not read 95.0 %.
 
     Examples
     --------
@@ -112,7 +112,7 @@ def at_least(share: float) -> str:
 
 
 def is_worth_less(one: Judgement) -> bool:
-    """Whether the flights count as fewer independent ones."""
+    """Tell whether the flights count as fewer independent ones."""
     return one.effective_flights < one.flights - 0.05
 
 
@@ -131,7 +131,7 @@ def _missing(one: Judgement) -> str:
 
 
 def wanted(limit: Limit) -> str:
-    """The bounds of a limit in words.
+    """Return the bounds of a limit in words.
 
     Examples
     --------
@@ -146,7 +146,7 @@ def _of_bound(bound: Bound, value: float) -> str:
 
 
 def bound_text(limit: Limit, one: Judgement) -> str:
-    """What the share stays below, in the unit of the limit where it has one bound."""
+    """Return the upper bound of the share, in the unit of the limit where it has one bound."""
     if one.share_bound is None:
         return ABSENT
     if len(limit.bounds) == 1:

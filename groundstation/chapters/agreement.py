@@ -1,4 +1,4 @@
-"""The line that sets two analyses of one log beside each other."""
+"""Line that compares two analyses of one log."""
 
 from groundstation.chapters.parts import Note, Tone
 from groundstation.chapters.wording import interval, number, sentence
@@ -8,7 +8,10 @@ UNITS = {"deg": ("°", 2), "s": ("s", 3)}
 
 
 def agreement_note(found: Agreement | None) -> Note | None:
-    """Both values with their 95 % intervals, and by how many sigma they differ; None where there is nothing to say."""
+    """Return both values with 95 % intervals and their difference in sigmas, or None.
+
+    None where there is nothing to compare.
+    """
     if found is None:
         return None
     unit, places = UNITS[found.unit]

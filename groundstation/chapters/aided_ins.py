@@ -1,4 +1,7 @@
-"""Chapter: an INS that GNSS corrects, or may correct: INS - GNSS, and the innovations that its own filter logged."""
+"""Chapter on an INS that GNSS corrects, or may correct.
+
+INS - GNSS, and the innovations that its own filter logged.
+"""
 
 from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
 from groundstation.chapters.wording import ABSENT, any_value, clock, number, percent, typeset, unit_sign
@@ -11,7 +14,7 @@ PLACES = {"m": 2, "mps": 3}
 
 
 def aided(answer: InertialResult) -> Section:
-    """The chapter of an INS that GNSS corrects, or of which that cannot be told."""
+    """Return the chapter of an INS that GNSS corrects, or may correct."""
     position = answer.difference("position")
     is_known = answer.kind == "gnss_aided"
     within = f": within {number(position.p95, 1, 'm')} of it (95 %)" if position is not None and is_known else ""

@@ -1,4 +1,4 @@
-"""What could not be assessed: subjects and reasons in plain words."""
+"""Subjects that could not be assessed, and the reasons in plain words."""
 
 from groundstation.chapters.generic import titled
 from groundstation.chapters.parts import Note, Section
@@ -23,13 +23,16 @@ SUBJECTS = {
 
 
 def reason_of(results: FlightResults, analysis: str) -> str:
-    """Why an analysis could not be carried out, in plain words; empty where nothing is said about it."""
+    """Return why an analysis could not be carried out, in plain words.
+
+    Empty where the results give no reason.
+    """
     reasons = results.reasons(analysis)
     return explained(analysis, reasons[0]) if reasons else ""
 
 
 def not_assessed(results: FlightResults) -> tuple[tuple[str, str], ...]:
-    """Subject and reason of every analysis that could not be carried out."""
+    """Return the subject and reason of every analysis that could not be carried out."""
     return tuple(
         (SUBJECTS.get(one.analysis) or titled(words(one.analysis)), typeset(in_plain_words(one.reason)))
         for one in results.not_assessable
@@ -37,6 +40,6 @@ def not_assessed(results: FlightResults) -> tuple[tuple[str, str], ...]:
 
 
 def without_answer(results: FlightResults, analysis: str, title: str, lead: str) -> Section | None:
-    """The chapter of an analysis that has no answer; None where no reason is known."""
+    """Return the chapter of an analysis that has no answer; None where no reason is known."""
     reason = reason_of(results, analysis)
     return Section(analysis, title, lead, (Note(f"Not assessable: {reason}", "unknown"),)) if reason else None

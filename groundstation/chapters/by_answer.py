@@ -20,7 +20,8 @@ def answer_chapters(results: FlightResults, chapters: Chapters) -> tuple[Section
 def chapters_of(results: FlightResults, chapters: Chapters) -> tuple[Section, ...]:
     """Build the chapters on all answers: their own, then a generic one for every other.
 
-    A chapter of a flight without its answer says why there is none.
+    First those written for an answer, then a generic one for each other answer. A chapter of a flight without its
+    answer says why there is none.
     """
     every = (*_built(chapters.of(results), results), *_generic(results, chapters))
     return tuple(section for section in every if section is not None)

@@ -1,4 +1,7 @@
-"""A comparison of two flights: who they are, which answers, settings and findings differ."""
+"""Chapters of a comparison of two flights.
+
+Their sources, and the answers, settings and findings that differ.
+"""
 
 from collections.abc import Sequence
 
@@ -15,7 +18,7 @@ SHARED = (
 
 
 def opening(comparison: Comparison) -> list[Part]:
-    """Who A and B are, and how their clocks are aligned."""
+    """Return who A and B are, and how their clocks are aligned."""
     sides = comparison.a, comparison.b
     rows = [
         ("Aircraft, flight", *(f"{side.aircraft} {side.flight}".strip() or ABSENT for side in sides)),
@@ -32,7 +35,7 @@ def opening(comparison: Comparison) -> list[Part]:
 
 
 def answers(comparison: Comparison) -> Section:
-    """The answers that both have."""
+    """Return the answers that both flights have."""
     heads = (
         Head("Answer"),
         Head("A", True),
@@ -64,7 +67,7 @@ def _value(value: Value) -> str:
 
 
 def settings(comparison: Comparison) -> Section | None:
-    """The settings that differ; None where none does."""
+    """Return the settings that differ; None where none does."""
     if not comparison.settings:
         return None
     rows = [(pair.name, _value(pair.a), _value(pair.b)) for pair in comparison.settings]
@@ -74,7 +77,7 @@ def settings(comparison: Comparison) -> Section | None:
 
 
 def findings(comparison: Comparison) -> Section | None:
-    """What was noticed in one alone; None where there is nothing."""
+    """Return the findings that one flight has and the other has not; None without any."""
     sides = (
         ("A", comparison.findings_a, comparison.not_assessable_a),
         ("B", comparison.findings_b, comparison.not_assessable_b),

@@ -1,4 +1,7 @@
-"""Chapter: how aircraft should move: the laws of control side by side, and what the recommended one asks for."""
+"""Chapter on how aircraft should move.
+
+The laws of control side by side, and the commands of the recommended one.
+"""
 
 from collections.abc import Mapping
 
@@ -45,7 +48,7 @@ CONTROL_HEADS = (
 
 
 def control(results: FlightResults) -> Section | None:
-    """The chapter; None without an answer."""
+    """Return the chapter on control; None without an answer."""
     answer = results.answer(ControlPlan)
     if answer is None:
         return None
@@ -63,7 +66,7 @@ def control(results: FlightResults) -> Section | None:
 
 
 def title_of(law: str) -> str:
-    """Name of a law for people."""
+    """Return the name of a law for people."""
     return LAWS.get(law, law)
 
 

@@ -1,4 +1,7 @@
-"""Chapter: navigation between aircraft: which algorithm to trust, how good it is, and on what it rests."""
+"""Chapter on navigation between aircraft: which algorithm to trust, and why.
+
+How good it is, and on what it rests.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -63,7 +66,7 @@ CLOCK_HEADS = (
 
 
 def cooperative(results: FlightResults) -> Section | None:
-    """The chapter; None when the results are not those of a session."""
+    """Return the chapter on a session; None for results of one flight."""
     answer = results.answer(CooperativeResult)
     if answer is None:
         return without_answer(results, "cooperative", TITLE, LEAD)
@@ -87,7 +90,7 @@ def cooperative(results: FlightResults) -> Section | None:
 
 
 def trusted(answer: CooperativeResult) -> AlgorithmRow:
-    """The algorithm to trust.
+    """Return the algorithm to trust.
 
     The default, unless the truth speaks against it: then, of those that neither diverge nor claim less error than they
     make, the one with the least error, where there is any. One session is too little to choose by its error alone. Dead
@@ -102,19 +105,22 @@ def trusted(answer: CooperativeResult) -> AlgorithmRow:
 
 
 def _is_safe(row: AlgorithmRow) -> bool:
-    """Whether truth shows neither divergence nor a sigma that is too small; one that is too large misleads nobody."""
+    """Tell whether truth shows neither divergence nor a sigma that is too small.
+
+    A sigma that is too large misleads nobody.
+    """
     if row.nees is None or row.nees_high is None:
         return False
     return row.diverges is False and row.nees <= row.nees_high
 
 
 def title_of(algorithm: str) -> str:
-    """Name of an algorithm for people."""
+    """Return the name of an algorithm for people."""
     return TITLES.get(algorithm, words(algorithm))
 
 
 def state_of(row: AlgorithmRow | SessionRow) -> Mark:
-    """What truth says of an algorithm, in a word."""
+    """Return the judgement of truth on an algorithm, in a word."""
     if row.diverges is None or row.is_consistent is None:
         return Mark("unknown", "Not judged")
     if row.diverges:
@@ -123,7 +129,7 @@ def state_of(row: AlgorithmRow | SessionRow) -> Mark:
 
 
 def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -> Front:
-    """The top of a session's report: what was found, or why nothing."""
+    """Return the top of a session's report: what was found, or why nothing."""
     answer = results.answer(CooperativeResult)
     if answer is None:
         why = reason_of(results, "cooperative") or "the logs do not hold what the method needs"
@@ -155,7 +161,7 @@ def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -
 
 
 def names_or_count(names: Sequence[str]) -> str:
-    """Names of a few aircraft; of many how many they are.
+    """Return the names of a few aircraft, or the count of many.
 
     Examples
     --------
@@ -278,7 +284,7 @@ def _geometry(answer: CooperativeResult) -> Grid | None:
 
 
 def worst_first(links: tuple[LinkRow, ...]) -> list[LinkRow]:
-    """Links in order of their residuals; those of which nothing was used first."""
+    """Return links by residual, largest first; links without a used range come before them."""
     return sorted(links, key=lambda row: (row.used > 0, -(row.residual_rms_m or 0.0), row.receiver, row.source))
 
 

@@ -1,4 +1,4 @@
-"""Chapter: what a user must know about the flight, most severe first, and what could not be assessed."""
+"""Chapter on findings: what a user must know, most severe first; what was not assessed."""
 
 from collections.abc import Sequence
 
@@ -18,9 +18,10 @@ HEADS = (Head("Severity"), Head("Finding"), Head("Where"), Head("Count", True))
 
 
 def findings(results: FlightResults) -> Section:
-    """The chapter: warnings and failures, remarks in the appendix; no findings is an answer too.
+    """Return the chapter on findings: warnings and failures, remarks in the appendix.
 
-    What the front tells is left out: verdicts, and what could not be assessed.
+    A flight without findings has the chapter too, which then says so. What the front tells is left out: verdicts, and
+    what could not be assessed.
     """
     found = [item for item in grouped(results.findings) if not item.code.endswith(TOLD_ABOVE)]
     grave = [item for item in found if item.severity != "info"]
@@ -32,7 +33,7 @@ def findings(results: FlightResults) -> Section:
 
 
 def _one_of_each(remarks: Sequence[Finding]) -> list[Finding]:
-    """The first remark of every kind, with the topics and the sum of the counts of all of that kind."""
+    """Return the first remark of every kind, with all topics and the summed count of the kind."""
     kinds: dict[str, list[Finding]] = {}
     for remark in remarks:
         kinds.setdefault(remark.code, []).append(remark)
@@ -48,7 +49,7 @@ def _joined(alike: Sequence[Finding]) -> Finding:
 
 
 def not_assessable(results: FlightResults) -> Grid | None:
-    """The analyses that could not be carried out, each with its reason; None where all could."""
+    """Return the analyses that could not be carried out, with reasons; None where all could."""
     rows = [(entry.analysis, explained(entry.analysis, entry.reason)) for entry in results.not_assessable]
     return Grid("Not assessable", (Head("Analysis"), Head("Reason")), rows) if rows else None
 

@@ -1,4 +1,7 @@
-"""Chapter: the forecast (system 2): how good it is by method and horizon, and whether its sigma is honest."""
+"""Chapter on the forecast (system 2).
+
+How good it is by method and horizon, and whether its sigma is honest.
+"""
 
 from collections.abc import Iterable
 
@@ -31,7 +34,7 @@ LEAD = (
 
 
 def forecast(results: FlightResults) -> Section | None:
-    """The chapter; None when the flight was not assessed and no reason is known."""
+    """Return the chapter; None when the flight was not assessed and no reason is known."""
     answer, ins = results.answer(ForecastResult), results.answer(InertialResult)
     if answer is None:
         return without_answer(results, "forecast", TITLE, LEAD)
@@ -56,7 +59,7 @@ def forecast(results: FlightResults) -> Section | None:
 
 
 def short(method: str) -> str:
-    """Name of a method for the head of a column.
+    """Return the name of a method for the head of a column.
 
     Examples
     --------
@@ -67,7 +70,7 @@ def short(method: str) -> str:
 
 
 def _heads(first: str, titles: Iterable[str]) -> tuple[Head, ...]:
-    """A head for the names and one for each column of numbers."""
+    """Return a head for the names and one for each column of numbers."""
     return (Head(first), *(Head(title, True) for title in titles))
 
 
@@ -117,7 +120,7 @@ def _default_in_detail(answer: ForecastResult) -> Grid | None:
 
 
 def _calibration(answer: ForecastResult) -> list[Grid]:
-    """A table for each method compared: the shipped one first."""
+    """Return a table for each method compared: the shipped one first."""
     titles = ("Starts", "Independent", "In 50 %", "In 68 %", "In 95 %", "NEES", "95 % limits", "σ scale")
     heads = (*_heads("Horizon", titles), Head("NEES is"))
     caption = (

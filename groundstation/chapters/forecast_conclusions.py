@@ -1,4 +1,4 @@
-"""What the chapter on the forecast comes to, in sentences: skill, honesty of the sigma, windows."""
+"""Conclusions of the chapter on the forecast: skill, honesty of the sigma, windows."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,12 +12,12 @@ HEADLINE_MIN = 60.0  # the horizon the conclusion quotes, or the longest there i
 
 
 def conclusions(answer: ForecastResult) -> list[Note]:
-    """A sentence or two for skill, honesty and windows."""
+    """Return a sentence or two for skill, honesty and windows."""
     return [note for note in (_gain(answer), _honesty(answer), _windows(answer)) if note is not None]
 
 
 def rows_of(answer: ForecastResult, method: str) -> dict[float, SkillRow]:
-    """Skill rows of a method by horizon, those that have an error."""
+    """Return skill rows of a method by horizon, those that have an error."""
     return {
         float(row.horizon_min): row
         for row in answer.skill
@@ -26,7 +26,7 @@ def rows_of(answer: ForecastResult, method: str) -> dict[float, SkillRow]:
 
 
 def title_of(method: str) -> str:
-    """Title of a method for people."""
+    """Return the title of a method for people."""
     return METHODS.get(method, method)
 
 
@@ -72,7 +72,7 @@ def _honesty(answer: ForecastResult) -> Note | None:
 
 
 def _uncalibrated(answer: ForecastResult) -> str:
-    """The sentence that opens the judgement of a forecast that is not calibrated."""
+    """Return the sentence that opens the judgement of a forecast that is not calibrated."""
     if answer.is_calibrated:
         return ""
     reason = typeset(answer.calibration_reason).strip().rstrip(".")
@@ -80,7 +80,7 @@ def _uncalibrated(answer: ForecastResult) -> str:
 
 
 def _misfit(shares: Mapping[float, float], every: Sequence[float]) -> str:
-    """Where the band is too narrow or too wide; empty where it fits."""
+    """Return at which horizons the band is too narrow or too wide; empty where it fits."""
     narrow = [lead for lead, share in shares.items() if share < HONEST[0]]
     wide = [lead for lead, share in shares.items() if share > HONEST[1]]
     told = [
@@ -91,7 +91,7 @@ def _misfit(shares: Mapping[float, float], every: Sequence[float]) -> str:
 
 
 def _too_few(answer: ForecastResult) -> set[float]:
-    """Horizons at which the shipped method has too few independent starts for a judgement."""
+    """Return the horizons at which the shipped method has too few independent starts."""
     return {
         float(row.horizon_min)
         for row in answer.calibration
@@ -100,7 +100,10 @@ def _too_few(answer: ForecastResult) -> set[float]:
 
 
 def _windows(answer: ForecastResult) -> Note | None:
-    """Whether the windows of Neusypin 2003 help on this flight: beside the last estimate of their own model."""
+    """Return whether the windows of Neusypin 2003 help on this flight.
+
+    They are compared with the last estimate of their own model.
+    """
     windows, last = rows_of(answer, "windows"), _separate_last(answer)
     shared = sorted(set(windows) & set(last))
     if not shared:
@@ -116,7 +119,10 @@ def _windows(answer: ForecastResult) -> Note | None:
 
 
 def _separate_last(answer: ForecastResult) -> dict[float, float]:
-    """RMS of the last estimate of two separate channels by horizon, whichever model the settings forecast by."""
+    """Return the RMS of the last estimate of two separate channels, by horizon.
+
+    The same whichever model the settings forecast by.
+    """
     found = {float(row.horizon_min): row.rms_m / (1.0 - row.gain) for row in answer.coupled if row.gain < 1.0}
     return found or {lead: row.rms_m for lead, row in rows_of(answer, "last_estimate").items()}
 
@@ -135,7 +141,7 @@ def _where(some: Sequence[float], every: Sequence[float]) -> str:
 
 
 def listed(values: Sequence[float]) -> str:
-    """Numbers in a row of words.
+    """Return numbers in a row of words.
 
     Examples
     --------

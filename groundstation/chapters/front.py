@@ -1,4 +1,4 @@
-"""The top of the report: which flight this is, its best answer, the others as tiles, what could not be assessed."""
+"""Top of the report: which flight, its best answer, others as tiles, what is not assessed."""
 
 from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.timescales import utc_ns_to_iso
@@ -53,7 +53,7 @@ def front(results: FlightResults, chapters: Chapters) -> Front:
 
 
 def _recorded(results: FlightResults) -> tuple[str, ...]:
-    """A sentence that names the topics of the log, those of raw data left out; none without such topics."""
+    """Return a sentence that names the topics of the log, except raw data; none without any."""
     topics = sorted(topic for topic in results.completeness if not topic.startswith(RAW_PREFIX))
     return (f"In the log: {', '.join(topics)}.",) if topics else ()
 

@@ -1,4 +1,4 @@
-"""The gates of an answer and the settings it was found with, as every chapter tells them."""
+"""Gates and settings of an answer, in the same form in every chapter."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ CAPTION = "Accept requires every gate except those that only inform."
 
 
 def gate_grid(gates: Sequence[Gate]) -> Grid | None:
-    """The gates of an answer, each with figure, limit and reason; None where there are none."""
+    """Return the gates of an answer, each with figure, limit and reason; None without any."""
     return Grid("Gates", HEADS, [_row(gate) for gate in gates], CAPTION) if gates else None
 
 
@@ -33,7 +33,7 @@ def _row(gate: Gate) -> tuple[Cell, ...]:
 
 
 def failed_to_inform(gates: Sequence[Gate]) -> str:
-    """A sentence that names the failed gates that only inform; empty without one.
+    """Return a sentence that names the failed gates that only inform; empty without one.
 
     Examples
     --------
@@ -50,7 +50,7 @@ def failed_to_inform(gates: Sequence[Gate]) -> str:
 
 
 def state_of(gate: Gate) -> Mark:
-    """The state of a gate; one that only informs does not stand against an accepted answer.
+    """Return the state of a gate; a failed one that only informs is a warning.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def state_of(gate: Gate) -> Mark:
 
 
 def limit_text(gate: Gate) -> str:
-    """A gate's limit with its sense.
+    """Return a gate's limit with its sense.
 
     Examples
     --------
@@ -81,7 +81,7 @@ def limit_text(gate: Gate) -> str:
 
 
 def setting_facts(settings: Mapping[str, float | str | bool], table: str = "") -> Facts | None:
-    """The settings an answer was found with, spelled as in a settings file; None where there are none.
+    """Return the settings behind an answer, spelled as in a settings file; None without any.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def setting_facts(settings: Mapping[str, float | str | bool], table: str = "") -
 
 
 def _in_toml(settings: Mapping[str, float | str | bool]) -> dict[str, str]:
-    """Keys and values as typed; a range, kept as its two ends, is an array again."""
+    """Return keys and values as typed; a range, kept as its two ends, is an array again."""
     told = {name: _value(value) for name, value in settings.items()}
     for low in [name for name in told if name.endswith(".low") and f"{name[:-4]}.high" in told]:
         told[low[:-4]] = f"[{told.pop(low)}, {told.pop(f'{low[:-4]}.high')}]"

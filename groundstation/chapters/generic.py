@@ -1,8 +1,8 @@
-"""The chapter of an answer that has none of its own, told by the names and kinds of its fields.
+"""Chapter of an answer that has no chapter of its own, from names and kinds of its fields.
 
 A name gives words and unit. A number or a text is a fact, a tuple of rows a grid, a dataclass facts under a title of
-their own. ``verdict`` with ``verdict_reason``, ``gates``, ``remarks`` and ``settings`` are told as every chapter tells
-them.
+their own. ``verdict`` with ``verdict_reason``, ``gates``, ``remarks`` and ``settings`` are presented as in every
+chapter.
 """
 
 import inspect
@@ -49,7 +49,7 @@ MOST_ROWS, MOST_VALUES = 40, 12
 
 
 def generic(results: FlightResults, answer: Answer) -> Section:
-    """The chapter of an answer, whatever it holds."""
+    """Return the chapter of an answer of any type."""
     title, verdict = titled(words(answer.analysis)), str(getattr(answer, "verdict", ""))
     plain = {name: value for name, value in _fields(answer) if name not in TOLD_ALIKE}
     parts: tuple[Part | None, ...] = (
@@ -70,7 +70,7 @@ def generic(results: FlightResults, answer: Answer) -> Section:
 
 
 def figures_over_time(results: FlightResults, analysis: str) -> tuple[str, ...]:
-    """Names of an analysis' figures that have rows and a column ``time_s``.
+    """Return names of an analysis' figures that have rows and a column ``time_s``.
 
     A figure belongs to the analysis whose name its own begins with, of several the longest: ``wind_samples`` to
     ``wind``.
@@ -86,7 +86,7 @@ def figures_over_time(results: FlightResults, analysis: str) -> tuple[str, ...]:
 
 
 def quantity(name: str) -> tuple[str, str]:
-    """A field name as words, and the sign of its unit.
+    """Return a field name as words, and the sign of its unit.
 
     Examples
     --------
@@ -100,7 +100,9 @@ def quantity(name: str) -> tuple[str, str]:
 
 
 def columns_by_unit(figure: FigureData) -> dict[str, tuple[str, ...]]:
-    """Columns of numbers that a figure has beside ``time_s``, by the sign of their unit; without a number, none.
+    """Return the columns of numbers beside ``time_s`` of a figure, by the sign of their unit.
+
+    Columns without a finite number are left out.
 
     Examples
     --------
@@ -121,7 +123,7 @@ def _is_of(name: str, analysis: str) -> bool:
 
 
 def titled(text: str) -> str:
-    """Words as a title; what people write in capitals stands so.
+    """Return words as a title; abbreviations keep their capitals.
 
     Examples
     --------
@@ -137,7 +139,7 @@ def _fields(holder: Any) -> list[tuple[str, Any]]:
 
 
 def _lead(answer: Answer) -> str:
-    """The first paragraph of the answer's docstring; empty where nobody wrote one."""
+    """Return the first paragraph of the answer's docstring; empty without one."""
     kind = type(answer)
     told = " ".join((inspect.cleandoc(kind.__doc__ or "").partition("\n\n")[0]).split())
     return "" if told.startswith(f"{kind.__name__}(") else told  # which a dataclass writes itself
@@ -151,7 +153,7 @@ def _verdict(verdict: str, reason: str) -> Note | None:
 
 
 def _has_parts(value: Any) -> bool:
-    """Whether a value is more than a fact: a dataclass, a mapping, rows."""
+    """Tell whether a value is more than a fact: a dataclass, a mapping, rows."""
     rows = isinstance(value, tuple) and bool(value) and all(is_dataclass(row) for row in value)
     return rows or is_dataclass(value) or isinstance(value, Mapping)
 
@@ -188,7 +190,10 @@ def _grid(title: str, rows: Sequence[Any]) -> Grid:
 
 
 def _told(name: str, value: Any, unit: str) -> str:
-    """A value in words, a number rounded as it is saved: the recording and the report tell the same."""
+    """Return a value in words, numbers rounded as they are saved.
+
+    So the recording and the report show the same.
+    """
     if isinstance(value, list | tuple) and len(value) > MOST_VALUES:
         return f"{len(value)} values"
     if isinstance(value, list | tuple):

@@ -1,4 +1,7 @@
-"""Chapter: heading correction (system 1): gates, estimates and the figures of the published method (Markelov 2015)."""
+"""Chapter on heading correction (system 1).
+
+Gates, estimates and the figures of the published method (Markelov 2015).
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -35,7 +38,7 @@ RUNWAY_HEADS = (
 
 
 def heading(results: FlightResults) -> Section:
-    """The chapter; without a result it says why there is none."""
+    """Return the chapter; without an answer it says why there is none."""
     answer = results.answer(HeadingResult)
     if answer is None:
         note = Note(f"Not assessable: {reason_of(results, 'heading') or UNKNOWN_REASON}", "unknown")
@@ -160,7 +163,10 @@ def _runway(answer: HeadingResult) -> Grid | None:
 
 
 def _standstill(still: Standstill | None) -> tuple[Part, ...]:
-    """The figures of the standstill; of a receiver that holds its velocity they would be flat lines at zero."""
+    """Return the figures of the standstill.
+
+    A note instead where the receiver holds its velocity: the figures would be flat lines at zero.
+    """
     return (Note(HELD, "unknown"),) if still is not None and still.velocity_is_held else STANDSTILL_FIGURES
 
 
@@ -216,7 +222,11 @@ def _geometry(answer: HeadingResult) -> Facts:
 
 
 def _spread(answer: HeadingResult, *, has_serial: bool) -> Facts | None:
-    """What parts of the taxi have of their own, what is added for steady terms, and steps."""
+    """Return the sigmas behind the interval and the steps of the INS heading.
+
+    Own error of a segment, wander, the parts that wind and steady sideslip add; None where no steady sideslip was
+    assessed.
+    """
     if not is_number(answer.steady_sigma_deg):
         return None
     wander = f"over {number(answer.wander_s, 0, 's')}"
@@ -235,7 +245,7 @@ def _spread(answer: HeadingResult, *, has_serial: bool) -> Facts | None:
 
 
 def _of_the_wind(answer: HeadingResult) -> list[tuple[str, str, str]]:
-    """The parts of the interval, each alone, and the sideslip that a known wind has made."""
+    """Return the parts of the interval, each alone, and the sideslip of a known wind."""
     rows = [
         (f"95 % half width, {PARTS.get(one.name, one.name)} alone", number(one.half_width_deg, 3, "°"), "")
         for one in answer.interval_parts
@@ -252,7 +262,7 @@ def _with_sigma(value: float | None, sigma: float | None, places: int, unit: str
 
 
 def _latency(answer: HeadingResult) -> list[tuple[str, str, str]]:
-    """The latency by which GNSS was put back before all else; nothing where it was not."""
+    """Return the latency by which GNSS was shifted before all else; empty where it was not."""
     if not is_number(answer.latency_used_s):
         return []
     value = _with_sigma(answer.latency_used_s, answer.latency_used_sigma_s, 3, "s")
@@ -260,7 +270,7 @@ def _latency(answer: HeadingResult) -> list[tuple[str, str, str]]:
 
 
 def _settings(settings: Mapping[str, float | str | bool]) -> tuple[Facts | None, Facts | None]:
-    """Those of the settings file, and those of the aircraft file."""
+    """Return the settings of the settings file, and those of the aircraft file."""
     own = {name: value for name, value in settings.items() if not name.startswith(AIRCRAFT)}
     aircraft = {name.removeprefix(AIRCRAFT): value for name, value in settings.items() if name.startswith(AIRCRAFT)}
     return setting_facts(own, "heading"), setting_facts(aircraft, "aircraft")

@@ -1,4 +1,7 @@
-"""Chapter: INS errors (system 2): what the INS is like, its states with sigma, and how consistent the filter is."""
+"""Chapter on INS errors (system 2).
+
+The quality of the INS, the error states with sigma, and the consistency of the filter.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -37,7 +40,7 @@ LEAD = "A Kalman filter estimates the errors of the INS against GNSS, north and 
 
 
 def inertial(results: FlightResults) -> Section | None:
-    """The chapter; None when the flight was not assessed and no reason is known."""
+    """Return the chapter; None when the flight was not assessed and no reason is known."""
     answer = results.answer(InertialResult)
     if answer is None:
         return without_answer(results, "inertial", TITLE, LEAD)
@@ -71,7 +74,7 @@ def _headline(answer: InertialResult) -> str:
 
 
 def _conclusions(answer: InertialResult) -> list[Note]:
-    """The chapter in a few sentences: what the INS is like, and whether the filter can be trusted."""
+    """Return the chapter in a few sentences: quality of the INS, trust in the filter."""
     notes = [_quality(answer)]
     if answer.reopened > 0:
         times = "once" if answer.reopened == 1 else f"{number(answer.reopened, 0)} times"
@@ -84,7 +87,7 @@ def _conclusions(answer: InertialResult) -> list[Note]:
 
 
 def _rates(answer: InertialResult) -> tuple[str, str]:
-    """Radial error over time, median and 95 %."""
+    """Return the radial error over time, median and 95 %."""
     median, p95 = answer.radial_error_rate_50_nmiph, answer.radial_error_rate_95_nmiph
     return number(median, 2, "nmi/h"), number(p95, 2, "nmi/h")
 
@@ -173,7 +176,7 @@ def _figures_of_merit(answer: InertialResult) -> Facts:
 
 
 def _start(answer: InertialResult) -> list[tuple[str, str, str]]:
-    """When navigation began, a row of the figures; none of an older answer."""
+    """Return when navigation began, as a row of the figures; no row for an older answer."""
     start = answer.navigation_start
     if start is None:
         return []
@@ -201,7 +204,7 @@ def _states(answer: InertialResult) -> Grid | None:
 
 
 def _state_row(answer: InertialResult, states: list[StateEstimate | None]) -> tuple[str, ...]:
-    """One state of both channels, None in a channel that lacks it."""
+    """Return one state of both channels, None in a channel that lacks it."""
     known = next(state for state in states if state is not None)
     title = known.title or known.name
     title = f"{title[:1].upper()}{title[1:]}, {unit_sign(known.unit)}"
@@ -288,7 +291,7 @@ def _azimuth(azimuth: AzimuthEstimate | None) -> Note | None:
 
 
 def _settings(settings: Mapping[str, float | str | bool]) -> tuple[Facts | None, ...]:
-    """What stands in the settings file, and the noise that follows from the class of the INS."""
+    """Return the keys of the settings file, and the noise that follows from the INS class."""
     own = {name: value for name, value in settings.items() if not name.startswith(NOISE)}
     noise = {name.removeprefix(NOISE): value for name, value in settings.items() if name.startswith(NOISE)}
     facts = setting_facts(noise)

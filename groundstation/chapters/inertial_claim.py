@@ -1,4 +1,7 @@
-"""What the INS errors and the forecast answer at a glance: how fast the INS drifts, and how far a forecast can go."""
+"""Claims of the INS errors and of the forecast.
+
+How fast the INS drifts, and how far a forecast can go.
+"""
 
 from groundstation.chapters.parts import Claim, Mark, Rank, Tone
 from groundstation.chapters.wording import is_number, number
@@ -10,7 +13,7 @@ HOUR_MIN = 60.0  # the horizon a forecast is judged by at a glance, or the longe
 
 
 def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -> Claim:
-    """Drift of an INS that GNSS does not correct.
+    """Return the drift of an INS that GNSS does not correct.
 
     ``quality`` says in a sentence whether the filter can be trusted; ``is_doubtful`` that its sigmas are too small.
     """
@@ -41,26 +44,35 @@ def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -
 
 
 def drift_of(answer: InertialResult) -> tuple[float | None, str]:
-    """How fast the position error grows, nmi/h, and by what measure: the median where an older version saved no fit."""
+    """Return how fast the position error grows, nmi/h, and the measure of it.
+
+    The measure is the median where an older version saved no fit.
+    """
     if answer.radial_error_rate_fit_nmiph is None:
         return answer.radial_error_rate_50_nmiph, "median"
     return answer.radial_error_rate_fit_nmiph, "time-position fit"
 
 
 def is_start_unknown(answer: InertialResult) -> bool:
-    """Whether nothing shows when navigation began; answers saved by older versions did not ask."""
+    """Tell whether the start of navigation is unknown.
+
+    False for answers of older versions, which did not look for it.
+    """
     return answer.navigation_start is not None and answer.navigation_start.time_s is None
 
 
 def growth(answer: InertialResult) -> str:
-    """Position error at the ends of the log, and the time between them, in words."""
+    """Return the position error at the ends of the log, and the time between them, in words."""
     minutes = None if answer.compared_hours is None else 60.0 * answer.compared_hours
     first, last = (number(error, 0, "m") for error in (answer.radial_error_first_m, answer.radial_error_last_m))
     return f"{first} at first, {last} after {number(minutes, 0, 'min')}"
 
 
 def forecast_claim(answer: ForecastResult, sentences: tuple[str, ...], tone: Tone) -> Claim | None:
-    """Error of the shipped forecast after an hour, or as near to it as the flight goes; None without an error."""
+    """Return the error of the shipped forecast after an hour; None without an error.
+
+    The horizon is the longest up to an hour, or the shortest where all are longer.
+    """
     rows = [row for row in answer.skill if is_number(row.rms_m)]
     shipped = {row.horizon_min: row for row in rows if row.method == answer.default_method}
     if not shipped:

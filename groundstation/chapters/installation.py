@@ -1,4 +1,4 @@
-"""Chapter: the heading error with what earlier flights of the same INS taught, beside that of the taxi alone."""
+"""Chapter on the heading error with and without what earlier flights of the INS taught."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ HEADS = (Head("Number"), Head("This taxi alone", True), Head("With earlier fligh
 
 
 def installation(results: FlightResults) -> Section | None:
-    """The chapter; None without an answer."""
+    """Return the chapter; None without an answer."""
     answer = results.answer(InstallationResult)
     if answer is None:
         return None
@@ -38,24 +38,24 @@ def installation(results: FlightResults) -> Section | None:
 
 
 def parts(answer: InstallationResult) -> tuple[Part, ...]:
-    """What a report shows of a learned answer."""
+    """Return the parts of a report on a learned answer."""
     if answer.why_not:
         return (nothing_learned(answer),)
     return kept((Note(sentence(answer)), _both(answer), _installed(answer.installed), _doubts(answer)))
 
 
 def not_learned(answer: InstallationResult) -> str:
-    """Why nothing was learned, in one line."""
+    """Return in one line why nothing was learned."""
     return f"Nothing learned of the installation: {typeset(answer.why_not)}"
 
 
 def nothing_learned(answer: InstallationResult) -> Note:
-    """That as a note."""
+    """Return why nothing was learned, as a note."""
     return Note(f"{not_learned(answer)}.", "unknown")
 
 
 def what_to_enter(answer: InstallationResult, step_deg: float) -> str:
-    """The number to type, or what to do instead."""
+    """Return the number to type, or what to do instead."""
     if answer.verdict == "advisory":
         return f"Good to ± {_arcmin(answer.half_width_deg)} only: taxi the other way, or state the wind"
     if answer.verdict != "accept":
@@ -66,12 +66,15 @@ def what_to_enter(answer: InstallationResult, step_deg: float) -> str:
 
 
 def sources(answer: InstallationResult) -> str:
-    """What the interval is made of: "this taxi ± 6′, wind ± 4′, installation of serial S from 7 flights ± 3′"."""
+    """Return the parts of the interval in words.
+
+    For example "this taxi ± 6′, wind ± 4′, installation of serial S from 7 flights ± 3′".
+    """
     return _parts(answer.interval_parts, answer)
 
 
 def sentence(answer: InstallationResult) -> str:
-    """The learned answer in a sentence or two: verdict, number, half width, its parts."""
+    """Return the learned answer in a sentence or two: verdict, number, half width, parts."""
     what = f"{VERDICTS[answer.verdict].text}: heading error {number(answer.error_deg, 3, '°', signed=True)}"
     enter = f", enter {number(answer.correction_deg, 2, '°', signed=True)}" if is_number(answer.correction_deg) else ""
     taught = (

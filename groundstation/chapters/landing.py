@@ -1,4 +1,7 @@
-"""The chapter on recorded approaches: how each was flown, where it touched down, and what shows accuracy."""
+"""Chapter on recorded approaches.
+
+How each was flown, where it touched down, and what shows accuracy.
+"""
 
 from groundstation.chapters.gates import limit_text, setting_facts, state_of
 from groundstation.chapters.parts import (
@@ -46,7 +49,7 @@ HOW = (
 
 
 def landing(results: FlightResults) -> Section | None:
-    """The chapter; None without approaches."""
+    """Return the chapter; None without approaches."""
     answer = results.answer(LandingResult)
     if answer is None:
         return None
@@ -66,7 +69,7 @@ def landing(results: FlightResults) -> Section | None:
 
 
 def _claim(answer: LandingResult) -> Claim | None:
-    """The last landing, or the last approach of a flight without one."""
+    """Return the last landing, or the last approach of a flight without one."""
     if not answer.approaches:
         return None
     landings = [one for one in answer.approaches if one.outcome == "landing"]
@@ -86,7 +89,7 @@ def _claim(answer: LandingResult) -> Claim | None:
 
 
 def _why(one: Approach) -> str:
-    """From which gates the approach was stabilised, and the criteria that failed."""
+    """Return the verdict of each gate height, with the criteria that failed."""
     told = []
     for at in one.stabilised:
         failed = [gate.title for gate in at.gates if gate.state == "failed"]
@@ -126,7 +129,7 @@ def _course(one: Approach) -> str:
 
 
 def _verdict(one: Approach) -> Mark:
-    """The worst of both gates."""
+    """Return the worst of both gates."""
     verdicts = [row.verdict for row in one.stabilised]
     worst = next((word for word in ("not stabilised", "stabilised") if word in verdicts), "not measured")
     return Mark(TONES[worst], worst)
@@ -176,7 +179,7 @@ def _approach(one: Approach) -> list[Part | None]:
 
 
 def _told(one: Approach) -> str:
-    """What a reader must know before the figures."""
+    """Return what a reader must know before the figures."""
     told = [_accuracy(error) for error in one.position_errors[:2]]
     if one.protection is not None:
         told.append(

@@ -1,4 +1,7 @@
-"""Chapter: approaches by two locators and an additional beacon: deviations, their errors, what speaks against them."""
+"""Chapter on approaches by two locators and an additional beacon.
+
+Deviations, their errors, what speaks against them.
+"""
 
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.gates import setting_facts
@@ -39,7 +42,10 @@ ROW_CAPTION = (
 
 
 def landing_beacons(results: FlightResults) -> Section | None:
-    """The chapter; the reason why not where bearings were logged, else None."""
+    """Return the chapter; None where no bearings were logged.
+
+    Where bearings were logged but gave no answer, the chapter says why.
+    """
     answer = results.answer(BeaconLanding)
     if answer is None:
         return without_answer(results, BeaconLanding.analysis, TITLE, LEAD)

@@ -1,4 +1,7 @@
-"""Chapter: landing by ranges: accuracy along the path against the categories, and how honest the filter is."""
+"""Chapter on landing by ranges.
+
+Accuracy along the path against the categories, and how honest the filter is.
+"""
 
 from groundstation.chapters.gates import setting_facts
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Part, Section
@@ -54,7 +57,7 @@ TRIAL_CAPTION = (
 
 
 def landing_ranges(results: FlightResults) -> Section | None:
-    """The chapter; None without an answer."""
+    """Return the chapter; None without an answer."""
     answer = results.answer(RangeLanding)
     if answer is None:
         return None
@@ -92,7 +95,7 @@ def _above(answer: RangeLanding) -> tuple[Part, ...]:
 
 
 def where(answer: RangeLanding, category: str, axis: str) -> str:
-    """Stretches of the path where an accuracy is met, metres before the threshold."""
+    """Return the stretches of the path where an accuracy is met, metres before the threshold."""
     spans = [one for one in answer.spans if (one.category, one.axis) == (category, axis)]
     told = (f"{number(one.from_before_threshold_m, 0)} to {number(one.to_before_threshold_m, 0, 'm')}" for one in spans)
     return ", ".join(told) or "nowhere"

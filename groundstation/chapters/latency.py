@@ -1,4 +1,4 @@
-"""Chapter: latency between sensors: how much later than the INS each shows the same motion."""
+"""Chapter on latency: how much later than the INS each sensor shows the same motion."""
 
 from groundstation.chapters.agreement import agreement_note
 from groundstation.chapters.assessed import without_answer
@@ -18,7 +18,7 @@ CAPTION = "Windows: degrees of freedom of the interval, of the windows used."
 
 
 def latency(results: FlightResults) -> Section | None:
-    """The chapter; None when the flight was not assessed and no reason is known."""
+    """Return the chapter; None when the flight was not assessed and no reason is known."""
     answer = results.answer(Latencies)
     if answer is None or not answer.rows:
         return without_answer(results, "latency", TITLE, LEAD)

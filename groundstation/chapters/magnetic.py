@@ -1,4 +1,7 @@
-"""Chapter: magnetic deviation (system 3): verdict, coefficients, steer card, and what each correction leaves."""
+"""Chapter on magnetic deviation (system 3).
+
+Verdict, coefficients, steer card, and the error left by each correction.
+"""
 
 from groundstation.chapters.agreement import agreement_note
 from groundstation.chapters.assessed import reason_of
@@ -62,7 +65,7 @@ CONDITIONS: dict[ConditionName, str] = {
 
 
 def magnetic(results: FlightResults) -> Section | None:
-    """The chapter; None when the flight was not assessed and no reason is known."""
+    """Return the chapter; None when the flight was not assessed and no reason is known."""
     answer = results.answer(MagneticResult)
     if answer is None:
         return _without_turns(results)
@@ -92,7 +95,10 @@ def magnetic(results: FlightResults) -> Section | None:
 
 
 def _without_turns(results: FlightResults) -> Section | None:
-    """The chapter of a flight without opposite turns: its ground runs, and why there is no deviation."""
+    """Return the chapter of a flight without opposite turns.
+
+    Its ground runs, and why there is no deviation.
+    """
     reason, runs = reason_of(results, "magnetic"), ground_runs(results)
     if not runs and not reason:
         return None
@@ -182,7 +188,7 @@ def _card(answer: MagneticResult) -> Grid | None:
 
 
 def _other_conditions(answer: MagneticResult) -> Grid | None:
-    """What the figure did not have, with its size, beside the table."""
+    """Return the conditions that the figure did not have, with their effect."""
     rows = [
         (
             CONDITIONS[row.name],
@@ -255,7 +261,7 @@ def _turns(answer: MagneticResult) -> Grid | None:
 
 
 def _swings(answer: MagneticResult) -> Grid | None:
-    """Repeated figures beside each other: equipment on and off, load, repeatability."""
+    """Return repeated figures beside each other: equipment on and off, load, repeatability."""
     if len(answer.swings) < 2:
         return None
     rows = [
@@ -272,7 +278,7 @@ def _swings(answer: MagneticResult) -> Grid | None:
 
 
 def _basis(answer: MagneticResult) -> Facts:
-    """What the deviation rests on."""
+    """Return the facts that the deviation rests on."""
     alignment, declination, coverage = answer.alignment, answer.declination, answer.coverage
     bias = ", ".join(
         f"{number(row.rms_deg, 2, '°')} at {number(row.bank_deg, 0, '°')}" + (" (flown)" if row.is_flown else "")
@@ -304,7 +310,7 @@ def _basis(answer: MagneticResult) -> Facts:
 
 
 def _gyros(alignment: Alignment) -> tuple[tuple[str, str, str], ...]:
-    """Drift of the three gyros before flight, where it was logged."""
+    """Return the drift of the three gyros before flight, where it was logged."""
     values, sigmas = alignment.gyro_drift_deg_per_h, alignment.gyro_drift_sigma_deg_per_h
     if values is None or sigmas is None:
         return ()
@@ -335,7 +341,7 @@ def _iron(iron: PoissonParameters | None) -> Grid | None:
 
 
 def _with_sigmas(values: Vector | None, sigmas: Vector | None, places: int) -> tuple[str, ...]:
-    """The three axes of a vector, each with its sigma; em dashes where it is not known."""
+    """Return the three axes of a vector, each with its sigma; em dashes for unknown sigmas."""
     if values is None or sigmas is None:
         return (ABSENT,) * 3
     return tuple(

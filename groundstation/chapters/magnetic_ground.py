@@ -1,4 +1,7 @@
-"""Parts of the chapter on magnetic deviation: the installed heading sensor on straight ground runs."""
+"""Parts of the chapter on magnetic deviation: straight ground runs.
+
+They judge the heading sensor as installed.
+"""
 
 from collections.abc import Sequence
 
@@ -20,7 +23,7 @@ HOW = (
 
 
 def ground_runs(results: FlightResults) -> tuple[Part, ...]:
-    """What the ground runs tell; nothing where there are none."""
+    """Return what the ground runs show; empty without runs."""
     answer = results.answer(GroundDeviation)
     errors_deg = [run.error_deg for run in answer.used if run.error_deg is not None] if answer else []
     if answer is None or not errors_deg:
@@ -36,7 +39,7 @@ def ground_runs(results: FlightResults) -> tuple[Part, ...]:
 
 
 def ground_workings(results: FlightResults) -> tuple[Part, ...]:
-    """What stands in the appendix of a report; nothing where there are no runs."""
+    """Return the parts for the appendix of a report; empty without runs."""
     answer = results.answer(GroundDeviation)
     if answer is None or not ground_runs(results):
         return ()
@@ -45,7 +48,7 @@ def ground_workings(results: FlightResults) -> tuple[Part, ...]:
 
 
 def ground_claim(results: FlightResults) -> Claim | None:
-    """What the ground runs answer; None where there are none."""
+    """Return the claim of the ground runs; None without runs."""
     answer = results.answer(GroundDeviation)
     errors_deg = [run.error_deg for run in answer.used if run.error_deg is not None] if answer else []
     if answer is None or not errors_deg:

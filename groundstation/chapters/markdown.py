@@ -1,4 +1,7 @@
-"""Sections as Markdown, in which nothing from a log can act as markup: text panels of the recording, study pages."""
+"""Sections as Markdown, for text panels of the recording and for study pages.
+
+Nothing from a log can act as markup.
+"""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,7 +17,9 @@ WIDEST_CELL = 60  # characters: a panel does not wrap cells, so longer remarks s
 
 
 def escaped(text: str) -> str:
-    """Text made safe for a Markdown document: no markup of its own, no link, no picture, no table cell.
+    """Return text made safe for a Markdown document.
+
+    No markup of its own, no link, no picture, no table cell.
 
     Examples
     --------
@@ -27,7 +32,7 @@ def escaped(text: str) -> str:
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A Markdown table; cells are Markdown already.
+    """Return a Markdown table; cells are Markdown already.
 
     Examples
     --------
@@ -43,9 +48,9 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def markdown(
     section: Section, *, level: int = 1, widest: int = WIDEST_CELL, links: Mapping[str, str] = NO_LINKS
 ) -> str:
-    """A section as a Markdown document, headed by its headline or its title.
+    """Return a section as a Markdown document, headed by its headline or its title.
 
-    The parts set small are left out, and figures, but for what stands in their place.
+    Parts in small type and figures are left out; a figure's replacement stays.
 
     Parameters
     ----------
@@ -64,12 +69,15 @@ def markdown(
 
 
 def part_markdown(part: Part, *, level: int = 2) -> str:
-    """A part of a section alone."""
+    """Return a part of a section alone, as Markdown."""
     return "\n\n".join(_part(part, level))
 
 
 def front_markdown(front: Front) -> str:
-    """The front of a report as a Markdown document: what flight it is, a row for each answer, why, what is missing."""
+    """Return the front of a report as a Markdown document.
+
+    Which flight it is, a row for each answer, why, what is missing.
+    """
     parts = [f"# {escaped(front.title)}"]
     if front.headline:
         parts.append(f"## {escaped(front.line)}")  # before the rest: a small panel shows it without scrolling
@@ -108,7 +116,10 @@ def _facts(facts: Facts, level: int, widest: int = WIDEST_CELL) -> list[str]:
 
 
 def _grid(grid: Grid, level: int, widest: int, links: Mapping[str, str]) -> list[str]:
-    """A table; where a column has long remarks they stand below it, each under the name of its row."""
+    """Return a table as Markdown.
+
+    Long remarks of a column stand below it, each under the name of its row.
+    """
     rows = [[_cell(cell) for cell in row] for row in grid.rows]
     named = min((place for row in grid.rows for place, cell in enumerate(row) if isinstance(cell, str)), default=0)
     for row, told in zip(rows, grid.rows, strict=True):
@@ -123,7 +134,10 @@ def _grid(grid: Grid, level: int, widest: int, links: Mapping[str, str]) -> list
 
 
 def _in_sight(grid: Grid, has_long_names: bool, named: int) -> list[int]:
-    """The order of the columns: long names stand behind the figures, or a narrow panel would show no figure."""
+    """Return the order of the columns, long names after the figures.
+
+    Otherwise a narrow panel would show no figure.
+    """
     places = list(range(len(grid.heads)))
     last_figure = max((place for place in places if grid.heads[place].numeric), default=named)
     if not has_long_names or last_figure < named:

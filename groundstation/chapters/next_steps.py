@@ -1,4 +1,7 @@
-"""Chapter: what to fly, record and check next time, for every answer that this flight could not give or not decide."""
+"""Chapter on what to fly, record and check next time.
+
+It covers every answer that this flight could not give or not decide.
+"""
 
 from collections.abc import Iterator
 
@@ -61,7 +64,7 @@ LOST = "the recorder: data were lost"
 
 
 def next_steps(results: FlightResults) -> Section | None:
-    """The chapter in at most three lines; None where nothing is left to wish for."""
+    """Return the chapter in at most three lines; None where nothing is left to advise."""
     lines: dict[str, dict[str, list[str]]] = {line: {} for line in LINES}
     for line, text, purpose in _advice(results):
         texts = lines[line].setdefault(purpose, [])
@@ -72,7 +75,7 @@ def next_steps(results: FlightResults) -> Section | None:
 
 
 def _told(texts: dict[str, list[str]]) -> str:
-    """What is wanted, by what it is for."""
+    """Return what is wanted, grouped by its purpose."""
     each = (
         f"for the {purpose}: {', '.join(some)}" if purpose else ", ".join(some)
         for purpose, some in texts.items()
@@ -83,7 +86,7 @@ def _told(texts: dict[str, list[str]]) -> str:
 
 
 def _advice(results: FlightResults) -> Iterator[tuple[str, str, str]]:
-    """Line, advice and what it is for, the most pressing first."""
+    """Yield line, advice and what it is for, the most pressing first."""
     heading, inertial = results.answer(HeadingResult), results.answer(InertialResult)
     if heading is not None:
         for gate in heading.gates:

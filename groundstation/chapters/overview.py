@@ -1,4 +1,7 @@
-"""Chapter: the flight at a glance: track map, altitude, speed, attitude, phases and the state of GNSS."""
+"""Chapter on the flight at a glance.
+
+Track map, altitude, speed, attitude, phases and the state of GNSS.
+"""
 
 from groundstation.chapters.parts import Figure, Section
 from groundstation.results.arrays.flight import Overview, StateLanes
@@ -11,6 +14,6 @@ FIGURES = (
 
 
 def overview(results: FlightResults) -> Section | None:
-    """The chapter, None when the flight has no overview."""
+    """Return the chapter; None when the flight has no overview."""
     known = results.rows_of(Overview) is not None or results.rows_of(StateLanes) is not None
     return Section("overview", "Overview of the flight", "", FIGURES) if known else None

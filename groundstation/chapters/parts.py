@@ -1,7 +1,7 @@
-"""What a page is made of: a front, sections, and in them figures, tables, facts and notes, without a word of markup.
+"""Parts of a page without any markup: a front, sections, figures, tables, facts, notes.
 
-A chapter builds them from the answers, once. HTML, typst, Markdown and the terminal are renderers of them; escaping
-happens there, for everything.
+A chapter builds them from the answers, once. HTML, typst, Markdown and the terminal are renderers of them; they alone
+escape.
 """
 
 from collections.abc import Iterable, Sequence
@@ -16,7 +16,7 @@ SYMBOLS: dict[Tone, str] = {"good": "✓", "bad": "✗", "warn": "▲", "unknown
 
 @dataclass(frozen=True)
 class Mark:
-    """A state in a cell: a symbol, a word and a colour, so that it survives a black-and-white printer."""
+    """State in a cell: a symbol, a word and a colour, readable in black and white."""
 
     tone: Tone
     text: str
@@ -31,14 +31,14 @@ Cell: TypeAlias = str | Mark
 
 
 class Part:
-    """Base of what a section is made of; ``kind`` tells a template which it has before it."""
+    """Base of the parts of a section; ``kind`` tells a template which part it is."""
 
     kind: ClassVar[str]
 
 
 @dataclass(frozen=True)
 class Figure(Part):
-    """Where a figure stands, by its name; a page that has figures draws it there, others leave it out.
+    """Place of a figure, by its name; a page without figures leaves it out.
 
     ``of`` says which of several alike: a state, a horizon. ``instead`` is what a page without figures shows there.
     """
@@ -59,7 +59,7 @@ class Head:
 
 @dataclass(frozen=True)
 class Grid(Part):
-    """A table; ``numbers`` names the arrays behind it."""
+    """Table; ``numbers`` names the arrays behind it."""
 
     kind: ClassVar[str] = "grid"
     title: str
@@ -71,9 +71,10 @@ class Grid(Part):
 
 @dataclass(frozen=True)
 class Facts(Part):
-    """Pairs of a label and a value, each with an optional remark; ``compact`` sets many short ones in columns.
+    """Pairs of a label and a value, each with an optional remark.
 
-    ``settings_of`` names the table of a settings file that the pairs are keys and values of.
+    ``compact`` sets many short ones in columns. ``settings_of`` names the table of a settings file whose keys and
+    values the pairs are.
     """
 
     kind: ClassVar[str] = "facts"
@@ -86,7 +87,10 @@ class Facts(Part):
 
 @dataclass(frozen=True)
 class Note(Part):
-    """A paragraph, set off in the colour of its tone; ``files`` beside the report are named, and linked on a screen."""
+    """Paragraph, set off in the colour of its tone.
+
+    ``files`` beside the report are named, and linked on a screen.
+    """
 
     kind: ClassVar[str] = "note"
     text: str
@@ -103,12 +107,12 @@ class Signatures(Part):
 
 
 def kept(parts: Iterable[Part | None]) -> tuple[Part, ...]:
-    """The parts that there are."""
+    """Return the parts that are not None."""
     return tuple(part for part in parts if part is not None)
 
 
 class Rank(IntEnum):
-    """Which claim a report opens with: the lowest that the flight has."""
+    """Order of claims: a report opens with the lowest that the flight has."""
 
     HEADING = 0  # decided: accept, advisory, reject, extend
     MAGNETIC = 1  # decided
@@ -126,7 +130,9 @@ class Rank(IntEnum):
 
 @dataclass(frozen=True)
 class Claim:
-    """What a chapter answers, at a glance: the report opens with the best claim, the others stand beside it as tiles.
+    """Answer of a chapter at a glance.
+
+    The report opens with the best claim, the others stand beside it as tiles.
 
     Parameters
     ----------
@@ -162,14 +168,15 @@ class Claim:
 
 @dataclass(frozen=True)
 class Section:
-    """One chapter of the report. ``key`` is its anchor; ``lead`` says in a sentence what it answers.
+    """One chapter of the report.
 
-    ``appendix`` are parts that only a report shows, behind all chapters: settings, workings, how it was computed.
-    ``number`` is what a report counts it by. ``is_open``: the answer came to nothing and ``headline`` says why; a
-    report then tells it among what could not be assessed, and its parts in the appendix.
+    ``key`` is its anchor; ``lead`` says in a sentence which question it answers. ``appendix`` are parts that only a
+    report shows, behind all chapters: settings, workings, how it was computed. ``number`` is its number in a report.
+    ``is_open``: there is no answer and ``headline`` says why; a report then lists it among what could not be assessed,
+    and puts its parts in the appendix.
 
     A page without a front (a text panel, the terminal) begins with ``headline``, the answer in a few words, and
-    ``above``, what the front of a report tells of it.
+    ``above``, its parts in the front of a report.
     """
 
     key: str
@@ -186,7 +193,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Tile:
-    """An answer beside the one a report opens with: the title and key of its chapter, and its claim."""
+    """Answer beside the one a report opens with: title and key of its chapter, its claim."""
 
     title: str
     key: str
@@ -195,7 +202,7 @@ class Tile:
 
 @dataclass(frozen=True)
 class Front:
-    """What stands above the first chapter; what is empty is left out.
+    """Part of a report above its first chapter; empty fields are left out.
 
     Parameters
     ----------
@@ -237,7 +244,10 @@ class Front:
 
 @dataclass(frozen=True)
 class Document:
-    """A whole report; ``kind`` says what of ("Flight report"), ``label`` stands on every page of paper."""
+    """Whole report.
+
+    ``kind`` says of what ("Flight report"), ``label`` stands on every page of paper.
+    """
 
     kind: str
     label: str

@@ -1,4 +1,7 @@
-"""Chapter: where ground points should stand: designs side by side, places, and what losing a point costs."""
+"""Chapter on where ground points should stand.
+
+Designs side by side, places, and the cost of losing a point.
+"""
 
 from collections.abc import Mapping
 
@@ -45,7 +48,7 @@ SEARCH_CAPTION = (
 
 
 def placement(results: FlightResults) -> Section | None:
-    """The chapter; None without an answer."""
+    """Return the chapter; None without an answer."""
     answer = results.answer(PlacementPlan)
     if answer is None:
         return None
@@ -63,7 +66,7 @@ def placement(results: FlightResults) -> Section | None:
 
 
 def design_title(design: str) -> str:
-    """Name of a design for people.
+    """Return the name of a design for people.
 
     Examples
     --------

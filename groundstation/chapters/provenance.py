@@ -1,4 +1,7 @@
-"""Chapter: where the numbers come from. Time of run, host and versions stand in manifest.json alone."""
+"""Chapter on where the numbers come from.
+
+Time of run, host and versions stand in manifest.json alone.
+"""
 
 from groundstation.chapters.parts import Facts, Note, Part, Section
 from groundstation.chapters.wording import ABSENT, clean, number
@@ -16,7 +19,7 @@ CHECKS = (
 
 
 def provenance(results: FlightResults) -> Section:
-    """The chapter."""
+    """Return the chapter."""
     flight_id = clean(results.flight_id)
     if results.is_plan:
         store = ("Scenario as given", "plan.toml", "the file that this plan was made from")
@@ -43,7 +46,7 @@ def provenance(results: FlightResults) -> Section:
 
 
 def source_pairs(source: Source, what: str = "log") -> tuple[tuple[str, str, str], ...]:
-    """The log a flight came from, or the scenario of a plan."""
+    """Return the log a flight came from, or the scenario of a plan."""
     return (
         (what.capitalize(), source.name or ABSENT, f"{number(source.size_bytes, 0)} bytes"),
         (f"SHA-256 of the {what}", source.sha256 or ABSENT, ""),

@@ -41,7 +41,7 @@ WHOLE = "Nothing lost, nothing unreadable."
 
 
 def quality(results: FlightResults) -> Section:
-    """The chapter: every flight has a ledger."""
+    """Return the chapter; every flight has a ledger."""
     parts = (
         *(_damages(results.ledger), _topics(results), Figure("quality.gaps")),
         *(_clock_steps(results.clock), _other_clocks(results.clock)),
@@ -52,7 +52,10 @@ def quality(results: FlightResults) -> Section:
 
 
 def _topics(results: FlightResults) -> Grid | None:
-    """The topics that answers rest on; those of raw data where there are no others. Counts of nothing are left out."""
+    """Return the topics that answers rest on, with their losses.
+
+    Topics of raw data where there are no others. Counts of zero are left out.
+    """
     data = results.rows_of(LedgerRows)
     if data is None:
         return None
@@ -98,7 +101,10 @@ def _clock_steps(clock: Clock) -> Grid | None:
 
 
 def _other_clocks(clock: Clock) -> Grid | None:
-    """The recorder's clock by the others of the log: segments, the breaks between them, errors that have a name."""
+    """Return the recorder's clock against the other clocks of the log.
+
+    Segments, the breaks between them, errors that have a name.
+    """
     rows = [row for relation in clock.relations for row in _relation_rows(relation)]
     title = "Recorder clock against other clocks"
     return Grid(title, CLOCK_HEADS, rows[:MOST_TOPICS], CLOCK_CAPTION) if rows else None
@@ -133,13 +139,16 @@ def _damage_row(damage: DamageEntry) -> tuple[str, ...]:
 
 
 def _nested(document: Clock | Ledger, title: str) -> Facts | None:
-    """What a document says, and has no table of its own, by the names of its fields; what is nothing is left out."""
+    """Return facts of a document by the names of its fields.
+
+    Fields with a table of their own and empty values are left out.
+    """
     pairs = [(name, value, "") for name, value in _flat(document) if value.partition("\u202f")[0] not in NOTHING]
     return Facts(title, pairs) if pairs else None
 
 
 def _flat(document: Any, above: str = "") -> list[tuple[str, str]]:
-    """A dataclass as pairs of a title and a value, with what is nested in it."""
+    """Return a dataclass as pairs of a title and a value, nested ones included."""
     out: list[tuple[str, str]] = []
     for one in fields(document):
         value = getattr(document, one.name)

@@ -1,4 +1,7 @@
-"""Chapter: against the reference: errors of GNSS, INS and the answers, and claimed against seen."""
+"""Chapter on the comparison with the reference.
+
+Errors of GNSS, INS and the answers; claimed sigma against seen errors.
+"""
 
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.gates import setting_facts
@@ -32,7 +35,7 @@ CAPTIONS: dict[Quantity, str] = {
 
 
 def reference(results: FlightResults) -> Section | None:
-    """The chapter; None where nobody asked for it."""
+    """Return the chapter; None where no comparison was asked for."""
     answer = results.answer(ReferenceResult)
     if answer is None:
         return without_answer(results, "reference", TITLE, LEAD)
@@ -264,7 +267,7 @@ def _relative(answer: ReferenceResult) -> Grid | None:
 
 
 def _figures(answer: ReferenceResult) -> list[tuple[str, str]]:
-    """Subjects and quantities that have a figure of their own, in the order of the errors."""
+    """Return subjects and quantities with a figure of their own, in the order of the errors."""
     found = dict.fromkeys((row.subject, row.quantity) for row in answer.errors)
     return [one for one in found if one[1] == "position" or one[0].partition(".")[0] in ("gnss", "ins", "heading")]
 
@@ -284,7 +287,7 @@ def _around(row: ErrorRow) -> str:
 
 
 def _between(bounds: tuple[float, float] | None, size: float, row: ErrorRow | None = None) -> str:
-    """An interval; a dash for one that is so wide that it says nothing."""
+    """Return an interval; a dash for one too wide to mean anything."""
     if bounds is None or bounds[1] - bounds[0] > WIDE * size:
         return ABSENT
     places = 2 if row is None else PLACES[row.unit]

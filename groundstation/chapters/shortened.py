@@ -1,4 +1,7 @@
-"""Sections cut for places where long tables are no help: paper, and panels that are laid out again and again."""
+"""Sections cut for places where long tables are no help.
+
+Paper, and panels that are laid out again and again.
+"""
 
 from dataclasses import replace
 
@@ -7,7 +10,10 @@ from groundstation.chapters.wording import number
 
 
 def shortened(section: Section, most: int, where: str) -> Section:
-    """The section with its long tables cut, which say how many rows more there are and where."""
+    """Return the section with its long tables cut.
+
+    A cut table says how many rows more there are, and where.
+    """
     return replace(section, parts=tuple(_cut(part, most, where) for part in section.parts))
 
 

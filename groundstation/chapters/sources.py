@@ -1,4 +1,4 @@
-"""Chapter: the sources of the methods, once, by the names that the other chapters call them by."""
+"""Chapter on the sources of the methods, once, by the names used in the other chapters."""
 
 from groundstation.chapters.parts import Facts, Section
 from groundstation.results.flight import FlightResults
@@ -26,7 +26,7 @@ SOURCES: dict[str, tuple[tuple[str, str], ...]] = {
 
 
 def sources(results: FlightResults) -> Section | None:
-    """The chapter; None where no answer rests on a source."""
+    """Return the chapter; None where no answer rests on a source."""
     named = dict.fromkeys(source for name in results.answers for source in SOURCES.get(name, ()))
     if not named:
         return None

@@ -1,4 +1,4 @@
-"""Sections as plain text for a terminal: aligned columns, nothing that a terminal takes for a command."""
+"""Sections as plain text for a terminal: aligned columns, no control sequences."""
 
 from groundstation.base.text_columns import columns
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Mark, Note, Part, Section
@@ -6,9 +6,9 @@ from groundstation.chapters.wording import clean
 
 
 def terminal(section: Section) -> str:
-    """A section as plain text, headed by its headline or its title.
+    """Return a section as plain text, headed by its headline or its title.
 
-    The parts set small are left out, and figures, but for what stands in their place.
+    Parts in small type and figures are left out; a figure's replacement stays.
 
     Examples
     --------
@@ -29,7 +29,7 @@ def terminal(section: Section) -> str:
 
 
 def part_text(part: Part | None) -> str:
-    """A part of a section alone; empty for one that is left out."""
+    """Return a part of a section alone, as text; empty for one that is left out."""
     if isinstance(part, Figure):
         return part_text(part.instead)
     if isinstance(part, Note):
@@ -40,7 +40,10 @@ def part_text(part: Part | None) -> str:
 
 
 def grid_text(grid: Grid) -> str:
-    """A table under its title; without rows nothing, without heads that have a title no line of heads."""
+    """Return a table under its title; empty without rows.
+
+    No line of heads where no head has a title.
+    """
     if not grid.rows:
         return ""
     heads = [[head.title for head in grid.heads]] if any(head.title for head in grid.heads) else []

@@ -1,4 +1,7 @@
-"""Chapter: several logs of one flight: how each was put on the flight's clock, and which sources are used."""
+"""Chapter on several logs of one flight.
+
+How each was put on the flight's clock, and which sources are used.
+"""
 
 from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section
 from groundstation.chapters.wording import number, typeset
@@ -31,7 +34,7 @@ SOURCE_HEADS = (Head("Kind"), Head("Used"), Head("Why"), Head("Others"))
 
 
 def together(results: FlightResults) -> Section | None:
-    """The chapter; None for a flight of one log."""
+    """Return the chapter; None for a flight of one log."""
     answer = results.answer(Together)
     if answer is None:
         return None

@@ -1,4 +1,4 @@
-"""The claim of the heading correction: the verdict in a word, what to enter, why, and the figures it rests on."""
+"""Claim of the heading correction: the verdict, what to enter, why, and the figures."""
 
 import re
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ NOT_ASSESSABLE = Mark("unknown", "Not assessable")
 
 
 def claim(heading: HeadingResult) -> Claim:
-    """The verdict with the number to type, or why there is none."""
+    """Return the verdict with the number to type, or why there is none."""
     is_late = any(gate.name == "before_take_off" and gate.state == "failed" for gate in heading.gates)
     return Claim(
         Rank.HEADING_OPEN if heading.verdict == "undecided" or is_late else Rank.HEADING,
@@ -48,7 +48,10 @@ def claim(heading: HeadingResult) -> Claim:
 
 
 def what_to_enter(heading: HeadingResult) -> str:
-    """The number to type with its sign and the digits of the entry step; never one where there is nothing to type."""
+    """Return the number to type, with its sign and the digits of the entry step.
+
+    Words instead of a number where nothing is to be typed.
+    """
     if heading.verdict == "advisory":
         return f"Good to {half_width(heading.confidence95_deg)} only: taxi the other way, or state the wind"
     if heading.verdict != "accept":
@@ -60,7 +63,7 @@ def what_to_enter(heading: HeadingResult) -> str:
 
 
 def reasons(heading: HeadingResult) -> tuple[str, ...]:
-    """Why the verdict is what it is, what failed beside it, and the error in words."""
+    """Return why the verdict is what it is, failed side checks, and the error in words."""
     why = typeset(
         re.split(r": enter |\. Not to be entered|\. To be entered", heading.verdict_reason)[0]
     )  # told by the headline
@@ -69,12 +72,16 @@ def reasons(heading: HeadingResult) -> tuple[str, ...]:
 
 
 def half_width(ends: tuple[float, float]) -> str:
-    """Half width of an interval in arcminutes, as ± figure."""
+    """Return the half width of an interval in arcminutes, as ± figure."""
     return f"± {number(0.5 * (ends[1] - ends[0]) * ARCMIN_PER_DEG, 0, '′')}"
 
 
 def steady_terms(heading: HeadingResult) -> tuple[str, ...]:
-    """What of the interval this taxi, the wind and the installation make, and what it is of; none where not known."""
+    """Return the shares of this taxi, the wind and the installation in the interval.
+
+    The text also says whose error it is: the airframe's or the platform's. Empty where the steady sideslip is not
+    known.
+    """
     if not is_number(heading.steady_sigma_deg):
         return ()
     power = UNEVEN_POWER if heading.settings.get("aircraft.taxi_power") == "uneven" else SAME_EVERYWHERE
@@ -82,7 +89,7 @@ def steady_terms(heading: HeadingResult) -> tuple[str, ...]:
 
 
 def _parts(heading: HeadingResult) -> str:
-    """The parts that the interval is made of, each as the half width it would have alone."""
+    """Return the parts of the interval, each as the half width it would have alone."""
     parts = (
         f"{PARTS.get(one.name, one.name)} ± {number(one.half_width_deg * ARCMIN_PER_DEG, 0, '′')}"
         for one in heading.interval_parts
@@ -99,7 +106,7 @@ def _parts(heading: HeadingResult) -> str:
 
 
 def _typed(heading: HeadingResult) -> str:
-    """Which of the two numbers is typed, and the other one with its own half width."""
+    """Return which of the two numbers is typed, and the other with its own half width."""
     ends = heading.platform_confidence95_deg
     if ends is None or not all(map(is_number, ends)):
         return ""
@@ -111,7 +118,7 @@ def _typed(heading: HeadingResult) -> str:
 
 
 def sentence(text: str) -> str:
-    """Text with a capital and a full stop.
+    """Return text with a capital and a full stop.
 
     Examples
     --------
@@ -137,7 +144,7 @@ def _in_words(heading: HeadingResult) -> str:
 
 
 def figures(heading: HeadingResult) -> tuple[tuple[str, str, str], ...]:
-    """The figures that decide, each with what it rests on."""
+    """Return the figures that decide, each with what it rests on."""
     samples, taxi = number(heading.samples, 0), number(heading.taxi_seconds, 0, "s")
     shown, sigma = number(heading.parking_ins_heading_deg, 2, "°"), number(heading.parking_sigma_deg, 2, "°")
     remark = f"95 % interval {interval(heading.confidence95_deg, 3, '°')}"

@@ -1,4 +1,4 @@
-"""Numbers and marks as a reader meets them: true minus signs, units, an em dash for what is absent."""
+"""Numbers and marks in text: true minus signs, units, an em dash for what is absent."""
 
 import math
 import re
@@ -14,7 +14,7 @@ HIDDEN = "\ufffd"  # stands for a control, or a mark that turns the direction of
 
 
 def clean(text: str) -> str:
-    """Text of a log in one line, without control and direction characters.
+    """Return text of a log in one line, without control and direction characters.
 
     Examples
     --------
@@ -25,17 +25,17 @@ def clean(text: str) -> str:
 
 
 def is_number(value: Any) -> TypeGuard[float]:
-    """Whether a JSON value is a finite number (a bool is none)."""
+    """Tell whether a JSON value is a finite number (a bool is none)."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def number(value: Any, places: int, unit: str = "", signed: bool = False) -> str:
-    """A number with its unit, rounded, with a true minus; an em dash when there is none.
+    """Return a number with its unit, rounded, with a true minus; an em dash without one.
 
     Examples
     --------
     >>> number(-1.0449, 2, "°"), number(0.4, 1, "m/s", signed=True), number(None, 2, "m")
-    ('−1.04°', '+0.4\u202fm/s', '—')
+    ('−1.04°', '+0.4 m/s', '—')
     """
     if not is_number(value):
         return ABSENT
@@ -49,7 +49,7 @@ def number(value: Any, places: int, unit: str = "", signed: bool = False) -> str
 
 
 def percent(share: Any, places: int = 0) -> str:
-    """A share as per cent.
+    """Return a share in per cent.
 
     Examples
     --------
@@ -60,12 +60,14 @@ def percent(share: Any, places: int = 0) -> str:
 
 
 def significant(value: Any, digits: int = 3) -> str:
-    """A number of unknown kind with so many significant digits, plain notation where that is readable.
+    """Return a number of unknown kind with so many significant digits.
+
+    Plain notation where that is readable.
 
     Examples
     --------
     >>> significant(0.0123456), significant(12345.6), significant(20.0), significant(-3), significant(1.2e-9)
-    ('0.0123', '12\u202f346', '20', '−3', '1.2e−9')
+    ('0.0123', '12 346', '20', '−3', '1.2e−9')
     """
     if not is_number(value):
         return ABSENT
@@ -82,7 +84,7 @@ def significant(value: Any, digits: int = 3) -> str:
 
 
 def interval(bounds: Any, places: int, unit: str) -> str:
-    """An interval with its unit.
+    """Return an interval with its unit.
 
     Examples
     --------
@@ -95,7 +97,7 @@ def interval(bounds: Any, places: int, unit: str) -> str:
 
 
 def step_places(step: Any) -> int:
-    """Decimals needed to write multiples of an entry step.
+    """Return decimals needed to write multiples of an entry step.
 
     Examples
     --------
@@ -108,7 +110,7 @@ def step_places(step: Any) -> int:
 
 
 def clock(seconds: Any) -> str:
-    """Flight time as minutes and seconds, hours when there are any.
+    """Return flight time as minutes and seconds, hours when there are any.
 
     Examples
     --------
@@ -124,7 +126,7 @@ def clock(seconds: Any) -> str:
 
 
 def typeset(text: str) -> str:
-    """Text written for a terminal with the signs of a page: true minus, plus-minus, degree.
+    """Return text of a terminal with the signs of a page: true minus, plus-minus, degree.
 
     Examples
     --------
@@ -136,7 +138,7 @@ def typeset(text: str) -> str:
 
 
 def sentence(text: str) -> str:
-    """Text written for a terminal as a sentence of a page.
+    """Return text written for a terminal as a sentence of a page.
 
     Examples
     --------
@@ -148,7 +150,7 @@ def sentence(text: str) -> str:
 
 
 def words(name: str) -> str:
-    """A field name as words: ``largest_gap`` becomes ``largest gap``."""
+    """Return a field name as words: ``largest_gap`` becomes ``largest gap``."""
     return clean(name).replace("_", " ").strip()
 
 
@@ -167,12 +169,12 @@ def named_quantity(name: str) -> tuple[str, str]:
 
 
 def unit_sign(unit: str) -> str:
-    """The sign a unit is printed with: ``deg`` becomes ``°``; what is unknown stays as it is."""
+    """Return the printed sign of a unit: ``deg`` becomes ``°``; unknown ones stay as they are."""
     return UNITS[unit].sign if unit in UNITS else unit
 
 
 def any_value(value: Any, unit: str = "") -> str:
-    """A JSON value of unknown kind in words."""
+    """Return a JSON value of unknown kind in words."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int) and not unit:

@@ -1,1 +1,1 @@
-"""The command line: parses, calls the pipeline, prints, sets the exit code."""
+"""Command line: parses, calls the pipeline, prints, sets the exit code."""

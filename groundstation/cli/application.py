@@ -1,4 +1,4 @@
-"""What all verbs have in common: the application, its exit codes, options spelled alike, errors in one line."""
+"""Application of all verbs: exit codes, options spelled alike, errors in one line."""
 
 import math
 import sys
@@ -83,15 +83,15 @@ EXAMPLES: Mapping[str, tuple[str, ...]] = {
 
 
 def examples(verb: str) -> str:
-    """What stands under the help of a verb: calls to copy, a paragraph each."""
+    """Return the examples under the help of a verb: calls to copy, a paragraph each."""
     return "\n\n".join(("Examples:", *(f"groundstation {line}" for line in EXAMPLES[verb])))
 
 
 class InOrder(typer.core.TyperGroup):
-    """The verbs in the order of a flight's way, wherever they are defined."""
+    """Group of verbs in the order in which a flight passes them, wherever they are defined."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Names, those without a place at the end."""
+        """Return the names, those without a place at the end."""
         places = {name: place for place, name in enumerate(VERBS)}
         return sorted(super().list_commands(ctx), key=lambda name: places.get(name, len(VERBS)))
 
@@ -245,7 +245,7 @@ def refuse_pdf_of_results(only: str | None, *, pdf: bool) -> None:
 
 
 def time_limit_s(given: float | None) -> float:
-    """The seconds that ``--timeout`` gives one log; infinite where it is left out.
+    """Return the limit of ``--timeout`` for one log, seconds; infinite where it is left out.
 
     Raises
     ------
@@ -269,7 +269,7 @@ def tell_failures(found: Iterable[Failure], *, with_traces: bool = False) -> int
 
 
 def time_bound(timeout: float | None, isolation: "Isolation | None" = None) -> "Bounds | None":
-    """What one log may take; None where there is neither a limit of time nor ``--isolate``.
+    """Return the bounds for one log; None with neither a limit of time nor ``--isolate``.
 
     Raises
     ------

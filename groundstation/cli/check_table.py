@@ -1,4 +1,4 @@
-"""How ``check`` looks on stdout: tables for people, JSON for programs."""
+"""Output of ``check`` on stdout: tables for people, JSON for programs."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
@@ -38,7 +38,7 @@ def show(
 
 
 def text_of(one: Checked, everything: bool = False) -> str:
-    """The ledger of one log as text."""
+    """Return the ledger of one log as text."""
     topics = one.ledger.topics
     shown = {name: topic for name, topic in topics.items() if everything or is_canonical(name) or _is_odd(topic)}
     usable = printable(one.usability.text) if one.usability else ""
@@ -71,7 +71,7 @@ def _head(one: Checked) -> str:
 
 
 def _clock(clock: Clock) -> str:
-    """The clock: where it began, how it was set, how it runs by other clocks of the log."""
+    """Return the clock: its start, how it was set, its rate against other clocks of the log."""
     if not clock.first_device_time:
         return ""
     time = "UTC" if clock.is_absolute else "no absolute time (NOTIME): counts from its own zero"
@@ -113,13 +113,16 @@ def _clock(clock: Clock) -> str:
 
 
 def _is_usual(finding: Finding) -> bool:
-    """Whether a finding is of the kind that fills pages and alarms nobody."""
+    """Tell whether a finding is of the kind that fills pages and alarms nobody."""
     is_of_source = bool(finding.topic) and not is_canonical(finding.topic)
     return is_of_source and finding.severity == "info" and finding.code in ("values.nan", "time.duplicates")
 
 
 def _is_odd(topic: TopicEntry) -> bool:
-    """Whether a topic has more to tell than its rate; repeated times are common among what a recorder writes."""
+    """Tell whether a topic has more to report than its rate.
+
+    Repeated times do not count: they are common in what a recorder writes.
+    """
     lost = any(counter.lost or counter.resets for counter in topic.sequences)
     return bool(topic.gaps.count or topic.backward_steps or topic.stray_rows or topic.losses) or lost
 

@@ -1,4 +1,7 @@
-"""The verbs on folders of flights: ``serve`` offers their recordings to a team, ``report --standard`` judges them."""
+"""Verbs on folders of flights.
+
+``serve`` offers their recordings to a team, ``report --standard`` judges them.
+"""
 
 from pathlib import Path
 from typing import Annotated
@@ -38,7 +41,9 @@ def serve(
 
 
 def acceptance(out: Path, standard: str, output: Path | None, fail_on: FailOnMode, *, quiet: bool, json: bool) -> int:
-    """Write the acceptance of the INS of a folder and print its front; 1 where a flight cannot be read.
+    """Write the acceptance of the INS of a folder and print its front.
+
+    Returns 1 where a flight cannot be read.
 
     Else 4 where ``fail_on`` is reached: with ``warn`` also where nothing was judged that the standard asks for.
     """

@@ -1,4 +1,7 @@
-"""The verbs on flights that exist: ``clip`` cuts a part out, ``export`` writes tracks, ``compare`` holds two up."""
+"""Verbs on flights that exist.
+
+``clip`` cuts a part out, ``export`` writes tracks, ``compare`` compares two.
+"""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -136,7 +139,10 @@ def export(
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
-    """Write tracks for other programs (Google Earth, GPX, a table, NMEA, SBET), or what figures show as CSV."""
+    """Write tracks for other programs, or the data of figures as CSV.
+
+    Tracks go to Google Earth, GPX, a table, NMEA or SBET.
+    """
     from groundstation.cli import printing
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.export import export as written
@@ -174,7 +180,10 @@ def compare(
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
-    """Compare two flights, or two runs of one flight: what differs, and both in one recording on one time axis."""
+    """Compare two flights, or two runs of one flight.
+
+    Shows what differs, and puts both into one recording on one time axis.
+    """
     from groundstation.base.serial import to_json
     from groundstation.cli import printing
     from groundstation.pipeline.verbs.compare import compare as held_against
@@ -191,7 +200,10 @@ def compare(
 
 
 def comparison_text(found: "Comparison", *, everything: bool = False) -> str:
-    """Text of ``compare``: who is who, how the clocks are aligned, the answers, settings and findings that differ."""
+    """Return the text of ``compare``: which flight is A and B, the alignment, differences.
+
+    The alignment of the clocks; answers, settings and findings that differ.
+    """
     from groundstation.base.text_columns import columns
 
     alignment = found.alignment

@@ -1,4 +1,4 @@
-"""The command ``groundstation``: its verbs. Heavy imports happen inside them."""
+"""Command ``groundstation`` with its verbs. Heavy imports happen inside them."""
 
 import io
 import sys
@@ -128,7 +128,9 @@ def run(
     json: Json = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Run everything the data allows: MCAP, heading correction, recording and report of each flight.
+    """Run everything the data allows: MCAP, heading correction, recording and report.
+
+    Each flight gets its own folder.
 
     Flights of several aircraft that ranged to one another over a data link are then analysed as a session.
 
@@ -167,7 +169,7 @@ def run(
         is_isolated=isolate,
         store=store,
     )
-    run_logs = run_together if together else run_each  # logs are joined anew at every run, in this process
+    run_logs = run_together if together else run_each  # logs are joined again at every run, in this process
     try:
         with listener("none" if quiet else progress) as listen:
             outcomes = run_logs(
@@ -216,7 +218,10 @@ def report(
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
-    """Make the reports and the index again from the saved results, without the logs; or the acceptance of the INS."""
+    """Make the reports and the index again from the saved results, without the logs.
+
+    With --standard, write the acceptance of the INS instead.
+    """
     from groundstation.cli import printing
     from groundstation.cli.text import printable
 
@@ -311,7 +316,9 @@ def cooperative(
     json: Json = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Analyse the logs of several aircraft together: positions from ranges over their data link.
+    """Analyse the logs of several aircraft together.
+
+    The ranges over their data link give positions.
 
     An OUT of an earlier run is continued: a session with the same logs, stations and settings is not run again.
     """
@@ -348,7 +355,10 @@ def main(arguments: Any = None) -> None:
 
 
 def _application_for(words: Sequence[str]) -> typer.Typer:
-    """The application with the verb alone that is asked for: Typer makes the parameters of all before it calls one."""
+    """Return the application with only the verb that is asked for.
+
+    Typer makes the parameters of all verbs before it calls one.
+    """
     asked = [verb for verb in app.registered_commands if [*words[:1]] == [_name_of(verb)]]
     if not asked:
         return app

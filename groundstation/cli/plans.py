@@ -1,4 +1,4 @@
-"""The verb ``plan``: how a session or a landing should be set up for the accuracy one needs."""
+"""Verb ``plan``: set up a session or a landing for the accuracy needed."""
 
 from pathlib import Path
 from typing import Annotated
@@ -68,7 +68,10 @@ def landing(
     json: Json = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Plan an approach by ranges to reference points: which category's accuracy is met, and where."""
+    """Plan an approach by ranges: where it meets the accuracy of which category.
+
+    The ranges are to reference points.
+    """
     return _plan("landing", scenario, output, listed, fail_on, pdf, force, quiet, verbose, json, progress)
 
 
@@ -85,7 +88,7 @@ def _plan(
     json: bool,
     progress: Progress,
 ) -> int:
-    """What every kind of plan does with the options they share."""
+    """Run a plan of any kind with the options that all kinds share."""
     from groundstation.base.text_columns import columns
     from groundstation.cli import printing
     from groundstation.cli.progress import listener

@@ -1,4 +1,4 @@
-"""How results look on stdout: lines for people, JSON for programs."""
+"""Output of results on stdout: lines for people, JSON for programs."""
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
@@ -11,13 +11,13 @@ from groundstation.pipeline.one_flight.log import log_name
 from groundstation.pipeline.one_flight.outcome import Outcome, State, worst_code
 from groundstation.pipeline.verbs.describe import BusWord, Description
 
-NAMED_SHOWN = 6  # words of a bus that an ICD names, told one by one
+NAMED_SHOWN = 6  # words of a bus that an ICD names, listed one by one
 
 __all__ = ["as_json", "catalogue", "description", "outcomes", "worst_code"]
 
 
 def description(what: Description, *, everything: bool = False) -> str:
-    """Text of ``info``; with ``everything`` each word of the buses has a line, else each bus."""
+    """Return the text of ``info``: a line for each bus, with ``everything`` for each word."""
     head = [[f"{key}:", printable(value)] for key, value in what.facts.items()]
     parts = [columns(head)]
     if what.topics:
@@ -44,7 +44,7 @@ def description(what: Description, *, everything: bool = False) -> str:
 
 
 def _every_word(buses: Sequence[BusWord]) -> str:
-    """A line for each terminal and subaddress, or label."""
+    """Return a line for each terminal and subaddress, or label."""
     rows = [["channel", "bus", "what", "count", "rate Hz", "ICD"]]
     for one in buses:
         rate = "" if one.rate_hz is None else f"{one.rate_hz:.4g}"
@@ -53,7 +53,7 @@ def _every_word(buses: Sequence[BusWord]) -> str:
 
 
 def _every_bus(buses: Sequence[BusWord]) -> str:
-    """A line for each bus, with what the ICD names on it."""
+    """Return a line for each bus, with what the ICD names on it."""
     rows = [["channel", "bus", "words", "kinds", "named", "by the ICD"]]
     for place, found in groupby(buses, key=lambda one: one.place):
         words = list(found)
@@ -73,9 +73,10 @@ def outcomes(
     with_times: bool = False,
     is_plan: bool = False,
 ) -> None:
-    """Print what became of each log: a line each on stdout, in the order of the logs: log, state, flight, answer.
+    """Print the outcome of each log: a line each on stdout, in the order of the logs.
 
-    On stderr what was skipped, by reason, then failures, then totals. Of a plan there is no state and no total.
+    A line has log, state, flight, answer. On stderr what was skipped, by reason, then failures, then totals. Of a plan
+    there is no state and no total.
     """
     if as_json_text:
         tell(as_json([_plain(outcome) for outcome in done]))
@@ -112,7 +113,7 @@ def tell_errors(outcome: Outcome, *, with_traces: bool = False) -> None:
 
 
 def removed(pdfs: Sequence[Path]) -> str:
-    """Line on PDFs of an earlier run that a report without PDFs removed.
+    """Return the line on PDFs of an earlier run that a report without PDFs removed.
 
     Examples
     --------
@@ -124,14 +125,14 @@ def removed(pdfs: Sequence[Path]) -> str:
 
 
 def _names(done: Sequence[Outcome]) -> list[str]:
-    """Logs by the names of their files; by their paths where two files have one name."""
+    """Return logs by the names of their files; by their paths where two files have one name."""
     files = [outcome.source if outcome.is_session else log_name(Path(outcome.source)) for outcome in done]
     paths = {file: {one.source for name, one in zip(files, done, strict=True) if name == file} for file in set(files)}
     return [file if len(paths[file]) == 1 else outcome.source for file, outcome in zip(files, done, strict=True)]
 
 
 def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:
-    """Logs that were skipped: one line for each reason, with at most so many names.
+    """Return logs that were skipped: one line for each reason, with at most so many names.
 
     Examples
     --------
@@ -155,7 +156,7 @@ def skipped_lines(done: Sequence[Outcome], most: int) -> list[str]:
 
 
 def totals(done: Sequence[Outcome]) -> str:
-    """Totals line: how many logs, and sessions of several, ended in which state.
+    """Return the totals line: how many logs, and sessions of several, ended in which state.
 
     Examples
     --------
@@ -237,7 +238,7 @@ KINDS = {
 
 
 def catalogue(entries: Sequence[Mapping[str, Any]], is_about_a_log: bool) -> str:
-    """Text of ``list``."""
+    """Return text of ``list``."""
     lines: list[str] = []
     kind = ""
     for entry in entries:

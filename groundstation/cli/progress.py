@@ -12,7 +12,10 @@ from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
 @contextmanager
 def listener(mode: Literal["auto", "none", "json"]) -> Iterator[Listener]:
-    """Give a listener for progress events; ``auto`` draws a bar only where stderr is a terminal."""
+    """Yield a listener for progress events.
+
+    ``auto`` draws a bar only where stderr is a terminal.
+    """
     if mode == "json":
         yield _as_json
     elif mode == "auto" and sys.stderr.isatty():
@@ -24,7 +27,10 @@ def listener(mode: Literal["auto", "none", "json"]) -> Iterator[Listener]:
 
 
 def _tell_of_compiling() -> None:
-    """Say why the first log of a format takes long, where nothing is compiled yet or nothing can be kept."""
+    """Say why the first log of a format takes long.
+
+    It does where nothing is compiled yet or compiled code cannot be kept.
+    """
     from groundstation.base.compile import keeps_nothing
 
     if keeps_nothing():
@@ -36,7 +42,7 @@ def _as_json(event: Event) -> None:
     if event.kind == "begin":
         document["total"] = event.total
     line = printable_json(json.dumps(document, ensure_ascii=False)) + "\n"
-    with suppress(OSError):  # nobody reads any more: the run goes on
+    with suppress(OSError):  # the reader of stderr is gone: the run goes on
         sys.stderr.write(line)  # one write: events come from two threads
         sys.stderr.flush()
 
@@ -49,7 +55,7 @@ def _bar() -> Iterator[Listener]:
     from rich.text import Text
 
     class Rate(TextColumn):
-        """Logs a minute."""
+        """Column with logs per minute."""
 
         def render(self, task: Task) -> Text:
             return Text(f"{60.0 * task.speed:.1f}/min" if task.speed else "")

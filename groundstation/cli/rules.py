@@ -1,4 +1,4 @@
-"""The verb ``rules``: what other limits would make of past verdicts."""
+"""Verb ``rules``: past verdicts under other limits."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -50,7 +50,9 @@ def test(
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
-    """List which verdicts would change under other limits, and why, from the gates that the flights saved.
+    """List which verdicts would change under other limits, and why.
+
+    The gates that the flights saved are judged again, without the logs.
 
     A setting that chooses data or changes what is measured needs the log: it is named; the rest is judged.
 
@@ -78,7 +80,10 @@ def test(
 
 
 def rules_text(found: "RulesTest", *, everything: bool = False) -> str:
-    """Text of ``rules test``: changed verdicts with the gates that changed them, what needs the log, totals."""
+    """Return the text of ``rules test``: changed verdicts, their gates, totals, open settings.
+
+    Open settings are those that need the log.
+    """
     from groundstation.base.text_columns import columns
 
     heads = [

@@ -1,4 +1,7 @@
-"""The verbs on simulated flights: ``simulate`` writes them as logs, ``study`` judges the estimators by them."""
+"""Verbs on simulated flights.
+
+``simulate`` writes them as logs, ``study`` judges the estimators by them.
+"""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -34,7 +37,10 @@ def simulate(
     verbose: Verbose = False,
     json: Json = False,
 ) -> int | None:
-    """Simulate a flight as a flat CSV, with the truth beside it. `groundstation list` names the scenarios."""
+    """Simulate a flight as a flat CSV, with the truth beside it.
+
+    `groundstation list` names the scenarios.
+    """
     from groundstation.pipeline.verbs.synthesis import simulate_to
 
     tell_written(simulate_to(scenario, output, seed=seed, form=form, force=force), as_json_text=json, quiet=quiet)
@@ -73,7 +79,10 @@ def study(
     verbose: Verbose = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Run the Monte Carlo behind the published figures, ours beside them; or every algorithm on recorded robots."""
+    """Run the Monte Carlo behind the published figures, ours beside them.
+
+    Or every algorithm on recorded robots (--recorded).
+    """
     from groundstation.cli.progress import listener
     from groundstation.pipeline.verbs.synthesis import study_to
 

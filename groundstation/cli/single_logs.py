@@ -1,4 +1,7 @@
-"""Verbs for single logs that make no flight: ``info``, ``check`` and ``convert``. Heavy imports happen inside them."""
+"""Verbs for single logs that make no flight: ``info``, ``check`` and ``convert``.
+
+Heavy imports happen inside them.
+"""
 
 from functools import partial
 from pathlib import Path
@@ -51,7 +54,10 @@ def info(
     json: Json = False,
     verbose: Verbose = False,
 ) -> int | None:
-    """Show what a log is: format, clock, span, topics with rows, rates, fields; its buses (word by word with -v)."""
+    """Show what a log is: format, clock, span, topics with rows, rates, fields.
+
+    Its buses are shown too, word by word with -v.
+    """
     from groundstation.cli import printing
     from groundstation.pipeline.one_flight.convert import why_nothing_is_placed
     from groundstation.pipeline.verbs import describe
@@ -102,7 +108,9 @@ def check(
     json: Json = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Print the integrity ledger: rates, coverage, gaps, losses and odd values of every topic. Writes nothing.
+    """Print the integrity ledger of every topic: rates, coverage, gaps, losses, odd values.
+
+    Writes nothing.
 
     With --for, the first line says whether the log can be used for that analysis.
     """
@@ -150,7 +158,10 @@ def convert(
     json: Json = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Convert recorded logs to MCAP (protobuf channels, zstd, indexed); the clock is repaired, both times are kept."""
+    """Convert recorded logs to MCAP (protobuf channels, zstd, indexed).
+
+    The clock is repaired, both times are kept.
+    """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
     from groundstation.pipeline.many_flights.references import judged_by

@@ -1,4 +1,4 @@
-"""Printing for all verbs: text that shows and drives no terminal, JSON for programs."""
+"""Printing for all verbs: text that never drives the terminal, JSON for programs."""
 
 import json
 from typing import Any
@@ -20,7 +20,7 @@ def say(text: str) -> None:
 
 
 def printable_lines(text: str) -> str:
-    """Text of several lines, each as :func:`groundstation.base.printable.printable` has it.
+    """Return text of several lines, each made printable.
 
     Examples
     --------

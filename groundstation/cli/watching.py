@@ -1,4 +1,4 @@
-"""The verb on a folder that logs arrive in: ``watch`` runs them, and keeps the page of the fleet current."""
+"""Verb ``watch``: run the logs that arrive in a folder, and update the page of the fleet."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -78,7 +78,9 @@ def watch(
     json: Json = False,
     progress: Progress = "auto",
 ) -> int | None:
-    """Run what arrives in a folder, once it has stopped growing, until Ctrl-C; index and fleet page stay current.
+    """Run the logs that arrive in a folder, once they have stopped growing, until Ctrl-C.
+
+    Index and fleet page stay current.
 
     It may be killed at any moment: the same command continues with what is not finished.
     """

@@ -1,4 +1,4 @@
-"""The Python API: a flight opened from a log or from a flight folder, everything computed when first asked for."""
+"""Python API: a flight from a log or a flight folder, computed when first asked for."""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -41,7 +41,7 @@ def open_flight(
     thresholds: Settings | None = None,
     weather: Settings | None = None,
 ) -> "OpenFlight":
-    """Open a flight: a recorded log, an MCAP that groundstation wrote, or a flight folder that ``run`` made.
+    """Open a flight: a recorded log, an MCAP that groundstation wrote, or a flight folder.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def open_flight(
 
 
 def open_fleet(out: AnyPath) -> "pd.DataFrame":
-    """The table of a folder of flights that ``run`` made, one row a flight.
+    """Return the table of a folder of flights that ``run`` made, one row a flight.
 
     Raises
     ------
@@ -106,7 +106,9 @@ def open_fleet(out: AnyPath) -> "pd.DataFrame":
 
 
 def simulate(scenario: str, folder: AnyPath, *, seed: int | None = None) -> Path:
-    """Simulate a flight with known truth into ``<folder>/<scenario>.csv``, whatever is there, and return that path.
+    """Simulate a flight with known truth into ``<folder>/<scenario>.csv``; return that path.
+
+    A file that is there is overwritten.
 
     Raises
     ------
@@ -120,7 +122,7 @@ def simulate(scenario: str, folder: AnyPath, *, seed: int | None = None) -> Path
 
 
 class Conversion:
-    """A log and what becomes of it when read: done once, shared by all settings it is analysed with."""
+    """Log with its conversion, done once and shared by all settings it is analysed with."""
 
     def __init__(self, log: Log) -> None:
         self.log = log
@@ -140,7 +142,10 @@ class Conversion:
 
 
 class OpenLog(OpenFlight):
-    """A flight from a log or MCAP, with settings; nothing is written but by :meth:`save` and :meth:`recording`."""
+    """Flight from a log or MCAP, with settings.
+
+    Only :meth:`save` and :meth:`recording` write anything.
+    """
 
     def __init__(self, conversion: Conversion, configuration: Configuration) -> None:
         self.configuration = configuration
@@ -188,7 +193,9 @@ class OpenLog(OpenFlight):
         return OpenLog(self._conversion, load_configuration(document, **layouts))
 
     def save(self, out: AnyPath, *, force: bool = False, pdf: bool = False) -> "SavedRun":
-        """Run the log into ``out`` as the verb ``run`` does, with ``pdf`` as with its option, and open the folder.
+        """Run the log into ``out`` as the verb ``run`` does, and open the folder.
+
+        ``pdf`` is like its option.
 
         Raises
         ------
@@ -216,7 +223,7 @@ class OpenLog(OpenFlight):
 
 
 class SavedRun(OpenFlight):
-    """A flight folder that a run made: its answers as they were saved, its tables from the MCAP in it."""
+    """Flight folder that a run made: saved answers, and tables from the MCAP in it."""
 
     def __init__(self, folder: Path) -> None:
         from groundstation.results.files import load
@@ -251,7 +258,7 @@ class SavedRun(OpenFlight):
 
     @cached_property
     def _log(self) -> OpenLog:
-        """The flight anew, from the MCAP, with the settings of the run."""
+        """Return the flight opened again from the MCAP, with the settings of the run."""
         mcap = file_in(self.folder, ".mcap")
         told = self.saved.manifest.configuration
         known = {name: value for name, value in told.items() if name in sections()}
@@ -279,7 +286,7 @@ def _file_or_content(settings: Settings | None) -> Path | Mapping[str, Any] | No
 
 
 def _laid_over(document: Mapping[str, Any], sections: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings with some sections changed: mappings key by key, lists as a whole."""
+    """Return settings with some sections changed: mappings key by key, lists as a whole."""
     out = {name: value for name, value in document.items() if name not in ("profile", "icds")}
     for name, value in sections.items():
         known = out.get(name, {})

@@ -1,4 +1,4 @@
-"""What a notebook does with one flight, whether it comes from a log or from a flight folder."""
+"""Flight in a notebook, from a log or from a flight folder."""
 
 from abc import ABC, abstractmethod
 from functools import cached_property
@@ -30,7 +30,7 @@ MOST_TOPICS = 12  # named in the card of a flight
 
 
 class OpenFlight(ABC):
-    """One flight. What stands here works alike for a log and for a flight folder."""
+    """One flight in a notebook. All methods work alike for a log and for a flight folder."""
 
     @property
     @abstractmethod
@@ -45,12 +45,12 @@ class OpenFlight(ABC):
     @property
     @abstractmethod
     def clock(self) -> Clock:
-        """How the recorder's clock was read and repaired."""
+        """Clock of the recorder: how it was read and repaired."""
 
     @property
     @abstractmethod
     def info(self) -> dict[str, str]:
-        """What the log is: file, format, first and last sample, metadata."""
+        """Facts of the log: file, format, first and last sample, metadata."""
 
     @property
     @abstractmethod
@@ -60,11 +60,16 @@ class OpenFlight(ABC):
     @property
     @abstractmethod
     def results(self) -> FlightResults:
-        """All answers; ``results.to_frame(name)`` gives findings and the arrays behind the figures."""
+        """Answers of all analyses.
+
+        ``results.to_frame(name)`` gives findings and the arrays behind the figures.
+        """
 
     @abstractmethod
     def with_settings(self, **sections: Any) -> "OpenFlight":
-        """The same flight with other settings; the log is read again only for other ``thresholds`` of the ledger.
+        """Return the same flight with other settings.
+
+        The log is read again only for other ``thresholds`` of the ledger.
 
         Parameters
         ----------
@@ -81,18 +86,19 @@ class OpenFlight(ABC):
 
     @abstractmethod
     def _saved(self) -> "SavedFlight":
-        """The flight as the report reads it."""
+        """Return the flight as the report reads it."""
 
     @cached_property
     def tables(self) -> Tables:
-        """Tables by topic: ``tables["ins"]["roll_deg"]`` is an array, ``tables["ins"].utc`` its times.
+        """Tables by topic: ``tables["ins"]["roll_deg"]`` is an array.
 
-        ``tables["ins"].to_frame()`` is indexed by UTC, or by flight time where there is none.
+        ``tables["ins"].utc`` are its times. ``tables["ins"].to_frame()`` is indexed by UTC, or by flight time where
+        there is none.
         """
         return Tables(self.flight)
 
     def heading(self) -> HeadingResult:
-        """The heading correction (system 1).
+        """Return the heading correction (system 1).
 
         Raises
         ------
@@ -102,27 +108,33 @@ class OpenFlight(ABC):
         return self.answer(HeadingResult)
 
     def inertial(self) -> InertialResult:
-        """The errors of the INS (system 2); raises as :meth:`heading`."""
+        """Return the errors of the INS (system 2); raises as :meth:`heading`."""
         return self.answer(InertialResult)
 
     def forecast(self) -> ForecastResult:
-        """How far the INS can be trusted without GNSS; raises as :meth:`heading`."""
+        """Return how far the INS can be trusted without GNSS; raises as :meth:`heading`."""
         return self.answer(ForecastResult)
 
     def latency(self) -> Latencies:
-        """How much later each sensor shows the motion that the INS shows; raises as :meth:`heading`."""
+        """Return how much later than the INS each sensor shows the motion.
+
+        Raises as :meth:`heading`.
+        """
         return self.answer(Latencies)
 
     def magnetic(self) -> MagneticResult:
-        """The deviation of the magnetic heading (system 3); raises as :meth:`heading`."""
+        """Return the deviation of the magnetic heading (system 3); raises as :meth:`heading`."""
         return self.answer(MagneticResult)
 
     def magnetic_ground(self) -> GroundDeviation:
-        """Error of the installed heading sensor on straight ground runs; raises as :meth:`heading`."""
+        """Return the error of the installed heading sensor on straight ground runs.
+
+        Raises as :meth:`heading`.
+        """
         return self.answer(GroundDeviation)
 
     def answer(self, kind: type[A]) -> A:
-        """The answer of any analysis, by its type.
+        """Return the answer of any analysis, by its type.
 
         Raises
         ------
@@ -141,7 +153,7 @@ class OpenFlight(ABC):
         return {name: plot.title for name, plot in self._plots.items()}
 
     def figure(self, name: str) -> Any:
-        """A figure of the report, for matplotlib.
+        """Return a figure of the report, for matplotlib.
 
         Parameters
         ----------
@@ -223,7 +235,7 @@ class OpenFlight(ABC):
         return f"<{type(self).__name__} {self.source.name} ({self.source.reader}){told}>"
 
     def _repr_html_(self) -> str:
-        """The top of the report as a short table: verdict, correction, span, topics."""
+        """Return the top of the report as a short table: verdict, correction, span, topics."""
         from groundstation.chapters.front import front
         from groundstation.systems import systems
 

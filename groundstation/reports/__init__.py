@@ -1,1 +1,4 @@
-"""Pages and fleet tables made from saved results: nothing is computed here, every number shown exists in results."""
+"""Pages and fleet tables made from saved results.
+
+Nothing is computed here: every number shown exists in results.
+"""

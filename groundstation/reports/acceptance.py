@@ -1,4 +1,4 @@
-"""The acceptance report: a page and a PDF ready to sign, from an acceptance alone."""
+"""Acceptance report: a page and a PDF ready to sign, from an acceptance alone."""
 
 from pathlib import Path
 

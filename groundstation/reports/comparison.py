@@ -1,4 +1,4 @@
-"""The page of a comparison: what differs between two flights, and their figures over each other."""
+"""Page of a comparison: the differences of two flights, and their figures over each other."""
 
 from collections.abc import Callable, Sequence
 
@@ -32,7 +32,7 @@ def comparison_html(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> s
 
 
 def _figures(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> Section | None:
-    """Figures of both flights over each other, without those that fail."""
+    """Return figures of both flights over each other, without those that fail."""
     sides = (
         Side("A", a, _default_method(a)),
         Side("B", b, _default_method(b), comparison.alignment.offset_s),

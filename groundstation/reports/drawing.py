@@ -1,4 +1,4 @@
-"""Plots as a report shows them: each a picture, with the panels that a page draws live over it."""
+"""Plots of a report as pictures, with the panels that a page draws live over them."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -37,24 +37,27 @@ class Drawing(Part):
 
 
 def plot_of(plots: Mapping[str, Callable[..., Plot | None]], figure: Figure, results: object) -> Plot | None:
-    """The plot of a figure of a chapter; None where there is nothing to show."""
+    """Return the plot of a figure of a chapter; None where there is nothing to show."""
     return plots[figure.name](results, *((figure.of,) if figure.of else ()))
 
 
 def drawing_of(plot: Plot | None, name: str = "") -> Drawing | None:
-    """The part of a report that shows a plot, by its name or another; None of no plot."""
+    """Return the part of a report that shows a plot, by its name or another; None without one."""
     if plot is None:
         return None
     return Drawing(plot.title, plot.caption, plot.alt, picture_of(plot), plot.numbers, name or plot.name)
 
 
 def drawn_by(plots: Mapping[str, Callable[..., Plot | None]], section: Section, results: object) -> Section:
-    """Section with the plots of its figures drawn, without those that fail or have nothing to show."""
+    """Return a section with the plots of its figures drawn.
+
+    Plots that fail or have nothing to show are left out.
+    """
     return replace(section, parts=kept(_drawn(plots, part, results) for part in section.parts))
 
 
 def _drawn(plots: Mapping[str, Callable[..., Plot | None]], part: Part, results: object) -> Part | None:
-    """A figure as a drawing, by the name that its chapter gives; any other part as it is."""
+    """Return a figure as a drawing, by its name in the chapter; any other part as it is."""
     if not isinstance(part, Figure):
         return part
     name = ".".join(filter(None, (part.name, part.of)))

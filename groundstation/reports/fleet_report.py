@@ -1,4 +1,7 @@
-"""The report of a folder of flights: one self-contained HTML file with every flight, and its PDF on demand."""
+"""Report of a folder of flights, with every flight: one HTML file, and a PDF on demand.
+
+The HTML file is self-contained.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -31,9 +34,9 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = False
 
     Notes
     -----
-    The page has a row for every flight, of more than 10 000 for those of note and the last ones; paper has at most 60
-    rows of any table, the flights of note first, and says how many more there are. The page's one script sorts and
-    filters the table of flights; without it the table stands as it is.
+    The page has a row for every flight; of more than 10 000, for those with remarks and the latest. Paper has at most
+    60 rows of any table, flights with remarks first, and says how many more there are. The page's one script sorts and
+    filters the table of flights; without it the table stays as it is.
 
     Raises
     ------
@@ -62,12 +65,15 @@ def fleet_document(fleet: FleetResults) -> Document:
 
 
 def on_paper(document: Document) -> Document:
-    """The same with long tables cut."""
+    """Return the document with long tables cut."""
     return replace(document, sections=[shortened(one, MOST_ROWS_ON_PAPER, PAGE) for one in document.sections])
 
 
 def fleet_report_html(document: Document, fleet: FleetResults) -> str:
-    """Render the report of a fleet as a complete HTML document, its flights in a table with links."""
+    """Render the report of a fleet as a complete HTML document.
+
+    Its flights are a table with links.
+    """
     script = (TEMPLATES / "fleet.js").read_text(encoding="utf-8").strip()
     return render(
         "fleet.html.j2",

@@ -1,4 +1,7 @@
-"""The report of one flight: one self-contained HTML file, and its PDF on demand, made from the saved results alone."""
+"""Report of one flight: one self-contained HTML file, and its PDF on demand.
+
+Made from the saved results alone.
+"""
 
 import re
 from collections.abc import Callable
@@ -41,8 +44,8 @@ class Written:
 def write_flight_report(folder: Path, systems: Systems, *, with_pdf: bool = False) -> Written:
     """Write report.html into a flight folder; with a magnetic deviation its table and steer card too.
 
-    A part that fails by a defect is left out, and summary.json and the report tell it: those that failed elsewhere
-    until then, too.
+    The exports are its table and steer card. A part that fails by a defect is left out; summary.json and the report
+    name it, and those that failed before.
 
     Parameters
     ----------
@@ -52,7 +55,7 @@ def write_flight_report(folder: Path, systems: Systems, *, with_pdf: bool = Fals
     systems : Systems
         Those whose answers it has.
     with_pdf : bool
-        Write report.pdf too. Without it there is none afterwards: that of an earlier run would tell of other results.
+        Write report.pdf too. Without it an old one is removed: it would show other results.
 
     Raises
     ------
@@ -133,9 +136,9 @@ def flight_document(saved: SavedFlight, systems: Systems) -> Document:
 
 
 def flight_report_html(document: Document, beside: str = "manifest.json") -> str:
-    """Render the report of a flight as a complete HTML document; its figures are drawn live where scripts may run.
+    """Render the report of a flight as a complete HTML document.
 
-    ``beside`` is the file that the foot of the page leads to.
+    Its figures are drawn live where scripts may run. ``beside`` is the file that the foot of the page leads to.
     """
     parts = (part for section in document.sections for part in section.parts)
     drawn = [part.svg for part in parts if isinstance(part, Drawing)]

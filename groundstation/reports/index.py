@@ -1,4 +1,7 @@
-"""index.json and index.csv: a row for each flight and session of a folder, and for each log that gave none."""
+"""index.json and index.csv: a row for each flight, session and log without a flight.
+
+The rows are those of one folder.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -21,9 +24,10 @@ KINDS: tuple[Kind, ...] = ("flight", "session", "failed", "skipped")
 
 @dataclass(frozen=True, kw_only=True)
 class IndexRow:
-    """One flight or session, or a log that gave none: every row has all columns in this order, None where none applies.
+    """One flight or session, or a log that gave none.
 
-    In place of ``answers`` stand those of the analyses of a flight, by the names of their columns; a session has none.
+    Every row has all columns in this order, None where one does not apply. In place of ``answers`` stand those of the
+    analyses of a flight, by the names of their columns; a session has none.
     """
 
     kind: Kind
@@ -48,16 +52,17 @@ class IndexRow:
 
 
 def columns_of(answers: Sequence[str]) -> tuple[str, ...]:
-    """Names of the columns in order, those of the answers in their place."""
+    """Return names of the columns in order, those of the answers in their place."""
     names = [one.name for one in fields(IndexRow)]
     place = names.index("answers")
     return (*names[:place], *answers, *names[place + 1 :])
 
 
 def index_row(saved: SavedFlight, kind: Kind = "flight", answers: Mapping[str, Any] | None = None) -> IndexRow:
-    """Build the row of one flight or session from what it saved; links are relative to the folder of flights.
+    """Build the row of one flight or session from its saved results.
 
-    A link is None when the flight folder lacks the file at the time of the call.
+    Links are relative to the folder of flights. A link is None when the flight folder lacks the file at the time of the
+    call.
 
     Raises
     ------
@@ -89,7 +94,7 @@ def index_row(saved: SavedFlight, kind: Kind = "flight", answers: Mapping[str, A
 
 
 def reasons_of(results: FlightResults) -> tuple[str, ...]:
-    """What was not assessable, each with its reason."""
+    """Return what was not assessable, each with its reason."""
     return tuple(f"{entry.analysis}: {entry.reason}" for entry in results.not_assessable)
 
 
@@ -114,7 +119,7 @@ def write_index(out: Path, rows: Iterable[IndexRow], answers: Sequence[str] = ()
     answers : sequence of str
         Names of the columns of the analyses.
     elsewhere : str
-        Where the rows of the flights are, if they are not among ``rows``: told in both files.
+        Where the rows of the flights are, if they are not among ``rows``; written into both files.
     """
     columns = columns_of(answers)
     told = [to_json_exactly(row) for row in sorted(rows, key=_place)]

@@ -1,7 +1,8 @@
-"""Where the report of a flight shows what earlier flights taught: it is filled in once all of them are known.
+"""Place in the report of a flight for what earlier flights taught.
 
-The report of a flight is written when the flight is run; earlier flights may arrive later. It therefore has two places,
-between marks that nothing from a log can write, and only what stands between them changes.
+It is filled in once all of them are known. The report of a flight is written when the flight is run; earlier flights
+may arrive later. It therefore has two places, between marks that nothing from a log can write, and only what stands
+between them changes.
 """
 
 import re
@@ -14,7 +15,7 @@ TOP, CHAPTER = "installation-top", "installation"
 
 
 def with_installation(page: str, answer: InstallationResult | None) -> str:
-    """The page of a flight with a learned answer in its places; with none, they are empty."""
+    """Return the page of a flight with a learned answer in its places; empty without one."""
     top = chapter = ""
     if answer is not None:
         top = "" if answer.why_not else render("installation-top.html.j2", text=sentence(answer))

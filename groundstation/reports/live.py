@@ -1,7 +1,8 @@
-"""What a page draws live over its pictures: the panels of each as data for uPlot, or the frames of one that stays.
+"""Data of a page that its script draws live over its pictures.
 
-Panels of curves, dots, bands and lanes over a number live; a figure with a map, cells or names along an axis stays a
-picture, of which the frames of its axes are kept. The numbers are those that the picture shows, as float32.
+The panels of each picture as data for uPlot, or only the frames of one that stays a picture. Panels of curves, dots,
+bands and lanes over a number live; a figure with a map, cells or names along an axis stays a picture, of which the
+frames of its axes are kept. The numbers are those that the picture shows, as float32.
 """
 
 import base64
@@ -19,7 +20,10 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Samples:
-    """Places in a picture, each with a value that is told when the cursor is near it; ``title`` says of what."""
+    """Places in a picture, each with a value that is shown when the cursor is near it.
+
+    ``title`` names the quantity.
+    """
 
     title: str
     x: FloatArray
@@ -29,10 +33,10 @@ class Samples:
 
 @dataclass(frozen=True)
 class Frame:
-    """One pair of axes: its place in the figure, in millimetres from the lower left corner, and its scales.
+    """One pair of axes: its place in the figure and its scales.
 
-    ``names`` are those along the vertical axis with their places, none along an axis of numbers. A range whose first
-    number is the greater runs backwards.
+    The place is in millimetres from the lower left corner. ``names`` are those along the vertical axis with their
+    places, none along an axis of numbers. A range whose first number is the greater runs backwards.
     """
 
     left_mm: float
@@ -53,9 +57,9 @@ class Frame:
 
 @dataclass(frozen=True)
 class Curve:
-    """What stands on axes: ``kind`` is line, dots, band (``y`` to ``upper``) or lanes (from ``x`` to ``upper``).
+    """Mark on axes: line, dots, band (``y`` to ``upper``) or lanes (``x`` to ``upper``).
 
-    ``name`` is empty for what the legend leaves out.
+    ``kind`` says which. ``name`` is empty for what the legend leaves out.
     """
 
     kind: str
@@ -70,7 +74,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Panel(Frame):
-    """One pair of axes with what stands on it.
+    """One pair of axes with its marks.
 
     ``grounds`` are start, end, colour and name of shaded spans, ``marks`` place and colour of upright lines.
     """
@@ -81,25 +85,26 @@ class Panel(Frame):
 
 
 class Svg(str):
-    """A picture as an SVG element, and the panels by which a page draws the same figure live; none: a picture alone.
+    """Picture as an SVG element, with the panels by which a page draws the same figure live.
 
-    ``frames`` are those of its axes.
+    Without panels it stays a picture. ``frames`` are those of its axes.
     """
 
     panels: tuple[Panel, ...]
     frames: tuple[Frame, ...]
 
     def __new__(cls, text: str, panels: tuple[Panel, ...] = (), frames: tuple[Frame, ...] = ()) -> "Svg":
-        """The text of the element, with its panels and frames."""
+        """Make the element from its text, with its panels and frames."""
         made = super().__new__(cls, text)
         made.panels, made.frames = panels, frames
         return made
 
 
 def page_data(figures: Iterable[tuple[Panel, ...]], pictures: Iterable[tuple[Frame, ...]] = ()) -> str:
-    """The panels of every live figure of a page, and the frames of every picture, as JSON for a script element.
+    """Return the panels of every live figure of a page as JSON for a script element.
 
-    Arrays are base64 of little-endian float32, NaN where a line breaks; equal arrays stand once.
+    The frames of every picture are in it too. Arrays are base64 of little-endian float32, NaN where a line breaks;
+    equal arrays stand once.
     """
     pool: dict[str, int] = {}
 

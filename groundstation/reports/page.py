@@ -1,4 +1,7 @@
-"""Turning report parts into pages: jinja2 with autoescape, one style sheet, nothing from outside."""
+"""Pages from the parts of a report: jinja2 with autoescape, one style sheet.
+
+Nothing is loaded from outside.
+"""
 
 import base64
 import hashlib
@@ -17,14 +20,17 @@ CONTENT_SECURITY_POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-u
 
 
 def render(template: str, **context: Any) -> str:
-    """Render a template of reports/templates; every value is escaped and cleaned of hidden characters."""
+    """Render a template of reports/templates.
+
+    Every value is escaped and cleaned of hidden characters.
+    """
     return str(_environment().get_template(template).render(csp=CONTENT_SECURITY_POLICY, **context))
 
 
 def live_figures(figures: Sequence[tuple[Panel, ...]], pictures: Sequence[tuple[Frame, ...]]) -> dict[str, str]:
-    """What flight.html.j2 needs to draw figures live and to zoom into pictures; empty texts without any.
+    """Return the values by which flight.html.j2 draws figures live and zooms into pictures.
 
-    Those are data, script with its digest, style.
+    Empty texts without any. Those are data, script with its digest, style.
     """
     if not (figures or pictures):
         return dict.fromkeys(("live_data", "script", "script_digest", "live_style"), "")
@@ -43,7 +49,7 @@ def live_figures(figures: Sequence[tuple[Panel, ...]], pictures: Sequence[tuple[
 
 
 def digest_of(script: str) -> str:
-    """The SHA-256 of a script as a content security policy names it."""
+    """Return the SHA-256 of a script as a content security policy names it."""
     return base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 

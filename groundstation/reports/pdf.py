@@ -1,4 +1,7 @@
-"""Reports on paper: a document handed to typst as data, so that nothing a log says is ever markup."""
+"""Reports on paper: a document handed to typst as data.
+
+So no text from a log can act as markup.
+"""
 
 import json
 import shutil
@@ -22,13 +25,13 @@ SVG_ALONE = '<svg xmlns="http://www.w3.org/2000/svg" stroke-linejoin="round" fon
 
 
 class PdfError(GroundstationError):
-    """The PDF could not be made; everything else of the report was."""
+    """Error of the PDF alone; everything else of the report was made."""
 
 
 def write_pdf(document: object, path: Path, template: Path | None = None) -> None:
-    """Write a report (:class:`~groundstation.chapters.parts.Document`) as PDF on A4; equal documents give equal bytes.
+    """Write a report as PDF on A4; equal documents give equal bytes.
 
-    Another dataclass is set by a template of its own.
+    A report is a :class:`~groundstation.chapters.parts.Document`. Another dataclass is set by a template of its own.
 
     Raises
     ------
@@ -70,7 +73,7 @@ def pdf_bytes(document: object, template: Path | None = None) -> bytes:
 
 
 def _plain(value: Any) -> Any:
-    """A part of a document as JSON holds it; each says what kind it is."""
+    """Return a part of a document as JSON values, each with its kind."""
     if isinstance(value, str):
         return clean(value).replace(" %", "\u00a0%")  # a number keeps its sign on its line
     if isinstance(value, Sequence):

@@ -31,7 +31,8 @@ APPENDICES: dict[str, Build] = {"provenance": provenance, "sources": sources}
 def flight_sections(saved: SavedFlight, systems: Systems) -> tuple[Section, ...]:
     """The chapters of a flight: the flight itself, what to do next, its answers, the best first, its data; appendices.
 
-    Of a session of several aircraft, and of a plan: those on its answers, its findings, its source.
+    The flight itself, what to do next, its answers, the best first, its data. Of a session of several aircraft, and of
+    a plan: those on its answers, its findings, its source.
 
     A chapter that has nothing to say is left out, one of nothing but figures without arrays, and one that fails.
     """
@@ -74,14 +75,20 @@ def _numbered(
 
 
 def _workings(section: Section, configuration: Mapping[str, Any]) -> Section:
-    """What a chapter leaves to the appendix; of the settings those that were set."""
+    """Return the part of a chapter that belongs in the appendix.
+
+    Settings are cut down to those that the user set.
+    """
     every = (*section.parts, *section.appendix) if section.is_open else section.appendix
     parts = kept(_as_set(part, configuration) for part in every)
     return Section(f"{section.key}-workings", f"{section.title}: workings", "", parts)
 
 
 def _as_set(part: Part, configuration: Mapping[str, Any]) -> Part | None:
-    """Settings cut down to those that the user set, None where there is none; any other part as it is."""
+    """Cut settings down to those that the user set, None where there is none.
+
+    Any other part stays as it is.
+    """
     if not isinstance(part, Facts) or not part.settings_of:
         return part
     given = configuration.get(part.settings_of)

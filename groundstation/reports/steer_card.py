@@ -1,4 +1,4 @@
-"""What a flight leaves beside its report for the cockpit: the deviation as a table and as a steer card on A6 paper."""
+"""Exports for the cockpit, beside a flight's report: deviation table and steer card (A6)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,10 @@ MOST_LETTERS, MOST_OF_A_REASON = 40, 150
 
 @dataclass(frozen=True)
 class CardLine:
-    """To fly a magnetic heading, steer that reading; the deviation to add with its sigma."""
+    """Line of a steer card: magnetic heading, reading to steer, deviation to add, its sigma.
+
+    To fly the heading, steer the reading.
+    """
 
     heading: str
     steer: str
@@ -32,7 +35,7 @@ class CardLine:
 
 @dataclass(frozen=True)
 class SteerCard:
-    """The card as it is printed.
+    """Steer card as printed.
 
     Parameters
     ----------
@@ -55,9 +58,9 @@ class SteerCard:
 
 
 def write_exports(saved: SavedFlight, *, with_card: bool = True) -> tuple[tuple[Path, ...], str]:
-    """Write deviation.csv and steer_card.pdf of a flight that has a magnetic deviation; others lose an old one.
+    """Write deviation.csv and steer_card.pdf of a flight that has a magnetic deviation.
 
-    Without ``with_card`` a card that is there stays.
+    Other flights lose old ones. Without ``with_card`` a card that is there stays.
 
     Returns
     -------
@@ -108,7 +111,7 @@ def steer_card(results: FlightResults, answer: MagneticResult) -> SteerCard:
 
 
 def _state(answer: MagneticResult) -> tuple[Mark, str]:
-    """The verdict; anything but accept is told largely."""
+    """Return the verdict; any but accept is printed large."""
     reason = _shorter(typeset(answer.verdict_reason), MOST_OF_A_REASON)
     if answer.verdict == "accept":
         return Mark("good", "Accepted"), reason
@@ -126,7 +129,7 @@ def _line(row: CardRow) -> CardLine:
 
 
 def _three_digits(heading_deg: float) -> str:
-    """A heading in whole degrees as it is spoken: 000 to 359."""
+    """Return a heading in whole degrees as it is spoken: 000 to 359."""
     return f"{round(heading_deg) % 360:03d}" if is_number(heading_deg) else ABSENT
 
 

@@ -1,8 +1,8 @@
-"""Monte Carlo behind the localizer as a reference: does the 95 % interval of the error of positions hold the truth?
+"""Monte Carlo study of the localizer as a reference for position errors.
 
-The family is that of docs/approaches.md, written down before it was run: finals on any course anywhere, INS errors of
-some hundred metres, positions in steps of 153 m, an ILS of category I within its tolerances. The other families each
-break one assumption.
+Does the 95 % interval of the error of positions hold the truth? The family is that of docs/approaches.md, written down
+before it was run: finals on any course anywhere, INS errors of some hundred metres, positions in steps of 153 m, an ILS
+of category I within its tolerances. The other families each break one assumption.
 """
 
 from collections.abc import Callable
@@ -36,7 +36,7 @@ ASSUMED = LandingSettings()
 
 @dataclass(frozen=True)
 class Family:
-    """A family of approaches: what it does to those of the plain one, and the settings they are judged with."""
+    """Family of approaches: its change to those of the plain family, and its settings."""
 
     name: str
     what: str
@@ -132,7 +132,7 @@ DIGITS = {
 
 
 def drawn(rng: np.random.Generator) -> ApproachScenario:
-    """A member of the plain family."""
+    """Return a member of the plain family."""
     runway = TrueRunway(float(rng.uniform(-60, 60)), float(rng.uniform(-179, 179)), float(rng.uniform(0, 360)))
     flown = Flown(
         start_distance_m=float(rng.uniform(12_000.0, 26_000.0)),
@@ -154,7 +154,10 @@ def drawn(rng: np.random.Generator) -> ApproachScenario:
 
 
 def site_of(scenario: ApproachScenario, rng: np.random.Generator) -> SiteData:
-    """What a site file says of the runway: bearing to 0.05 deg, threshold to 1 m, the nominal width."""
+    """Return the runway as a site file states it.
+
+    Bearing to 0.05 deg, threshold to 1 m, the nominal width.
+    """
     runway = scenario.runway
     north_m, east_m = rng.normal(0.0, 1.0, 2)
     told = Runway(
@@ -170,7 +173,7 @@ def site_of(scenario: ApproachScenario, rng: np.random.Generator) -> SiteData:
 
 
 def measured(scenario: ApproachScenario, site: SiteData, settings: LandingSettings) -> PositionError | None:
-    """The error of the positions of an approach, None where it is not measured."""
+    """Return the error of the positions of an approach, None where it is not measured."""
     simulated: SimulatedApproach = simulate_approach(scenario)
     known = Known(flight_phases(simulated.flight), site=site)
     try:

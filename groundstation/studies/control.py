@@ -1,4 +1,7 @@
-"""Study of optimal control of a session and of placement: every published figure with ours beside it."""
+"""Study of optimal control of a session and of placement.
+
+Every published figure with ours beside it.
+"""
 
 from collections.abc import Callable, Sequence
 
@@ -42,7 +45,7 @@ def study_control(runs: int = 100, seed: int = 0, progress: Progress | None = No
 
 
 def published_table(tell: Progress) -> FigureData:
-    """Ours beside the published figures."""
+    """Tabulate our figures beside the published ones."""
     answers: dict[str, ControlPlan] = {}
     for name in dict.fromkeys(case.plan for case in CASES):
         tell(f"plan {name}")
@@ -68,7 +71,10 @@ def _near(published: float, ours: float) -> str:
 
 
 def laws_table(plan: SessionPlan, runs: int, seed: int, tell: Progress) -> FigureData:
-    """Every law of a session of exact neighbours: computed sigma, errors of simulated flights, NEES with its limits."""
+    """Tabulate every law of a session of exact neighbours.
+
+    Computed sigma, errors of simulated flights, NEES with its limits.
+    """
     session = Session(plan)
     laws = {UNCONTROLLED: session.motion.uncontrolled}
     laws |= {name: local_law(session, name).controls for name in LOCAL_CRITERIA}
@@ -93,7 +99,10 @@ def laws_table(plan: SessionPlan, runs: int, seed: int, tell: Progress) -> Figur
 
 
 def placement_table(plans: dict[str, SessionPlan], tell: Progress) -> FigureData:
-    """The best third point for each fixed point: by analysis, by the determinant, by the covariance."""
+    """Tabulate the best third point by analysis, by the determinant, by the covariance.
+
+    One row per fixed point.
+    """
     rows = []
     for name, plan in plans.items():
         tell(f"fixed point {name}")
@@ -112,7 +121,7 @@ def placement_table(plans: dict[str, SessionPlan], tell: Progress) -> FigureData
 
 
 def _third(answer: PlacementPlan, design: str) -> float:
-    """How far before the threshold a design puts the third point."""
+    """Return the distance of a design's third point before the threshold, m."""
     return -next(row.north_m for row in answer.places_of(design) if row.is_placed)
 
 
@@ -121,7 +130,7 @@ def _is_published(before_m: float) -> bool:
 
 
 def page(tables: Sequence[FigureData], runs: int, seed: int) -> tuple[Section, ...]:
-    """The study in sections."""
+    """Return the study in sections."""
     published, laws, placed = tables
     return (
         section(

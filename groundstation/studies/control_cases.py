@@ -1,4 +1,4 @@
-"""The published figures of control and placement, each with the plan that stands for it.
+"""Published figures of control and placement, each with the plan for it.
 
 Source: O. N. Skrypnik, thesis on navigation between aircraft, 2010, chapters 5 (control) and 6.2 (placement).
 """
@@ -24,7 +24,10 @@ CORRELATED_S = (0.0, 1.0, 10.0)
 
 @dataclass(frozen=True)
 class Case:
-    """One published figure: of which plan, what is read off its answer, and what is written there; NaN: a direction."""
+    """One published figure: its plan, its value, and the function that reads ours.
+
+    A value of NaN: only a direction is published.
+    """
 
     name: str
     plan: str
@@ -35,19 +38,19 @@ class Case:
 
 
 def scenario(name: str) -> SessionPlan:
-    """A shipped plan of a session."""
+    """Return a shipped plan of a session."""
     return load_plan(SESSION_PLAN, name).scenario
 
 
 def measures(answer: ControlPlan) -> ControlMeasures:
-    """Accuracy and geometry with time."""
+    """Return accuracy and geometry with time."""
     found = found_in(answer.figures, ControlMeasures)
     assert found is not None
     return found
 
 
 def least_sigma_m(answer: ControlPlan, axis: str) -> float:
-    """Least sigma along the way under the recommended law."""
+    """Return the least sigma along the way under the recommended law."""
     data = measures(answer)
     two_sigma_m = {
         "north": data.two_sigma_north_m,
@@ -59,7 +62,10 @@ def least_sigma_m(answer: ControlPlan, axis: str) -> float:
 
 
 def _ratio(answer: ControlPlan, name: str) -> float:
-    """A measure of geometry at the end under the law of the source's local criterion over that without control."""
+    """Return a measure of geometry at the end, under control over that without control.
+
+    The law is that of the source's local criterion, the determinant.
+    """
     laws = answer.law("determinant"), answer.law(UNCONTROLLED)
     return float(getattr(laws[0], name) / getattr(laws[1], name))
 
@@ -97,7 +103,10 @@ CASES: tuple[Case, ...] = (
 
 
 def placements() -> dict[str, SessionPlan]:
-    """The third point of an approach, for fixed points along the path and for correlated range errors, by name."""
+    """Return plans of an approach that place its third point, by name.
+
+    They vary the fixed point along the path, and the correlation of range errors.
+    """
     base = scenario(THIRD)
     found = {}
     for before_m in FIXED_BEFORE_M:
@@ -109,7 +118,7 @@ def placements() -> dict[str, SessionPlan]:
 
 
 def with_fixed_point(base: SessionPlan, before_m: float) -> SessionPlan:
-    """An approach that begins so that an epoch of it falls on a point of the path.
+    """Return an approach that begins so that an epoch of it falls on a point of the path.
 
     The way is moved along itself by less than a step.
     """

@@ -1,7 +1,8 @@
-"""Simulated flights along laws of control: is the accuracy that a plan computes met, and is it honest?
+"""Simulated flights along laws of control.
 
-Each flight draws the errors that the plan believes in, ranges are those of the true places, and the filter takes the
-directions at its own estimate, as one in the air must: what the linear covariance of a plan leaves out.
+Is the accuracy that a plan computes met, and is it honest? Each flight draws the errors that the plan believes in,
+ranges are those of the true places, and the filter takes the directions at its own estimate, as one in the air must:
+what the linear covariance of a plan leaves out.
 """
 
 from dataclasses import dataclass
@@ -18,7 +19,10 @@ PASSES = 3  # linearisations of each epoch: one is not enough 300 m off at range
 
 @dataclass(frozen=True)
 class Flown:
-    """Errors of many flights at the end: rms north, east (m), and NEES of both, with how many flights there were."""
+    """Errors of many flights at the end: rms north and east (m), and NEES of both.
+
+    ``runs`` is the number of flights.
+    """
 
     rms_north_m: float
     rms_east_m: float
@@ -27,7 +31,7 @@ class Flown:
 
 
 def fly(session: Session, paths: Paths, runs: int, rng: np.random.Generator) -> Flown:
-    """Fly one law many times; all others are exact, and the judged aircraft alone is estimated.
+    """Fly one law many times; only the judged aircraft is estimated, all others are exact.
 
     The filter is an iterated extended one (Bell and Cathey, 1993): at each epoch the ranges are taken anew about the
     estimate they led to.
@@ -46,7 +50,10 @@ def fly(session: Session, paths: Paths, runs: int, rng: np.random.Generator) -> 
 def _one(
     model: AccuracyModel, position_m: FloatArray, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Error states at the end: true, estimated, and their covariance. Position = true position + error."""
+    """Return the error states at the end: true, estimated, and their covariance.
+
+    Position = true position + error.
+    """
     sources = position_m[:, [one for one in range(model.sources) if one != model.user]]
     R = model.variance_m2 * np.eye(sources.shape[1])
     F, noise = model.dynamics, np.linalg.cholesky(model.noise + 1e-12 * np.eye(model.size))

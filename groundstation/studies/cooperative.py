@@ -1,4 +1,7 @@
-"""Monte Carlo behind navigation between aircraft: every published figure with ours beside it, and how honest it is."""
+"""Monte Carlo study of navigation between aircraft.
+
+Every published figure with ours beside it, and how honest ours is.
+"""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""The published figures of navigation between aircraft, each with the session that stands for it."""
+"""Published figures of navigation between aircraft, each with the session for it."""
 
 from dataclasses import dataclass, fields
 from typing import Literal
@@ -305,7 +305,10 @@ CASES: tuple[Case, ...] = (
 
 
 def settings_of(scenario: SessionScenario, case: Case) -> CooperativeSettings:
-    """Settings whose belief is exactly what the session draws from; no gate, as in the source."""
+    """Return settings whose belief is exactly what the session draws from; no gate.
+
+    The source has no gate either.
+    """
     errors = scenario.errors
     belief = InsBelief(**{item.name: getattr(errors, item.name) for item in fields(InsBelief)})
     return CooperativeSettings(

@@ -16,7 +16,7 @@ HONEST_SHARE = 0.99  # of honest filters inside the limits: some twenty are judg
 
 
 def measured(case: Case, outcomes: Sequence[Outcome]) -> tuple[float, float]:
-    """The figure as the filter computes it, and as its errors show it over the runs."""
+    """Return the figure by the filter's covariance, and by its errors over the runs."""
     error = np.array([one.error_m for one in outcomes])
     sigma = np.array([one.sigma_m for one in outcomes])
     other = np.array([one.other_error_m for one in outcomes])
@@ -38,14 +38,17 @@ def measured(case: Case, outcomes: Sequence[Outcome]) -> tuple[float, float]:
 
 
 def is_near(case: Case, value: float) -> bool | None:
-    """Whether a figure lies within a factor of two of the published one; None where none was published."""
+    """Tell whether a figure lies within a factor of two of the published one.
+
+    None where none was published.
+    """
     if np.isnan(case.low):
         return None
     return bool(case.low / FACTOR <= value <= case.high * FACTOR)
 
 
 def study_table(cases: Sequence[Case], outcomes: dict[str, tuple[Outcome, ...]]) -> FigureData:
-    """Ours beside the published figures, with both verdicts."""
+    """Tabulate our figures beside the published ones, with both verdicts."""
     rows = []
     for case in cases:
         several = outcomes[case.name]
@@ -90,7 +93,7 @@ def study_table(cases: Sequence[Case], outcomes: dict[str, tuple[Outcome, ...]])
 
 
 def page(cases: Sequence[Case], table: FigureData, runs: int, seed: int) -> tuple[Section, ...]:
-    """The study in sections."""
+    """Return the study in sections."""
     head = ("case", "algorithm", "published", "computed", "measured", "factor 2", "NEES (2)", "consistent", "diverges")
     body = []
     for k, case in enumerate(cases):

@@ -1,4 +1,7 @@
-"""The runs of the cooperative study: each session simulated, filtered and judged; what is kept of it is small."""
+"""Runs of the cooperative study: each session simulated, filtered and judged.
+
+A small outcome of each is kept.
+"""
 
 import os
 from collections.abc import Callable, Sequence
@@ -64,7 +67,10 @@ class Outcome:
 def run_cases(
     cases: Sequence[Case], runs: int, seed: int, progress: Progress | None = None, workers: int = WORKERS
 ) -> dict[str, tuple[Outcome, ...]]:
-    """Every case ``runs`` times; cases of one session see the same flights, whatever the number of workers."""
+    """Run every case ``runs`` times.
+
+    Cases of one session see the same flights, whatever the number of workers.
+    """
     outcomes: dict[str, tuple[Outcome, ...]] = {}
     is_repeated = runs >= MANY_RUNS
     jobs = [(case, seed, run, is_repeated) for case in cases for run in range(runs)]
@@ -129,5 +135,8 @@ def _ratio(errors: list[FloatArray], tracks: Sequence[object], first: float, las
 
 
 def diverges(outcomes: Sequence[Outcome]) -> bool:
-    """Whether errors of the last tenth, over all runs, are beyond three computed sigma_r."""
+    """Tell whether the late errors of all runs are beyond three computed sigma_r.
+
+    Late: the last tenth of a run.
+    """
     return not np.sqrt(np.mean([one.late_ratio**2 for one in outcomes])) <= DIVERGED  # an error that is no number too

@@ -1,4 +1,7 @@
-"""Monte Carlo behind the forecast: every method under true and false models, and how honest the forecasts are."""
+"""Monte Carlo study of the forecast.
+
+Every method under true and false models, and how honest the forecasts are.
+"""
 
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.studies import forecast_tables as tables
@@ -16,7 +19,9 @@ CALIBRATED_SHARE = 0.3  # of the flights: sigmas take longer than forecasts, and
 
 
 def study_forecast(runs: int = 200, seed: int = 71, progress: Progress | None = None) -> StudyResult:
-    """Fly every case and compare the methods; RMS, ratios and coverage with intervals over flights.
+    """Fly every case and compare the methods.
+
+    RMS, ratios and coverage with intervals over flights.
 
     Parameters
     ----------

@@ -79,7 +79,9 @@ class Case:
 
 
 def study_cases(seed: int) -> tuple[Case, ...]:
-    """All cases of a study; their seeds grow from ``FIRST_SEED``, none of them used for tuning.
+    """Return all cases of a study; their seeds grow from ``FIRST_SEED``.
+
+    None of the seeds was used for tuning.
 
     Examples
     --------
@@ -125,28 +127,28 @@ def study_cases(seed: int) -> tuple[Case, ...]:
 
 
 def full_case(name: str, title: str, ins_class: str, route: RouteKind, seed: int) -> Case:
-    """A case of full truth, filtered with the noise of its class as shipped."""
+    """Return a case of full truth, filtered with the noise of its class as shipped."""
     family = FamilySettings(ins=ins_class, route=route, gnss=RECEIVER)
     noise = load_class(ins_class)
     return Case(name, title, family, seed, noise, uses_velocity=True, is_calibrated=True, is_held_out=True)
 
 
 def own_case(name: str, route: RouteKind, seed: int) -> Case:
-    """A case of a route nothing was tuned on, every flight with an instrument of its own."""
+    """Return a case of a route nothing was tuned on, each flight with its own instrument."""
     title = f"navigation grade, {route.replace('_', ' ')}, each flight its own instrument"
     case = full_case(name, title, "navigation", route, seed)
     return replace(case, family=replace(case.family, each_its_own=True), is_new=True)
 
 
 def differences_of(batch: ErrorBatch, row: int, epochs: Epochs) -> Differences:
-    """Epochs of one simulated flight with the motion of its INS."""
+    """Return epochs of one simulated flight with the motion of its INS."""
     velocity = np.stack([batch.velocity_north_mps[row], batch.velocity_east_mps[row]], axis=1)
     place = (batch.latitude_deg[row], batch.longitude_deg[row], batch.altitude_m[row])
     return Differences("ins", "gnss", epochs, *place, velocity, 0.0, (), batch.heading_deg[row])
 
 
 def matched_noise(ins: InsClass, gnss: GnssNoise) -> InsNoise:
-    """The filter's noise for which channel truth of a class is exactly true."""
+    """Return the filter's noise for which channel truth of a class is exactly true."""
     return InsNoise(
         name=f"{ins.name}, matched",
         position_m=ins.initial_position_m,
@@ -163,7 +165,7 @@ def matched_noise(ins: InsClass, gnss: GnssNoise) -> InsNoise:
 
 
 def epochs_of(case: Case, batch: ErrorBatch, row: int) -> Epochs:
-    """What the filter is given of one simulated flight: INS minus GNSS at every epoch."""
+    """Return the filter's input of one simulated flight: INS minus GNSS at every epoch."""
     position = batch.position_error_m[row] - batch.gnss_position_error_m[row]
     velocity = batch.velocity_error_mps[row] - batch.gnss_velocity_error_mps[row]
     if not case.uses_velocity:
@@ -176,7 +178,10 @@ def epochs_of(case: Case, batch: ErrorBatch, row: int) -> Epochs:
 
 
 def model_of(case: Case, batch: ErrorBatch, row: int) -> ChannelModel:
-    """The channel model of a flight: the truth's own gravity and radius, or those of its mean place."""
+    """Return the channel model of a flight.
+
+    Gravity and radius are the truth's own, or those of the flight's mean place.
+    """
     if case.family.truth == "channel":
         return ChannelModel(MPS2_PER_G, RADIUS_M, case.noise.beta_per_s)
     place: tuple[FloatArray, FloatArray] = (batch.latitude_deg[row], batch.altitude_m[row])

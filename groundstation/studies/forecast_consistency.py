@@ -1,4 +1,7 @@
-"""The filter on channels of which its model is exactly true: NEES of all six states and NIS against chi-square."""
+"""Consistency of the filter on channels of which its model is exactly true.
+
+NEES of all six states and NIS against chi-square.
+"""
 
 from dataclasses import dataclass
 
@@ -30,7 +33,10 @@ class MatchedRun:
     truth: FloatArray
 
     def nees(self, epoch: int) -> float:
-        """Squared error of all states over both channels, normalised by the filter's covariance; 12 on average."""
+        """Return NEES of all states over both channels at an epoch; 12 on average.
+
+        NEES: squared error normalised by the filter's covariance.
+        """
         error = self.run.x[epoch] - self.truth[epoch]
         total = 0.0
         for channel in range(error.shape[1]):
@@ -42,7 +48,10 @@ class MatchedRun:
 
 
 def matched_run(seed: int, number: int, *, duration_s: int = DURATION_S, uses_velocity: bool = True) -> MatchedRun:
-    """Draw run ``number`` of a seed: I-21-like channels, white GNSS at 1 Hz, and the filter that knows it all."""
+    """Draw run ``number`` of a seed and filter it with the true model.
+
+    I-21-like channels, white GNSS at 1 Hz.
+    """
     rng, ins = np.random.default_rng((seed, number)), load_ins_class("i-21")
     states = np.moveaxis(channel_truth(ins, duration_s + 1, 1.0, rng).states, 0, 2)
     noise = matched_noise(ins, GnssNoise(POSITION_M, 0.0, 0.0, VELOCITY_MPS, 0.0, 0.0, is_inflated=False))
@@ -57,10 +66,10 @@ def matched_run(seed: int, number: int, *, duration_s: int = DURATION_S, uses_ve
 
 
 def consistency_table(seed: int, runs: int = RUNS, *, uses_velocity: bool = True) -> FigureData:
-    """Mean NEES a state at some times over ``runs`` flights, and mean NIS of position and velocity over all epochs.
+    """Tabulate mean NEES per state at some times, and mean NIS, over ``runs`` flights.
 
-    1 is honest; limits are those of 99 % of chi-square with ``freedom`` degrees of freedom: flights and channels are
-    independent, and so are innovations of one another.
+    NIS is that of position and velocity over all epochs. 1 is honest; limits are those of 99 % of chi-square with
+    ``freedom`` degrees of freedom: flights and channels are independent, and so are innovations of one another.
     """
     nees, nis, count = np.zeros(len(TIMES_S)), np.zeros(2), np.zeros(2, dtype=np.int64)
     for number in range(runs):

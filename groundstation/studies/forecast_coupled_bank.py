@@ -1,4 +1,7 @@
-"""The bank of noise sets on the coupled model, flown to decide on the default forecast: docs/decisions/012."""
+"""Bank of noise sets on the coupled model, to decide on the default forecast.
+
+See docs/decisions/012.
+"""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -50,19 +53,25 @@ DECAYS = np.array([PATTERN.index((row, row)) for row in CHANNELS[:, RANDOM_DRIFT
 
 @dataclass(frozen=True)
 class SetForecasts:
-    """Forecasts of k sets from s starts at l leads: means, metres, and variances, m^2, shapes (k, s, l, 2)."""
+    """Forecasts of k sets from s starts at l leads, shapes (k, s, l, 2).
+
+    Means in metres and variances in m^2.
+    """
 
     mean_m: FloatArray
     variance_m2: FloatArray
 
     def mixed(self, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance of the mixture with weights (k, s), shapes (s, l, 2)."""
+        """Return the mean and variance of the mixture with weights (k, s), shapes (s, l, 2)."""
         share = weight[:, :, None, None]
         mean = np.sum(share * self.mean_m, axis=0)
         return mean, np.sum(share * (self.variance_m2 + np.square(self.mean_m - mean)), axis=0)
 
     def weights(self, replay: Hindcast, judge_m2: FloatArray, prior: FloatArray) -> FloatArray:
-        """Weight of each set at each start, (k, s), from outages that were over by then, as those of ``bank``."""
+        """Return the weight of each set at each start, (k, s), from outages over by then.
+
+        The weights are formed like those of ``bank``.
+        """
         evidence = np.tile(np.log(prior), (len(replay.start_s), 1))
         for lead_s in JUDGED_S:
             lead = round(lead_s / LEAD_STEP_S) - 1
@@ -76,7 +85,7 @@ class SetForecasts:
 
 
 def coarse_differences(differences: Differences, coarse: Coarse) -> Differences:
-    """The differences over coarse epochs, with the motion of the INS there."""
+    """Return the differences over coarse epochs, with the motion of the INS there."""
     time_s, own_s = coarse.epochs.time_s, differences.epochs.time_s
     latitude, altitude, north, east = (np.interp(time_s, own_s, part) for part in differences.motion_known)
     return replace(
@@ -93,7 +102,10 @@ def coarse_differences(differences: Differences, coarse: Coarse) -> Differences:
 def set_forecasts(
     differences: Differences, flown: FilterRun, replay: Hindcast, settings: InertialSettings
 ) -> SetForecasts:
-    """Forecast with the coupled model and every set of the class's bank from the starts of a replay."""
+    """Forecast with the coupled model and every noise set from the starts of a replay.
+
+    The noise sets are those of the bank of the INS class.
+    """
     coarse = Coarse.of(flown)
     short = coarse_differences(differences, coarse)
     runs = [run_coupled(short, coarse.noise(noise), settings, every=1) for noise in flown.noise.bank.sets(flown.noise)]
@@ -123,7 +135,10 @@ def _values(differences: Differences, time_s: FloatArray, flown: FilterRun) -> F
 
 
 def _at_start(run: CoupledRun, differences: Differences, epoch: int, start_s: float) -> tuple[FloatArray, FloatArray]:
-    """What a set knew at an epoch, carried to a start less than a coarse epoch later."""
+    """Return the state of a set at an epoch, carried to a start.
+
+    The start is less than a coarse epoch later.
+    """
     x, P = np.array(run.x[epoch]), np.array(run.P[epoch])
     seconds = start_s - float(run.epochs.time_s[epoch])
     if seconds > 1e-6:
@@ -141,7 +156,7 @@ def _densities(run: CoupledRun) -> FloatArray:
 
 
 def _grown(run: CoupledRun, values: FloatArray, P: FloatArray) -> FloatArray:
-    """Variance of the position at the leads, shape (l, 2)."""
+    """Return the variance of the position at the leads, shape (l, 2)."""
     nothing = np.zeros(0, np.int64)
     unseen = kalman.Measurements(nothing, np.zeros((0, 0)), nothing, lines_of(run.epochs, run.noise))
     carried = kalman.run_filter(
@@ -157,9 +172,10 @@ def _grown(run: CoupledRun, values: FloatArray, P: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class BankOutcome:
-    """One flight: mean square of the radial error, m^2, and share inside the 95 % band; methods, horizons (m, h).
+    """Errors of one flight by method and horizon, shapes (m, h).
 
-    The coupled model with the class's noise, the bank on it, and the bank with the class's own filter among its sets.
+    Mean square of the radial error, m^2, and share inside the 95 % band. The coupled model with the class's noise, the
+    bank on it, and the bank with the class's own filter among its sets.
     """
 
     mean_square_m2: FloatArray
@@ -170,7 +186,10 @@ METHODS = ("coupled", ALONE, WITH_CLASS)
 
 
 def judge_bank(differences: Differences, flown: FilterRun, truth: Epochs, settings: InertialSettings) -> BankOutcome:
-    """Replay outages of a flight by the three methods; errors against ``truth``, bands against GNSS."""
+    """Replay outages of a flight by the three methods.
+
+    Errors are judged against ``truth``, bands against GNSS.
+    """
     epochs, lead_s = flown.epochs, LEAD_STEP_S * np.arange(1.0, LEADS + 1.0)
     at = start_epochs(epochs, float(epochs.time_s[0]) + PAST_FROM_S, settings.start_step_s)
     plain = Hindcast(at, epochs.time_s[at], lead_s, {}, built_up(epochs, at, lead_s))
@@ -227,7 +246,10 @@ def fly_banks(cases: Sequence[Case], runs: int, settings: InertialSettings) -> d
 
 
 def bank_table(outcomes: Mapping[str, Sequence[BankOutcome]]) -> FigureData:
-    """RMS over that of the coupled model with the class's noise, and coverage, by case, method and horizon."""
+    """Tabulate RMS ratio and coverage by case, method and horizon.
+
+    The ratio is over the RMS of the coupled model with the class's noise.
+    """
     rows = []
     for case, several in outcomes.items():
         rms = np.sqrt(np.mean([one.mean_square_m2 for one in several], axis=0))

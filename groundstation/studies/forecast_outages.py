@@ -1,4 +1,7 @@
-"""Flights with outages in the log: the smoother inside them, the forecasts through and after them, and their bands."""
+"""Flights with outages in the log.
+
+The smoother inside them, the forecasts through and after them, and their bands.
+"""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -60,7 +63,7 @@ class OutageOutcome:
 
 
 def outages_of(time_s: FloatArray, seed: int, run: int) -> list[tuple[float, float]]:
-    """Begin and end of the outages of a flight, seconds."""
+    """Return begin and end of the outages of a flight, seconds."""
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(run, crc32(b"outages"))))
     begin = float(time_s[0]) + FIRST_S
     found: list[tuple[float, float]] = []
@@ -122,7 +125,7 @@ def _through(
     whole: Epochs,
     settings: InertialSettings,
 ) -> FloatArray:
-    """Share of the channels inside the 95 % band of the forecast at the end of each outage."""
+    """Return the share of channels in the forecast's 95 % band at the end of each outage."""
     found = []
     for begin, end in gaps:
         at = np.array([int(np.searchsorted(whole.time_s, begin + 1e-6)) - 1])
@@ -138,7 +141,10 @@ def _through(
 def _after(
     flown: FilterRun, coupled: CoupledRun, at: Int64Array, whole: Epochs, settings: InertialSettings
 ) -> FloatArray:
-    """Coverage of the default's 95 % band from starts, by horizon, against what GNSS showed without any outage."""
+    """Return the coverage of the default's 95 % band from the starts ``at``, by horizon.
+
+    The reference is the GNSS of the same flight without any outage.
+    """
     lead_s = leads_of(LEAD_STEP_S, 60.0 * AFTER_MIN[-1])
     every = start_epochs(flown.epochs, settings.first_start_s, settings.start_step_s)
     replay = hindcast(flown, every, lead_s, (), settings)
@@ -167,7 +173,10 @@ def fly_outages(cases: Sequence[Case], runs: int, settings: InertialSettings) ->
 
 
 def outage_table(outcomes: Mapping[str, Sequence[OutageOutcome]]) -> FigureData:
-    """One row a case: means over flights of the coverages, RMS over flights of the smoother's errors."""
+    """Tabulate one row per case, over its flights.
+
+    Means of the coverages, RMS of the smoother's errors.
+    """
     names = (
         *(
             "case",

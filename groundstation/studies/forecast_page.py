@@ -1,4 +1,4 @@
-"""The page of the forecast study: what was asked, what came out, in words made from the tables."""
+"""Page of the forecast study: questions and results, in sentences from the tables."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -23,7 +23,7 @@ CONFIRMED = {BETTER: "confirmed", WORSE: "refuted", UNDECIDED: "neither shown"}
 def page(
     cases: Sequence[Case], tables: dict[str, FigureData], runs: int, calibrated_runs: int, default_method: str
 ) -> tuple[Section, ...]:
-    """The study in sections."""
+    """Return the study in sections."""
     return (
         section(
             "Study: forecast of INS errors",
@@ -48,7 +48,7 @@ def page(
 
 
 def _windows(cases: Sequence[Case], ratios: FigureData) -> Section:
-    """Whether windows are better: in words, then as ratios."""
+    """Return the section that compares windows: sentences, then ratios."""
     said = []
     for title, group in (
         ("the filter is told something false", [case.name for case in cases if case.is_misled]),
@@ -69,7 +69,7 @@ def _windows(cases: Sequence[Case], ratios: FigureData) -> Section:
 
 
 def _tally(says: NDArray[Any]) -> str:
-    """How often a claim of the paper came out."""
+    """Return how often a claim of the paper was confirmed and refuted."""
     counts = (int((says == verdict).sum()) for verdict in (BETTER, WORSE))
     return "the paper's claim is confirmed at {} and refuted at {} of {} horizons".format(*counts, len(says))
 
@@ -104,7 +104,7 @@ def _claim(later: FigureData, case: str, method: str) -> str:
 
 
 def _held_out(cases: Sequence[Case], tables: dict[str, FigureData], default_method: str) -> Section:
-    """Which method wins on flights that stand for real ones."""
+    """Return the section on the best method on flights that stand for real ones."""
     held_out, rms = tables["forecast_held_out"], tables["forecast_rms"]
     order = [str(name) for name in held_out["method"]]
     equal = [name for name, low in zip(order[1:], held_out["against_best_low"][1:], strict=True) if low <= 1.0]
@@ -206,7 +206,7 @@ def _classic(cases: Sequence[Case], rms: FigureData) -> Grid:
 
 
 def _cell(table: FigureData, value: str, digits: int, **chosen: str) -> list[str]:
-    """Value and limits at each horizon, empty where there is none."""
+    """Return the value and limits at each horizon, empty where there is none."""
     rows, cells = _rows(table, **chosen), []
     for horizon in STUDY_HORIZONS_MIN:
         at = np.flatnonzero(rows & (table["horizon_min"] == horizon))

@@ -1,4 +1,7 @@
-"""The flights of the forecast study: each simulated, filtered and replayed; what is kept of it is small."""
+"""Flights of the forecast study: each simulated, filtered and replayed.
+
+A small outcome of each is kept.
+"""
 
 import os
 from collections.abc import Callable, Sequence
@@ -35,7 +38,9 @@ WORKERS = 2
 
 @dataclass(frozen=True)
 class Honesty:
-    """How the sigmas of one flight's forecasts came out; axes: method with a covariance, horizon.
+    """Comparison of the forecasts' sigmas with the errors of one flight.
+
+    Axes: method with a covariance, horizon.
 
     Parameters
     ----------
@@ -87,7 +92,9 @@ class Outcome:
 def run_cases(
     cases: Sequence[Case], runs: int, calibrated_runs: int, settings: InertialSettings, progress: Progress | None = None
 ) -> dict[str, tuple[Outcome, ...]]:
-    """Replay ``runs`` flights of every case; cases of one family and seed see the same flights.
+    """Replay ``runs`` flights of every case.
+
+    Cases of one family and seed see the same flights.
 
     Parameters
     ----------
@@ -130,7 +137,10 @@ def _fly(cases: list[Case], run: int, is_calibrated: bool, settings: InertialSet
 
 
 def replay_flight(case: Case, batch: ErrorBatch, row: int, is_calibrated: bool, settings: InertialSettings) -> Outcome:
-    """Filter a flight of a batch and replay its outages with every method, judged by the truth."""
+    """Filter a flight of a batch and replay its outages with every method.
+
+    The truth judges the forecasts.
+    """
     epochs = epochs_of(case, batch, row)
     run = run_filter(epochs, model_of(case, batch, row), case.noise, gate=case.gate)
     plan = plan_replay(run, settings)
@@ -149,7 +159,7 @@ def replay_flight(case: Case, batch: ErrorBatch, row: int, is_calibrated: bool, 
 
 
 def _with_coupled(replay: Hindcast, case: Case, batch: ErrorBatch, row: int, settings: InertialSettings) -> Hindcast:
-    """The replay with the last estimate of the coupled model beside the others."""
+    """Return the replay with the last estimate of the coupled model beside the others."""
     run = run_coupled(differences_of(batch, row, epochs_of(case, batch, row)), case.noise, settings)
     forecast = hindcast_coupled(run, replay.at, replay.lead_s, settings)
     variance = coupled_variance(run, replay.at, replay.lead_s)
@@ -161,7 +171,10 @@ def _with_coupled(replay: Hindcast, case: Case, batch: ErrorBatch, row: int, set
 
 
 def _claimed(method: str, run: FilterRun, replay: Hindcast, settings: InertialSettings) -> Claimed:
-    """What a method claims; the coupled last estimate as where the settings choose that model."""
+    """Return the sigma that a method claims.
+
+    The coupled last estimate claims what it does where the settings choose the coupled model.
+    """
     if method == COUPLED:
         own = {"last_estimate": replay.variance_m2[COUPLED]}
         replay = replace(replay, forecast_m={"last_estimate": replay.forecast_m[COUPLED]}, variance_m2=own)
@@ -172,7 +185,10 @@ def _claimed(method: str, run: FilterRun, replay: Hindcast, settings: InertialSe
 
 
 def mean_squares(replay: Hindcast) -> FloatArray:
-    """Mean square of the radial error over each set of starts: shape (methods, sets, horizons)."""
+    """Return the mean square of the radial error, shape (methods, sets, horizons).
+
+    The mean is over each set of starts.
+    """
     leads = leads_at(replay)
     classic = [np.flatnonzero(np.abs(replay.start_s - 3600.0 * hours) < 1.0) for hours in CLASSIC_START_H]
     out = np.full((len(METHOD_NAMES), len(SETS_OF_STARTS), len(leads)), np.nan)
@@ -186,12 +202,12 @@ def mean_squares(replay: Hindcast) -> FloatArray:
 
 
 def leads_at(replay: Hindcast) -> list[int]:
-    """Index of each horizon of the study among the leads."""
+    """Return the index of each horizon of the study among the leads."""
     return [int(np.argmin(np.abs(replay.lead_s - 60.0 * horizon))) for horizon in STUDY_HORIZONS_MIN]
 
 
 def _honesty(run: FilterRun, replay: Hindcast, since: slice, settings: InertialSettings) -> Honesty:
-    """Errors over sigmas against what GNSS shows: its error at both ends belongs to the claim."""
+    """Return errors over sigmas; GNSS is the reference, its error at both ends is claimed."""
     leads = leads_at(replay)
     parts: list[list[FloatArray]] = []
     for method in JUDGED_NAMES:
@@ -218,13 +234,13 @@ def _honesty(run: FilterRun, replay: Hindcast, since: slice, settings: InertialS
 
 
 def _share_inside(ratio: FloatArray, level: int) -> FloatArray:
-    """Share of the squared ratios (s, h, c) inside a band, per horizon."""
+    """Return the share of the squared ratios (s, h, c) inside a band, per horizon."""
     inside = np.where(np.isfinite(ratio), ratio <= QUANTILES[level] ** 2, np.nan)
     return mean_known(inside.mean(axis=2))
 
 
 def mean_known(values: FloatArray) -> FloatArray:
-    """Mean over the first axis of what is known, NaN where nothing is."""
+    """Return the mean over the first axis of what is known, NaN where nothing is."""
     known = np.isfinite(values)
     count = known.sum(axis=0)
     return np.asarray(np.where(count > 0, np.where(known, values, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan))

@@ -1,4 +1,7 @@
-"""Tables of the forecast study: RMS, ratios and findings with intervals over flights, held-out scores, honesty."""
+"""Tables of the forecast study.
+
+RMS, ratios and findings with intervals over flights, held-out scores, honesty.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +36,9 @@ _ALL = SETS_OF_STARTS.index("all")
 
 @dataclass(frozen=True)
 class Resampled:
-    """Mean squares of one case over all flights, and over flights drawn again with replacement.
+    """Mean squares of one case over all flights, and over bootstrap draws of flights.
+
+    Flights are drawn with replacement.
 
     Parameters
     ----------
@@ -50,7 +55,10 @@ class Resampled:
 
     @classmethod
     def of(cls, outcomes: Sequence[Outcome], seed: int) -> "Resampled":
-        """Draw ``DRAWS`` times as many flights as there are; the same draws for every case of as many flights."""
+        """Return a case with ``DRAWS`` bootstrap draws of its flights.
+
+        Cases with equally many flights get the same draws.
+        """
         each = np.stack([outcome.mean_square_m2 for outcome in outcomes])
         count = len(each)
         weights = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), DRAWS) / count
@@ -58,29 +66,32 @@ class Resampled:
         return cls(np.tensordot(weights, each, axes=1), count)
 
     def rms_m(self, method: str, starts: int = _ALL) -> FloatArray:
-        """RMS over flights and starts, shape (1 + draws, h)."""
+        """Return the RMS over flights and starts, shape (1 + draws, h)."""
         return np.asarray(np.sqrt(self.mean_square_m2[:, METHOD_NAMES.index(method), starts]))
 
     def ratio(self, method: str, reference: str = REFERENCE, starts: int = _ALL) -> FloatArray:
-        """RMS of a method over that of another, shape (1 + draws, h)."""
+        """Return the RMS of a method over that of another, shape (1 + draws, h)."""
         return np.asarray(self.rms_m(method, starts) / self.rms_m(reference, starts))
 
 
 def interval(values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Value, low and high 95 % limit of resampled values (1 + draws, ...)."""
+    """Return value, low and high 95 % limit of resampled values (1 + draws, ...)."""
     low, high = np.quantile(values[1:], [TAIL, 1.0 - TAIL], axis=0)
     return values[0], low, high
 
 
 def finding(low: float, high: float) -> str:
-    """What an interval of a ratio of errors says."""
+    """Return the conclusion from an interval of a ratio of errors; empty without one."""
     if np.isnan(low):
         return ""
     return BETTER if high < 1.0 else WORSE if low > 1.0 else UNDECIDED
 
 
 def rms_table(cases: dict[str, Resampled]) -> FigureData:
-    """RMS of every method in every case, at all starts and at the paper's four, with 95 % limits."""
+    """Tabulate the RMS of every method in every case, at all starts and the paper's four.
+
+    The values have 95 % limits.
+    """
     rows = []
     for case, sample in cases.items():
         for place, starts in enumerate(SETS_OF_STARTS):
@@ -93,7 +104,10 @@ def rms_table(cases: dict[str, Resampled]) -> FigureData:
 
 
 def ratio_table(cases: dict[str, Resampled]) -> FigureData:
-    """RMS of windows and smoothed start over that of the last estimate, with 95 % limits and what they say."""
+    """Tabulate the RMS of windows and smoothed start over that of the last estimate.
+
+    The ratios have 95 % limits and a conclusion.
+    """
     rows = []
     for case, sample in cases.items():
         for place, starts in enumerate(SETS_OF_STARTS):
@@ -107,7 +121,10 @@ def ratio_table(cases: dict[str, Resampled]) -> FigureData:
 
 
 def later_table(cases: dict[str, Resampled]) -> FigureData:
-    """RMS from the latest of the four starts whose horizon fits over RMS from the first, with 95 % limits."""
+    """Tabulate RMS from the latest start over RMS from the first, with 95 % limits.
+
+    The latest of the four starts whose horizon fits.
+    """
     rows = []
     for case, sample in cases.items():
         for method in (REFERENCE, "windows"):
@@ -124,7 +141,10 @@ def later_table(cases: dict[str, Resampled]) -> FigureData:
 
 
 def cure_table(windows: Resampled, cure: Resampled) -> FigureData:
-    """The paper's windows under coloured GNSS error over the last estimate with R inflated, on the same flights."""
+    """Tabulate the paper's windows over the last estimate with R inflated.
+
+    The GNSS error is coloured; the flights are the same.
+    """
     ratio = windows.rms_m("windows") / cure.rms_m(REFERENCE)
     rows = [
         (STUDY_HORIZONS_MIN[at], float(windows.rms_m("windows")[0, at]), float(cure.rms_m(REFERENCE)[0, at]), *found)
@@ -136,7 +156,7 @@ def cure_table(windows: Resampled, cure: Resampled) -> FigureData:
 
 
 def held_out_table(cases: Sequence[Case], samples: dict[str, Resampled]) -> FigureData:
-    """Score of every method on the held-out flights, best first.
+    """Tabulate the score of every method on the held-out flights, best first.
 
     ``score`` is the geometric mean, over cases and horizons (all starts), of RMS over that of the last estimate;
     ``against_best`` the same over the best method, with 95 % limits over flights.
@@ -158,7 +178,7 @@ def held_out_table(cases: Sequence[Case], samples: dict[str, Resampled]) -> Figu
 
 
 def honesty_table(outcomes: dict[str, tuple[Outcome, ...]], flights_at_least: int = 2) -> FigureData:
-    """Coverage of the 50, 68 and 95 % bands and NEES, per case, method and horizon.
+    """Tabulate coverage of the 50, 68 and 95 % bands, and NEES, by case, method and horizon.
 
     ``nees`` is the mean over all starts (1 is honest); ``first`` the mean over the first start of each flight, whose
     99 % limits come from chi-square with two degrees of freedom a flight. Columns ``_model`` are before the sigma is
@@ -209,7 +229,7 @@ def honesty_table(outcomes: dict[str, tuple[Outcome, ...]], flights_at_least: in
 
 
 def _flights_within(known: Sequence[Honesty]) -> FloatArray:
-    """Share of the flights whose NEES lies within its 95 % limits, shape (methods, h)."""
+    """Return the share of flights with NEES in its 95 % limits, shape (methods, h)."""
     inside = []
     for honesty in known:
         freedom = 2.0 * honesty.independent
@@ -219,7 +239,10 @@ def _flights_within(known: Sequence[Honesty]) -> FloatArray:
 
 
 def gate_table(outcomes: dict[str, tuple[Outcome, ...]]) -> FigureData:
-    """Share of the position measurements that the gate rejected: mean over flights and largest."""
+    """Tabulate the share of the position measurements that the gate rejected.
+
+    Mean over flights, and largest.
+    """
     shares = {case: np.array([outcome.rejected_share for outcome in several]) for case, several in outcomes.items()}
     rows = [(case, float(share.mean()), float(share.max())) for case, share in shares.items()]
     names = ("case", "rejected_share", "largest_rejected_share")

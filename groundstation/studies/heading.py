@@ -1,4 +1,7 @@
-"""Monte Carlo behind the heading correction: accuracy, coverage, gates, and the figures of the paper again."""
+"""Monte Carlo study of the heading correction.
+
+Accuracy, coverage, gates, and the figures of the paper again.
+"""
 
 import time
 
@@ -72,7 +75,7 @@ def study_heading(
 
 
 def published_table(outcomes: list[RunOutcome]) -> FigureData:
-    """Published figures beside those of all simulated runs together."""
+    """Tabulate published figures beside those of all simulated runs together."""
     accepted = np.array([run.verdict == "accept" for run in outcomes])
     error = np.abs([run.error_deg for run in outcomes]) * 60.0
     precise = np.array([run.precision_deg <= 0.05 for run in outcomes])

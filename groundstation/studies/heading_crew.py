@@ -1,4 +1,7 @@
-"""The heading verdict on the family crew of docs/heading-family.md: acceptance, coverage, both numbers."""
+"""Study of the heading verdict on the family crew of docs/heading-family.md.
+
+Acceptance, coverage, both numbers.
+"""
 
 import time
 from collections.abc import Callable, Sequence
@@ -47,7 +50,10 @@ MOVING_MPS = 6.0
 
 @dataclass(frozen=True)
 class CrewOutcome:
-    """One run: errors are estimate minus truth, arcmin; ``inside``: whether the 95 % interval holds the truth."""
+    """One run of the crew: verdict and errors, estimate minus truth, in arcmin.
+
+    ``is_inside``: the 95 % interval holds the truth.
+    """
 
     kind: Kind
     verdict: str
@@ -60,7 +66,7 @@ class CrewOutcome:
 
 
 def run_crew(seed: int, number: int, kind: Kind | None = None) -> CrewOutcome:
-    """Draw run ``number`` of a seed, pass it through the estimator and compare both its numbers with the truth.
+    """Draw run ``number`` of a seed, estimate, and compare both numbers with the truth.
 
     ``kind``: that of its turn where none is given.
     """
@@ -122,7 +128,10 @@ def _case(rng: np.random.Generator, kind: Kind) -> TaxiCase:
 
 
 def _changed(run: TaxiRun, kind: Kind, rng: np.random.Generator, same_deg: float, mounting_deg: float) -> TaxiRun:
-    """The run with what its kind adds: sideslip, mounting, antenna height, a receiver that holds or is led astray."""
+    """Return the run with the disturbances of its kind.
+
+    Sideslip, mounting, antenna height, a receiver that holds or is led astray.
+    """
     time_s, gnss_s = run.ins_time_s, run.gnss_time_s
     north, east = run.velocity_north_mps.copy(), run.velocity_east_mps.copy()
     speed = np.hypot(north, east)
@@ -176,7 +185,9 @@ def study_crew(
     kept: Kept | None = None,
     minutes: float | None = None,
 ) -> StudyResult:
-    """Run the estimator over the third family of docs/heading-family.md, so many runs of each kind by turns.
+    """Run the estimator over the third family of docs/heading-family.md.
+
+    So many runs of each kind, by turns.
 
     Parameters
     ----------
@@ -221,7 +232,10 @@ def study_crew(
 
 
 def gates_table(outcomes: Sequence[CrewOutcome]) -> FigureData:
-    """Share of the runs of each kind whose standstill passes that fail each required gate; gates that any fails."""
+    """Tabulate the share of runs that fail each required gate, by kind.
+
+    Only runs that pass the standstill and gates that any run fails count.
+    """
     still = [one for one in outcomes if one.passes_standstill]
     names = sorted({name for one in still for name in one.failed})
     kinds = [kind for kind in ALL_KINDS if any(one.kind == kind for one in still)]
@@ -233,7 +247,10 @@ def gates_table(outcomes: Sequence[CrewOutcome]) -> FigureData:
 
 
 def crew_table(outcomes: Sequence[CrewOutcome]) -> FigureData:
-    """One row a kind: verdicts, share that passes the standstill, coverage of both numbers, errors accepted."""
+    """Tabulate one row per kind of run.
+
+    Verdicts, share that passes the standstill, coverage of both numbers, errors accepted.
+    """
     rows = []
     for kind in ALL_KINDS:
         mine = [one for one in outcomes if one.kind == kind]

@@ -1,4 +1,7 @@
-"""The estimator on simulated taxi runs of the family: errors, coverage of both intervals, acceptance by gate."""
+"""Study of the estimator on simulated taxi runs of the family.
+
+Errors, coverage of both intervals, acceptance by gate.
+"""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -28,7 +31,7 @@ MOST_SEGMENTS = 3  # so many and more count as one
 
 @dataclass(frozen=True)
 class RunOutcome:
-    """One simulated run and what the estimator made of it. Errors are estimate minus truth, degrees.
+    """One simulated run with its estimates; errors are estimate minus truth, degrees.
 
     ``seconds_to_precision`` is the taxi time after which the paper's e stays within its limit, None if it never does.
     """
@@ -50,12 +53,12 @@ class RunOutcome:
 
     @property
     def is_inside(self) -> bool:
-        """Whether our interval holds the truth (ends are given relative to it)."""
+        """Tell whether our interval holds the truth (ends are given relative to it)."""
         return self.low_deg <= 0.0 <= self.high_deg
 
     @property
     def is_inside_measured(self) -> bool:
-        """Whether the interval without steady sideslip holds the truth."""
+        """Tell whether the interval without steady sideslip holds the truth."""
         return self.low_measured_deg <= 0.0 <= self.high_measured_deg
 
     @property
@@ -64,7 +67,7 @@ class RunOutcome:
 
     @property
     def is_inside_paper(self) -> bool:
-        """Whether the paper's mean +- e holds the truth."""
+        """Tell whether the paper's mean +- e holds the truth."""
         return abs(self.paper_error_deg) <= self.precision_deg
 
     @property
@@ -73,7 +76,10 @@ class RunOutcome:
 
 
 def run_once(family: Family, seed: int, number: int, settings: HeadingSettings | None = None) -> RunOutcome:
-    """Draw run ``number`` of a seed, pass it through tables and estimator, and compare with the truth."""
+    """Draw run ``number`` of a seed, estimate, and compare with the truth.
+
+    The run passes through tables and estimator.
+    """
     run = draw_run(family, seed, number)
     case = run.case
     aircraft = AircraftData(
@@ -93,7 +99,7 @@ def run_once(family: Family, seed: int, number: int, settings: HeadingSettings |
 
 
 def outcome_of(number: int, case: TaxiCase, result: HeadingResult, truth_deg: float) -> RunOutcome:
-    """Set a result beside the true error of its run."""
+    """Return a result with the true error of its run."""
     running = found_in(result.figures, HeadingRunning)
     assert running is not None
     limit = next(gate.limit for gate in result.gates if gate.name == "precision")
@@ -135,7 +141,9 @@ def run_families(
     kept: Kept | None = None,
     is_over: Callable[[], bool] | None = None,
 ) -> dict[Family, tuple[RunOutcome, ...]]:
-    """Runs 0 to ``runs`` - 1 of each family and seed, by turns; fewer, equally many of each, where time is over.
+    """Run 0 to ``runs`` - 1 of each family and seed, by turns.
+
+    Fewer, equally many of each, where time is over.
 
     Parameters
     ----------
@@ -167,7 +175,7 @@ def run_families(
 
 
 def runs_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
-    """One row for each run: parameters that matter, error, interval, verdict."""
+    """Tabulate one row for each run: parameters that matter, error, interval, verdict."""
 
     def column(value: Callable[[RunOutcome], float | str | bool]) -> NDArray[np.generic]:
         return np.array([value(outcome) for outcome in outcomes])
@@ -201,7 +209,10 @@ Cell = tuple[str, BoolArray]
 
 
 def _cells(outcomes: Sequence[RunOutcome]) -> Iterable[Cell]:
-    """Names of the cells and which runs belong to them. Edges hold the grid values and divide the continuous ones."""
+    """Return the names of the cells and the runs in each.
+
+    Edges hold the grid values and divide the continuous ones.
+    """
 
     def split(name: str, values: Iterable[float], edges: Sequence[float], unit: str) -> Iterable[Cell]:
         array = np.array(list(values))
@@ -229,7 +240,7 @@ def _cells(outcomes: Sequence[RunOutcome]) -> Iterable[Cell]:
 
 
 def coverage_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
-    """Coverage of our interval and of the paper's, and errors, for each cell of the family.
+    """Tabulate coverage of both intervals, and errors, for each cell of the family.
 
     ``coverage_sigma`` is the sampling error of the coverage at 0.95.
     """
@@ -266,10 +277,10 @@ def coverage_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
 
 
 def segments_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
-    """Coverage with and without steady terms by number of segments, for each kind of disturbance.
+    """Tabulate coverage with and without steady terms by number of segments.
 
-    What is the same all along one segment cannot be told from the error by that segment: with more of them, in other
-    directions, their spread shows it.
+    Each kind of disturbance has its own rows. What is the same all along one segment cannot be told from the error by
+    that segment: with more of them, in other directions, their spread shows it.
     """
     kinds = np.array([outcome.case.disturbance.kind for outcome in outcomes])
     segments = np.minimum([len(outcome.case.segments_s) for outcome in outcomes], MOST_SEGMENTS)
@@ -288,7 +299,7 @@ def segments_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
 
 
 def gates_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
-    """Share of runs that pass each required gate, and each verdict's share."""
+    """Tabulate the share of runs that pass each required gate, and each verdict's share."""
     names = list(outcomes[0].gates)
     shares = [float(np.mean([outcome.gates.get(gate) == "passed" for outcome in outcomes])) for gate in names]
     for verdict in ("accept", "advisory", "extend", "reject", "undecided"):
@@ -298,7 +309,10 @@ def gates_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
 
 
 def time_to_precision_table(name: str, outcomes: Sequence[RunOutcome]) -> FigureData:
-    """Taxi time the paper's e needs to stay within its limit, by length of run: share that gets there, quartiles."""
+    """Tabulate the taxi time that the paper's e needs to stay within its limit.
+
+    A row for each length of run has the share that gets there, and quartiles.
+    """
     lengths = np.array([sum(outcome.case.segments_s) for outcome in outcomes])
     seconds = np.array([np.inf if run.seconds_to_precision is None else run.seconds_to_precision for run in outcomes])
     rows = []

@@ -1,4 +1,7 @@
-"""The published and stated figures of the method, measured again on plain simulated processes (vectorised)."""
+"""Published and stated figures of the method, measured on plain simulated processes.
+
+The simulation is vectorised.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +19,17 @@ SWAY_DEG, SWAY_HZ = 0.5, 0.4
 
 
 def coverage_of_e(differences_deg: FloatArray) -> float:
-    """Share of runs, shape (runs, n), true error 0, whose mean +- e holds 0."""
+    """Return the share of runs, shape (runs, n), true error 0, whose mean +- e holds 0."""
     count = differences_deg.shape[1]
     e = NORMAL_95 * np.std(differences_deg, axis=1) / np.sqrt(count - 1)
     return float(np.mean(np.abs(np.mean(differences_deg, axis=1)) <= e))
 
 
 def precision_table(rng: np.random.Generator, runs: int) -> FigureData:
-    """Coverage of the paper's e on 60-s runs: sway of given damping, GNSS error correlated over given times."""
+    """Tabulate the coverage of the paper's e on 60-s runs.
+
+    Sway of given damping, GNSS error correlated over given times.
+    """
     count = round(60.0 / STEP_S)
     labels, stated, measured = [], [], []
     for damping, figure in ((0.02, 0.99), (0.1, 0.87), (0.2, 0.73), (0.5, 0.52)):
@@ -46,7 +52,10 @@ def precision_table(rng: np.random.Generator, runs: int) -> FigureData:
 
 
 def quality_table(rng: np.random.Generator, runs: int) -> FigureData:
-    """Quality (spread of the running mean) on ordinary 120-s runs and with a drift of 2 deg/min."""
+    """Tabulate quality (spread of the running mean) on 120-s runs.
+
+    The runs are ordinary ones, and ones with a drift of 2 deg/min.
+    """
     count = round(120.0 / STEP_S)
     time_min = np.arange(count) * STEP_S / 60.0
     noise = damped_oscillation(rng, (runs, count), STEP_S, SWAY_DEG, SWAY_HZ, 0.1)
@@ -75,7 +84,10 @@ RECEIVERS: tuple[tuple[str, float, float, float], ...] = (
 
 
 def standstill_tables(rng: np.random.Generator, runs: int, limit_mps: float = 0.01) -> tuple[FigureData, FigureData]:
-    """Length of the mean velocity at standstill over 10 s and 30 s: share within the limit, and its density."""
+    """Tabulate the length of the mean velocity at standstill over 10 s and 30 s.
+
+    Share within the limit, and its density.
+    """
     names, windows, shares, p97 = [], [], [], []
     density: dict[str, list[FloatArray]] = {"receiver": [], "window_s": [], "speed_mps": [], "density_per_mps": []}
     edges = np.linspace(0.0, 0.05, 51)
@@ -107,9 +119,10 @@ def standstill_tables(rng: np.random.Generator, runs: int, limit_mps: float = 0.
 
 
 def arm_table() -> FigureData:
-    """Largest effect of an uncorrected antenna arm inside the gates (1 deg/s at 6 m/s), and of a gentle curve.
+    """Tabulate the largest effect of an uncorrected antenna arm inside the gates.
 
-    A turn of given rate for 10 s in a 40-s run at 6 m/s shifts the mean by arm x rate / speed x 10 / 40.
+    The gates are 1 deg/s at 6 m/s; the effect of a gentle curve is given too. A turn of given rate for 10 s in a 40-s
+    run at 6 m/s shifts the mean by arm x rate / speed x 10 / 40.
     """
     arms = np.array([2.0, 5.0, 10.0])
     return FigureData(

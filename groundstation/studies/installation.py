@@ -1,4 +1,7 @@
-"""The learned installation on fleets of docs/installation-family.md: coverage, half widths, acceptance."""
+"""Study of the learned installation on fleets of docs/installation-family.md.
+
+Coverage, half widths, acceptance.
+"""
 
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -52,7 +55,7 @@ def study_installation(
     kept: Kept | None = None,
     minutes: float | None = None,
 ) -> StudyResult:
-    """Draw fleets of every family and judge what each flight is told by what the earlier ones taught.
+    """Draw fleets of every family and judge each flight by what earlier ones taught.
 
     Parameters
     ----------
@@ -135,7 +138,10 @@ def _holds(ends_deg: tuple[float, float], truth_deg: float) -> bool:
 
 
 def table_by(judged: Sequence[Judged], by: str, name: str) -> FigureData:
-    """One row for each family and each flight number, or each number of flights since a change."""
+    """Tabulate one row for each family and each value of ``by``.
+
+    ``by``: the number of the flight, or of flights since a change.
+    """
     found: dict[tuple[str, int], list[Judged]] = {}
     for one in sorted(judged, key=lambda one: (ORDER.index(one.family), getattr(one, by))):
         found.setdefault((one.family, getattr(one, by)), []).append(one)
@@ -169,7 +175,7 @@ def table_by(judged: Sequence[Judged], by: str, name: str) -> FigureData:
 
 
 def pool_table(pool: Sequence[TaxiOfPool]) -> FigureData:
-    """What the pool is like: errors, half widths, gates that fail."""
+    """Tabulate errors, half widths and failed gates of the pool."""
     errors, halves = (np.array([getattr(one, name) for one in pool]) for name in ("error_deg", "half_width_deg"))
     rows = [
         ("rms error, arcmin", float(np.sqrt(np.mean(errors**2))) * ARCMIN_PER_DEG),

@@ -1,4 +1,7 @@
-"""Fleets of docs/installation-family.md: aircraft with mountings, factors and winds, and what their flights show."""
+"""Fleets of docs/installation-family.md.
+
+Aircraft with mountings, factors and winds, and what their flights show.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +32,7 @@ LIMIT_DEG = 1.0 / 3.0
 
 @dataclass(frozen=True)
 class FamilyOfFleets:
-    """One family: what its flights know, and what is different."""
+    """One family: the knowledge of its flights, and what is different."""
 
     name: str
     alignment: str = "stored heading"
@@ -60,7 +63,10 @@ FAMILIES: tuple[FamilyOfFleets, ...] = (
 
 @dataclass(frozen=True)
 class FlownFlight:
-    """A flight of a fleet: what it shows, the truth, and since how many flights another unit flies (0: none does)."""
+    """Flight of a fleet: what it shows, and the truth.
+
+    ``since_change``: for how many flights another unit has flown, 0 where none has.
+    """
 
     lesson: Lesson
     taxi: TaxiOfPool
@@ -70,7 +76,10 @@ class FlownFlight:
 
 
 def draw_fleet(number: int, seed: int, pool: Sequence[TaxiOfPool], aircraft: int = AIRCRAFT) -> list[list[FlownFlight]]:
-    """Draw the aircraft of a family (its number in :data:`FAMILIES`), each with its flights in order of time."""
+    """Draw the aircraft of a family, each with its flights in order of time.
+
+    ``number`` is that of the family in :data:`FAMILIES`.
+    """
     return [_aircraft(number, seed, place, pool) for place in range(aircraft)]
 
 
@@ -141,12 +150,12 @@ def _aircraft(number: int, seed: int, place: int, pool: Sequence[TaxiOfPool]) ->
 
 
 def taxi_sigma(taxi: TaxiOfPool) -> float:
-    """Sigma of a normal distribution with the half width of this taxi alone."""
+    """Return the sigma of a normal distribution with the half width of this taxi alone."""
     return taxi.half_width_deg / NORMAL_95
 
 
 def _verdict(taxi: TaxiOfPool, half_width_deg: float) -> str:
-    """Verdict by this taxi alone."""
+    """Return the verdict by this taxi alone."""
     if set(taxi.failed) - CURED_BY_MORE_DATA:
         return "reject"
     if taxi.failed:
@@ -155,14 +164,14 @@ def _verdict(taxi: TaxiOfPool, half_width_deg: float) -> str:
 
 
 def _alone_half_width(taxi: TaxiOfPool, stated: tuple[float, float], told_mps: float, has_metar: bool) -> float:
-    """Half width of the whole interval by this taxi alone."""
+    """Return the half width of the whole interval by this taxi alone."""
     usual = float(np.hypot(*stated)) * (METAR_MPS if has_metar else ORDINARY_WIND_MPS)
     wind = np.hypot(stated[1] * told_mps if has_metar else 0.0, usual)
     return NORMAL_95 * float(np.sqrt(taxi_sigma(taxi) ** 2 + wind**2 + STEADY_DEG**2))
 
 
 def _units(change: str, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Which of two units flies each flight."""
+    """Draw which of two units flies each flight."""
     from_flight, odd = int(rng.integers(2, 5)), int(rng.integers(1, 5))
     either = rng.integers(0, 2, FLIGHTS)
     flights = np.arange(FLIGHTS)
@@ -176,5 +185,5 @@ def _units(change: str, rng: np.random.Generator) -> NDArray[np.int64]:
 
 
 def _from_right(wind_mps: NDArray[np.float64], track_rad: float) -> float:
-    """Wind across a path from the right, m/s, of a velocity of the air north and east."""
+    """Return the wind across a path from the right, m/s, from its north and east components."""
     return float(wind_mps[0] * np.sin(track_rad) - wind_mps[1] * np.cos(track_rad))

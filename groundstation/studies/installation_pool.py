@@ -1,4 +1,7 @@
-"""One-way taxis through the whole heading estimator: the pool that fleets of docs/installation-family.md draw from."""
+"""Pool of one-way taxis through the whole heading estimator.
+
+Fleets of docs/installation-family.md draw from it.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +23,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class TaxiOfPool:
-    """What the estimator made of one taxi without wind, mounting and sideslip.
+    """Result of the estimator on one taxi without wind, mounting and sideslip.
 
     Parameters
     ----------
@@ -42,7 +45,7 @@ class TaxiOfPool:
 
     @property
     def passes_standstill(self) -> bool:
-        """Whether the mean velocity at standstill is within the limit."""
+        """Tell whether the mean velocity at standstill is within the limit."""
         return STANDSTILL_GATE not in self.failed
 
 
@@ -67,7 +70,7 @@ def draw_taxi(seed: int, number: int) -> TaxiOfPool:
 
 
 def taxi_of(found: HeadingResult, error_deg: float) -> TaxiOfPool:
-    """What the pool keeps of an answer."""
+    """Return the part of an answer that the pool keeps."""
     (taxi,) = (part for part in found.interval_parts if part.name == "taxi")
     failed = tuple(gate.name for gate in found.gates if gate.required and gate.state != "passed" and gate.name != WHOLE)
     return TaxiOfPool(error_deg, taxi.sigma_deg, taxi.half_width_deg, found.segments[0].mean_track_deg, failed)
@@ -89,7 +92,10 @@ def draw_pool(
     kept: Kept | None = None,
     is_over: Callable[[], bool] = lambda: False,
 ) -> tuple[TaxiOfPool, ...]:
-    """Draw the first ``runs`` runs of a pool, fewer where time is over; those ``kept`` are not made again."""
+    """Draw the first ``runs`` runs of a pool, fewer where time is over.
+
+    Runs in ``kept`` are not made again.
+    """
     made: list[TaxiOfPool] = []
     for number in range(runs):
         found = None if kept is None else kept.get(f"pool-{seed}", number)
@@ -106,7 +112,7 @@ def draw_pool(
 
 
 def pool_figure(pool: Sequence[TaxiOfPool]) -> FigureData:
-    """The pool as a table."""
+    """Return the pool as a table."""
     columns = {
         name: np.array([getattr(one, name) for one in pool], dtype=np.float64)
         for name in ("error_deg", "sigma_deg", "half_width_deg", "track_deg")

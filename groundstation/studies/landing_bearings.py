@@ -1,4 +1,7 @@
-"""Landing by locators in the study: errors along the approach by propagation and by drawn bearings."""
+"""Landing by locators in the study.
+
+Errors along the approach by propagation and by drawn bearings.
+"""
 
 import numpy as np
 
@@ -25,7 +28,7 @@ SPAN_STEP_M = 5.0
 
 
 def bearing_table(runs: int, seed: int) -> FigureData:
-    """95 % of the errors of side, distance and height above the glide path at each distance.
+    """Tabulate 95 % errors of side, distance and height above the glide path by distance.
 
     ``formula``: the source's, on the course, by propagation; ``drawn``: the same formulas fed with drawn bearings;
     ``joint``: all three bearings at once, drawn, as the analysis of a log solves them.
@@ -75,7 +78,7 @@ def _share_95(error: FloatArray) -> float:
 
 
 def bearing_spans() -> FigureData:
-    """Where accuracy of each category is met by the source's formulas, as stretches before the threshold."""
+    """Tabulate where each category is met by the source's formulas, m before the threshold."""
     before = np.arange(0.0, 8000.0, SPAN_STEP_M)
     slope = float(np.tan(np.deg2rad(GLIDE_DEG)))
     rows = []

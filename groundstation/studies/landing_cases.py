@@ -1,4 +1,4 @@
-"""The published figures of landing by ranges, each with the approach that stands for it.
+"""Published figures of landing by ranges, each with the approach for it.
 
 Source: O. N. Skrypnik, thesis on navigation between aircraft, 2010, chapters 5 and 6.
 """
@@ -20,7 +20,7 @@ CAT_I, CAT_II, CAT_III = CATEGORIES
 
 @dataclass(frozen=True)
 class PublishedSigma:
-    """One published sigma: of which approach, which figure of it, and what is written there."""
+    """One published sigma: its approach, its quantity, its value."""
 
     approach: str
     figure: Figure
@@ -74,12 +74,15 @@ FLOWN = ("three-points-axis", "three-points-offset", "three-points-near", "movin
 
 
 def approach(name: str) -> RangeApproach:
-    """A shipped approach."""
+    """Return a shipped approach."""
     return load_plan(LANDING_PLAN, name).scenario
 
 
 def variations() -> dict[str, RangeApproach]:
-    """The approach with the moving fourth point under other noise, baro and ranges, by what is changed."""
+    """Return the approach with the moving fourth point under changed conditions, by name.
+
+    Other noise, baro and ranges.
+    """
     base = approach("moving-fourth")
     noises = {
         "3 m each 0.01 s (the source)": RangeNoise(),

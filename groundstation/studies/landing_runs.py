@@ -1,4 +1,4 @@
-"""The runs of the landing study: each approach answered once, in processes that share nothing."""
+"""Runs of the landing study: each approach answered once, in separate processes."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -17,7 +17,10 @@ WORKERS = 2
 def run_approaches(
     approaches: Mapping[str, RangeApproach], trials: Mapping[str, int], seed: int, progress: Progress | None = None
 ) -> dict[str, RangeLanding]:
-    """Answer of every approach, by name; ``trials`` says how many are simulated, none where it says nothing."""
+    """Return the answer of every approach, by name.
+
+    ``trials`` is the number of simulated approaches by name, 0 for a name that it lacks.
+    """
     wanted = {name: replace(one, trials=trials.get(name, 0), seed=seed) for name, one in approaches.items()}
     found: dict[str, RangeLanding] = {}
     if not any(one.trials for one in wanted.values()):
@@ -31,5 +34,8 @@ def run_approaches(
 
 
 def _answer(scenario: RangeApproach) -> RangeLanding:
-    """The answer without its arrays, which no table of the study needs and no process can hand over."""
+    """Return the answer without its arrays.
+
+    No table of the study needs them, and no process can hand them over.
+    """
     return replace(range_landing(scenario), figures=())

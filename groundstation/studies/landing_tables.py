@@ -1,4 +1,7 @@
-"""Tables of the landing study: published figures with ours beside them, noise, order of the variants, honesty."""
+"""Tables of the landing study: published figures with ours beside them.
+
+Noise, order of the variants, honesty.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -13,20 +16,20 @@ THRESHOLD = "threshold"
 
 
 def table(name: str, columns: Sequence[str], rows: Sequence[Sequence[object]], digits: int = 2) -> FigureData:
-    """A table of rows."""
+    """Return a table of rows."""
     arrays = {column: np.array([row[place] for row in rows]) for place, column in enumerate(columns)}
     return FigureData(name, arrays, dict.fromkeys(columns, digits))
 
 
 def figure_of(answer: RangeLanding, figure: Figure) -> float:
-    """One sigma that an answer holds."""
+    """Return one sigma that an answer holds."""
     if figure == "touchdown_up":
         return answer.at(TOUCHDOWN).sigma_up_m
     return {"least_along": answer.least_along_m, "least_right": answer.least_right_m}.get(figure, answer.least_up_m)
 
 
 def sigma_table(answers: Mapping[str, RangeLanding]) -> FigureData:
-    """Published sigmas with ours."""
+    """Tabulate published sigmas with ours."""
     rows = []
     for one in SIGMAS:
         ours = figure_of(answers[one.approach], one.figure)
@@ -37,12 +40,12 @@ def sigma_table(answers: Mapping[str, RangeLanding]) -> FigureData:
 
 
 def error_95_m(row: AccuracyRow, axis: Axis) -> float:
-    """The 95 % figure of an axis."""
+    """Return the 95 % figure of an axis."""
     return {"lateral": row.lateral_95_m, "horizontal": row.horizontal_95_m}.get(axis, row.vertical_95_m)
 
 
 def holds(claim: PublishedCategory, error_m: float) -> bool:
-    """Whether an error agrees with a claim."""
+    """Tell whether an error agrees with a claim."""
     limits = {one.name: one.vertical_m if claim.axis == "vertical" else one.horizontal_m for one in CATEGORIES}
     if not claim.category:
         return error_m > max(limits.values())
@@ -50,7 +53,10 @@ def holds(claim: PublishedCategory, error_m: float) -> bool:
 
 
 def category_table(answers: Mapping[str, RangeLanding]) -> FigureData:
-    """Published claims of categories with our 95 % figures at the threshold and at touchdown."""
+    """Tabulate published claims of categories with our 95 % figures.
+
+    Our figures are those at the threshold and at touchdown.
+    """
     rows = []
     for claim in CLAIMS:
         answer = answers[claim.approach]
@@ -62,7 +68,7 @@ def category_table(answers: Mapping[str, RangeLanding]) -> FigureData:
 
 
 def order_table(answers: Mapping[str, RangeLanding]) -> FigureData:
-    """Variants of the source, the worst height at touchdown first."""
+    """Tabulate variants of the source, the worst height at touchdown first."""
     ordered = sorted(answers.items(), key=lambda pair: -pair[1].at(TOUCHDOWN).sigma_up_m)
     rows = []
     for name, answer in ordered:
@@ -78,7 +84,10 @@ def _sigmas(row: AccuracyRow) -> tuple[float, float, float]:
 
 
 def variation_table(answers: Mapping[str, RangeLanding]) -> FigureData:
-    """What noise, correlation, baro and control do to the approach with the moving point."""
+    """Tabulate the effect of noise, correlation, baro and control.
+
+    The approach is that with the moving point.
+    """
     rows = []
     for name, answer in answers.items():
         threshold, touchdown = answer.at(THRESHOLD), answer.at(TOUCHDOWN)
@@ -93,7 +102,7 @@ def variation_table(answers: Mapping[str, RangeLanding]) -> FigureData:
 
 
 def trial_table(answers: Mapping[str, RangeLanding]) -> FigureData:
-    """NEES and over-confidence of simulated approaches."""
+    """Tabulate NEES and over-confidence of simulated approaches."""
     rows = [
         (
             *(name, "white" if row.filter == WHITE else "as it is", row.before_threshold_m),

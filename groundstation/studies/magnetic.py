@@ -1,4 +1,7 @@
-"""Monte Carlo behind the magnetic deviation: error of every method, the published claim and its limit, honesty."""
+"""Monte Carlo study of the magnetic deviation.
+
+Error of every method, the published claim and its limit, honesty.
+"""
 
 from collections.abc import Sequence
 
@@ -14,7 +17,9 @@ from groundstation.systems.study import StudyResult
 def study_magnetic(
     runs: int = 200, seed: int = 71, progress: Progress | None = None, *, sweeps: Sequence[Sweep] = SWEEPS
 ) -> StudyResult:
-    """Fly figures through every sweep and compare the methods with the truth; RMS, shares, refusals with intervals.
+    """Fly figures through every sweep and compare the methods with the truth.
+
+    RMS, shares, refusals with intervals.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""Bias of one branch and of the average of opposite branches by formula, and the power of the bank it grows with."""
+"""Bias of one branch and of the average of opposite branches, by formula.
+
+The bias grows with a power of the bank.
+"""
 
 from dataclasses import dataclass
 
@@ -16,7 +19,7 @@ EXPONENTS = np.arange(0.5, 4.001, 0.02)  # tried where a floor of noise is fitte
 
 @dataclass(frozen=True)
 class Biases:
-    """RMS over the circle of what steady banks show more than level flight does, shapes (k,), by the study's banks."""
+    """RMS over the circle of steady banks minus level flight, by bank, shapes (k,)."""
 
     one_branch_deg: FloatArray
     average_deg: FloatArray
@@ -27,9 +30,9 @@ class Biases:
 
 
 def formula_biases(settings: MagnetometerSettings) -> Biases:
-    """Biases of one magnetometer in the field of the published figures, at the banks of ``EXACT_BANKS_DEG``.
+    """Return the biases of one magnetometer at the banks of ``EXACT_BANKS_DEG``.
 
-    No flight: a bank held exactly on every heading, no noise.
+    The field is that of the published figures. No flight: a bank held exactly on every heading, no noise.
     """
     field = np.array(PUBLISHED_FIELD_NT)
     level = deviation_truth(settings, field).compass_error_deg
@@ -45,9 +48,9 @@ def formula_biases(settings: MagnetometerSettings) -> Biases:
 
 
 def power_law(bank_deg: FloatArray, rms_deg: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Exponent p and size g of g (bank / 20 deg)^p through RMS values, shape (draws, k): shapes (draws,).
+    """Fit exponent p and size g of g (bank / 20 deg)^p to RMS values, shape (draws, k).
 
-    Least squares of the logarithms.
+    Both have the shape (draws,). Least squares of the logarithms.
 
     Examples
     --------
@@ -62,9 +65,10 @@ def power_law(bank_deg: FloatArray, rms_deg: FloatArray) -> tuple[FloatArray, Fl
 
 
 def power_law_above_floor(bank_deg: FloatArray, rms_deg: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The same of RMS values that hold a floor f of noise: rms^2 = f^2 + g^2 (bank / 20 deg)^(2 p), f^2 >= 0.
+    """Fit exponent and size to RMS values that hold a floor f of noise.
 
-    For each of ``EXPONENTS`` f^2 and g^2 are linear; the exponent of least squared relative error wins.
+    rms^2 = f^2 + g^2 (bank / 20 deg)^(2 p), f^2 >= 0. For each of ``EXPONENTS`` f^2 and g^2 are linear; the exponent of
+    least squared relative error wins.
 
     Examples
     --------
@@ -92,7 +96,7 @@ def power_law_above_floor(bank_deg: FloatArray, rms_deg: FloatArray) -> tuple[Fl
 
 
 def bank_at(limit_deg: float, exponent: FloatArray, size: FloatArray) -> FloatArray:
-    """Bank at which a power law passes a limit, degrees.
+    """Return the bank at which a power law passes a limit, degrees.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Cases of the magnetic study: families of flights, what is varied in them, and figures that are not complete."""
+"""Cases of the magnetic study: families of flights, sweeps, incomplete figures."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -43,7 +43,7 @@ EXACT_BANKS_DEG = (10.0, 15.0, 20.0, 25.0, 30.0)
 
 @dataclass(frozen=True)
 class Setup:
-    """How the flights of one point are made; equal setups are the same flights and flown once.
+    """Conditions of the flights of one point; equal setups are flown once.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Setup:
 
 @dataclass(frozen=True)
 class Sweep:
-    """One quantity that is varied, all others at their reference.
+    """One quantity that is varied; all others stay at their reference.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ SWEEPS = (BANK, DIP, NOISE, ATTITUDE, COVERAGE, DRIFT, AZIMUTH)
 
 
 def setups(sweeps: Sequence[Sweep] = SWEEPS) -> tuple[Setup, ...]:
-    """Every setup of some sweeps and of the claim once.
+    """Return every setup of some sweeps and of the claim once.
 
     Examples
     --------
@@ -173,7 +173,7 @@ INCOMPLETE: dict[str, Callable[[float], Legs]] = {
 
 
 def with_figure(legs: Legs, figure: Legs) -> Legs:
-    """The legs of a family's flight with another first figure."""
+    """Return the legs of a family's flight with another first figure."""
     return (*legs[:FIRST_TURN], *figure, *legs[FIRST_TURN + 2 :])
 
 
@@ -182,7 +182,10 @@ def with_figure(legs: Legs, figure: Legs) -> Legs:
 
 @dataclass(frozen=True)
 class WideCell:
-    """Whole flights with one disturbance more than the judged family; ``is_load_logged``: whether the log has it."""
+    """Whole flights with one disturbance more than the judged family.
+
+    ``is_load_logged``: the log has the electric load.
+    """
 
     family: MagneticFamilySettings
     is_load_logged: bool = True
@@ -209,7 +212,7 @@ WIDE: dict[str, WideCell] = {
 
 
 def seed_of(seed: int, run: int) -> int:
-    """Seed of one flight of a study.
+    """Return the seed of one flight of a study.
 
     Examples
     --------

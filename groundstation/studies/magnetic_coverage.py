@@ -1,4 +1,7 @@
-"""Coverage of the magnetic deviation cell by cell: accepted flights of both families against the truth."""
+"""Coverage of the magnetic deviation cell by cell.
+
+Accepted flights of both families against the truth.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -17,7 +20,7 @@ Cell = tuple[str, str, Sequence[Outcome]]
 
 
 def first_cells(judged: Sample, sweeps: Sequence[Sweep], samples: Mapping[Setup, Sample]) -> Iterable[Cell]:
-    """The whole flights of the first family, and the points of its sweeps."""
+    """Return the whole flights of the first family, and the points of its sweeps."""
     yield FIRST, "whole flights", judged.outcomes
     for sweep in sweeps:
         for value, setup in sweep.points:
@@ -25,7 +28,7 @@ def first_cells(judged: Sample, sweeps: Sequence[Sweep], samples: Mapping[Setup,
 
 
 def coverage_table(cells: Iterable[Cell]) -> FigureData:
-    """How often errors of accepted flights stay within 1.96 stated sigma, a row for each cell.
+    """Tabulate how often errors of accepted flights stay within 1.96 stated sigma, by cell.
 
     ``*_a_to_e``: coefficients A to E; ``*_level``: headings of level flight; ``recommended_*``: by the method that the
     flight recommends, with the RMS of its error over all headings and flights and that of the worst flight.

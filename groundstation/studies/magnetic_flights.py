@@ -1,4 +1,7 @@
-"""Flights of the magnetic study, made of what the estimator needs, or whole from the stand on."""
+"""Flights of the magnetic study: only what the estimator needs, or whole.
+
+Whole flights start on the stand.
+"""
 
 from dataclasses import replace
 
@@ -28,7 +31,7 @@ INS_FIELDS = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m", "roll_deg
 
 
 class Hangar:
-    """Flights of one seed: trajectories are flown once for all setups that have them, and so is the taxi."""
+    """Flights of one seed; each trajectory and each taxi is flown once for all setups."""
 
     def __init__(self, seed: int) -> None:
         self.seed = seed
@@ -36,7 +39,10 @@ class Hangar:
         self._taxis: dict[float, HeadingResult | None] = {}
 
     def outcome(self, setup: Setup, figure: Legs | None = None) -> Outcome:
-        """Fly one setup, perhaps with another figure than its family's, and judge what the estimator makes of it."""
+        """Fly one setup and judge the estimator's answer.
+
+        ``figure``: flown instead of that of the family.
+        """
         scenario = draw_magnetic_scenario(setup.family, self.seed)
         if figure is not None:
             scenario = replace(scenario, legs=with_figure(scenario.legs, figure))
@@ -49,7 +55,7 @@ class Hangar:
         return judge(flown, heading=heading, phases=phases)
 
     def flown(self, scenario: Scenario, setup: Setup) -> Flown:
-        """The level part of a flight."""
+        """Return the level part of a flight."""
         motion = self._motion(scenario)
         assert scenario.magnetometer is not None
         field = world_field_nt(motion, scenario, scenario.magnetometer)
@@ -71,7 +77,10 @@ class Hangar:
         return self._motions[key]
 
     def _taxi(self, family: MagneticFamilySettings) -> HeadingResult | None:
-        """System 1's answer of the taxi before the flight: that of the same azimuth error, without drift."""
+        """Return system 1's answer of the taxi before the flight.
+
+        The taxi has the same azimuth error, and no drift.
+        """
         sigma = family.heading_error_sigma_deg
         if sigma not in self._taxis:
             drawn = draw_magnetic_scenario(replace(family, drift_sigma_dph=0.0), self.seed)
@@ -81,7 +90,10 @@ class Hangar:
 
 
 def wide_outcome(cell: WideCell, seed: int) -> Outcome:
-    """A whole flight from stand to landing, answered as the pipeline does: latencies, taxi, deviation."""
+    """Fly a whole flight from stand to landing and answer it as the pipeline does.
+
+    Latencies, taxi, deviation.
+    """
     simulated = simulate(draw_magnetic_scenario(cell.family, seed))
     scenario, motion, flight = simulated.scenario, simulated.trajectory, simulated.flight
     assert scenario.magnetometer is not None
@@ -96,7 +108,7 @@ def wide_outcome(cell: WideCell, seed: int) -> Outcome:
 
 
 def judged_outcome(family: MagneticFamilySettings, seed: int) -> Outcome:
-    """A whole flight of a family."""
+    """Return a whole flight of a family."""
     return wide_outcome(WideCell(family), seed)
 
 
@@ -108,7 +120,7 @@ def _aligned(flight: Flight) -> HeadingResult | None:
 
 
 def _flight(scenario: Scenario, readings: list[Readings]) -> Flight:
-    """Readings as the tables of a flight."""
+    """Return readings as the tables of a flight."""
     zero_ns = scenario.start_utc_ns or 0
     tables = {
         part.topic: Table(

@@ -1,4 +1,4 @@
-"""What the methods leave on a simulated flight, and how honest their sigmas are: judged by the truth."""
+"""Errors of the methods on a simulated flight, judged by the truth; honesty of sigmas."""
 
 from dataclasses import dataclass, fields
 
@@ -36,7 +36,7 @@ NOT_ASSESSABLE = "not assessable"
 
 @dataclass(frozen=True)
 class Judged:
-    """How one method's sigmas came out on one flight.
+    """Comparison of one method's sigmas with its errors on one flight.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One flight: what the estimator answered, and what is left of the heading error, against the truth.
+    """One flight: the estimator's answer, and the remaining heading error against the truth.
 
     Parameters
     ----------
@@ -111,7 +111,10 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Flown:
-    """A flight with its truth: ``motion`` at the rate of the log, ``field_ned_nt`` (n, 3) of the world along it."""
+    """Flight with its truth.
+
+    ``motion`` at the rate of the log, ``field_ned_nt`` (n, 3) of the world along it.
+    """
 
     scenario: Scenario
     flight: Flight
@@ -120,7 +123,7 @@ class Flown:
 
     @property
     def magnetometer(self) -> MagnetometerSettings:
-        """What is wrong with the sensor."""
+        """Errors of the sensor."""
         assert self.scenario.magnetometer is not None
         return self.scenario.magnetometer
 
@@ -132,7 +135,10 @@ def judge(
     latencies: Latencies | None = None,
     phases: Phases | None = None,
 ) -> Outcome:
-    """Answer of the estimator on a flight, and what its methods leave, against the truth."""
+    """Return the answer of the estimator on a flight, and the errors of its methods.
+
+    Errors are against the truth.
+    """
     middle = flown.field_ned_nt[len(flown.field_ned_nt) // 2]
     horizontal = float(np.hypot(middle[0], middle[1]))
     dip = float(np.rad2deg(np.arctan2(middle[2], horizontal)))
@@ -171,7 +177,10 @@ def judge(
 
 @dataclass(frozen=True)
 class Circle:
-    """Level flight on n headings without noise: magnetic heading, readings (n, 3), attitude of the INS."""
+    """Level flight on n headings without noise.
+
+    Magnetic heading, readings (n, 3), attitude of the INS.
+    """
 
     magnetic_heading_deg: FloatArray
     field_nt: FloatArray
@@ -185,7 +194,10 @@ class Circle:
 
 
 def level_circle(flown: Flown, field_ned_nt: FloatArray) -> Circle:
-    """What the magnetometer of a flight would show in level flight, and with what attitude the INS would level it."""
+    """Return readings of a flight's magnetometer in level flight, with the INS attitude.
+
+    The attitude is that with which the INS would level it.
+    """
     declination = float(np.rad2deg(np.arctan2(field_ned_nt[1], field_ned_nt[0])))
     heading = CENTRES_DEG
     roll, pitch = np.zeros(len(heading)), np.full(len(heading), ANGLE_OF_ATTACK_DEG)
@@ -196,9 +208,9 @@ def level_circle(flown: Flown, field_ned_nt: FloatArray) -> Circle:
 
 
 def errors_deg(circle: Circle, result: MagneticResult) -> dict[str, tuple[FloatArray, ...]]:
-    """What each method leaves on a circle: corrected minus true magnetic heading; NaN where it has nothing to say.
+    """Return the error of each method on a circle: corrected minus true magnetic heading.
 
-    One branch alone is both of them, each by itself.
+    NaN where a method has no value. One branch alone is both of them, each by itself.
     """
     shown, declination = circle.shown_deg, result.declination.value_deg
     table = found_in(result.figures, MagneticTable)
@@ -218,7 +230,10 @@ def errors_deg(circle: Circle, result: MagneticResult) -> dict[str, tuple[FloatA
 
 
 def is_modulus_refused(result: MagneticResult) -> bool:
-    """Whether the estimator's own limits would refuse the modulus fit, which the study fits without them."""
+    """Tell whether the estimator's own limits would refuse the modulus fit.
+
+    The study fits it without them.
+    """
     row = result.method("constant_modulus")
     if row.state == "refused" or row.condition_number is None:
         return True
@@ -233,7 +248,7 @@ def _by_iron(circle: Circle, parameters: PoissonParameters | None) -> FloatArray
 
 
 def _coefficients(flown: Flown, field_ned_nt: FloatArray) -> FloatArray:
-    """A to E of level flight, shape (5,), as the truth has them."""
+    """Return A to E of level flight, shape (5,), as the truth has them."""
     ins = flown.scenario.ins
     truth = deviation_truth(
         flown.magnetometer,
@@ -246,7 +261,10 @@ def _coefficients(flown: Flown, field_ned_nt: FloatArray) -> FloatArray:
 
 
 def _held_out(flown: Flown, result: MagneticResult) -> dict[str, FloatArray]:
-    """Errors on the held-out part against the true magnetic heading, and the uncorrected heading; empty without one."""
+    """Return errors on the held-out part, and the uncorrected heading; empty without one.
+
+    Errors are against the true magnetic heading.
+    """
     every = found_in(result.figures, MagneticSamples)
     samples = None if every is None else every.where(every.part == "held out")
     if not samples:

@@ -1,4 +1,4 @@
-"""The page of the magnetic study: what was asked, what came out, in words made from the tables."""
+"""Page of the magnetic study: questions and results, in sentences from the tables."""
 
 from collections.abc import Sequence
 
@@ -31,7 +31,7 @@ NOT_A_NUMBER = "-"
 
 
 def page(tables: dict[str, FigureData], runs: int, seed: int, sweeps: Sequence[Sweep] = SWEEPS) -> tuple[Section, ...]:
-    """The study in sections."""
+    """Return the study in sections."""
     return (
         section(
             "Study: magnetic deviation determined in flight",
@@ -94,7 +94,10 @@ def _coverage(coverage: FigureData) -> Section:
 
 
 def residual_claim(honesty: FigureData, method: str) -> str:
-    """Whether 95 % of the flights leave a held-out error within 2 stated sigma, in words."""
+    """Return in words whether 95 % of the held-out errors stay within 2 stated sigma.
+
+    One error for each flight counts.
+    """
     row = int(np.flatnonzero(rows_where(honesty, method=method, error_of=HELD_OUT))[0])
     share, high = float(honesty["inside2"][row]), float(honesty["inside2_high"][row])
     if np.isnan(share):
@@ -109,7 +112,7 @@ def residual_claim(honesty: FigureData, method: str) -> str:
 
 
 def coefficient_claim(honesty: FigureData, method: str) -> str:
-    """How many of A to E are within 3 sigma, in words."""
+    """Return in words how many of A to E are within 3 sigma."""
     rows = rows_where(honesty, method=method) & np.isin(honesty["error_of"], LETTERS)
     known = honesty["flights"][rows]
     inside = int(np.sum(np.round(honesty["inside3"][rows] * known)))
@@ -125,7 +128,7 @@ def coefficient_claim(honesty: FigureData, method: str) -> str:
 
 
 def _too_small(honesty: FigureData, rows: BoolArray) -> str:
-    """The coefficients that lie within 2 sigma surely less often than a normal error would."""
+    """Return the coefficients within 2 sigma significantly less often than a normal error."""
     shown = rows & (honesty["inside2_high"] < NORMAL_2_SIGMA)
     letters = [
         f"{honesty['error_of'][row]} ({PERCENT * honesty['inside2'][row]:.1f} % within 2 sigma)"
@@ -208,7 +211,7 @@ def _claim(tables: dict[str, FigureData]) -> Section:
 
 
 def claim_text(claim: FigureData) -> str:
-    """The published claim set against what was flown, in words."""
+    """Return the published claim and the result of the flights, in words."""
     row = int(np.argmin(np.abs(claim["bank_deg"] - BANK_DEG)))
     branch, average = float(claim["flown_branch_deg"][row]), float(claim["flown_average_deg"][row])
     said = "confirmed with a limit" if claim["left_high"][row] < 0.5 else "not confirmed"
@@ -222,7 +225,7 @@ def claim_text(claim: FigureData) -> str:
 
 
 def limit_text(power: FigureData) -> str:
-    """How the bias of the average grows and where it passes the limit, in words."""
+    """Return in words how the bias of the average grows and where it passes the limit."""
     row = int(np.flatnonzero(power["source"] == POWER_SOURCES[1])[0])
     low, high = (float(power[f"exponent_{end}"][row]) for end in ("low", "high"))
     square = "as its square within the limits" if low <= 2.0 <= high else (
@@ -248,7 +251,10 @@ def _sweep(sweep: Sweep, tables: dict[str, FigureData]) -> Section:
 
 
 def sweep_text(sweep: Sweep, table: FigureData, verdicts: FigureData, ratios: FigureData) -> str:
-    """Which method is better where, how much one branch loses, where sigmas and verdicts fail, in words."""
+    """Return in words which method is better where, and how much one branch loses.
+
+    The text also says where sigmas and verdicts fail.
+    """
     parts = [_comparison(sweep, ratios, IRON, "Without A the iron fit is")]
     branch = rows_where(ratios, sweep=sweep.name, method="one_branch") & np.isfinite(ratios["ratio"])
     if branch.any():
@@ -333,7 +339,7 @@ def _incomplete(refusals: FigureData) -> Section:
 
 
 def refusal_text(table: FigureData) -> str:
-    """How many of the incomplete figures were not accepted, in words."""
+    """Return in words how many of the incomplete figures were not accepted."""
     total = sum(int(table["flights"][table["figure"] == kind][0]) for kind in np.unique(table["figure"]))
     let_through = table["verdict"] == "accept"
     passed = int(np.sum(table["count"][let_through]))
@@ -362,14 +368,14 @@ def _number(value: float, digits: int) -> str:
 
 
 def _limits(table: FigureData, row: int, stem: str, digits: int = 2) -> str:
-    """A value with its limits; the unit stands last in the columns' names."""
+    """Return a value with its limits; the unit stands last in the columns' names."""
     unit = "_deg" if f"{stem}_deg" in table.columns else ""
     value, low, high = (float(table[f"{stem}{end}{unit}"][row]) for end in ("", "_low", "_high"))
     return NOT_A_NUMBER if np.isnan(value) else f"{value:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
 
 
 def _shares(table: FigureData, row: int, name: str, low: str = "", high: str = "") -> str:
-    """A share with its limits, in per cent."""
+    """Return a share with its limits, in per cent."""
     value = float(table[name][row])
     if np.isnan(value):
         return NOT_A_NUMBER

@@ -1,4 +1,7 @@
-"""The flights of the magnetic study: every seed flies all setups, on several processes; what is kept is small."""
+"""Runs of the magnetic study: every seed flies all setups, on several processes.
+
+A small outcome of each is kept.
+"""
 
 import multiprocessing
 import os
@@ -24,7 +27,10 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 @dataclass(frozen=True)
 class Job:
-    """One seed: what is flown with it. ``wide`` is the cell of the second family, ``taxi`` that of the third."""
+    """Flights of one seed.
+
+    ``wide`` is the cell of the second family, ``taxi`` that of the third.
+    """
 
     run: int
     seed: int
@@ -65,7 +71,7 @@ class RunOutcome:
 
 
 def jobs_of(runs: int, seed: int, swept_setups: tuple[Setup, ...]) -> list[Job]:
-    """One job for each run; the seed alone decides how each setup is flown."""
+    """Return one job for each run; the seed alone decides how each setup is flown."""
     cells, taxis = tuple(WIDE), tuple(taxi_cells())
     swept, incomplete = (max(2, round(share * runs)) for share in (SWEPT_SHARE, INCOMPLETE_SHARE))
     return [
@@ -83,7 +89,10 @@ def jobs_of(runs: int, seed: int, swept_setups: tuple[Setup, ...]) -> list[Job]:
 
 
 def run_jobs(jobs: Sequence[Job], progress: Progress | None = None) -> tuple[RunOutcome, ...]:
-    """Fly all jobs, in as many processes as there are cores; the outcomes are in the order of the jobs."""
+    """Fly all jobs, on as many processes as there are cores.
+
+    The outcomes are in the order of the jobs.
+    """
     found = []
     with _mapped(len(jobs)) as mapped:
         for outcome in mapped(fly_job, jobs):
@@ -123,7 +132,7 @@ def _told(outcome: RunOutcome) -> str:
 
 @contextmanager
 def _mapped(jobs: int) -> Iterator[Callable[[Callable[[Job], RunOutcome], Sequence[Job]], Iterator[RunOutcome]]]:
-    """A map over jobs: in this process for a few, else in processes of one thread each."""
+    """Return a map over jobs: in this process for a few, else in single-threaded processes."""
     workers = min(jobs, os.cpu_count() or 1)
     if jobs < POOLED_FROM or workers < 2:
         yield map
@@ -138,7 +147,7 @@ def _mapped(jobs: int) -> Iterator[Callable[[Callable[[Job], RunOutcome], Sequen
 
 @contextmanager
 def _environment(changes: dict[str, str]) -> Iterator[None]:
-    """Environment variables that processes started meanwhile see."""
+    """Set environment variables for processes started meanwhile."""
     before = {name: os.environ.get(name) for name in changes}
     os.environ.update(changes)
     try:

@@ -1,4 +1,7 @@
-"""Tables of the magnetic study: errors of every method, the claim and its limit, honesty of sigmas, refusals."""
+"""Tables of the magnetic study.
+
+Errors of every method, the claim and its limit, honesty of sigmas, refusals.
+"""
 
 import re
 from collections import Counter
@@ -31,9 +34,10 @@ _PLACE = re.compile(r": at # s # deg at # deg of bank")
 
 @dataclass(frozen=True)
 class Sample:
-    """Outcomes of one point, run by run, and weights to draw them again, shape (1 + draws, runs): first every run once.
+    """Outcomes of one point, run by run, and bootstrap weights, shape (1 + draws, runs).
 
-    Runs are the independent units; the weights are the same at every point.
+    The first row of weights counts every run once. Runs are the independent units; the weights are the same at every
+    point.
     """
 
     outcomes: tuple[Outcome, ...]
@@ -43,38 +47,38 @@ class Sample:
         object.__setattr__(self, "weights", frozen(self.weights))
 
     def each(self, value: Callable[[Outcome], float]) -> FloatArray:
-        """A figure of every run, shape (runs,), NaN where it has none."""
+        """Return a figure of every run, shape (runs,), NaN where it has none."""
         return np.array([value(outcome) for outcome in self.outcomes], dtype=np.float64)
 
     def rms(self, values: FloatArray) -> FloatArray:
-        """RMS over the runs that have a figure, shape (1 + draws,)."""
+        """Return the RMS over the runs that have a figure, shape (1 + draws,)."""
         return np.sqrt(self.mean(np.square(values)))
 
     def mean(self, values: FloatArray) -> FloatArray:
-        """Mean over the runs that have a figure, shape (1 + draws,)."""
+        """Return the mean over the runs that have a figure, shape (1 + draws,)."""
         known = np.isfinite(values)
         count = self.weights @ known
         total = self.weights @ np.where(known, values, 0.0)
         return np.where(count > 0.0, total / np.where(count > 0.0, count, 1.0), np.nan)
 
     def of_method(self, method: str, *, whole: bool) -> FloatArray:
-        """RMS error of a method on every run: whole or without A."""
+        """Return the RMS error of a method on every run: whole or without A."""
         place = METHODS.index(method)
         return self.each(lambda outcome: float((outcome.rms_deg if whole else outcome.shape_deg)[place]))
 
     def judged(self, method: str, value: Callable[[Judged], float]) -> FloatArray:
-        """A figure of the sigmas of a method on every run."""
+        """Return a figure of the sigmas of a method on every run."""
         return self.each(lambda outcome: value(outcome.judged[method]) if method in outcome.judged else float("nan"))
 
 
 def resampling(runs: int, seed: int) -> FloatArray:
-    """Weights of the runs: all once, then drawn with replacement; shape (1 + draws, runs)."""
+    """Return weights of the runs: all once, then bootstrap draws; shape (1 + draws, runs)."""
     drawn = np.random.default_rng(seed).multinomial(runs, np.full(runs, 1.0 / runs), DRAWS)
     return np.concatenate([np.ones((1, runs)), drawn])
 
 
 def interval(values: FloatArray) -> tuple[float, float, float]:
-    """Value, low and high 95 % limit of resampled values (1 + draws,)."""
+    """Return value, low and high 95 % limit of resampled values (1 + draws,)."""
     known = values[1:][np.isfinite(values[1:])]
     if not known.size or not np.isfinite(values[0]):
         return float("nan"), float("nan"), float("nan")
@@ -83,19 +87,19 @@ def interval(values: FloatArray) -> tuple[float, float, float]:
 
 
 def samples_of(runs: Sequence[RunOutcome], setups: Sequence[Setup], seed: int) -> dict[Setup, Sample]:
-    """The outcomes of every setup."""
+    """Return the outcomes of every setup."""
     weights = resampling(len(runs), seed)
     return {setup: Sample(tuple(run.swept[place] for run in runs), weights) for place, setup in enumerate(setups)}
 
 
 def judged_sample(runs: Sequence[RunOutcome], seed: int) -> Sample:
-    """The whole flights of the judged family."""
+    """Return the whole flights of the judged family."""
     flown = tuple(run.judged for run in runs if run.judged is not None)
     return Sample(flown, resampling(len(flown), seed))
 
 
 def accepted(sample: Sample, seed: int) -> Sample:
-    """Those that the estimator accepted."""
+    """Return the sample of the runs that the estimator accepted."""
     kept = tuple(outcome for outcome in sample.outcomes if outcome.verdict == "accept")
     return Sample(kept, resampling(len(kept), seed) if kept else np.zeros((1 + DRAWS, 0)))
 
@@ -104,9 +108,10 @@ def accepted(sample: Sample, seed: int) -> Sample:
 
 
 def sweep_table(sweep: Sweep, samples: dict[Setup, Sample]) -> FigureData:
-    """RMS error of every method over the points of a sweep, whole and without A, with 95 % limits over flights.
+    """Tabulate the RMS error of every method over the points of a sweep.
 
-    ``fitted`` flights count; ``inside2`` is the share of the headings on which the error is within 2 stated sigma.
+    Whole and without A, with 95 % limits over flights. ``fitted`` flights count; ``inside2`` is the share of the
+    headings on which the error is within 2 stated sigma.
     """
     rows = []
     for value, setup in sweep.points:
@@ -129,7 +134,10 @@ def sweep_table(sweep: Sweep, samples: dict[Setup, Sample]) -> FigureData:
 
 
 def ratio_table(sweeps: Sequence[Sweep], samples: dict[Setup, Sample]) -> FigureData:
-    """Error of the iron fit, and of one branch, over that of the branch table, without A, on the same flights."""
+    """Tabulate errors of the iron fit and of one branch over that of the branch table.
+
+    The errors are without A; the flights are the same.
+    """
     rows = []
     for sweep in sweeps:
         for value, setup in sweep.points:
@@ -146,14 +154,17 @@ def ratio_table(sweeps: Sequence[Sweep], samples: dict[Setup, Sample]) -> Figure
 
 
 def finding(low: float, high: float) -> str:
-    """What an interval of a ratio of errors says."""
+    """Return the conclusion from an interval of a ratio of errors; empty without one."""
     if np.isnan(low):
         return ""
     return BETTER if high < 1.0 else WORSE if low > 1.0 else UNDECIDED
 
 
 def residual_table(sample: Sample) -> FigureData:
-    """What every method leaves on whole flights: on every heading, and on the held-out part against truth and INS."""
+    """Tabulate the error that every method leaves on whole flights.
+
+    Columns: every heading, and the held-out part against truth and INS.
+    """
     rows = []
     for method in METHODS:
         whole, shape = (sample.of_method(method, whole=is_whole) for is_whole in (True, False))
@@ -174,9 +185,10 @@ def residual_table(sample: Sample) -> FigureData:
 
 
 def claim_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> FigureData:
-    """Bank error of one branch and of the average of opposite ones: by formula and flown without noise.
+    """Tabulate the bank error of one branch and of the average, by formula and flown.
 
-    ``left`` is the share of one branch's error that the average keeps; published are the figures of the design.
+    The average is that of opposite branches; the flights have no noise. ``left`` is the share of one branch's error
+    that the average keeps; published are the figures of the design.
     """
     rows = []
     for place, (bank, setup) in enumerate(CLAIM.points):
@@ -198,7 +210,10 @@ def claim_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> Fig
 
 
 def power_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> FigureData:
-    """Exponent of the bank with which the average's bias grows, and the bank at which it passes the limit."""
+    """Tabulate the exponent of the bank with which the average's bias grows.
+
+    The table also has the bank at which the bias passes the limit.
+    """
     banks = np.array(EXACT_BANKS_DEG)
     weigher = samples[CLAIM.points[0][1]]
     formula = np.stack([weigher.rms(np.array([run.biases.average_deg[k] for run in runs])) for k in range(len(banks))])
@@ -228,7 +243,10 @@ def power_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> Fig
 
 
 def honesty_table(sample: Sample) -> FigureData:
-    """Shares of the flights whose error against the truth is within 1, 2, 3 stated sigma, with 95 % limits."""
+    """Tabulate the shares of the flights with an error within 1, 2, 3 stated sigma.
+
+    Errors are against the truth; with 95 % limits.
+    """
     rows: list[tuple[object, ...]] = []
     for method in JUDGED_METHODS:
         for place, letter in enumerate(LETTERS):
@@ -261,7 +279,10 @@ MEASURES = {
 
 
 def _inside(ratio: FloatArray) -> tuple[float, ...]:
-    """How many are known, the shares within the limits with exact intervals, and the RMS of the ratio."""
+    """Return count, shares within the limits with exact intervals, and RMS of the ratio.
+
+    The count is that of known ratios.
+    """
     known = np.abs(ratio[np.isfinite(ratio)])
     parts: list[float] = [len(known)]
     for limit in RATIO_LIMITS:
@@ -274,7 +295,7 @@ def _inside(ratio: FloatArray) -> tuple[float, ...]:
 
 
 def verdict_table(judged: Sample, sweeps: Sequence[Sweep], samples: dict[Setup, Sample]) -> FigureData:
-    """What became of the flights of every point, and the reason that most of the others were not accepted for.
+    """Tabulate the verdicts at every point, and the commonest reason against acceptance.
 
     ``modulus_refused`` counts assessable flights on which the estimator's limits refuse the modulus fit.
     """
@@ -296,7 +317,10 @@ def verdict_table(judged: Sample, sweeps: Sequence[Sweep], samples: dict[Setup, 
 
 
 def incomplete_table(runs: Sequence[RunOutcome]) -> FigureData:
-    """Figures that are not complete: how many were refused or accepted, by reason (# stands for a number)."""
+    """Tabulate how many incomplete figures were refused or accepted, by reason.
+
+    In a reason, # stands for a number.
+    """
     rows = []
     flown = [run.incomplete for run in runs if run.incomplete]
     for kind in flown[0] if flown else ():
@@ -311,12 +335,12 @@ def incomplete_table(runs: Sequence[RunOutcome]) -> FigureData:
 
 
 def reasons_of(outcomes: Iterable[Outcome]) -> Counter[str]:
-    """How often each reason was given: the first one of each flight, without its numbers."""
+    """Count each reason: the first one of each flight, without its numbers."""
     return Counter(plain_reason(outcome.reason) for outcome in outcomes)
 
 
 def plain_reason(text: str) -> str:
-    """The first reason of several without numbers and places.
+    """Return the first reason of several without numbers and places.
 
     Examples
     --------
@@ -327,7 +351,7 @@ def plain_reason(text: str) -> str:
 
 
 def rows_where(table: FigureData, **chosen: object) -> BoolArray:
-    """Rows of a table with given values."""
+    """Return rows of a table with given values."""
     return np.asarray(np.logical_and.reduce([table[name] == value for name, value in chosen.items()]), dtype=np.bool_)
 
 

@@ -1,6 +1,7 @@
-"""Third family of the magnetic study: figure-eights after a taxi of every verdict (docs/magnetic-family.md, in words).
+"""Third family of the magnetic study: figure-eights after a taxi of every verdict.
 
-The INS is off by up to 2 deg; what aligns it is the flight's own taxi, or its turns where the taxi may not.
+Described in docs/magnetic-family.md. The INS is off by up to 2 deg; what aligns it is the flight's own taxi, or its
+turns where the taxi may not.
 """
 
 from collections.abc import Callable, Sequence
@@ -57,7 +58,7 @@ class TaxiCell:
 
 @dataclass(frozen=True)
 class TaxiOutcome:
-    """One flight: verdicts, by what it was aligned, error and sigma of A of the table and of what the figure used.
+    """One flight: verdicts, source of its alignment, error and sigma of A of the table.
 
     ``heading_error_deg``: heading analysis minus truth of the airframe; NaN where there is none. ``left_deg``: error of
     the alignment at the figure.
@@ -75,7 +76,7 @@ class TaxiOutcome:
 
 
 def taxi_cells() -> dict[str, TaxiCell]:
-    """The cells by name, in the order of the runs."""
+    """Return the cells by name, in the order of the runs."""
     return {
         "two ways": TaxiCell(TWO_WAYS),
         "one way": TaxiCell((Taxi(800.0, 10.0),)),
@@ -92,7 +93,10 @@ def taxi_cells() -> dict[str, TaxiCell]:
 
 
 def simulate_taxi_flight(cell: TaxiCell, seed: int) -> Simulated:
-    """Simulate one flight of a cell; the truth of the INS heading is that of its scenario but for what is spoilt."""
+    """Simulate one flight of a cell.
+
+    The truth of the INS heading is that of its scenario, except for what the cell spoils.
+    """
     simulated = simulate(_drawn(cell, seed))
     if cell.spoil is None:
         return simulated
@@ -122,7 +126,10 @@ def taxi_outcome(name: str, seed: int) -> TaxiOutcome:
 
 
 def true_airframe_error(simulated: Simulated) -> Callable[[float], float]:
-    """INS heading minus heading of the nose at a flight second, as the log shows it after all that was spoilt."""
+    """Return the true airframe error, INS heading minus heading of the nose, by flight second.
+
+    The INS heading is that of the log, after all that was spoilt.
+    """
     ins, truth = simulated.flight["ins"], simulated.flight["truth"]
     true_deg = np.interp(
         simulated.flight.time_s("ins"),
@@ -139,7 +146,7 @@ def true_airframe_error(simulated: Simulated) -> Callable[[float], float]:
 
 
 def true_a_deg(simulated: Simulated) -> float:
-    """A of level flight as the truth has it, in the field at the middle of the flight."""
+    """Return A of level flight by the truth, in the field at the middle of the flight."""
     scenario, magnetometer = simulated.scenario, simulated.scenario.magnetometer
     assert magnetometer is not None
     field = world_field_nt(simulated.trajectory, scenario, magnetometer)
@@ -161,7 +168,7 @@ def fly_taxis(seed: int, runs: Sequence[int]) -> tuple[TaxiOutcome, ...]:
 
 
 def taxi_table(outcomes: Sequence[TaxiOutcome]) -> FigureData:
-    """How A came out, a row for each cell and one for all.
+    """Tabulate the error of A, a row for each cell and one for all.
 
     ``inside_3_sigma``: share of all tables, ``accepted_rms_deg`` and ``accepted_worst_deg``: error of A where accepted.
     """
@@ -187,7 +194,7 @@ def _row(outcomes: Sequence[TaxiOutcome]) -> tuple[float, ...]:
 
 
 def _answers(flight: Flight) -> tuple[HeadingResult | None, InertialResult | None, Latencies | None]:
-    """What the pipeline knows before the deviation."""
+    """Return the answers that the pipeline has before the deviation."""
     latencies, heading, inertial = None, None, None
     with suppress(NotAssessableError):
         latencies = estimate_latencies(flight)
@@ -232,7 +239,7 @@ def _without_switch(flight: Flight, _rng: np.random.Generator) -> Flight:
 
 
 def _taxi_s(flight: Flight) -> tuple[float, float]:
-    """Begin and end of the motion on the ground before the take-off run."""
+    """Return begin and end of the motion on the ground before the take-off run, s."""
     truth, time_s = flight["truth"], flight.time_s("truth")
     speed = np.hypot(truth.values("velocity_north_mps"), truth.values("velocity_east_mps"))
     moving = (speed > 2.0) & (time_s < time_s[np.argmax(speed > 25.0)] - 15.0)
@@ -250,7 +257,10 @@ def _heading_off(flight: Flight, added_deg: FloatArray) -> Flight:
 
 
 def _step(flight: Flight, rng: np.random.Generator) -> Flight:
-    """A step of U(0.3, 0.6) deg of the INS heading at U(0.3, 0.7) of the taxi, to the error of the scenario."""
+    """Add a step of U(0.3, 0.6) deg to the INS heading at U(0.3, 0.7) of the taxi.
+
+    From the step on the error is that of the scenario.
+    """
     begin_s, end_s = _taxi_s(flight)
     at_s = begin_s + rng.uniform(0.3, 0.7) * (end_s - begin_s)
     size = rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 0.6)
@@ -258,7 +268,10 @@ def _step(flight: Flight, rng: np.random.Generator) -> Flight:
 
 
 def _mode_change(flight: Flight, rng: np.random.Generator) -> Flight:
-    """The INS leaves alignment in the middle of the taxi; over 20 s its heading settles to the scenario's."""
+    """Let the INS leave alignment in the middle of the taxi.
+
+    Over 20 s its heading settles to the scenario's.
+    """
     begin_s, end_s = _taxi_s(flight)
     time_s, at_s = flight.time_s("ins"), begin_s + rng.uniform(0.5, 0.7) * (end_s - begin_s)
     size = rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 0.6)
@@ -268,7 +281,7 @@ def _mode_change(flight: Flight, rng: np.random.Generator) -> Flight:
 
 
 def _held(flight: Flight, _rng: np.random.Generator) -> Flight:
-    """The receiver holds its velocity through the turn between the straights."""
+    """Hold the receiver's velocity through the turn between the straights."""
     truth = flight["truth"]
     rate = np.gradient(np.unwrap(truth.values("true_heading_deg"), period=360.0), flight.time_s("truth"))
     begin_s, end_s = _taxi_s(flight)
@@ -283,7 +296,10 @@ def _held(flight: Flight, _rng: np.random.Generator) -> Flight:
 
 
 def _multipath(flight: Flight, rng: np.random.Generator) -> Flight:
-    """GNSS velocity error in motion of U(0.03, 0.1) m/s whose direction is phase + 2 x track."""
+    """Add a GNSS velocity error in motion.
+
+    U(0.03, 0.1) m/s in the direction phase + 2 x track.
+    """
     size, phase = rng.uniform(0.03, 0.1), rng.uniform(0.0, 360.0)
     gnss, time_s = flight["gnss"], flight.time_s("gnss")
     north, east = gnss.values("velocity_north_mps"), gnss.values("velocity_east_mps")
@@ -299,7 +315,7 @@ def _multipath(flight: Flight, rng: np.random.Generator) -> Flight:
 
 
 def _wander(flight: Flight, rng: np.random.Generator) -> Flight:
-    """The INS heading wanders by U(0.1, 0.4) deg over LU(30, 200) s."""
+    """Let the INS heading wander by U(0.1, 0.4) deg over LU(30, 200) s."""
     time_s = flight.time_s("ins")
     over_s = float(np.exp(rng.uniform(np.log(30.0), np.log(200.0))))
     step_s = float(np.median(np.diff(time_s)))
@@ -307,7 +323,7 @@ def _wander(flight: Flight, rng: np.random.Generator) -> Flight:
 
 
 def _in_the_air(flight: Flight, _rng: np.random.Generator) -> Flight:
-    """The log begins 20 s after lift-off."""
+    """Cut the log so that it begins 20 s after lift-off."""
     truth = flight["truth"]
     altitude = truth.values("altitude_ellipsoid_m")
     from_ns = int(truth.time_ns[np.argmax(altitude > altitude[0] + 1.0)]) + 20 * 10**9

@@ -1,7 +1,8 @@
-"""Recorded robots: every algorithm on every set, judged against motion capture. Nothing is calibrated with the truth.
+"""Study of recorded robots: every algorithm on every set, against motion capture.
 
-What differs from robot to robot (scales of odometry, range, angle and lag of the camera) are states of the filters. The
-settings below hold for all sets of a kind; docs/cooperative.md says where each comes from.
+Nothing is calibrated with the truth. What differs from robot to robot (scales of odometry, range, angle and lag of the
+camera) are states of the filters. The settings below hold for all sets of a kind; docs/cooperative.md says where each
+comes from.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -104,7 +105,10 @@ class RecordedSet:
     findings: tuple[Finding, ...] = ()
 
     def cases(self) -> dict[str, tuple[Session, ...]]:
-        """Sessions by name: as recorded, and where there is a map with the second half of the vehicles blind to it."""
+        """Return the sessions by name: as recorded, or with a full and a half-blind map.
+
+        The second half of the vehicles is blind to the map, where there is one and three vehicles or more.
+        """
         names = self.sessions[0].names
         blind = names[len(names) // 2 :]
         if not self.sessions[0].points or len(names) < 3:
@@ -164,7 +168,7 @@ def score(runs: Sequence[AlgorithmRun], sessions: Sequence[Session], truth: Trut
 
 
 def _mean(parts: Sequence[FloatArray]) -> float:
-    """Mean of all that is a number; NaN without any."""
+    """Return the mean of all that is a number; NaN without any."""
     whole = np.concatenate(parts) if parts else np.zeros(0)
     known = whole[np.isfinite(whole)]
     return float(known.mean()) if len(known) else float("nan")
@@ -173,7 +177,7 @@ def _mean(parts: Sequence[FloatArray]) -> float:
 def study_recorded(
     sets: Sequence[RecordedSet], progress: Progress | None = None, algorithms: Sequence[str] = tuple(ALGORITHMS)
 ) -> StudyResult:
-    """Run every algorithm on every case of every set, and lay them out in one table."""
+    """Run every algorithm on every case of every set, and tabulate the results."""
     rows, remarks = [], list[str]()
     for one in sets:
         settings = SETTINGS[one.kind]

@@ -1,4 +1,4 @@
-"""Scenarios of plans: those that come with the package, by name, and a user's own."""
+"""Scenarios of plans: the shipped ones, by name, and a user's own."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,12 +19,12 @@ class LoadedPlan(Generic[ScenarioT]):
 
 
 def plan_names(plan: Plan[ScenarioT]) -> tuple[str, ...]:
-    """Names of the shipped scenarios of a kind of plan."""
+    """Return names of the shipped scenarios of a kind of plan."""
     return _shipped(plan).names()
 
 
 def load_plan(plan: Plan[ScenarioT], name_or_path: str | Path) -> LoadedPlan[ScenarioT]:
-    """A shipped scenario by name, or a user's by the path of its TOML file.
+    """Load a shipped scenario by name, or a user's by the path of its TOML file.
 
     Raises
     ------

@@ -13,7 +13,10 @@ from groundstation.results.figures import FigureData
 
 @dataclass(frozen=True)
 class StudyResult:
-    """What a study found: tables (arrays with units in their names) and its page, the heading section first."""
+    """Result of a study: tables (arrays with units in their names) and its page.
+
+    The heading section comes first.
+    """
 
     name: str
     tables: tuple[FigureData, ...]
@@ -30,13 +33,13 @@ class StudyResult:
 
 
 def section(title: str, *parts: Part | str) -> Section:
-    """A section of a page; a text becomes a paragraph, an empty one is left out."""
+    """Return a section of a page; a text becomes a paragraph, an empty one is left out."""
     made = [Note(part) if isinstance(part, str) else part for part in parts if part != ""]
     return Section("", title, "", made)
 
 
 def table(data: FigureData) -> Grid:
-    """A table with all its columns, numbers rounded to the digits of their columns."""
+    """Return a table with all its columns, rounded to the digits of their columns."""
 
     def cell(name: str, value: object) -> str:
         if isinstance(value, float | np.floating):
@@ -50,5 +53,5 @@ def table(data: FigureData) -> Grid:
 
 
 def grid(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Grid:
-    """A table of texts."""
+    """Return a table of texts."""
     return Grid("", [Head(head) for head in heads], rows)

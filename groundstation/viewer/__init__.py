@@ -1,4 +1,7 @@
-"""Tables and results of a flight as a Rerun recording; the only room that imports rerun. Imports nothing heavy."""
+"""Tables and results of a flight as a Rerun recording.
+
+The only room that imports rerun. This module imports nothing heavy.
+"""
 
 import os
 

@@ -1,4 +1,4 @@
-"""How a catalog shows its recordings: a sortable table of their results, and cards with a small plot of each flight.
+"""Views of a catalog: a sortable table of results, and cards with a small plot per flight.
 
 Rerun's table blueprints are unstable: all that knows them is here.
 """

@@ -1,6 +1,7 @@
-"""Charts of one number against another: Rerun plots against time alone, so lines, axes and ticks are drawn in 2D.
+"""Charts of one number against another, drawn in 2D: lines, axes and ticks.
 
-The picture is a box of fixed shape; values are scaled into it, and the ticks say what they are.
+Rerun itself plots against time alone. The picture is a box of fixed shape; values are scaled into it, and the ticks say
+what they are.
 """
 
 from collections.abc import Sequence
@@ -36,7 +37,7 @@ FILLING, BEHIND, MIDDLE, FRONT, NOW = -1.0, 0.0, 1.0, 2.0, 90.0
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis: title with unit, ends, scale, and the texts of places that have one of their own.
+    """Axis of a chart: title with unit, ends, scale, and the places that have own texts.
 
     One that runs backwards has the greater end first; a symlog scale is linear up to ``linear_to``.
     """
@@ -49,17 +50,17 @@ class Axis:
     texts: tuple[tuple[float, str], ...] = ()
 
     def share(self, values: FloatArray) -> FloatArray:
-        """Place of values along the axis, 0 to 1; NaN outside of it."""
+        """Return the place of values along the axis, 0 to 1; NaN outside of it."""
         with np.errstate(invalid="ignore"):
             scaled = Span(self.scale, self.low, self.high, self.linear_to).shares(values)
             return np.where((scaled >= -1e-9) & (scaled <= 1.0 + 1e-9), scaled, np.nan)
 
     def within(self, values: FloatArray) -> FloatArray:
-        """Values moved to the nearer end where they lie beyond it."""
+        """Clip values to the ends of the axis."""
         return np.clip(values, min(self.low, self.high), max(self.low, self.high))
 
     def ticks(self) -> tuple[tuple[float, str], ...]:
-        """Round values inside the range, each with its text.
+        """Return round values inside the range, each with its text.
 
         Examples
         --------
@@ -90,7 +91,7 @@ class Axis:
 
 
 def _of_decades(low: float, high: float) -> list[float]:
-    """Ones, twos and fives of every decade; of many decades the ones."""
+    """Return ones, twos and fives of every decade; of many decades only the ones."""
     first, last = np.floor(np.log10(low)), np.ceil(np.log10(high))
     parts = (1.0, 2.0, 5.0) if np.log10(high / low) <= MOST_DECADES else (1.0,)
     marks = np.concatenate([part * 10.0 ** np.arange(first, last + 1) for part in parts])
@@ -98,12 +99,12 @@ def _of_decades(low: float, high: float) -> list[float]:
 
 
 def screen_radius(points: float) -> float:
-    """Radius in points of the screen: Rerun takes a negative one for that."""
+    """Return a radius in points of the screen; for Rerun that is a negative number."""
     return -points
 
 
 def round_step(step: float) -> float:
-    """Nearest of 1, 2 and 5 times a power of ten.
+    """Return the nearest of 1, 2 and 5 times a power of ten.
 
     Examples
     --------
@@ -133,13 +134,13 @@ class Chart:
         self._frame()
 
     def view(self, name: str = "") -> rrb.Spatial2DView:
-        """The view that shows the chart, named after its axes unless it has a name."""
+        """Return the view that shows the chart, named after its axes unless it has a name."""
         bounds = rrb.VisualBounds2D(x_range=[-LEFT, WIDTH + self.right], y_range=[-TOP, self.height + BOTTOM])
         name = name or f"{self.y.title} by {self.x.title}"
         return rrb.Spatial2DView(name=name, origin=f"/{self.path}", visual_bounds=bounds)
 
     def points(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Places in the picture, shape (n, 2); its axes run right and down."""
+        """Return places in the picture, shape (n, 2); its axes run right and down."""
         return np.column_stack([WIDTH * self.x.share(x), self.height * (1.0 - self.y.share(y))])
 
     def legend(self, lines: Sequence[Line], *, is_beside: bool = False) -> None:
@@ -163,7 +164,10 @@ class Chart:
         at_s: float | None = None,
         order: float = FRONT,
     ) -> None:
-        """Log lines; with ``at_s`` they stand from that flight time on, until others take their place."""
+        """Log lines; with ``at_s`` they are shown from that flight time on.
+
+        They stay until others take their place.
+        """
         strips: list[FloatArray] = []
         shades: list[Colour] = []
         radii: list[float] = []
@@ -220,9 +224,10 @@ class Chart:
         shades: Sequence[Colour],
         order: float = FILLING,
     ) -> None:
-        """Log filled boxes between ends across and up, shapes (n,), each of upright lines side by side.
+        """Log filled boxes between ends across and up, shapes (n,).
 
-        Ends of lines are round, so that one line as broad as its box would not look like one.
+        Each box is made of upright lines side by side. Ends of lines are round, so that one line as broad as its box
+        would not look like one.
         """
         left, right = (WIDTH * self.x.share(self.x.within(ends)) for ends in across)
         low, high = (self.height * (1.0 - self.y.share(self.y.within(ends))) for ends in up)
@@ -257,9 +262,9 @@ class Chart:
         self.recorder.static(f"{self.path}/{name}", points)
 
     def moving(self, name: str, time_s: FloatArray, x: FloatArray, y: FloatArray, line: Line) -> None:
-        """Log a mark that is at a place from its flight time on; rows without a place in the box are left out.
+        """Log a mark that is at a place from its flight time on.
 
-        Of very many places 600 are logged, evenly spread.
+        Rows without a place in the box are left out. Of very many places 600 are logged, evenly spread.
         """
         points = self.points(x, y)
         known = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(time_s))
@@ -271,7 +276,10 @@ class Chart:
         self.recorder.stream.send_columns(f"{self.path}/{name}", indexes, columns)
 
     def cursor(self) -> None:
-        """Log an upright line on an axis of time: it moves while the run lasts and is gone afterwards."""
+        """Log an upright line on an axis of time, at the flight time of the playhead.
+
+        It is gone outside the axis.
+        """
         time_s = np.linspace(self.x.low, self.x.high, CURSOR_STEPS)
         x = np.linspace(0.0, WIDTH, CURSOR_STEPS)
         strips = [np.array([[place, 0.0], [place, self.height]]) for place in x.tolist()]
@@ -317,7 +325,7 @@ class Chart:
 
 
 def unbroken(points: FloatArray) -> list[FloatArray]:
-    """Pieces of a line between its NaN, of two points or more.
+    """Return pieces of a line between its NaN, of two points or more.
 
     Examples
     --------

@@ -1,4 +1,6 @@
-"""One colour per meaning, everywhere: Okabe and Ito's palette, told apart by colour-blind readers on either theme.
+"""Colours: one per meaning, everywhere, from the palette of Okabe and Ito.
+
+Colour-blind readers tell them apart on the light and the dark theme.
 
 Source: M. Okabe, K. Ito, Color Universal Design, 2008 (https://jfly.uni-koeln.de/color/).
 """
@@ -121,7 +123,9 @@ DOT: Final[dict[Emphasis, float]] = {"faint": 1.0, "thin": 1.3, "usual": 1.6, "b
 
 
 def faint(colour: Colour) -> Colour:
-    """A dark shade of a colour, to fill with: lines drawn beside one another must not be transparent.
+    """Return a dark shade of a colour, to fill with.
+
+    Lines drawn beside one another must not be transparent.
 
     Examples
     --------
@@ -133,7 +137,9 @@ def faint(colour: Colour) -> Colour:
 
 
 def for_states(states: Iterable[str], known: Mapping[str, Colour]) -> dict[str, Colour]:
-    """A colour for every state: the known ones keep theirs, the others take those left, in order of appearance.
+    """Return a colour for every state, in order of appearance.
+
+    Known states keep theirs, the others take those that are left.
 
     Examples
     --------
@@ -149,7 +155,7 @@ def for_states(states: Iterable[str], known: Mapping[str, Colour]) -> dict[str, 
 
 
 def for_series(count: int) -> tuple[Colour, ...]:
-    """Colours of ``count`` series without a meaning of their own, repeating after eight.
+    """Return colours of ``count`` series without a meaning; they repeat after eight.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The text panel of a comparison: the chapters of its page."""
+"""Text panel of a comparison: the chapters of its page."""
 
 from groundstation.chapters.comparison import answers, findings, opening, settings
 from groundstation.chapters.markdown import markdown, part_markdown
@@ -9,7 +9,7 @@ MOST_ROWS = 100  # of a table: the viewer lays out the whole text again and agai
 
 
 def comparison_text(comparison: Comparison) -> str:
-    """Markdown of the panel."""
+    """Return Markdown of the panel."""
     sections = (answers(comparison), settings(comparison), findings(comparison))
     told = (markdown(shortened(one, MOST_ROWS, "compare.html"), level=2) for one in sections if one is not None)
     return "\n\n".join([*map(part_markdown, opening(comparison)), *told])

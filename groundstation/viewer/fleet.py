@@ -1,4 +1,7 @@
-"""The Rerun recording of a fleet: fleet.rrd, a row a flight, on the timelines ``utc`` and ``flight_number``."""
+"""Rerun recording of a fleet: fleet.rrd, with one row per flight.
+
+Its timelines are ``utc`` and ``flight_number``.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -49,7 +52,10 @@ def write_fleet_recording(path: Path, fleet: FleetResults) -> None:
 
 
 def send_fleet(stream: rr.RecordingStream, fleet: FleetResults) -> rrb.Blueprint:
-    """Log a fleet to a stream that has its sink, send the layout, wait until all is out; returns the layout."""
+    """Log a fleet to a stream that has its sink, and send the layout.
+
+    Waits until all is out; returns the layout.
+    """
     recorder = FleetRecorder(stream, fleet)
     stream.send_recording_name("Fleet")
     logged = (attempt("aircraft", one.name, _logged, recorder, fleet, one) for one in aircraft_of(fleet))

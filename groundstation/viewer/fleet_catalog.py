@@ -1,4 +1,7 @@
-"""Offer recordings through Rerun's own catalog server, each data set with the layout its recordings embed."""
+"""Catalog of recordings on Rerun's own server.
+
+Each data set has the layout that its recordings embed.
+"""
 
 import socket
 import tempfile
@@ -60,7 +63,9 @@ class Catalog:
 def catalog_server(
     flights: Sequence[Path], fleet: Path | None, *, host: str, port: int, sessions: Sequence[Path] = ()
 ) -> Iterator[Catalog]:
-    """Serve recordings until the context is left: data sets ``flights``, ``sessions`` (where any are) and ``fleet``.
+    """Serve recordings as data sets until the context is left.
+
+    The data sets are ``flights``, ``sessions`` (where any are) and ``fleet``.
 
     Raises
     ------
@@ -93,7 +98,10 @@ def catalog_server(
 
 @contextmanager
 def _behind_a_gate(host: str, port: int) -> Iterator[tuple[Server, str]]:
-    """Rerun's server on an address that nobody is told, and the address of the gate before it for others."""
+    """Start Rerun's server on a secret address, and return it with the gate's address.
+
+    Others know only the address of the gate.
+    """
     try:
         entry = Gate(host, port)
     except (OSError, OverflowError) as error:
@@ -107,7 +115,9 @@ def _behind_a_gate(host: str, port: int) -> Iterator[tuple[Server, str]]:
 
 
 def reachable(url: str) -> str:
-    """Address for others: a server that listens on every address is found by the name of its machine.
+    """Return the address that others can use.
+
+    A server on all addresses has the name of its machine.
 
     Examples
     --------
@@ -120,7 +130,10 @@ def reachable(url: str) -> str:
 
 
 def _register(dataset: DatasetEntry, paths: Sequence[Path]) -> tuple[dict[str, Path], list[tuple[Path, str]]]:
-    """Register recordings, those at fault left out: segment ids with their files, files refused with the reason."""
+    """Register recordings, except damaged ones.
+
+    Returns segment ids with their files, and refused files with the reason.
+    """
     faults = damaged(paths)
     by_uri = {path.absolute().as_uri(): path for path in paths if path not in faults}
     offered: dict[str, Path] = {}
@@ -144,7 +157,10 @@ def _register(dataset: DatasetEntry, paths: Sequence[Path]) -> tuple[dict[str, P
 
 
 def _lay_out(dataset: DatasetEntry, recordings: Iterable[Path]) -> None:
-    """Give a data set the one layout it can have: the fullest of its recordings serves the most flights."""
+    """Give a data set its layout, that of its fullest recording.
+
+    A data set can have only one; the fullest serves the most flights.
+    """
     largest = sorted(recordings, key=lambda path: path.stat().st_size)[-MOST_LAYOUTS:]
     views = {path: _views(path) for path in largest}
     if any(views.values()):
@@ -158,7 +174,7 @@ def _lay_out_table(dataset: DatasetEntry, layout: Path) -> None:
 
 
 def _views(path: Path) -> int:
-    """Number of views in the layout of a recording; none in a damaged one."""
+    """Return the number of views in the layout of a recording; none in a damaged one."""
     try:
         reader = RrdReader(path)
         entities = {chunk.entity_path for store in reader.blueprints() for chunk in reader.stream(store=store)}
@@ -168,7 +184,10 @@ def _views(path: Path) -> int:
 
 
 def _link(dataset: DatasetEntry, fleet: Path, links: dict[str, str], layer: Path) -> None:
-    """Let the links in the table of flights lead into the catalog: a layer over the text that the file holds."""
+    """Point the links in the table of flights into the catalog.
+
+    The new text is a layer over the text that the file holds.
+    """
     text = _text(fleet)
     for name, url in links.items():
         text = text.replace(f"]({name}/{name}.rrd)", f"]({url})")
@@ -181,7 +200,10 @@ def _link(dataset: DatasetEntry, fleet: Path, links: dict[str, str], layer: Path
 
 
 def _text(fleet: Path) -> str:
-    """The table of flights in the recording of a fleet; empty without one or in a damaged file."""
+    """Return the table of flights in the recording of a fleet.
+
+    Empty without one, or for a damaged file.
+    """
     try:
         for chunk in RrdReader(fleet).stream():
             if chunk.entity_path == f"/{FLIGHTS_TEXT}":

@@ -1,6 +1,7 @@
-"""Density of the heading error over a fleet: growing flight by flight over its final state, and each flight's own.
+"""Density of the heading error over a fleet.
 
-Rerun takes the abscissa of a bar for its left edge.
+It grows flight by flight over its final state; each flight has its own too. Rerun takes the abscissa of a bar for its
+left edge.
 """
 
 import math
@@ -70,9 +71,10 @@ def heading_error_density(recorder: FleetRecorder, fleet: FleetResults) -> list[
 
 
 def steps(densities: Densities, order: Int64Array) -> Iterator[tuple[int, FloatArray]]:
-    """Places in the order to draw at, 200 at most and the last among them, and the density of all flights up to each.
+    """Yield places in ``order`` to draw at, and the density of all flights up to each.
 
-    Merged by samples, as the density of the whole fleet is: the last step equals it.
+    There are at most 200 places, the last among them. Densities are merged by samples, like that of the whole fleet:
+    the last step equals it.
     """
     places = np.unique(np.linspace(0, len(order) - 1, min(len(order), MOST_STEPS)).round().astype(np.int64))
     total, count, done = np.zeros(len(densities.pooled_per_deg)), 0, 0
@@ -85,7 +87,7 @@ def steps(densities: Densities, order: Int64Array) -> Iterator[tuple[int, FloatA
 
 
 def _normal(recorder: FleetRecorder, normal: FittedNormal, edge_deg: FloatArray) -> float:
-    """Draw the fitted normal as hairlines; its height."""
+    """Draw the fitted normal as hairlines; return its height."""
     x = np.linspace(edge_deg[0], edge_deg[-1], NORMAL_POINTS)
     width = np.diff(x)
     height = 1.0 / (normal.sigma_deg * math.sqrt(2.0 * math.pi))

@@ -1,4 +1,4 @@
-"""Send the rows of a fleet to Rerun: a row is a flight, with its place on the timelines of the fleet."""
+"""Recorder of a fleet for Rerun: a row is a flight, with its place on the timelines."""
 
 from collections.abc import Mapping, Sequence
 
@@ -17,7 +17,7 @@ FLIGHT_NUMBER = "flight_number"
 
 
 class FleetRecorder(Recorder):
-    """A recorder whose rows are flights: where the one of a flight takes times, this one takes numbers of flights.
+    """Recorder whose rows are flights: it takes numbers of flights in place of times.
 
     Flights are numbered from 1 in order of their start (``utc``); those without a time come after them and have no
     place but their number.
@@ -37,25 +37,25 @@ class FleetRecorder(Recorder):
         super().__init__(stream, 0, self.timed > 0)
 
     def numbers(self, flight_ids: NDArray[np.str_]) -> Int64Array:
-        """Numbers of flights."""
+        """Return numbers of flights."""
         return np.array([self._number[name] for name in flight_ids.tolist()], dtype=np.int64)
 
     def set_flight(self, number: int) -> None:
-        """Let what is logged next stand at a flight; ``stream.reset_time`` ends it."""
+        """Put everything logged next at a flight, until ``stream.reset_time``."""
         self.stream.reset_time()
         self.stream.set_time(FLIGHT_NUMBER, sequence=number)
         if number <= self.timed:
             self.stream.set_time(UTC, timestamp=self.starts[number - 1])
 
     def indexes(self, time_ns: Int64Array) -> list[rr.TimeColumn]:
-        """Time columns of flights that all have a time, or all have none."""
+        """Return time columns of flights that all have a time, or all have none."""
         columns = [rr.TimeColumn(FLIGHT_NUMBER, sequence=time_ns)]
         if len(time_ns) and time_ns[0] <= self.timed:
             columns.append(rr.TimeColumn(UTC, timestamp=self.starts[time_ns - 1]))
         return columns
 
     def points(self, path: str, numbers: Int64Array, values: FloatArray, lines: Sequence[Line]) -> None:
-        """Log series that share their rows, ``values`` of shape (n, k), as points that no line joins."""
+        """Log series that share their rows as points without lines, values of shape (n, k)."""
         style = rr.SeriesPoints(
             names=[line.name for line in lines],
             colors=[line.colour for line in lines],
@@ -66,7 +66,10 @@ class FleetRecorder(Recorder):
         self._scalars(path, numbers, values)
 
     def lane(self, path: str, time_ns: Int64Array, states: Sequence[str], colours: Mapping[str, Colour]) -> None:
-        """Log one lane of states, a flight each; the last one of the fleet is as wide as if another flight followed."""
+        """Log one lane of states, a flight each.
+
+        The last flight is as wide as if another followed.
+        """
         shown = np.array([clean_text(state) for state in states])
         shades = for_states((state for state in shown.tolist() if state), colours)
         self.static(path, rr.StateConfiguration(values=list(shades), colors=list(shades.values())))
@@ -76,7 +79,10 @@ class FleetRecorder(Recorder):
         self.stream.send_columns(path, self._behind_all(), rr.StateChange.columns(state=[""]))
 
     def _behind_all(self) -> list[rr.TimeColumn]:
-        """Time columns of the place behind the last flight: a state that begins there is never seen."""
+        """Return time columns of the place behind the last flight.
+
+        A state that begins there is never seen.
+        """
         columns = [rr.TimeColumn(FLIGHT_NUMBER, sequence=[len(self.order) + 1])]
         if self.timed:
             known = self.starts[: self.timed]
@@ -85,6 +91,6 @@ class FleetRecorder(Recorder):
         return columns
 
     def _parts(self, time_ns: Int64Array) -> list[Int64Array]:
-        """Rows of flights with a time, and of those without."""
+        """Return rows of flights with a time, and of those without."""
         has_time = time_ns <= self.timed
         return [rows for rows in (np.flatnonzero(has_time), np.flatnonzero(~has_time)) if len(rows)]

@@ -1,4 +1,7 @@
-"""Text panels of the recording of a fleet: the chapters of its page, with links to recordings and entities."""
+"""Text panels of the recording of a fleet: the chapters of its page, with links.
+
+Links lead to recordings and entities.
+"""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -25,7 +28,10 @@ LINKS = (
 
 
 def aircraft_text(fleet: FleetResults, entities: Mapping[str, str]) -> str:
-    """The heading error by aircraft, each a link to its entity; then changes of level, outliers and calibration."""
+    """Return the heading error by aircraft, each a link to its entity.
+
+    Then changes of level, outliers and calibration.
+    """
     names = {aircraft_name(name): f"recording://{entity}" for name, entity in entities.items() if name}
     links = {name: link for name, link in names.items() if link.isascii()}
     told = [aircraft.heading(fleet)]
@@ -36,7 +42,10 @@ def aircraft_text(fleet: FleetResults, entities: Mapping[str, str]) -> str:
 
 
 def flights_text(recorder: FleetRecorder, fleet: FleetResults) -> str:
-    """Table of the flights in order, the name of each a link to its recording; then the sessions."""
+    """Return the table of the flights in order, then the sessions.
+
+    Each name is a link to its recording.
+    """
     rows = recorder.order[-MOST_ROWS:]
     numbers = recorder.numbers(fleet.flights["flight_id"].astype(np.str_)[rows])
     told = flights.by_number(fleet, rows, numbers)
@@ -50,13 +59,13 @@ def flights_text(recorder: FleetRecorder, fleet: FleetResults) -> str:
 
 
 def forecast_text(fleet: FleetResults) -> str:
-    """The skill of the methods over all flights; empty where there is no forecast."""
+    """Return the skill of the methods over all flights; empty where there is no forecast."""
     told = skill.build(fleet)
     return "" if told is None else _text(told, {})
 
 
 def failed_text(fleet: FleetResults) -> str:
-    """Table of the logs that gave no flight, and why."""
+    """Return the table of the logs that gave no flight, and why."""
     return _text(rest.not_in_fleet(fleet), {}, "index.csv")
 
 

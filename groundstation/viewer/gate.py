@@ -1,8 +1,8 @@
-"""A gate before Rerun's catalog server, which answers any name: browsers come in by a name of this machine alone.
+"""Gate before Rerun's catalog server, for browsers that use this machine's own names.
 
-Viewers and programs speak HTTP/2 without encryption, which no browser does; browsers speak HTTP/1.1 and name the host
-that their page asked for. Each connection of HTTP/1.1 takes one request, so that every request is looked at. The server
-itself listens on an address of this machine that nobody is told.
+The server itself answers to any host name. Viewers and programs speak HTTP/2 without encryption, which no browser does;
+browsers speak HTTP/1.1 and name the host that their page asked for. Each connection of HTTP/1.1 takes one request, so
+that every request is looked at. The server itself listens on an address of this machine that nobody is told.
 """
 
 import math
@@ -31,7 +31,10 @@ _OF_THE_CONNECTION = (b"connection", b"keep-alive", b"proxy-connection", b"upgra
 
 
 def hidden_address() -> str:
-    """One of 2^24 addresses of this machine by chance; 127.0.0.1 where the system has no others (macOS)."""
+    """Return a random one of 2^24 addresses of this machine.
+
+    127.0.0.1 where the system has no others (macOS).
+    """
     address = f"127.{secrets.randbelow(256)}.{secrets.randbelow(256)}.{2 + secrets.randbelow(252)}"
     try:
         with socket.socket() as probe:
@@ -42,7 +45,7 @@ def hidden_address() -> str:
 
 
 class Gate(socketserver.ThreadingTCPServer):
-    """Passes on what may come in, byte by byte.
+    """Server that forwards permitted connections, byte by byte.
 
     Parameters
     ----------
@@ -69,12 +72,15 @@ class Gate(socketserver.ThreadingTCPServer):
 
     @property
     def port(self) -> int:
-        """The port it listens on."""
+        """Port it listens on."""
         return int(self.server_address[1])
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Take visitors until the context is left; they wait until :meth:`open` says where they are led."""
+        """Accept connections until the context is left.
+
+        They wait until :meth:`open` sets their destination.
+        """
         with self:
             threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True).start()
             try:
@@ -83,12 +89,15 @@ class Gate(socketserver.ThreadingTCPServer):
                 self.shutdown()
 
     def open(self, host: str, port: int) -> None:
-        """Let visitors through to an address."""
+        """Let waiting connections through to an address."""
         self.behind = (host, port)
         self._is_open.set()
 
     def destination(self) -> tuple[str, int] | None:
-        """Where visitors are led; None when it does not open in time."""
+        """Return the address that connections are forwarded to.
+
+        None when the gate does not open in time.
+        """
         self._is_open.wait(PATIENCE_S)
         return self.behind
 
@@ -120,7 +129,7 @@ class _Visitor(socketserver.BaseRequestHandler):
                 back.join()
 
     def _head(self) -> tuple[bytes, bytes]:
-        """First head of the connection, to its end, and the bytes behind it."""
+        """Return the first head of the connection, to its end, and the bytes after it."""
         head = b""
         while len(head) < MOST_HEAD_BYTES and HEAD_END not in head:
             block = self.request.recv(BLOCK_BYTES)
@@ -132,14 +141,14 @@ class _Visitor(socketserver.BaseRequestHandler):
 
 
 class Request(NamedTuple):
-    """Request as it is passed on: a head that ends the connection, the length of its body."""
+    """Request to forward: a head that ends the connection, and the length of its body."""
 
     head: bytes
     body_bytes: int
 
 
 def request_of(head: bytes) -> Request | None:
-    """Request that begins a connection of HTTP/1.1, if its one Host is of this machine.
+    """Return the first request of a connection of HTTP/1.1, if its one Host is this machine.
 
     None else, and where two readers of it might see two requests: ends of lines that are none, a body without a
     length, or with two.
@@ -169,7 +178,7 @@ def request_of(head: bytes) -> Request | None:
 
 
 def _pass_on(source: socket.socket, target: socket.socket, first: bytes = b"", most: float = math.inf) -> None:
-    """Pass bytes on until the source ends; behind ``most`` of them they are dropped."""
+    """Forward bytes until the source ends; bytes after the first ``most`` are dropped."""
     with suppress(OSError):
         block = first or source.recv(BLOCK_BYTES)
         while block:
@@ -182,7 +191,7 @@ def _pass_on(source: socket.socket, target: socket.socket, first: bytes = b"", m
 
 
 def _answer(inner: socket.socket, visitor: socket.socket, is_last: bool) -> None:
-    """Pass answers on; behind the last one the connection is closed."""
+    """Forward answers; after the last one the connection is closed."""
     _pass_on(inner, visitor)
     if is_last:
         with suppress(OSError):

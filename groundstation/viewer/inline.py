@@ -1,4 +1,4 @@
-"""The recording inside a notebook, in the viewer of the package rerun-notebook."""
+"""Recording inside a notebook, in the viewer of the package rerun-notebook."""
 
 import contextlib
 import importlib.util
@@ -15,7 +15,7 @@ from groundstation.viewer.inner import NOTEBOOK, NOTEBOOK_ASSET, NOTEBOOK_ASSET_
 
 
 def is_notebook() -> bool:
-    """Whether this process is the kernel of a Jupyter notebook."""
+    """Tell whether this process is the kernel of a Jupyter notebook."""
     ipython = sys.modules.get("IPython")
     return ipython is not None and hasattr(ipython.get_ipython(), "kernel")
 
@@ -25,8 +25,8 @@ def inline_viewer(
 ) -> Any:
     """A viewer for a notebook cell with the recording of one flight in it: the same logging as into a file.
 
-    The viewer's own files come from this machine, not from the Internet, unless the environment
-    (``NOTEBOOK_ASSET``) says otherwise.
+    The recording is logged as into a file. The viewer's own files come from this machine, not from the Internet, unless
+    the environment (``NOTEBOOK_ASSET``) says otherwise.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def inline_viewer(
             next_step="pip install 'groundstation[notebook]', or show(inline=False) for a window",
         )
     os.environ.setdefault(NOTEBOOK_ASSET, NOTEBOOK_ASSET_HERE)
-    with contextlib.redirect_stdout(io.StringIO()):  # it tells where it serves, which is nobody's business here
+    with contextlib.redirect_stdout(io.StringIO()):  # it prints its address, which a notebook does not need
         from rerun.notebook import Viewer
 
     from groundstation.viewer.recording import open_stream, send_flight

@@ -1,7 +1,7 @@
-"""What of Rerun is not public, all in this file: names, places and what its programs say; each with the reason for it.
+"""Private parts of Rerun in use, all in this file, each with its reason.
 
-Here, and nowhere else, is what to look through when ``rerun-sdk`` goes to another minor version. Rerun is imported
-inside the functions: opening its viewer does without.
+Names, places and messages of its programs. Look through this file, and no other, when ``rerun-sdk`` goes to another
+minor version. Rerun is imported inside the functions: opening its viewer does without.
 """
 
 import importlib.util
@@ -25,7 +25,7 @@ NOTEBOOK = "rerun_notebook"  # the package that rerun.notebook imports: asked fo
 NOTEBOOK_ASSET = "RERUN_NOTEBOOK_ASSET"  # the environment's word on where the viewer in a cell comes from
 NOTEBOOK_ASSET_HERE = "serve-local"  # from this machine; left out, from the Internet
 SEGMENT = "rerun_segment_id"  # the column of its name in the table of a catalog
-# Further columns of that table: what the catalog itself tells of a recording.
+# Further columns of that table, which the catalog itself adds to a recording.
 OF_THE_CATALOG = (
     *("rerun_layer_names", "rerun_storage_urls", "rerun_last_updated_at", "rerun_num_chunks", "rerun_size_bytes"),
     *("rerun_registration_status", "rerun_registration_time", "rerun_schema_sha256"),
@@ -33,7 +33,9 @@ OF_THE_CATALOG = (
 
 
 def viewer_executable() -> Path:
-    """Path of the viewer shipped in the wheel: Rerun looks on PATH, where an unactivated environment has nothing.
+    """Return the path of the viewer shipped in the wheel.
+
+    Rerun looks on PATH, where an environment that is not activated has nothing.
 
     Raises
     ------
@@ -50,7 +52,9 @@ def viewer_executable() -> Path:
 
 
 def page_port(line: str) -> int | None:
-    """The port of the web viewer's page, where a line of the viewer's log tells it: nothing else does.
+    """Return the port of the web viewer's page from a line of its log; None for other lines.
+
+    No other place has it.
 
     Examples
     --------
@@ -62,7 +66,10 @@ def page_port(line: str) -> int | None:
 
 
 def catalog_client(url: str) -> "CatalogClient":
-    """Make a client of a catalog server, without the library (datafusion, 43 MB) that the public constructor loads."""
+    """Make a client of a catalog server without loading datafusion (43 MB).
+
+    The public constructor loads it.
+    """
     from rerun.catalog import CatalogClient
     from rerun_bindings import CatalogClientInternal
 
@@ -70,7 +77,7 @@ def catalog_client(url: str) -> "CatalogClient":
 
 
 def send_blueprint(stream: "rr.RecordingStream", blueprint: "rrb.Blueprint") -> None:
-    """Send a layout to a stream, as its own method does, and close the stream that it is made in.
+    """Send a layout to a stream, and close the stream that the layout is made in.
 
     Rerun 0.41 leaves that one open: two threads and their buffers stay for each recording of a process.
     """
@@ -95,7 +102,10 @@ def send_blueprint(stream: "rr.RecordingStream", blueprint: "rrb.Blueprint") -> 
 
 
 def forget_closed() -> None:
-    """End the threads and free the buffers of streams that nobody holds any more; without it they stay."""
+    """End the threads and free the buffers of streams that are no longer referenced.
+
+    Without this call they stay.
+    """
     import rerun_bindings
 
     rerun_bindings.flush_and_cleanup_orphaned_recordings()

@@ -1,4 +1,4 @@
-"""Open a recording in the viewer that the rerun-sdk wheel ships, native or in a browser."""
+"""Viewer of the rerun-sdk wheel, native or in a browser, for a recording."""
 
 import os
 import socket
@@ -37,7 +37,7 @@ def require_display(environment: Mapping[str, str], platform: str = sys.platform
 def viewer_command(
     what: Path | str, *, web: bool = False, host: str = LOCAL, port: int | None = None, headless: bool = False
 ) -> list[str]:
-    """Command line that opens a recording, or what an address offers.
+    """Return the command line that opens a recording, or the address of a catalog.
 
     Examples
     --------
@@ -54,7 +54,7 @@ def viewer_command(
 
 
 def viewer_environment(environment: Mapping[str, str]) -> dict[str, str]:
-    """Environment of the viewer: it may log, for that is how it tells the address of its page.
+    """Return the environment of the viewer, with logging on: the log has the page's address.
 
     Examples
     --------
@@ -65,7 +65,7 @@ def viewer_environment(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def _web_port(host: str) -> int:
-    """Rerun's usual port for the page, or any free one when another viewer has it."""
+    """Return Rerun's usual port for the page, or any free one when another viewer has it."""
     try:
         with socket.socket() as listener:
             listener.bind((host, WEB_PORT))
@@ -83,7 +83,9 @@ def open_viewer(
     headless: bool = False,
     say: Callable[[str], None] = lambda _: None,
 ) -> int:
-    """Open a recording, or what an address offers, and wait until the viewer is closed; Ctrl-C closes it.
+    """Open a recording, or the address of a catalog, and wait until the viewer is closed.
+
+    Ctrl-C closes it.
 
     Parameters
     ----------

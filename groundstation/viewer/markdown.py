@@ -5,7 +5,9 @@ from groundstation.viewer.names import clean_text
 
 
 def markdown_text(text: str, limit: int = 400) -> str:
-    """Text from a log made safe for a Markdown document: no markup of its own, no link, no picture, no table cell.
+    """Return text from a log made safe for a Markdown document.
+
+    No markup of its own, no link, no picture, no table cell.
 
     Examples
     --------

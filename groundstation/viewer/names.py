@@ -1,4 +1,7 @@
-"""Names an operator reads, and entity paths no log can break: whatever a file calls its columns, both stay legible."""
+"""Names for people, and entity paths that no log can break.
+
+Whatever a file calls its columns, both stay legible.
+"""
 
 import re
 from collections.abc import Iterable
@@ -24,7 +27,9 @@ WORDS: dict[str, str] = {
 
 
 def clean_text(text: str, limit: int = MAX_LABEL_CHARACTERS) -> str:
-    """One printable line of a text from a log: control and direction marks become spaces, the rest is cut at ``limit``.
+    """Return a text from a log as one printable line, cut at ``limit``.
+
+    Control and direction marks become spaces.
 
     Examples
     --------
@@ -36,9 +41,10 @@ def clean_text(text: str, limit: int = MAX_LABEL_CHARACTERS) -> str:
 
 
 def path_parts(names: Iterable[str]) -> list[str]:
-    """Entity path parts of names, in their order and each unique: letters, digits, ``_``, ``-`` and ``.`` alone.
+    """Return entity path parts of names, in their order and each unique.
 
-    Separators, control characters and markup become ``_``; names that would then clash are numbered.
+    Letters, digits, ``_``, ``-`` and ``.`` alone. Separators, control characters and markup become ``_``; names that
+    would then clash are numbered.
 
     Examples
     --------
@@ -60,7 +66,7 @@ def path_parts(names: Iterable[str]) -> list[str]:
 
 
 def split_unit(field: str) -> tuple[str, str]:
-    """Name of a field without its unit, and the unit as people write it.
+    """Return the name of a field without its unit, and the unit as people write it.
 
     Examples
     --------
@@ -72,7 +78,7 @@ def split_unit(field: str) -> tuple[str, str]:
 
 
 def words(name: str) -> str:
-    """Words of a name in readable spelling.
+    """Return words of a name in readable spelling.
 
     Examples
     --------
@@ -83,7 +89,7 @@ def words(name: str) -> str:
 
 
 def label(field: str) -> str:
-    """Series name of a field, unit last: ``true heading, deg``.
+    """Return the series name of a field, unit last: ``true heading, deg``.
 
     Examples
     --------
@@ -95,7 +101,9 @@ def label(field: str) -> str:
 
 
 def source_label(name: str) -> str:
-    """Name of a topic or field that is not ours: as the source spells it, for that is the name people search for.
+    """Return the name of a topic or field that is not ours, as the source spells it.
+
+    People search for that name.
 
     Examples
     --------
@@ -120,7 +128,7 @@ def natural_order(name: str) -> tuple[tuple[str, int], ...]:
 
 
 def topic_label(topic: str) -> str:
-    """Name of a topic for tab and view titles.
+    """Return the name of a topic for tab and view titles.
 
     Examples
     --------

@@ -1,4 +1,7 @@
-"""Whether a request calls this machine by a name of its own: a page elsewhere can make any other name point here."""
+"""Test of the host name in a request against the names of this machine.
+
+A page elsewhere can make any other name point here.
+"""
 
 import ipaddress
 import re
@@ -9,9 +12,10 @@ _HOST = re.compile(r"(\[(?P<address>[0-9a-f:.]+)\]|(?P<name>[^:\[\]]+))(:\d*)?")
 
 
 def is_own_name(host: str) -> bool:
-    """Whether a Host header is an address, ``localhost`` or the name of this machine, with a port or without.
+    """Tell whether a Host header is an address, ``localhost`` or this machine's name.
 
-    An address cannot be made to point elsewhere, so a browser sends one only for a page of that address.
+    A port may follow. An address cannot be made to point elsewhere, so a browser sends one only for a page of that
+    address.
 
     Examples
     --------

@@ -1,6 +1,7 @@
-"""Rerun's web viewer and one recording, from a server of our own: of one origin, under this machine's own names alone.
+"""Server of Rerun's web viewer with one recording, under this machine's own names alone.
 
-Rerun's page holds the viewer and nothing of a flight; its files are taken from its own server, which then ends.
+Viewer and recording come from one origin. Rerun's page holds the viewer and nothing of a flight; its files are taken
+from its own server, which then ends.
 """
 
 import http.client
@@ -30,7 +31,7 @@ _RANGE = re.compile(r"bytes=(\d+)-(\d*)$")
 
 
 def page_files(executable: Path, environment: Mapping[str, str]) -> dict[str, tuple[str, bytes]]:
-    """Files of Rerun's web viewer: for each path its media type and content (43 MB in all).
+    """Return files of Rerun's web viewer: media type and content by path (43 MB in all).
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ def page_files(executable: Path, environment: Mapping[str, str]) -> dict[str, tu
 
 
 def _told_port(process: "subprocess.Popen[bytes]", log: Path) -> int:
-    """The port of the page, which Rerun logs."""
+    """Return the port of the page, which Rerun logs."""
     deadline = time.monotonic() + PATIENCE_S
     text = ""
     while time.monotonic() < deadline and process.poll() is None:
@@ -114,7 +115,7 @@ def page_server(
 
 
 class PageServer(ThreadingHTTPServer):
-    """Answers the paths of the page and that of the recording, nothing else.
+    """Server of the page's paths and that of the recording, nothing else.
 
     Parameters
     ----------
@@ -142,7 +143,7 @@ class PageServer(ThreadingHTTPServer):
 
     @property
     def url(self) -> str:
-        """Where a browser of this machine finds the page."""
+        """Address of the page for a browser of this machine."""
         host, port = str(self.server_address[0]), self.server_address[1]
         name = LOCAL if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
         return f"http://{name}:{port}"
@@ -213,4 +214,4 @@ class _Visitor(BaseHTTPRequestHandler):
         self.end_headers()
 
     def log_message(self, *_: object) -> None:
-        """Say nothing of each request."""
+        """Log no requests."""

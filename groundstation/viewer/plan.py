@@ -1,4 +1,4 @@
-"""The Rerun recording of a plan."""
+"""Rerun recording of a plan."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A panel of a plot as a chart: its axes, its marks in their order, the names of those that have one."""
+"""Panel of a plot as a chart: axes, marks in their order, names of marks that have one."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -32,7 +32,10 @@ COLOURS = 24  # of a scale of cells
 def chart_view(
     recorder: Recorder, path: str, panel: Panel, name: str, height: float = HEIGHT, window: int | None = None
 ) -> rrb.Spatial2DView:
-    """Log a panel as a chart under ``path``; over flight time with a cursor, of a broken axis a window."""
+    """Log a panel as a chart under ``path``.
+
+    A chart over flight time has a cursor; one with a broken axis shows one window.
+    """
     shown = panel if window is None else _of_window(panel, window)
     x, y = extents.x_span(shown, extents.x_extent(shown.marks)), extents.y_span(shown)
     if shown.is_map:
@@ -60,7 +63,7 @@ def _axis(told: DescribedAxis, span: Span, names: tuple[tuple[float, str], ...])
 
 
 def _of_window(panel: Panel, window: int) -> Panel:
-    """A panel over one of the windows of its axis of time."""
+    """Return a panel over one of the windows of its axis of time."""
     x = panel.x
     low, high = x.windows[window]
     ends = panel.y.ranges[window] if panel.y.ranges else (panel.y.low, panel.y.high)
@@ -74,7 +77,7 @@ def _of_window(panel: Panel, window: int) -> Panel:
 
 
 def _cut(mark: AnyMark, low: float, high: float) -> AnyMark:
-    """What of a mark with samples lies between two places."""
+    """Return the part of a mark between two places; marks without samples stay whole."""
     if not isinstance(mark, marks.Curve | marks.Dots | marks.Band):
         return mark
     with np.errstate(invalid="ignore"):
@@ -98,7 +101,7 @@ def _curves(chart: Chart, name: str, several: list[marks.Curve], order: float) -
 
 
 def _stepped(x: FloatArray, *columns: FloatArray) -> tuple[FloatArray, ...]:
-    """Each value held about its place."""
+    """Return a step curve: each value held about its place."""
     return np.repeat(extents.edges(x), 2)[1:-1], *(np.repeat(values, 2) for values in columns)
 
 
@@ -217,7 +220,7 @@ def _cells(chart: Chart, name: str, several: list[marks.Cells], _: float) -> Non
 
 
 def _told(chart: Chart, name: str, several: list[marks.Told], _: float) -> None:
-    """Log a mark that is where the aircraft is at the cursor, where the description tells flight time."""
+    """Log a mark at the aircraft's place at the cursor, where flight time is described."""
     for mark in several:
         if mark.is_time:
             chart.moving(name, mark.value, mark.x, mark.y, Line("", colours.PAPER, HERE))

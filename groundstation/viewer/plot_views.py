@@ -65,10 +65,11 @@ def panels_of(
 
 
 def runs_of(recorder: Recorder, told: Plot | None, path: str, *, height: float = 70.0) -> list[list[rrb.View]]:
-    """Log the windows of the time axis of a plot as charts, under ``path`` by their number; for each its views.
+    """Log the windows of a plot's time axis as charts, and return the views of each.
 
-    A time view shows the whole flight or a stretch about the cursor; a run of two minutes in a flight of an hour is a
-    sliver in it. Here it has an axis of its own, with the cursor on it while it lasts.
+    Their paths are under ``path``, by the number of the window. A time view shows the whole flight or a stretch about
+    the cursor; a run of two minutes in a flight of an hour is a sliver in it. Here it has an axis of its own, with the
+    cursor on it while it lasts.
     """
     drawn = [one for one in _named(told, "") if not any(isinstance(mark, Lanes) for mark in one[2].marks)]
     count = max((len(panel.x.windows) for _, _, panel in drawn), default=0)
@@ -87,7 +88,10 @@ def plot_of(recorder: Recorder, name: str, results: FlightResults, *of: str) -> 
 
 
 def _named(told: Plot | None, of: str) -> Iterator[tuple[str, str, Panel]]:
-    """Panels with entity path and title; a panel without a title beside one that has it is named after that."""
+    """Yield panels with entity path and title.
+
+    A panel without a title beside one that has it is named after that.
+    """
     if told is None:
         return
     base = "/".join(path_parts([part])[0] for part in told.name.split("."))
@@ -103,7 +107,10 @@ def _named(told: Plot | None, of: str) -> Iterator[tuple[str, str, Panel]]:
 
 
 def _part(panel: Panel, title: str) -> str:
-    """What the path of a panel is named after: what a lane is called in a view of lanes."""
+    """Return the name of a panel in its entity path.
+
+    "lanes" for lanes, the axis or the title for all others.
+    """
     if any(isinstance(mark, Lanes) for mark in panel.marks):
         return "lanes"
     axis = panel.y.title or title
@@ -174,13 +181,16 @@ def _line(mark: Mark, unit: str, title: str) -> Line:
 
 
 def _name_of_alike(panel: Panel, mark: Mark) -> str:
-    """The name of a mark of the same kind and role: both edges of an interval have one name."""
+    """Return the name of a mark of the same kind and role.
+
+    Both edges of an interval have one name.
+    """
     alike = (one for one in panel.marks if type(one) is type(mark) and one.role == mark.role and one.name)
     return next((one.name for one in alike), "")
 
 
 def _is_joined(dots: Dots, curves: Sequence[Curve]) -> bool:
-    """Tell whether dots are a line in a recording: measurements behind the line that was made of them."""
+    """Tell whether dots are a line in a recording: the measurements behind a line."""
     return dots.role == "unused" and any(_same(dots.x, one.x) for one in curves)
 
 
@@ -214,12 +224,15 @@ def _band(recorder: Recorder, path: str, band: Band, about: Curve | None, line: 
 
 
 def _middle(band: Band) -> FloatArray:
-    """The line about which a band is drawn: of one that stands on zero that is zero, where its axis begins."""
+    """Return the line about which a band is drawn: zero for a band that stands on zero.
+
+    Its axis begins there.
+    """
     return np.where(np.isfinite(band.high), 0.0, np.nan) if not band.low.any() else 0.5 * (band.low + band.high)
 
 
 def _join(groups: list[_Joined], mark: Curve | Dots, line: Line) -> None:
-    """Put a line beside those that share its rows."""
+    """Put a line into the group that shares its rows."""
     known = np.isfinite(mark.x)
     time_s, values = mark.x[known], mark.y[known]
     for group in groups:
@@ -245,7 +258,10 @@ def _limits(recorder: Recorder, path: str, panel: Panel, limits: Sequence[Limit]
 
 
 def _range(panel: Panel) -> tuple[float, float] | None:
-    """Ends of the vertical axis that are told, or that bands need: Rerun fits it to lines alone."""
+    """Return the ends of the vertical axis where a panel states them or has bands.
+
+    Else None: Rerun fits the axis to lines alone.
+    """
     has_band = any(isinstance(mark, Band) for mark in panel.marks)
     if panel.y.low is None and panel.y.high is None and not has_band:
         return None
@@ -254,7 +270,7 @@ def _range(panel: Panel) -> tuple[float, float] | None:
 
 
 def _title(title: str, named: Sequence[Line]) -> str:
-    """The title with the colours of its lines; empty where a legend must tell them."""
+    """Return the title with the colours of its lines; empty where only a legend can name them."""
     if len({(line.name, line.colour) for line in named}) < 2:
         return title
     names = {line.colour: list(dict.fromkeys(one.name for one in named if one.colour == line.colour)) for line in named}
@@ -263,7 +279,10 @@ def _title(title: str, named: Sequence[Line]) -> str:
 
 
 def _lanes(recorder: Recorder, path: str, panel: Panel, title: str) -> rrb.View:
-    """Log states over time, each mark of them as one lane that says every state, those that the page leaves out too."""
+    """Log states over time, each mark as one lane that names every state.
+
+    States that the page leaves out are included.
+    """
     paths = []
     several = [mark for mark in panel.marks if isinstance(mark, Lanes)]
     for place, mark in enumerate(several):

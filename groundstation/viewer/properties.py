@@ -1,4 +1,4 @@
-"""Results as properties of a recording: a catalog lists, sorts and filters recordings by them."""
+"""Results as properties of a recording, by which a catalog lists, sorts and filters."""
 
 import re
 from collections.abc import Mapping
@@ -23,13 +23,16 @@ _UNIT = re.compile(r"(_[a-z0-9]+)$")
 
 
 def send_properties(stream: rr.RecordingStream, results: FlightResults) -> None:
-    """Log what a recording is of, and every figure of every answer, a property each with the answer's name."""
+    """Log the source of a recording and every figure of every answer.
+
+    One property per answer, by its name.
+    """
     for name, values in properties_of(results).items():
         stream.send_property(name, rr.AnyValues(True, **values))
 
 
 def properties_of(results: FlightResults) -> dict[str, dict[str, Value]]:
-    """Properties by name: the flight, then every answer.
+    """Return properties by name: the flight, then every answer.
 
     An answer gives its numbers, flags and words; of an interval (``confidence95_deg``) both ends (``..._low_deg``,
     ``..._high_deg``), of what it holds in turn the same one level down. What is not known is left out.
@@ -69,7 +72,10 @@ def _values(answer: Answer) -> dict[str, Value]:
 
 
 def _parts(name: str, value: Any) -> Mapping[str, Value]:
-    """A field of an answer as values with names; nothing for one that is no number, flag, word or pair of numbers."""
+    """Return a field of an answer as named values.
+
+    Empty for a field that is no number, flag, word or pair of numbers.
+    """
     if isinstance(value, bool):
         return {name: value}
     if isinstance(value, str):

@@ -1,4 +1,4 @@
-"""Send columns of one flight to Rerun, always on both timelines: what every tab logs with."""
+"""Recorder of one flight for Rerun: every tab logs with it, on both timelines."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ LEVELS = {"info": "INFO", "warn": "WARN", "fail": "ERROR"}
 
 @dataclass(frozen=True)
 class Line:
-    """How one series looks: its name with unit, colour and width in points."""
+    """Appearance of one series: its name with unit, colour and width in points."""
 
     name: str
     colour: Colour
@@ -51,12 +51,12 @@ class Recorder:
         self.stream, self.start_ns, self.has_utc, self.systems = stream, start_ns, has_utc, systems
 
     def time_ns(self, flight_seconds: ArrayLike) -> Int64Array:
-        """Corrected time of flight seconds, to the nanosecond."""
+        """Return the corrected time of flight seconds, to the nanosecond."""
         offsets = np.rint(np.asarray(flight_seconds, dtype=np.float64) * NS_PER_S).astype(np.int64)
         return offsets + np.int64(self.start_ns)
 
     def indexes(self, time_ns: Int64Array) -> list[rr.TimeColumn]:
-        """Time columns of the rows on every timeline the flight has."""
+        """Return time columns of the rows on every timeline the flight has."""
         columns = [rr.TimeColumn(FLIGHT_TIME, duration=(time_ns - self.start_ns).astype("timedelta64[ns]"))]
         if self.has_utc:
             columns.append(rr.TimeColumn(UTC, timestamp=time_ns.astype("datetime64[ns]")))
@@ -80,10 +80,10 @@ class Recorder:
         *,
         is_stepped: bool = False,
     ) -> None:
-        """Log series that share their rows: ``values`` of shape (n, k), NaN where a line is interrupted.
+        """Log series that share their rows.
 
-        ``breaks``, shape (n - 1,), tells after which rows the lines end; a row of NaN is put there. Stepped lines hold
-        each value until the next one.
+        ``values`` has the shape (n, k), NaN where a line is interrupted. ``breaks``, shape (n - 1,), tells after which
+        rows the lines end; a row of NaN is put there. Stepped lines hold each value until the next one.
         """
         if breaks is not None:
             time_ns, values = break_line(time_ns, values, breaks)
@@ -106,7 +106,10 @@ class Recorder:
         breaks: BoolArray,
         limit: int,
     ) -> int:
-        """Log series as :meth:`lines` does, of long ones some ``limit`` rows (see :func:`series.thin`); rows kept."""
+        """Log series as :meth:`lines` does, thinned to ``limit`` rows; return the rows kept.
+
+        See :func:`series.thin`; ``limit`` is approximate.
+        """
         rows = thin(values, breaks, limit)
         self.lines(path, time_ns[rows], values[rows], lines, breaks[rows[:-1]])
         return len(rows)
@@ -120,10 +123,11 @@ class Recorder:
         line: Line,
         breaks: BoolArray | None = None,
     ) -> None:
-        """Log a filled band of ``half_width`` on either side of a line, shapes (n,), empty where one of them is NaN.
+        """Log a filled band of ``half_width`` on either side of a line, shapes (n,).
 
-        Rerun fills one sigma of a measurement: its variance is the half width squared, whatever share the name says
-        that the band holds. Axes are scaled by the line alone. Entities are drawn in the order of their names.
+        Empty where one of them is NaN. Rerun fills one sigma of a measurement: its variance is the half width squared,
+        whatever share the name says that the band holds. Axes are scaled by the line alone. Entities are drawn in the
+        order of their names.
         """
         edges = np.column_stack([centre, half_width])
         if breaks is not None:
@@ -150,11 +154,14 @@ class Recorder:
             self.stream.send_columns(path, self.indexes(time_ns[part]), scalars.partition([width] * rows))
 
     def _parts(self, time_ns: Int64Array) -> Iterable[slice | Int64Array]:
-        """Rows in parts that one call sends."""
+        """Return rows in parts that one call sends."""
         return (slice(start, start + ROWS_PER_CALL) for start in range(0, len(time_ns), ROWS_PER_CALL))
 
     def lane(self, path: str, time_ns: Int64Array, states: Sequence[str], colours: Mapping[str, Colour]) -> None:
-        """Log one lane of states, each holding until the next row; an empty state ends the one before."""
+        """Log one lane of states, each until the next row.
+
+        An empty state ends the one before.
+        """
         shown = [clean_text(state) for state in states]
         shades = for_states((state for state in shown if state), colours)
         self.static(path, rr.StateConfiguration(values=list(shades), colors=list(shades.values())))

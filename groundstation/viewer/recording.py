@@ -1,4 +1,7 @@
-"""The Rerun recording of one flight, into a file or into a running viewer: the same logging with another sink."""
+"""Rerun recording of one flight, into a file or into a running viewer.
+
+Both log the same; only the sink differs.
+"""
 
 import hashlib
 import re
@@ -106,7 +109,7 @@ def stream_recording(
 
 
 def _expect_viewer(url: str) -> None:
-    """Raise when nobody listens: Rerun itself would find out after a minute of waiting."""
+    """Raise when nobody listens; Rerun itself would notice after a minute of waiting."""
     parts = urlsplit(url)
     try:
         socket.create_connection((parts.hostname or "", parts.port or DEFAULT_PORT), timeout=CONNECT_SECONDS).close()
@@ -157,7 +160,10 @@ def answer_tabs(kind: type[Answer] | None, recorder: Recorder, results: FlightRe
 def send_layout(
     stream: rr.RecordingStream, tabs: Sequence[rrb.Container], *, timeline: str = FLIGHT_TIME
 ) -> rrb.Blueprint:
-    """Send the layout of a recording, its panels closed and its time standing still, and wait until all is out."""
+    """Send the layout of a recording, and wait until all is out.
+
+    Its panels are closed and its time stands still.
+    """
     blueprint = rrb.Blueprint(
         rrb.Tabs(contents=tabs, active_tab=0),
         rrb.TimePanel(state="collapsed", timeline=timeline, play_state="paused"),
@@ -172,7 +178,9 @@ def send_layout(
 
 
 def application_id(flight_id: str) -> str:
-    """Application id of a flight: its own, for Rerun binds a layout to it and flights differ in their topics.
+    """Return the application id of a flight.
+
+    Each flight has its own: Rerun binds a layout to it, and flights differ in their topics.
 
     Examples
     --------
@@ -187,7 +195,10 @@ def application_id(flight_id: str) -> str:
 
 @contextmanager
 def open_stream(identity: str) -> Iterator[rr.RecordingStream]:
-    """Open a stream in strict mode, without Rerun's own timelines; closed, file footer written, on leaving."""
+    """Open a stream in strict mode, without Rerun's own timelines.
+
+    On leaving it is closed and the file footer written.
+    """
     strict = rr.strict_mode()
     rr.set_strict_mode(True)  # else the SDK drops data with a mere warning
     stream = rr.RecordingStream(application_id(identity), recording_id=clean_text(identity), send_properties=False)

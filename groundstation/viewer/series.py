@@ -1,4 +1,7 @@
-"""Rows of a line: where it must break, and which rows an hour of data can do without. No value is ever altered."""
+"""Rows of a line: where it must break, and which rows can be left out.
+
+No value is ever altered.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +16,7 @@ FEW_ROWS = 10  # too few to say what an ordinary step is
 
 
 def gap_after(time_ns: Int64Array) -> BoolArray:
-    """Whether the line breaks between a row and the next one, shape (n - 1,).
+    """Tell whether the line breaks between a row and the next one, shape (n - 1,).
 
     Examples
     --------
@@ -28,7 +31,7 @@ def gap_after(time_ns: Int64Array) -> BoolArray:
 
 
 def covers_gap(time_ns: Int64Array, gap_starts_ns: Int64Array) -> BoolArray:
-    """Whether a listed gap begins between a row and the next one, shape (n - 1,).
+    """Tell whether a listed gap begins between a row and the next one, shape (n - 1,).
 
     Examples
     --------
@@ -42,7 +45,9 @@ def covers_gap(time_ns: Int64Array, gap_starts_ns: Int64Array) -> BoolArray:
 
 
 def wraps_after(heading_deg: FloatArray) -> BoolArray:
-    """Whether a heading, shape (n,) or (n, k), jumps across north between a row and the next, shape (n - 1,).
+    """Tell whether a heading jumps across north between a row and the next, shape (n - 1,).
+
+    The heading has the shape (n,) or (n, k).
 
     Examples
     --------
@@ -54,7 +59,9 @@ def wraps_after(heading_deg: FloatArray) -> BoolArray:
 
 
 def break_line(time_ns: Int64Array, values: FloatArray, breaks: BoolArray) -> tuple[Int64Array, FloatArray]:
-    """Insert a row of NaN, one nanosecond after each row that a break follows: Rerun joins points across missing rows.
+    """Insert a row of NaN one nanosecond after each row before a break.
+
+    Rerun joins points across missing rows.
 
     Examples
     --------
@@ -69,7 +76,9 @@ def break_line(time_ns: Int64Array, values: FloatArray, breaks: BoolArray) -> tu
 
 
 def thin(values: FloatArray, breaks: BoolArray, limit: int) -> Int64Array:
-    """Choose rows that keep the picture: the extremes of every series in every stretch, and both sides of each break.
+    """Choose rows that keep the picture of a line.
+
+    The extremes of every series in every stretch, and both sides of each break.
 
     Parameters
     ----------
@@ -114,7 +123,7 @@ def thin(values: FloatArray, breaks: BoolArray, limit: int) -> Int64Array:
 
 
 def rows_that_fit(rows: list[int], widths: list[int], scalars: int) -> int:
-    """Largest row limit for which all groups together hold at most ``scalars`` numbers.
+    """Return the largest row limit for which all groups hold at most ``scalars`` numbers.
 
     Short groups stay whole and leave their share to the long ones.
 
@@ -133,7 +142,7 @@ def rows_that_fit(rows: list[int], widths: list[int], scalars: int) -> int:
 
 
 def runs(states: NDArray[np.str_]) -> Int64Array:
-    """Positions at which a state differs from the one before, the first row among them.
+    """Return positions at which a state differs from the one before, the first row among them.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The Rerun recording of a session of several aircraft."""
+"""Rerun recording of a session of several aircraft."""
 
 from pathlib import Path
 

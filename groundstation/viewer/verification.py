@@ -1,4 +1,7 @@
-"""Look whether recordings are sound before they are served: Rerun may end the process that reads a damaged one."""
+"""Check of recordings before they are served.
+
+Rerun may end the process that reads a damaged one.
+"""
 
 import os
 import subprocess
@@ -14,8 +17,8 @@ PATIENCE_S = 60.0  # for so many; 2 MB take 0.04 s
 def damaged(recordings: Sequence[Path]) -> dict[Path, str]:
     """Find the recordings that Rerun cannot decode from end to end, each with the reason.
 
-    Rerun's own `rrd verify` looks, in a process of its own: whatever the bytes do to it, this process goes on. Where
-    one of several is damaged, halves are looked at again. A value changed into another that decodes is not found.
+    Rerun's own `rrd verify` reads them in a process of its own, so that a crash does not end this one. Where one of
+    several is damaged, halves are checked again. A value changed into another that decodes is not found.
 
     Raises
     ------
@@ -36,7 +39,7 @@ def damaged(recordings: Sequence[Path]) -> dict[Path, str]:
 
 
 def _fault(batch: Sequence[Path]) -> str:
-    """What is wrong with any of a few recordings, in a line; empty when all are sound."""
+    """Return the fault of any of a few recordings in a line; empty when all are sound."""
     command = [str(viewer_executable()), "rrd", "verify", *(str(path.absolute()) for path in batch)]
     environment = os.environ | {"RUST_LOG": "off", "NO_COLOR": "1"}
     try:

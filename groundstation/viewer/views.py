@@ -1,4 +1,7 @@
-"""Views as this room uses them: every time axis open on the whole flight, names instead of axis titles."""
+"""Views with the defaults of this room.
+
+Every time axis is open on the whole flight; names take the place of axis titles.
+"""
 
 from collections.abc import Sequence
 
@@ -10,7 +13,10 @@ from groundstation.viewer.recorder import Line
 
 
 def whole_flight() -> rrb.TimeAxis:
-    """Time axis open on everything: the one range that holds on ``utc`` and on ``flight_time``."""
+    """Return a time axis open on everything.
+
+    It is the one range that holds on ``utc`` and on ``flight_time``.
+    """
     everything = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
     return rrb.TimeAxis(view_range=everything)
 
@@ -18,7 +24,10 @@ def whole_flight() -> rrb.TimeAxis:
 def plot(
     name: str, contents: str | Sequence[str], *, axis_range: tuple[float, float] | None = None, legend: bool = True
 ) -> rrb.TimeSeriesView:
-    """Time series of the entities named; ``axis_range`` fixes the vertical axis, else it fits the data."""
+    """Return a time series view of the entities named.
+
+    ``axis_range`` fixes the vertical axis, else it fits the data.
+    """
     entities = [contents] if isinstance(contents, str) else list(contents)
     return rrb.TimeSeriesView(
         name=name,
@@ -31,7 +40,7 @@ def plot(
 
 
 def lanes(name: str, contents: str | Sequence[str]) -> rrb.StateTimelineView:
-    """State lanes of the entities named."""
+    """Return the state lanes of the entities named."""
     entities = [contents] if isinstance(contents, str) else list(contents)
     return rrb.StateTimelineView(
         name=name, origin="/", contents=[f"+ /{entity}/**" for entity in entities], time_view=whole_flight()
@@ -39,7 +48,9 @@ def lanes(name: str, contents: str | Sequence[str]) -> rrb.StateTimelineView:
 
 
 def told_by_colour(lines: Sequence[Line], unit: str) -> str:
-    """Title of a view without a legend, which would cover what it names: each line with the word for its colour.
+    """Return the title of a view without a legend: each line with its colour in words.
+
+    A legend would cover the lines.
 
     Examples
     --------
@@ -54,5 +65,5 @@ def told_by_colour(lines: Sequence[Line], unit: str) -> str:
 
 
 def document(name: str, path: str) -> rrb.TextDocumentView:
-    """Text panel."""
+    """Return a text panel."""
     return rrb.TextDocumentView(name=name, origin=f"/{path}")

@@ -1,4 +1,7 @@
-"""Chapters of the fleet report: ``build(fleet)`` gives a Section, or None when there is nothing to say."""
+"""Chapters of the fleet report.
+
+``build(fleet)`` returns a Section, or None when there is nothing to say.
+"""
 
 from collections.abc import Callable
 

@@ -36,7 +36,7 @@ def heading(fleet: FleetResults) -> Section:
 
 
 def assessed(fleet: FleetResults) -> list[AircraftRow]:
-    """The aircraft with a heading error."""
+    """Return the aircraft with a heading error."""
     return [row for row in fleet.by_aircraft[1:] if row.mean_deg is not None]
 
 
@@ -89,14 +89,14 @@ def _has_rate(fleet: FleetResults) -> NDArray[np.bool_]:
 
 
 def unaided_figures(fleet: FleetResults, quantity: str) -> dict[str, Any]:
-    """A quantity of the flights whose unaided INS has a rate, by aircraft."""
+    """Return a quantity of the flights whose unaided INS has a rate, by aircraft."""
     rows = _has_rate(fleet) & (fleet.flights["ins_kind"] == "unaided")
     owner, values = fleet.flights["aircraft"][rows], fleet.flights[quantity][rows]
     return {name: values[owner == name] for name in np.unique(owner).tolist()}
 
 
 def median_rate(fleet: FleetResults) -> tuple[float | None, int]:
-    """Median over the unaided flights of their rate, nautical miles per hour, and how many these are."""
+    """Return the median rate of the unaided flights, nmi/h, and the number of these flights."""
     rate = fleet.flights[RATE][fleet.flights["ins_kind"] == "unaided"]
     rate = rate[np.isfinite(rate)]
     return (float(np.median(rate)), len(rate)) if len(rate) else (None, 0)

@@ -17,7 +17,7 @@ def build(fleet: FleetResults) -> Section:
 
 
 def judged(row: FleetCalibration) -> Mark:
-    """Whether the stated share lies in the interval of the share found."""
+    """Tell whether the stated share lies in the interval of the share found."""
     low, high = row.confidence95
     if high < row.stated:
         return Mark("warn", "too sure")

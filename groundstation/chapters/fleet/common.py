@@ -1,4 +1,4 @@
-"""What the chapters of the fleet report share: words for quantities, aircraft, times and counts."""
+"""Words of the fleet report's chapters for quantities, aircraft, times and counts."""
 
 import math
 from collections.abc import Mapping
@@ -22,23 +22,25 @@ QUANTITIES: Mapping[str, tuple[str, str, int]] = {  # title, unit, decimals
 
 
 def title_of(quantity: str) -> str:
-    """A quantity in words."""
+    """Return a quantity in words."""
     return QUANTITIES[quantity][0] if quantity in QUANTITIES else named_quantity(quantity)[0]
 
 
 def figure_of(quantity: str, value: float | None) -> str:
-    """A value of a quantity with its unit; angles carry their sign."""
+    """Return a value of a quantity with its unit; angles carry their sign."""
     _, unit, places = QUANTITIES.get(quantity, (*named_quantity(quantity), 3))
     return bounded(value, places, unit, signed=unit in "°′")
 
 
 def bounded(value: float | None, places: int, unit: str = "", *, signed: bool = False) -> str:
-    """A number as it is written, or that it is beyond all reason: digits without end would burst a column.
+    """Return a number as text, or "> 1 000 000" for one beyond reason.
+
+    Digits without end would burst a column.
 
     Examples
     --------
     >>> bounded(0.456, 2, "m"), bounded(-1e15, 2, "°"), bounded(None, 2)
-    ('0.46\u202fm', '< −1\u202f000\u202f000°', '—')
+    ('0.46 m', '< −1 000 000°', '—')
     """
     if not is_number(value) or abs(value) <= BEYOND_REASON:
         return number(value, places, unit, signed=signed)
@@ -46,33 +48,33 @@ def bounded(value: float | None, places: int, unit: str = "", *, signed: bool = 
 
 
 def span_of(bounds: tuple[float, float] | None, places: int, unit: str) -> str:
-    """An interval, each end written as :func:`bounded` does."""
+    """Return an interval, each end written as :func:`bounded` does."""
     return ABSENT if bounds is None else " … ".join(bounded(end, places, unit, signed=True) for end in bounds)
 
 
 def aircraft_name(name: str, most: int = 40) -> str:
-    """The name of an aircraft, shortened where it is very long, or that the log has none."""
+    """Return the name of an aircraft, shortened where very long; "not named" without one."""
     name = clean(name) or NOT_NAMED
     return name if len(name) <= most else name[: most - 1] + "…"
 
 
 def verdict_words(verdict: str) -> str:
-    """A verdict as a word for counts."""
+    """Return a verdict as a word for counts."""
     return VERDICTS[verdict].text.lower() if verdict in VERDICTS else "not assessable"
 
 
 def day(time: np.datetime64) -> str:
-    """The day of a time: 2026-05-04; an em dash where it is missing."""
+    """Return the day of a time: 2026-05-04; an em dash where it is missing."""
     return ABSENT if np.isnat(time) else str(time.astype("datetime64[D]"))
 
 
 def minute(time: np.datetime64) -> str:
-    """A time to the minute: 2026-05-04 06:00; an em dash where it is missing."""
+    """Return a time to the minute: 2026-05-04 06:00; an em dash where it is missing."""
     return ABSENT if np.isnat(time) else str(time.astype("datetime64[m]")).replace("T", " ")
 
 
 def plural(count: int, one: str, many: str = "") -> str:
-    """A count with its noun.
+    """Return a count with its noun.
 
     Examples
     --------

@@ -1,4 +1,7 @@
-"""Chapter: density of the heading error of every flight, overlaid with the fitted normal (figure 3 of the paper)."""
+"""Chapter on the density of the heading error of every flight.
+
+Overlaid with the fitted normal (figure 3 of the paper).
+"""
 
 import numpy as np
 
@@ -43,5 +46,5 @@ def _normals(fleet: FleetResults) -> Grid:
 
 
 def angle(value: float, unit: str = "°") -> str:
-    """An angle as this chapter writes it."""
+    """Return an angle as this chapter writes it."""
     return number(value, 3, unit, signed=True)

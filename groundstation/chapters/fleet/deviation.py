@@ -1,4 +1,4 @@
-"""Chapter: the magnetic deviation that flights found, those of one aircraft beside each other."""
+"""Chapter on the magnetic deviation found in flights, by aircraft."""
 
 from groundstation.chapters.fleet.common import aircraft_name, bounded
 from groundstation.chapters.magnetic import TONES
@@ -22,7 +22,7 @@ def build(fleet: FleetResults) -> Section | None:
 
 
 def usable(fleet: FleetResults) -> list[DeviationRow]:
-    """The deviations of the flights that are not rejected."""
+    """Return the deviations of the flights that are not rejected."""
     return [row for row in fleet.deviations if row.verdict != "reject"]
 
 

@@ -32,7 +32,10 @@ LINKED = (("recording", "rrd"), ("mcap", "mcap"))
 
 @dataclass(frozen=True)
 class FlightLine:
-    """A flight in the table: its cells but the last, remarks, links (text, address relative to the fleet's page)."""
+    """Flight in the table: its cells but the last, remarks and links.
+
+    A link is a text and an address relative to the fleet's page.
+    """
 
     report: str
     cells: Sequence[Cell]
@@ -41,13 +44,16 @@ class FlightLine:
 
 
 def lines(fleet: FleetResults) -> list[FlightLine]:
-    """Flights in the order of the fleet: every one, or of more than :data:`MOST_LINES` those of note, then the last."""
+    """Return the flights in the order of the fleet, at most :data:`MOST_LINES`.
+
+    A larger fleet shows the flights with remarks, then the latest.
+    """
     noted = remarks_of(fleet)
     return _lines(fleet, _shown(fleet, noted), noted)
 
 
 def by_number(fleet: FleetResults, rows: NDArray[np.intp], numbers: NDArray[np.int64]) -> Section:
-    """The chapter as a recording has it: some flights with the numbers by which they stand on its timeline."""
+    """Return the chapter for a recording: some flights with their numbers on its timeline."""
     shown = _lines(fleet, rows, remarks_of(fleet))
     cells = [
         (line.cells[0], str(place), *line.cells[1:], _joined(line.remarks))
@@ -66,7 +72,7 @@ def _lines(fleet: FleetResults, rows: NDArray[np.intp], noted: Mapping[str, Sequ
 
 
 def caption_of(fleet: FleetResults) -> str:
-    """What stands above the table: what its columns mean, and which flights are not in it."""
+    """Return the caption of the table: the meaning of its columns, and which flights it omits."""
     if len(fleet) <= MOST_LINES:
         return CAPTION
     some = (
@@ -77,7 +83,7 @@ def caption_of(fleet: FleetResults) -> str:
 
 
 def _shown(fleet: FleetResults, noted: Mapping[str, Sequence[Mark]]) -> NDArray[np.intp]:
-    """Rows of the flights in the table."""
+    """Return rows of the flights in the table."""
     every = np.arange(len(fleet))
     if len(fleet) <= MOST_LINES:
         return every
@@ -98,13 +104,13 @@ def _line(row: dict[str, Any], remarks: Sequence[Mark]) -> FlightLine:
 
 
 def verdict_mark(verdict: str) -> Mark:
-    """A verdict as it stands in a cell."""
+    """Return a verdict as it stands in a cell."""
     mark = VERDICTS.get(verdict) or Mark("unknown", clean(verdict) or "not assessable")
     return Mark(mark.tone, mark.text.lower())
 
 
 def remarks_of(fleet: FleetResults) -> dict[str, list[Mark]]:
-    """What is out of the ordinary about flights, by flight id, the most severe first."""
+    """Return what is out of the ordinary about flights, by flight id, most severe first."""
     found: dict[str, list[Mark]] = {}
 
     def note(flight_id: Any, tone: Tone, text: str) -> None:
@@ -131,7 +137,7 @@ def remarks_of(fleet: FleetResults) -> dict[str, list[Mark]]:
 
 
 def build(fleet: FleetResults) -> Section:
-    """Build the chapter as paper has it: the flights of note first, the most severe on top."""
+    """Build the chapter for paper: flights with remarks first, the most severe on top."""
     if not len(fleet):
         return Section(KEY, "Flights", LEAD, (Note("No log gave a flight.", "unknown"),))
     every = sorted(lines(fleet), key=_gravity)

@@ -1,4 +1,4 @@
-"""What stands on top: what the fleet is, what asks for attention, the key figures."""
+"""Top of the fleet report: what the fleet is, what asks for attention, key figures."""
 
 from collections import Counter
 
@@ -13,7 +13,7 @@ from groundstation.chapters.wording import ABSENT, number, percent
 from groundstation.results.fleet import FleetResults
 
 MOST_NAMES = 6
-MOST_CHANGES = 3  # told in sentences
+MOST_CHANGES = 3  # each in a sentence
 LONGEST_NAME = 24
 
 
@@ -101,7 +101,7 @@ def _changes(fleet: FleetResults) -> list[str]:
 
 
 def _judged(fleet: FleetResults) -> str:
-    """How much of the fleet has flights enough for trend and outliers."""
+    """Return how many aircraft have enough flights for trend and outliers."""
     named = len([name for name in fleet.aircraft if name])
     charted = len(set(fleet.trend.aircraft.tolist()))
     fewest = fleet.stated.get("fewest_flights_for_a_trend")

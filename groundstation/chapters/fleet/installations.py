@@ -1,4 +1,7 @@
-"""Chapter: how each INS sits in its aircraft and how the aircraft crabs, as the flights teach it one by one."""
+"""Chapter on how each INS sits in its aircraft and how the aircraft crabs.
+
+Learned from the flights one by one.
+"""
 
 from collections.abc import Sequence
 
@@ -44,12 +47,12 @@ def build(fleet: FleetResults) -> Section | None:
 
 
 def rows_of(fleet: FleetResults, place: int) -> NDArray[np.intp]:
-    """Rows of the flights of an installation, in order of time."""
+    """Return rows of the flights of an installation, in order of time."""
     return np.flatnonzero(fleet.installation_flights.place == place)
 
 
 def name_of(row: InstallationRow) -> str:
-    """An installation in words."""
+    """Return an installation in words."""
     return f"{aircraft_name(row.aircraft, 24)}, serial {clean(row.ins_serial)[:24]}"
 
 
@@ -85,7 +88,7 @@ def _between(value: float | None, sigma: float | None) -> str:
 
 
 def _others(rows: Sequence[InstallationRow]) -> Grid | None:
-    """Compass, antenna and latency of each installation; None where no flight observed any."""
+    """Return compass, antenna and latency of each installation; None without observations."""
     heads = (
         *(Head("Aircraft"), Head("Serial"), Head("Figure"), Head("Flights", True), Head("Value ± 95 %", True)),
         Head("Changes and odd flights"),

@@ -1,4 +1,7 @@
-"""Chapter: the sessions of several aircraft, each with the algorithm to trust; their reports are pages of their own."""
+"""Chapter on the sessions of several aircraft, each with the algorithm to trust.
+
+Their reports are pages of their own.
+"""
 
 import numpy as np
 

@@ -36,18 +36,21 @@ def build(fleet: FleetResults) -> Section | None:
 
 
 def drawn(fleet: FleetResults) -> list[FleetSkill]:
-    """The rows of methods at horizons at which they err."""
+    """Return the rows with an error above zero, by method and horizon."""
     return [row for row in fleet.skill if row.rms_m > 0.0]
 
 
 def shipped_method(fleet: FleetResults) -> str:
-    """The method that most flights ship, the first in the order of the methods where several do; empty without any."""
+    """Return the method that most flights ship; empty without any.
+
+    The first in the order of the methods where several are equal.
+    """
     names, counts = np.unique(fleet.skill_flights.method, return_counts=True)
     return str(names[int(np.argmax(counts))]) if len(names) else ""
 
 
 def headline(fleet: FleetResults) -> FleetSkill | None:
-    """The shipped method after an hour, or at its longest horizon before that."""
+    """Return the shipped method after an hour, or at its longest horizon before that."""
     mine = [row for row in fleet.skill if row.method == shipped_method(fleet)]
     exact = [row for row in mine if row.horizon_min == HEADLINE_MIN]
     found = exact or mine
@@ -55,7 +58,7 @@ def headline(fleet: FleetResults) -> FleetSkill | None:
 
 
 def method_title(name: str) -> str:
-    """A method in words."""
+    """Return a method in words."""
     return METHODS.get(name, clean(name))
 
 

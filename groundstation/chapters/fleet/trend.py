@@ -55,17 +55,17 @@ def _changes(fleet: FleetResults) -> Part:
 
 
 def flights_of(fleet: FleetResults, quantity: str, name: str) -> NDArray[np.intp]:
-    """Rows of the trend of a quantity of an aircraft."""
+    """Return rows of the trend of a quantity of an aircraft."""
     return np.flatnonzero((fleet.trend.quantity == quantity) & (fleet.trend.aircraft == name))
 
 
 def charted(fleet: FleetResults, quantity: str) -> list[str]:
-    """Aircraft with a trend of a quantity."""
+    """Return aircraft with a trend of a quantity."""
     return sorted(set(fleet.trend.aircraft[fleet.trend.quantity == quantity].tolist()))
 
 
 def changes_of(fleet: FleetResults, quantity: str, name: str) -> list[tuple[int, ChangePoint]]:
-    """Changes of level of a quantity of an aircraft, with the numbers they have in table and chart."""
+    """Return changes of level of a quantity of an aircraft, numbered as in table and chart."""
     numbered = enumerate(fleet.change_points, 1)
     return [(place, one) for place, one in numbered if (one.aircraft, one.quantity) == (name, quantity)]
 

@@ -1,4 +1,4 @@
-"""Plots of chapters: a figure is told once, as a description beside the chapter that mentions it."""
+"""Plots of chapters: each figure is described once, beside the chapter that mentions it."""
 
 from collections.abc import Mapping
 

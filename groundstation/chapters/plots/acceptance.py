@@ -1,4 +1,7 @@
-"""Plots of an acceptance: radial errors of all flights over the hours of navigation, and their rates."""
+"""Plots of an acceptance: radial errors of all flights over the hours, and their rates.
+
+The hours are those of navigation.
+"""
 
 from collections.abc import Callable
 
@@ -17,14 +20,14 @@ RATE, FIXED = "radial_rate_fit_nmiph", ("radial_largest_nmi", "radial_final_nmi"
 
 
 def _single(found: Acceptance, *quantities: str) -> list[answers.Limit]:
-    """Limits on one of these figures alone."""
+    """Return the limits that bound one of these quantities alone."""
     return [
         limit for limit in found.standard.limits if len(limit.bounds) == 1 and limit.bounds[0].quantity in quantities
     ]
 
 
 def growth(found: Acceptance) -> Plot:
-    """Radial error of every flight, what half and 95 % of them stay within, and the limits."""
+    """Return the radial error of every flight with CEP50, R95, their bound and the limits."""
     data, curves = found.growth, found.curves
     shown = thin(len(found.included), MOST_CURVES)
     marks: list[AnyMark] = []
@@ -62,7 +65,7 @@ def growth(found: Acceptance) -> Plot:
 
 
 def rates(found: Acceptance) -> Plot:
-    """Share of the flights whose rate is at most so large, with the limits on it."""
+    """Return the distribution of the rates of the flights, with the limits on it."""
     flights = sorted(found.included, key=lambda flight: flight.values[RATE])
     rate = np.array([flight.values[RATE] for flight in flights], dtype=np.float64)
     share = np.arange(1, len(rate) + 1) / len(rate)

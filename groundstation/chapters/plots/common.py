@@ -1,4 +1,7 @@
-"""What the plots of several chapters share: labels, spans of time, roles of lanes, whether a column has values."""
+"""Parts that the plots of several chapters share.
+
+Labels, spans of time, roles of lanes, whether a column has values.
+"""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -14,7 +17,7 @@ MOST_IN_LEGEND = 40  # characters
 
 
 def label(text: Any, most: int = MOST_IN_LEGEND) -> str:
-    """Text of a log fit for a plot: one line of bounded length.
+    """Return text of a log fit for a plot: one line of bounded length.
 
     Examples
     --------
@@ -31,18 +34,18 @@ def has_values(*columns: Floats | None) -> bool:
 
 
 def span(*times_s: Floats) -> tuple[float, float]:
-    """First and last moment of some columns; 0 and 1 where there is none."""
+    """Return the first and last moment of some columns; 0 and 1 where there is none."""
     times = finite(*times_s)
     return (float(times.min()), float(times.max())) if times.size else (0.0, 1.0)
 
 
 def positive(values: Floats) -> Floats:
-    """Values that a logarithmic axis can show, NaN for the others."""
+    """Return values that a logarithmic axis can show, NaN for the others."""
     return np.where(values > 0.0, values, np.nan)
 
 
 def lane_roles(states: Iterable[str], known: Mapping[str, Role]) -> dict[str, Role]:
-    """Roles of states; those that name a limit that was passed (``gdop > 2``) warn.
+    """Return roles of states; those that name a limit that was passed (``gdop > 2``) warn.
 
     Examples
     --------
@@ -59,5 +62,5 @@ def lane_roles(states: Iterable[str], known: Mapping[str, Role]) -> dict[str, Ro
 
 
 def line_with_dots(x: Floats, y: Floats, role: Role, name: str = "") -> tuple[Curve, Dots]:
-    """Few values joined by a line, each with a dot."""
+    """Return a few values joined by a line, each with a dot."""
     return Curve(x=x, y=y, role=role, name=name), Dots(x=x, y=y, role=role, emphasis="bold")

@@ -1,4 +1,4 @@
-"""Plots of a comparison: what two flights have in common over each other."""
+"""Plots of a comparison: curves of two flights over each other."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -28,12 +28,15 @@ class HasRows(Protocol):
     """A flight with its arrays."""
 
     def rows_of(self, kind: type[T]) -> T | None:
-        """The typed arrays of a figure, None when the flight has none."""
+        """Return the typed arrays of a figure, None when the flight has none."""
 
 
 @dataclass(frozen=True)
 class Side:
-    """One of two flights: its letter, A or B, its forecast method, and its start after that of A."""
+    """One of two flights: its letter, its forecast method, and its start.
+
+    The letter is A or B, the start is in seconds after that of A.
+    """
 
     letter: str
     flight: HasRows
@@ -42,18 +45,21 @@ class Side:
 
     @property
     def role(self) -> Role:
-        """Of its lines."""
+        """Role of its lines."""
         return "ins" if self.letter == "A" else "gnss"
 
     @property
     def emphasis(self) -> Emphasis:
-        """Of its lines: where both agree, A is seen behind B."""
+        """Emphasis of its lines: A is bold, so that it is seen behind B where both agree."""
         return "bold" if self.letter == "A" else "usual"
 
 
 @dataclass(frozen=True)
 class TimeLine:
-    """What is drawn of a flight over its time, with half of its 95 % band; None where there is no band."""
+    """Curve of a flight over its time, with half of its 95 % band.
+
+    The half is None where there is no band.
+    """
 
     time_s: Floats
     values: Floats | None
@@ -61,14 +67,14 @@ class TimeLine:
 
 
 class Overlay(Generic[T]):
-    """A line of both flights: its figure, what is read of it, its axis and title."""
+    """Curve that both flights have: its figure, its columns, its axis and title."""
 
     def __init__(self, kind: type[T], key: str, read: Callable[[T], TimeLine], axis: str, title: str) -> None:
         self.name, self.axis, self.title = f"{kind.figure}-{key}", axis, title
         self._kind, self._read = kind, read
 
     def of(self, flight: HasRows) -> TimeLine | None:
-        """The line of a flight, None where it has no number."""
+        """Return the line of a flight, None where it has no number."""
         rows = flight.rows_of(self._kind)
         line = None if rows is None else self._read(rows)
         return line if line is not None and has_values(line.values) else None
@@ -124,7 +130,10 @@ OVERLAYS: tuple[Overlay[Any], ...] = (
 
 
 def tracks(sides: Sequence[Side]) -> Plot | None:
-    """Tracks of both flights on one map, or each from its own origin where they are far from each other."""
+    """Return the tracks of both flights on one map.
+
+    Each from its own origin where they are far from each other.
+    """
     drawn = []
     for side in sides:
         data = side.flight.rows_of(Overview)
@@ -154,7 +163,7 @@ def tracks(sides: Sequence[Side]) -> Plot | None:
 
 
 def overlay(sides: Sequence[Side], told: Overlay[Any]) -> Plot | None:
-    """A line of both flights over the flight time of A, with its band."""
+    """Return a line of both flights over the flight time of A, with its band."""
     drawn = [(side, line) for side in sides if (line := told.of(side.flight)) is not None]
     if not drawn:
         return None
@@ -187,7 +196,7 @@ def overlay(sides: Sequence[Side], told: Overlay[Any]) -> Plot | None:
 
 
 def growth(sides: Sequence[Side]) -> Plot | None:
-    """RMS of the forecast by horizon, the shipped method and the INS without one."""
+    """Return the RMS of the forecast by horizon, the shipped method and the INS without one."""
     marks = []
     for side in sides:
         data = side.flight.rows_of(ForecastGrowth)

@@ -1,4 +1,4 @@
-"""Plots of a planned session: ways from above, accuracy and geometry with time, laws of control."""
+"""Plots of a planned session: ways from above, accuracy and geometry with time, laws."""
 
 from collections.abc import Mapping
 
@@ -34,7 +34,7 @@ def _data(results: FlightResults, kind: type[T]) -> tuple[ControlPlan, T] | None
 
 
 def paths(results: FlightResults) -> Plot | None:
-    """Ways of all aircraft from above: under the recommended law, and without control."""
+    """Return ways of all aircraft from above: under the recommended law, and without control."""
     found = _data(results, ControlPaths)
     if found is None:
         return None
@@ -71,7 +71,7 @@ def paths(results: FlightResults) -> Plot | None:
 
 
 def measures(results: FlightResults) -> Plot | None:
-    """Accuracy and geometry of the judged aircraft with time, every law in its colour."""
+    """Return accuracy and geometry of the judged aircraft with time, every law in its colour."""
     found = _data(results, ControlMeasures)
     if found is None:
         return None
@@ -104,7 +104,7 @@ def _law(name: str, mine: Flags, time: Floats, values: Floats) -> Curve:
 
 
 def law(results: FlightResults) -> Plot | None:
-    """Every control with time under every law, with its bounds."""
+    """Return every control with time under every law, with its bounds."""
     found = _data(results, ControlPaths)
     if found is None or not found[0].controls:
         return None
@@ -137,7 +137,7 @@ def _control(answer: ControlPlan, data: ControlPaths, row: ControlRow, *, legend
 
 
 def _unwrapped(data: ControlPaths, rows: Flags, start_deg: float) -> Floats:
-    """Headings without jumps through north, beginning at the start."""
+    """Return headings without jumps through north, beginning at the start."""
     track = unwrap(data.track_deg[rows])
     return np.asarray(start_deg + track - track[0])
 

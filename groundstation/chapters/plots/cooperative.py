@@ -1,4 +1,4 @@
-"""Plots of the chapter on navigation between aircraft: map, errors against sigma, geometry, residuals."""
+"""Plots of navigation between aircraft: map, errors against sigma, geometry, residuals."""
 
 from collections.abc import Mapping
 
@@ -42,7 +42,7 @@ STEEP = 20.0  # a dilution so many times its median is drawn on a logarithmic ax
 
 
 def _tracks(results: FlightResults) -> tuple[CooperativeResult, CooperativeTracks, str] | None:
-    """The answer, its tracks and the algorithm that is drawn."""
+    """Return the answer, its tracks and the algorithm that is drawn."""
     answer, data = results.answer(CooperativeResult), results.rows_of(CooperativeTracks)
     return None if answer is None or data is None else (answer, data, trusted(answer).algorithm)
 
@@ -52,7 +52,7 @@ def _places(data: CooperativeTracks | SessionPoints) -> Floats:
 
 
 def session_map(results: FlightResults) -> Plot | None:
-    """Tracks from above with their 2 sigma ellipses, and the ground points."""
+    """Return tracks from above with their 2 sigma ellipses, and the ground points."""
     found = _tracks(results)
     if found is None:
         return None
@@ -98,13 +98,16 @@ def session_map(results: FlightResults) -> Plot | None:
 
 
 def _ellipses(data: CooperativeTracks, rows: Flags) -> Floats:
-    """2 sigma ellipses about the origin, north and east, shape (n, 49, 2); upright where no correlation is saved."""
+    """Return 2 sigma ellipses about the origin, north and east, shape (n, 49, 2).
+
+    Their axes are north and east where no correlation is saved.
+    """
     north, east = data.sigma_north_m[rows], data.sigma_east_m[rows]
     return outlines(north, east, np.nan_to_num(data.correlation_north_east[rows]), 2.0)
 
 
 def _magnified(plane: Floats, ellipses: Floats) -> int:
-    """How many times larger ellipses are drawn so that they can be seen."""
+    """Return the factor by which ellipses are enlarged so that they can be seen."""
     side = float(np.nanmax(np.nanmax(plane[:, :2], axis=0) - np.nanmin(plane[:, :2], axis=0)))
     return magnified(side, float(np.nanmedian(np.hypot(*np.moveaxis(ellipses, 2, 0)))))
 
@@ -115,12 +118,18 @@ def _numbers(results: FlightResults) -> tuple[str, ...]:
 
 
 def _is_crowd(answer: CooperativeResult) -> bool:
-    """Tell whether there are more aircraft than roles of a series: lines are then not told apart by them."""
+    """Tell whether there are more aircraft than roles of a series.
+
+    Their lines then share roles.
+    """
     return len(answer.vehicle_names) > len(SERIES)
 
 
 def errors(results: FlightResults) -> Plot | None:
-    """Horizontal error of each aircraft against its computed 2 sigma_r, and that of dead reckoning."""
+    """Return the horizontal error of each aircraft against its computed 2 sigma_r.
+
+    The error of dead reckoning is drawn too.
+    """
     found = _tracks(results)
     if found is None:
         return None
@@ -157,7 +166,10 @@ def _error(data: CooperativeTracks, name: str, algorithm: str, *, legend: bool) 
 
 
 def _largest(answer: CooperativeResult, algorithm: str) -> list[str]:
-    """The aircraft that have a panel, in their order: of very many those with the largest 2 sigma_r at the end."""
+    """Return the aircraft that have a panel, in their order.
+
+    Very many are cut to those with the largest 2 sigma_r at the end.
+    """
     rows = [row for row in answer.vehicles if row.algorithm == algorithm]
     kept = {row.vehicle for row in sorted(rows, key=lambda row: -row.two_sigma_r_m)[:MOST_PANELS]}
     return [name for name in answer.vehicle_names if name in kept]
@@ -169,7 +181,10 @@ def _ceiling(*values: Floats) -> float:
 
 
 def _styles(answer: CooperativeResult) -> dict[str, tuple[Role, str]]:
-    """Role and label of the line of each aircraft; of a crowd the one of the poorest geometry stands out, last."""
+    """Return role and label of the line of each aircraft.
+
+    In a crowd, only the aircraft with the poorest geometry stands out; it is drawn last.
+    """
     names = answer.vehicle_names
     if not _is_crowd(answer) or not answer.geometry:
         return {name: (series(number), label(name, 12)) for number, name in enumerate(names)}
@@ -179,7 +194,7 @@ def _styles(answer: CooperativeResult) -> dict[str, tuple[Role, str]]:
 
 
 def geometry(results: FlightResults) -> Plot | None:
-    """HDOP, determinant and smallest eigenvalue of every aircraft with time."""
+    """Return HDOP, determinant and smallest eigenvalue of every aircraft with time."""
     answer, data = results.answer(CooperativeResult), results.rows_of(CooperativeGeometry)
     if answer is None or data is None:
         return None
@@ -210,7 +225,7 @@ def geometry(results: FlightResults) -> Plot | None:
 
 
 def links(results: FlightResults) -> Plot | None:
-    """Residuals of every range over their own sigma; gated ones stand out."""
+    """Return residuals of every range over their own sigma; gated ones stand out."""
     answer, data = results.answer(CooperativeResult), results.rows_of(CooperativeLinks)
     if answer is None or data is None:
         return None

@@ -1,4 +1,4 @@
-"""Plots of the flight at a glance: track map, altitude, speed, phases and the state of GNSS."""
+"""Plots of the flight at a glance: track map, altitude, speed, phases and state of GNSS."""
 
 from collections.abc import Sequence
 
@@ -28,7 +28,7 @@ GNSS_ROLES: dict[str, Role] = {"good": "answer", "integrity lost": "bad", "no GN
 
 
 def track_map(results: FlightResults) -> Plot | None:
-    """The track in local coordinates, with the taxi enlarged and the used stretches marked."""
+    """Return the track in local coordinates, the taxi enlarged, the used stretches marked."""
     data = results.rows_of(Overview)
     if data is None:
         return None
@@ -85,12 +85,12 @@ def _extent(north: Floats, east: Floats) -> float:
 
 
 def _scale(north: Floats, east: Floats) -> tuple[float, str]:
-    """Factor and unit of a map."""
+    """Return the factor and unit of a map."""
     return (1e-3, "km") if _extent(north, east) > LARGEST_IN_METRES else (1.0, "m")
 
 
 def _ellipses(corrected: CorrectedPosition, origin: tuple[float, float], larger: int, scale: float) -> Outlines:
-    """95 % ellipses of the corrected position along the track."""
+    """Return 95 % ellipses of the corrected position along the track."""
     rows = corrected.along()
     north, east = plan_north_east_m(corrected.latitude_deg[rows], corrected.longitude_deg[rows], *origin)
     sigmas = corrected.sigma_north_m[rows], corrected.sigma_east_m[rows]
@@ -120,13 +120,13 @@ def _map(time: Floats, north: Floats, east: Floats, used: Flags, title: str, beh
 
 
 def _at_least(values: Floats, first: int) -> tuple[float, float]:
-    """Ends of the axis of a map of an aircraft at rest."""
+    """Return ends of the axis of a map of an aircraft at rest."""
     half, known = 0.5 * SMALLEST_MAP_M, finite(values)
     return min(float(known.min()), values[first] - half), max(float(known.max()), values[first] + half)
 
 
 def profile(results: FlightResults) -> Plot | None:
-    """Altitude and ground speed over time, shaded by phase, above the state of GNSS."""
+    """Return altitude and ground speed over time, shaded by phase, above the state of GNSS."""
     data = results.rows_of(Overview)
     if data is None:
         return None
@@ -178,13 +178,13 @@ def _phases(phases: PhaseSpans) -> Spans:
 
 
 def _first_known(*listed: tuple[Floats | None, str]) -> tuple[Floats, str]:
-    """The first of some columns that has a value, else the first, and its name."""
+    """Return the first of some columns that has a value, else the first, and its name."""
     there = [(values, name) for values, name in listed if values is not None]
     return next(((values, name) for values, name in there if np.isfinite(values).any()), there[0])
 
 
 def attitude(results: FlightResults) -> Plot | None:
-    """Roll, pitch and heading over time, as far as they are known; None where none is."""
+    """Return roll, pitch and heading over time, as far as they are known; None where none is."""
     data = results.rows_of(Overview)
     if data is None:
         return None
@@ -213,7 +213,10 @@ _TWO: tuple[Role, Role] = ("ins", "gnss")
 
 
 def states(results: FlightResults) -> Plot | None:
-    """Flight modes, arming and ground contact as the log tells them, a row for each state; None when it tells none."""
+    """Return flight modes, arming and ground contact as logged, a row for each state.
+
+    None when the log has none of them.
+    """
     data = results.rows_of(StateLanes)
     if data is None:
         return None

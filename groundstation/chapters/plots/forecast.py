@@ -26,13 +26,16 @@ def _shipped(results: FlightResults) -> str:
 
 
 def method_roles(default: str) -> dict[str, Role]:
-    """A role for every method; the raw INS and the shipped one have those of their meaning."""
+    """Return a role for every method; raw INS and shipped method have roles of their own."""
     others = (name for name in METHODS if name not in ("raw_ins", default))
     return {**dict(zip(others, OTHERS, strict=False)), "raw_ins": "ins", default: "answer"}
 
 
 def growth(results: FlightResults) -> Plot | None:
-    """RMS error by horizon, a line for each method, the shipped one thick; logarithmic axes."""
+    """Return the RMS error by horizon, a line for each method, on logarithmic axes.
+
+    The line of the shipped method is thick.
+    """
     data, default = results.rows_of(ForecastGrowth), _shipped(results)
     known = [] if data is None else [name for name in METHODS if has_values(data.rms_m.get(name))]
     if data is None or not known or not has_values(data.horizon_min):
@@ -65,7 +68,10 @@ def _last(values: Floats) -> float:
 
 
 def calibration(results: FlightResults) -> Plot | None:
-    """Shares inside the 50, 68 and 95 % bands by horizon, and NEES with its limits, of the shipped method."""
+    """Return shares inside the 50, 68 and 95 % bands, and NEES, of the shipped method.
+
+    Both are by horizon; NEES has its limits.
+    """
     answer = results.answer(ForecastResult)
     mine = [] if answer is None else [row for row in answer.calibration if row.method == answer.default_method]
     mine = sorted((row for row in mine if np.isfinite(row.horizon_min)), key=lambda row: row.horizon_min)
@@ -109,7 +115,10 @@ def _nees(rows: list[CalibrationRow]) -> Panel:
 
 
 def hindcast_map(results: FlightResults) -> Plot | None:
-    """Radial error by start and horizon, the shipped method beside the raw INS, on one scale of colour."""
+    """Return the radial error by start and horizon, shipped method beside raw INS.
+
+    Both on one scale of colour.
+    """
     data = results.rows_of(ForecastMap)
     if data is None:
         return None

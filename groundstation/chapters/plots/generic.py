@@ -1,4 +1,4 @@
-"""Plot of the chapter that any answer has: arrays over flight time, one panel for each unit."""
+"""Plot that any answer has: arrays over flight time, one panel for each unit."""
 
 import numpy as np
 
@@ -14,7 +14,10 @@ from groundstation.results.flight import FlightResults
 
 
 def series(results: FlightResults, name: str) -> Plot | None:
-    """The columns of a figure over its ``time_s``, those of one unit together; None without a number to draw."""
+    """Return the columns of a figure over its ``time_s``; None without a number to draw.
+
+    Columns of one unit share a panel.
+    """
     data = results.figure_with_rows(name)
     if data is None:
         return None

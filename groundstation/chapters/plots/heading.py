@@ -1,4 +1,7 @@
-"""Plots of the taxi stage: difference over time, density, convergence, heading and track, estimates by segment."""
+"""Plots of the taxi stage.
+
+Difference over time, density, convergence, heading and track, estimates by segment.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -45,13 +48,16 @@ LANE_MM, ROW_MM = 4.6, 5.2
 
 
 def taxi_windows(samples: HeadingSamples) -> Windows:
-    """Spans of flight time that the taxi plots show, one for each ground run that was used; of all where none was."""
+    """Return the spans of flight time that the taxi plots show, one for each ground run used.
+
+    Spans of all ground runs where none was used.
+    """
     time, used = samples.time_s, samples.is_used
     return windows(time[used] if used.any() else time)
 
 
 def difference(results: FlightResults) -> Plot | None:
-    """Difference over time with the running mean, its honest interval and e."""
+    """Return the difference over time with the running mean, its honest interval and e."""
     samples, running = results.rows_of(HeadingSamples), results.rows_of(HeadingRunning)
     if samples is None:
         return None
@@ -78,7 +84,7 @@ def difference(results: FlightResults) -> Plot | None:
 
 
 def _running(running: HeadingRunning) -> list[AnyMark]:
-    """The running mean with e and its honest interval."""
+    """Return the running mean with e and its honest interval."""
     time, mean, e = running.time_s, running.mean_deg, running.precision_deg
     honest = running.honest_half_width_deg
     marks: list[AnyMark] = []
@@ -99,7 +105,7 @@ def _sample_range(value: Floats, used: Flags) -> tuple[float, float]:
 
 
 def convergence(results: FlightResults) -> Plot | None:
-    """Precision e, quality and honest half width as the samples come in, with their limits."""
+    """Return precision e, quality and honest half width as samples come in, with limits."""
     running = results.rows_of(HeadingRunning)
     if running is None:
         return None
@@ -130,7 +136,7 @@ def convergence(results: FlightResults) -> Plot | None:
 
 
 def density(results: FlightResults) -> Plot | None:
-    """Density of the heading error with the fitted normal (figure 3 of the paper)."""
+    """Return the density of the heading error with the fitted normal (figure 3 of the paper)."""
     bars, normal = results.rows_of(HeadingDistribution), results.rows_of(HeadingNormal)
     if bars is None:
         return None
@@ -161,7 +167,10 @@ def density(results: FlightResults) -> Plot | None:
 
 
 def taxi(results: FlightResults) -> Plot | None:
-    """Heading, track and speed during the taxi above the lanes that say which gate each epoch met."""
+    """Return heading, track and speed during the taxi, and lanes of the gates.
+
+    The lanes show which gate each epoch met.
+    """
     samples = results.rows_of(HeadingSamples)
     if samples is None:
         return None
@@ -227,7 +236,7 @@ def _lane_states(lanes: HeadingLanes | None, spans: Windows) -> tuple[str, ...]:
 
 
 def forest(results: FlightResults) -> Plot | None:
-    """Estimates by segment and by direction with their intervals, beside the one of the whole run."""
+    """Return estimates by segment and by direction with intervals, and that of the whole run."""
     answer = results.answer(HeadingResult)
     if answer is None or not answer.segments:
         return None
@@ -258,7 +267,7 @@ def forest(results: FlightResults) -> Plot | None:
 
 
 def _whole_run(answer: HeadingResult, row: int) -> list[AnyMark]:
-    """The estimate of the whole run through all rows, and its own row."""
+    """Return the estimate of the whole run through all rows, and its own row."""
     error, bounds = answer.error_deg, answer.confidence95_deg
     if not is_number(error):
         return []
@@ -274,7 +283,10 @@ def _whole_run(answer: HeadingResult, row: int) -> list[AnyMark]:
 
 
 def spectrum(results: FlightResults) -> Plot | None:
-    """Spectral density of the residuals beside the noise model that the honest interval rests on."""
+    """Return the spectral density of the residuals and the noise model of the interval.
+
+    The honest interval rests on that model.
+    """
     data = results.rows_of(HeadingSpectrum)
     if data is None:
         return None

@@ -1,4 +1,7 @@
-"""Plots of the INS errors: each state with its band, innovations, observability, and the track before and after."""
+"""Plots of the INS errors: states with bands, innovations, observability, track.
+
+The track before and after correction.
+"""
 
 from collections.abc import Mapping
 
@@ -45,7 +48,7 @@ STATES = {
 
 
 def state(results: FlightResults, name: str) -> Plot | None:
-    """A state of both channels: measured, estimated, smoothed, with the 95 % band."""
+    """Return a state of both channels: measured, estimated, smoothed, with the 95 % band."""
     data = results.rows_of(InertialStates)
     if data is None or not _are_known(data, name):
         return None
@@ -66,7 +69,7 @@ def state(results: FlightResults, name: str) -> Plot | None:
 
 
 def tilt_and_drift(results: FlightResults) -> Plot | None:
-    """Platform tilt and constant gyro drift of both channels with their bands."""
+    """Return the platform tilt and constant gyro drift of both channels with their bands."""
     data = results.rows_of(InertialStates)
     names = ("tilt", "drift")
     if data is None or not all(_are_known(data, name) for name in names):
@@ -111,7 +114,7 @@ def _state(data: InertialStates, channel: StatesOfChannel, name: str, title: str
 
 
 def _range(one: StateSeries) -> tuple[float | None, float | None]:
-    """Ends of the axis on which every estimate is seen and the band most of the time."""
+    """Return ends of the axis on which every estimate is seen and the band most of the time."""
     half = NORMAL_95 * one.sigma
     shown = finite(one.value, one.measured)
     if not shown.size:
@@ -122,7 +125,7 @@ def _range(one: StateSeries) -> tuple[float | None, float | None]:
 
 
 def outages(data: InertialStates) -> Spans:
-    """Spans of time in which the filter forecast."""
+    """Return the spans of time in which the filter forecast."""
     gone, time = data.is_forecast, data.time_s
     edges = np.flatnonzero(np.diff(np.concatenate([[0], gone.astype(np.int8), [0]])))
     start, end = time[edges[::2]], time[np.minimum(edges[1::2], len(time) - 1)]
@@ -130,7 +133,7 @@ def outages(data: InertialStates) -> Spans:
 
 
 def radial(results: FlightResults) -> Plot | None:
-    """Radial error of the track as flown by the INS and as corrected, on a logarithmic axis."""
+    """Return the radial error of the track by the INS and as corrected, on a log axis."""
     data = results.rows_of(InertialTrack)
     if data is None or data.ins_error_m is None or data.corrected_error_m is None:
         return None
@@ -154,7 +157,7 @@ def radial(results: FlightResults) -> Plot | None:
 
 
 def innovations(results: FlightResults) -> Plot | None:
-    """Innovations over their sigma, with the limits that 95 % should keep."""
+    """Return innovations over their sigma, with the limits that 95 % should keep."""
     data = results.rows_of(InertialStates)
     if data is None or not has_values(data.north.normalised_innovation, data.east.normalised_innovation):
         return None
@@ -184,7 +187,7 @@ def innovations(results: FlightResults) -> Plot | None:
 
 
 def observability(results: FlightResults) -> Plot | None:
-    """How well each state is seen as the flight goes on."""
+    """Return how well each state is observed as the flight goes on."""
     data = results.rows_of(InertialObservability)
     if data is None or not any(has_values(values) for values in data.north.states().values()):
         return None
@@ -209,7 +212,7 @@ def _observed(data: InertialObservability, part: ObservabilityOfChannel, channel
 
 
 def differences(results: FlightResults, quantity: str) -> Plot | None:
-    """INS minus GNSS of an INS that GNSS corrects, north and east."""
+    """Return INS minus GNSS of an INS that GNSS corrects, north and east."""
     data = results.rows_of(InertialDifferences)
     if data is None:
         return None
@@ -232,7 +235,7 @@ def differences(results: FlightResults, quantity: str) -> Plot | None:
 
 
 def own_innovations(results: FlightResults) -> Plot | None:
-    """Innovations that the INS's own filter logged, with its band where it logged one."""
+    """Return innovations that the INS's own filter logged, with its band where it logged one."""
     data = results.rows_of(InertialOwnInnovations)
     if data is None:
         return None
@@ -269,7 +272,7 @@ def _own(time: Floats, own: OwnInnovationsOfChannel, channel: str, quantity: str
 
 
 def _most_of(values: Floats) -> tuple[float, float]:
-    """Ends of an axis that hold all but one in a hundred."""
+    """Return ends of an axis that hold all but one in a hundred."""
     known = np.abs(finite(values))
     largest = 1.3 * float(np.quantile(known, 0.99)) if known.size else 1.0
     return -max(largest, 1e-3), max(largest, 1e-3)

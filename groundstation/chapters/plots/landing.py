@@ -1,4 +1,7 @@
-"""Plots of the approaches: deviations with corridors, the final from above and from the side, protection levels."""
+"""Plots of the approaches: deviations with corridors, the final, protection levels.
+
+The final from above and from the side.
+"""
 
 from collections.abc import Mapping
 
@@ -23,7 +26,7 @@ THRESHOLD = Limit(value=0.0, is_upright=True, role="faint", dash="", emphasis="f
 
 
 def _parts(results: FlightResults, of: str) -> tuple[Approach, LandingPath] | None:
-    """The approach, and the samples of it."""
+    """Return the approach and its samples."""
     answer, data = results.answer(LandingResult), results.rows_of(LandingPath)
     one = None if answer is None else next((row for row in answer.approaches if str(row.number) == of), None)
     if one is None or data is None:
@@ -33,7 +36,10 @@ def _parts(results: FlightResults, of: str) -> tuple[Approach, LandingPath] | No
 
 
 def deviations(results: FlightResults, of: str) -> Plot | None:
-    """Lateral and vertical deviation over distance, with a dot of the guidance and the figures of the categories."""
+    """Return lateral and vertical deviation over distance.
+
+    One dot of the guidance and the figures of the categories are drawn too.
+    """
     found = _parts(results, of)
     if found is None:
         return None
@@ -82,7 +88,7 @@ def _deviation(own: LandingPath, guided: Floats, placed: Floats, dot_m: Floats, 
 
 
 def _distance(own: LandingPath) -> Axis:
-    """Distance before the threshold, flown from left to right."""
+    """Return the distance before the threshold, flown from left to right."""
     far, near = float(np.nanmax(own.distance_m)), float(np.nanmin(own.distance_m))
     return Axis("distance before the threshold, km", low=far / M_PER_KM, high=min(near / M_PER_KM, BEHIND_KM))
 
@@ -94,7 +100,7 @@ def _reach(guided: Floats, placed: Floats, before: np.ndarray) -> float:
 
 
 def final(results: FlightResults, of: str) -> Plot | None:
-    """The final from above, and from the side."""
+    """Return the final from above, and from the side."""
     found = _parts(results, of)
     if found is None:
         return None
@@ -145,7 +151,10 @@ def _from_the_side(one: Approach, own: LandingPath) -> Panel:
 
 
 def motion(results: FlightResults, of: str) -> Plot | None:
-    """Sink rate and bank over the time of the approach: of the recording, where there is room for it."""
+    """Return sink rate and bank over the time of the approach.
+
+    Only the recording shows this plot: a page has no room.
+    """
     found = _parts(results, of)
     if found is None:
         return None
@@ -169,7 +178,10 @@ def motion(results: FlightResults, of: str) -> Plot | None:
 
 
 def protection(results: FlightResults, of: str) -> Plot | None:
-    """Protection levels against alarm limits over time: the part of a Stanford plot that a log without truth has."""
+    """Return protection levels against alarm limits over time.
+
+    The part of a Stanford plot that a log without truth has.
+    """
     found, data = _parts(results, of), results.rows_of(LandingProtection)
     if found is None or data is None:
         return None

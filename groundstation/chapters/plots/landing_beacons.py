@@ -1,4 +1,4 @@
-"""Plot of landing by locators: deviations along the approach with their bands, and the limits of the categories."""
+"""Plot of landing by locators: deviations with bands, limits of the categories."""
 
 from collections.abc import Mapping
 
@@ -18,7 +18,7 @@ MOST_APPROACHES = 7
 
 
 def deviations(results: FlightResults) -> Plot | None:
-    """Right of the course and above the glide path by distance, every approach."""
+    """Return deviations right of the course and above the glide path of every approach."""
     answer, data = results.answer(BeaconLanding), results.rows_of(BeaconsPath)
     if answer is None or data is None:
         return None
@@ -42,7 +42,7 @@ def deviations(results: FlightResults) -> Plot | None:
 def _marks(
     answer: BeaconLanding, data: BeaconsPath, values: Floats, sigma: Floats, limits: list[float]
 ) -> list[AnyMark]:
-    """Bands of all approaches, limits and locators, then the positions."""
+    """Return bands of all approaches, limits and locators, then the positions."""
     before = data.straight_before_threshold_m
     marks: list[AnyMark] = []
     dots: list[AnyMark] = []
@@ -63,7 +63,7 @@ def _marks(
 
 
 def _running_median(values: Floats) -> Floats:
-    """Median of so many neighbours, NaN left out; the ends repeat."""
+    """Return the median of so many neighbours, NaN left out; the ends repeat."""
     padded = np.pad(values, MEDIAN_OF // 2, mode="edge")
     neighbours = np.lib.stride_tricks.sliding_window_view(padded, MEDIAN_OF)
     known = np.isfinite(neighbours).any(axis=1)

@@ -1,4 +1,7 @@
-"""Plots of landing by ranges: points and path, accuracy along it with the categories' limits, simulated errors."""
+"""Plots of landing by ranges: points and path, accuracy along it, simulated errors.
+
+The accuracy with the limits of the categories.
+"""
 
 from collections.abc import Mapping
 
@@ -26,7 +29,7 @@ def _data(results: FlightResults, kind: type[T]) -> tuple[RangeLanding, T] | Non
 
 
 def space(results: FlightResults) -> Plot | None:
-    """Path and points from above and from the side."""
+    """Return the path and points from above and from the side."""
     found = _data(results, RangesSpace)
     if found is None:
         return None
@@ -64,7 +67,10 @@ def _view(answer: RangeLanding, data: RangesSpace, across: Floats, *, has_names:
 
 
 def accuracy(results: FlightResults) -> Plot | None:
-    """Horizontal, lateral and vertical 95 % figures along the path, with the limits of the categories."""
+    """Return horizontal, lateral and vertical 95 % figures along the path.
+
+    The limits of the categories are drawn too.
+    """
     found = _data(results, RangesPath)
     if found is None:
         return None
@@ -102,7 +108,7 @@ def _accuracy(data: RangesPath, title: str, lines: list[tuple[Floats, Role, str]
 
 
 def trials(results: FlightResults) -> Plot | None:
-    """Errors to the right and up of simulated approaches in the band that the filter computes."""
+    """Return errors to the right and up of simulated approaches in the filter's band."""
     found = _data(results, RangesErrors)
     if found is None:
         return None

@@ -1,4 +1,4 @@
-"""Plot of the chapter on latency: what is left between sensor and INS against the latency tried."""
+"""Plot of latency: what is left between sensor and INS against the latency tried."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,7 @@ MOST_PAIRS = len(SERIES)
 
 
 def search(results: FlightResults) -> Plot | None:
-    """The residual of every pair against the latency tried; None without the arrays."""
+    """Return the residual of every pair against the latency tried; None without the arrays."""
     answer, data = results.answer(Latencies), results.rows_of(LatencySearch)
     if answer is None or data is None:
         return None

@@ -1,4 +1,4 @@
-"""Plots of the magnetic deviation: by heading, on the part held out, the figure flown, its branches, the modulus."""
+"""Plots of the magnetic deviation: by heading, held out, flown figure, branches, modulus."""
 
 from collections.abc import Mapping
 
@@ -37,13 +37,13 @@ NT_PER_UT = 1e3
 
 
 def heading_axis(step_deg: float = 30.0) -> Axis:
-    """Axis of the magnetic heading as read, a number at every so many degrees."""
+    """Return an axis of the magnetic heading as read, a number at every so many degrees."""
     ticks = tuple(np.arange(0.0, 361.0, step_deg).tolist())
     return Axis("magnetic heading as read, °", "angle", 0.0, 360.0, ticks=ticks)
 
 
 def deviation(results: FlightResults) -> Plot | None:
-    """Deviation against heading by each method, with bands."""
+    """Return the deviation against heading by each method, with bands."""
     curves, table = results.rows_of(MagneticCurves), results.rows_of(MagneticTable)
     if curves is None:
         return None
@@ -73,7 +73,10 @@ def deviation(results: FlightResults) -> Plot | None:
 
 
 def held_out(results: FlightResults) -> Plot | None:
-    """Error of the magnetic heading where no fit has seen, before and after the recommended correction."""
+    """Return the error of the magnetic heading on samples that no fit used.
+
+    Before and after the recommended correction.
+    """
     answer, data = results.answer(MagneticResult), results.rows_of(MagneticSamples)
     if answer is None or data is None or not (mine := data.part == "held out").any():
         return None
@@ -104,7 +107,7 @@ def held_out(results: FlightResults) -> Plot | None:
 
 
 def track(results: FlightResults) -> Plot | None:
-    """The figures as flown, told apart by branch."""
+    """Return the figures as flown, with the branches in their own roles."""
     answer, data = results.answer(MagneticResult), results.rows_of(Overview)
     turns = [turn for turn in answer.turns if turn.state == "used"] if answer else []
     if data is None or not turns:
@@ -146,7 +149,7 @@ def _branch(turn: Turn) -> tuple[str, Role]:
 
 
 def branches(results: FlightResults) -> Plot | None:
-    """Compass error on either branch and their average, declination in it."""
+    """Return the compass error on either branch and their average, declination in it."""
     samples, table = results.rows_of(MagneticSamples), results.rows_of(MagneticTable)
     if samples is None or table is None:
         return None
@@ -170,7 +173,7 @@ def branches(results: FlightResults) -> Plot | None:
 
 
 def modulus(results: FlightResults) -> Plot | None:
-    """Modulus of the field on the figures before and after it is freed of the iron."""
+    """Return the modulus of the field on the figures before and after it is freed of the iron."""
     answer, data = results.answer(MagneticResult), results.rows_of(MagneticModulus)
     if answer is None or data is None:
         return None
@@ -197,7 +200,10 @@ def modulus(results: FlightResults) -> Plot | None:
 
 
 def ground_runs(results: FlightResults) -> Plot | None:
-    """Error by magnetic heading: every run with its bar, its epochs behind it, the curve where there is one."""
+    """Return the error by magnetic heading: a bar for every run, epochs, fitted curve.
+
+    Epochs lie behind the bars; no curve where none was fitted.
+    """
     answer = results.answer(GroundDeviation)
     used = [run for run in answer.used if run.error_deg is not None] if answer else []
     if not used:

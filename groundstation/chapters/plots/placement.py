@@ -19,7 +19,10 @@ TOP_SHARE = 90.0  # per cent of the map's values that keep their own colour
 
 
 def accuracy_map(results: FlightResults) -> Plot | None:
-    """Accuracy at the fixed point over places of the last point, with what is kept out and where the points stand."""
+    """Return accuracy at the fixed point over places of the last point.
+
+    The areas kept out and the places of the points are drawn too.
+    """
     answer, data = results.answer(PlacementPlan), results.rows_of(PlacementMap)
     if answer is None or data is None:
         return None
@@ -60,7 +63,7 @@ def accuracy_map(results: FlightResults) -> Plot | None:
 
 
 def _keep_out(rings: PlacementKeepOut) -> Outlines:
-    """Polygons that are kept out, with their names."""
+    """Return polygons that are kept out, with their names."""
     names = tuple(dict.fromkeys(rings.label.tolist()))
     corners = np.column_stack([rings.east_m, rings.north_m]) / M_PER_KM
     drawn = tuple(corners[rings.label == name] for name in names)
@@ -68,7 +71,7 @@ def _keep_out(rings: PlacementKeepOut) -> Outlines:
 
 
 def _stand(points: PlacementPoints, answer: PlacementPlan) -> list[AnyMark]:
-    """The points of the recommended design, and where those that are placed were given."""
+    """Return the points of the recommended design, and where placed ones were given."""
     x, y = points.east_m / M_PER_KM, points.north_m / M_PER_KM
     given = (points.design == GIVEN) & points.is_placed
     marks: list[AnyMark] = [
@@ -86,7 +89,7 @@ def _stand(points: PlacementPoints, answer: PlacementPlan) -> list[AnyMark]:
 
 
 def accuracy(results: FlightResults) -> Plot | None:
-    """Two sigma along the way, every design in its colour."""
+    """Return two sigma along the way, every design in its colour."""
     answer, data = results.answer(PlacementPlan), results.rows_of(PlacementAccuracy)
     if answer is None or data is None:
         return None

@@ -1,4 +1,4 @@
-"""Plot of the chapter on data quality: where data are present and where they are missing, by topic."""
+"""Plot of data quality: where data are present and where they are missing, by topic."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ LANE_MM = 4.6
 
 
 def gaps(results: FlightResults) -> Plot | None:
-    """Strips of data and gaps over flight time; None without a ledger."""
+    """Return strips of data and gaps over flight time; None without a ledger."""
     ledger, holes = results.rows_of(LedgerRows), results.rows_of(GapRows)
     if ledger is None:
         return None
@@ -47,7 +47,7 @@ def gaps(results: FlightResults) -> Plot | None:
 
 
 def _gaps(holes: GapRows, order: tuple[str, ...], least_s: float) -> Lanes:
-    """The longest gaps of each topic, each wide enough to be seen."""
+    """Return the longest gaps of each topic, each wide enough to be seen."""
     rows = [np.flatnonzero(holes.topic == name) for name in order]
     kept = [mine[np.sort(np.argsort(-holes.length_s[mine], kind="stable")[:MOST_GAPS])] for mine in rows]
     shown = np.concatenate(kept) if kept else np.zeros(0, dtype=np.intp)

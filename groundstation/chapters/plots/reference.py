@@ -1,4 +1,7 @@
-"""Plots of the comparison with a reference: errors in the band claimed, plan view, claimed against seen."""
+"""Plots of the comparison with a reference.
+
+Errors in the band claimed, plan view, claimed against seen.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,12 +27,15 @@ LARGEST_IN_METRES = 3000.0
 
 
 def role_of(subject: str) -> Role:
-    """The role of a subject; the corrected INS is the answer."""
+    """Return the role of a subject; the corrected INS is the answer."""
     return ROLES.get(subject.partition(".")[0], "answer")
 
 
 def errors(results: FlightResults, of: str) -> Plot | None:
-    """Errors of one subject and quantity over time, in the band of 95 % that it and the reference claim."""
+    """Return errors of one subject and quantity over time, in their claimed 95 % band.
+
+    The band that subject and reference claim together.
+    """
     subject, _, quantity = of.partition(" ")
     data = results.rows_of(ReferenceErrors)
     if data is None:
@@ -62,7 +68,7 @@ class ErrorAxis:
 
 
 def _error_axes(data: ReferenceErrors, quantity: str) -> tuple[ErrorAxis, ...]:
-    """Axes of a quantity; a sigma claimed of several axes together is shared out among them."""
+    """Return the axes of a quantity; a sigma claimed of several axes is shared among them."""
     if quantity == "position":
         across = NORMAL_95 / np.sqrt(2.0) * data.horizontal_sigma_m
         return (
@@ -126,7 +132,7 @@ def track(results: FlightResults) -> Plot | None:
 
 
 def claims(results: FlightResults) -> Plot | None:
-    """Share of the errors inside the 95 % claimed, with its interval."""
+    """Return the share of the errors inside the 95 % claimed, with its interval."""
     answer = results.answer(ReferenceResult)
     if answer is None or not answer.claims:
         return None

@@ -1,4 +1,4 @@
-"""Plots of the standstill stage: errors of the velocity components, density of the mean speed."""
+"""Plots of the standstill stage: velocity errors, density of the mean speed."""
 
 from collections.abc import Mapping
 
@@ -24,7 +24,10 @@ def _assessed(results: FlightResults) -> Standstill | None:
 
 
 def components(results: FlightResults) -> Plot | None:
-    """Velocity components at standstill over time and against each other (figure 2a of the paper)."""
+    """Return velocity components at standstill over time and against each other.
+
+    Figure 2a of the paper.
+    """
     data = results.rows_of(StandstillVelocity)
     if data is None:
         return None
@@ -73,7 +76,10 @@ def _plane(north: Floats, east: Floats, reach: float, still: Standstill | None) 
 
 
 def mean_speed(results: FlightResults) -> Plot | None:
-    """Density of the mean speed over 10 s and 30 s with the limit (figure 2b of the paper)."""
+    """Return the density of the mean speed over 10 s and 30 s with the limit.
+
+    Figure 2b of the paper.
+    """
     data = results.rows_of(StandstillMeanSpeed)
     if data is None:
         return None

@@ -1,4 +1,4 @@
-"""Plot of the chapter on several logs: the motion that two of them show, and the difference."""
+"""Plot of several logs: the motion that two of them show, and the difference."""
 
 from collections.abc import Mapping
 
@@ -18,7 +18,10 @@ PANEL_MM = 40.0
 
 
 def motion(results: FlightResults, of: str) -> Plot | None:
-    """Both motions over each other, and below what the joined log shows less the other; None without the arrays."""
+    """Return both motions in one panel, and the joined log minus the other below.
+
+    None without the arrays.
+    """
     answer, name = results.answer(Together), of or "a"
     both = results.rows_of(JoinedMotion, name)
     left = results.rows_of(JoinedDifference, name)

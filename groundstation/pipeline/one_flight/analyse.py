@@ -1,4 +1,7 @@
-"""Tables of one flight in, all its answers out: everything the data allows, and the reason for what it does not."""
+"""Answers of one flight from its tables, and the reason for each answer that is missing.
+
+Everything that the data allows is answered.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -41,7 +44,7 @@ TRUTH = "truth"
 
 @dataclass(frozen=True)
 class Given:
-    """What is known of a flight before anything is estimated."""
+    """Facts of a flight before anything is estimated."""
 
     flight_id: str
     source: Source
@@ -53,7 +56,7 @@ class Given:
 
 @dataclass(frozen=True)
 class Answered:
-    """What the analyses of a flight gave: answers and findings by analysis, and why some gave nothing.
+    """Results of the analyses of a flight: answers and findings by analysis, and reasons.
 
     ``reasons`` has an entry for every analysis that applies and has no answer; ``not_assessable`` leaves out those that
     only lack the answer of another.
@@ -66,7 +69,7 @@ class Answered:
     workings: Mapping[str, Any] = field(default_factory=dict)
 
     def joined(self, later: "Answered") -> "Answered":
-        """What these analyses gave, and others after them."""
+        """Return these results and those of later analyses together."""
         return Answered(
             {**self.answers, **later.answers},
             {**self.findings, **later.findings},
@@ -117,31 +120,37 @@ def analyse(flight: Flight, given: Given, configuration: Configuration) -> Fligh
 
 
 def _as_stated(flight: Flight, configuration: Configuration) -> Flight:
-    """The flight with what the aircraft file says of its ground contact."""
+    """Return the flight with the ground contact that the aircraft file states."""
     if not configuration.settings.aircraft.always_on_ground:
         return flight
     return replace(flight, metadata=MappingProxyType({**flight.metadata, ALWAYS_ON_GROUND: "true"}))
 
 
 def seen_by_analyses(flight: Flight, configuration: Configuration) -> Flight:
-    """The flight as every analysis but those that judge is given it."""
+    """Return the flight as all analyses get it, except those that judge by the truth."""
     return _as_stated(flight, configuration).without(TRUTH)
 
 
 def answers_of(flight: Flight, configuration: Configuration) -> tuple[Answered, Known]:
-    """Run all analyses on a flight; the truth is seen by those alone that judge by it, and by them after all others."""
+    """Run all analyses on a flight.
+
+    Only analyses that judge by the truth see it, and they run after all others.
+    """
     seen = flight.without(TRUTH)
     known = known_of(seen, configuration)
     found = run_analyses(tuple(one for one in systems().analyses if not one.judges), seen, known)
     so_far = replace(known, answers=found.answers, workings=found.workings)
     judged = run_analyses(tuple(one for one in systems().analyses if one.judges), flight, so_far)
     if not topics_of_kind(TRUTH, flight.topics()):
-        judged = replace(judged, not_assessable=())  # nobody asked for it
+        judged = replace(judged, not_assessable=())  # no truth was given: no reason is needed
     return found.joined(judged), known
 
 
 def known_of(flight: Flight, configuration: Configuration) -> Known:
-    """What the analyses may use besides the tables of a flight: phases, and all that the user says of it."""
+    """Return what the analyses may use besides the tables of a flight.
+
+    Phases, and all that the user states about it.
+    """
     settings = configuration.settings
     known = Known(
         phases=flight_phases(flight),
@@ -158,9 +167,10 @@ def known_of(flight: Flight, configuration: Configuration) -> Known:
 
 
 def run_analyses(analyses: tuple[Analysis, ...], data: Any, known: Any) -> Answered:
-    """Run analyses on a flight or a session, each behind those it builds on; what lacks data gives its reason.
+    """Run analyses on a flight or a session, each after those it builds on.
 
-    So does one that fails by a defect, where failures are gathered (:mod:`groundstation.base.failures`).
+    An analysis that lacks data gives its reason. So does one that fails by a defect, where failures are gathered
+    (:mod:`groundstation.base.failures`).
 
     Parameters
     ----------
@@ -207,7 +217,10 @@ class _Unanswered(NamedTuple):
 def _run_one(
     analysis: Analysis, data: Any, known: Any, reasons: Mapping[str, NotAssessable]
 ) -> Found[Any] | _Unanswered | None:
-    """Run an analysis behind others that gave ``reasons``; None where it does not apply."""
+    """Run an analysis; None where it does not apply.
+
+    ``reasons`` are those of earlier analyses without an answer.
+    """
     if not analysis.applies(data, known):
         return None
     missing = next((name for name in analysis.requires if name not in known.answers), None)
@@ -227,7 +240,7 @@ def _run_one(
 def _on_damage(
     analysis: Analysis, flight: Flight, given: Given, answers: Answers, gaps: Mapping[str, Gaps]
 ) -> tuple[Finding, ...]:
-    """The finding on damage among the samples that an answer rests on."""
+    """Return the finding on damage among the samples of an answer."""
     answer = answers.get(analysis.name)
     use = None if answer is None else analysis.rests_on(flight, answer)
     if use is None:

@@ -1,4 +1,7 @@
-"""``run --apply``: a deviation of the magnetic heading, the flight's own or another's, added to the log."""
+"""``run --apply``: add a deviation to the magnetic heading of the log.
+
+The deviation is the flight's own or another's.
+"""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -39,7 +42,7 @@ MOST_DRAWN = 20_000
 
 @dataclass(frozen=True)
 class Applied:
-    """What became of it: the results with their findings, and the corrected heading where there is one."""
+    """Result of ``--apply``: results with their findings, and the corrected heading, if any."""
 
     results: FlightResults
     deviation: Deviation | None = None
@@ -47,12 +50,14 @@ class Applied:
 
 
 def corrected_name(flight_id: str) -> str:
-    """Name of the MCAP with the corrected heading, beside the flight's own."""
+    """Return the name of the MCAP with the corrected heading, beside the flight's own."""
     return f"{flight_id}{CORRECTED}"
 
 
 def apply_deviation(flight: Flight, results: FlightResults, asked: Apply | None, settings: "UserSettings") -> Applied:
-    """Add a deviation to the magnetic heading of a flight; a finding tells what was done, or why nothing was.
+    """Add a deviation to the magnetic heading of a flight.
+
+    A finding says what was done, or why nothing was.
 
     Parameters
     ----------
@@ -129,7 +134,10 @@ def _other_aircraft(results: FlightResults, deviation: Deviation) -> list[Findin
 def _judged(
     flight: Flight, results: FlightResults, corrected: "CorrectedHeading", settings: "UserSettings"
 ) -> list[Finding]:
-    """Whether the heading is nearer to that of the flight's own INS than before."""
+    """Return findings on whether the corrected heading is nearer to that of the flight's INS.
+
+    It is compared with the heading before the deviation was added.
+    """
     from groundstation.estimators.magnetic.corrected import judge
     from groundstation.tables.phases import flight_phases
 
@@ -156,7 +164,10 @@ def _judged(
 
 
 def ins_error_deg(results: FlightResults, ins_topic: str) -> float:
-    """Error of the INS heading where it is known: at the figure, as taxi shows it, or as turns in flight do."""
+    """Return the error of the INS heading where it is known.
+
+    It is known at the figure, from taxi, or from turns in flight.
+    """
     from groundstation.estimators.magnetic.alignment import refused
 
     magnetic, heading = results.answer(MagneticResult), results.answer(HeadingResult)
@@ -193,9 +204,10 @@ def _fields(corrected: "CorrectedHeading") -> dict[str, np.ndarray]:
 
 
 def write_corrected(target: Path, info: "StoreInfo", flight: Flight, applied: Applied, thresholds: Thresholds) -> None:
-    """Write the corrected heading as an MCAP on the clock of the flight's own; nothing where nothing was applied.
+    """Write the corrected heading as an MCAP on the clock of the flight's own.
 
-    Log times and device times are those of the samples it comes from, so that a viewer opens both files together.
+    Nothing is written where nothing was applied. Log times and device times are those of the samples it comes from, so
+    that a viewer opens both files together.
 
     Parameters
     ----------
@@ -252,7 +264,7 @@ def _present(values: np.ndarray) -> np.ndarray | None:
 
 
 def _origin(corrected: "CorrectedHeading", deviation: Deviation) -> dict[str, str]:
-    """Whose deviation, by which method, added to what."""
+    """Return whose deviation was added, by which method, to which heading."""
     told = {
         "deviation.flight": deviation.flight_id,
         "deviation.aircraft": deviation.aircraft,

@@ -1,6 +1,7 @@
-"""What the user sets: estimator settings, aircraft and site files, intervals left out or forced. Strictly checked.
+"""Settings of the user: estimators, aircraft and site files, intervals. Strictly checked.
 
-The analyses are imported when their settings are asked for, or when the user gives any: a log is converted without.
+The user may leave out or force intervals. The analyses are imported when their settings are asked for, or when the user
+gives any: a log is converted without.
 """
 
 from collections.abc import Iterable, Mapping
@@ -47,13 +48,16 @@ def tables() -> tuple[str, ...]:
 
 @cache
 def sections() -> tuple[str, ...]:
-    """Names of all that a settings file may hold."""
+    """Return names of all that a settings file may hold."""
     return (*tables(), ISOLATION, *LISTS)
 
 
 @dataclass(frozen=True)
 class Interval:
-    """Part of a flight that the user excludes or forces; ends as written: flight seconds, +mm:ss or ISO UTC."""
+    """Part of a flight that the user excludes or forces.
+
+    Its ends are as written: flight seconds, +mm:ss or ISO UTC.
+    """
 
     start: str
     end: str
@@ -62,7 +66,10 @@ class Interval:
 
 @dataclass(frozen=True)
 class RulesLabel:
-    """What a settings file calls its limits: kept in the manifest, told by ``rules test``; it changes no result."""
+    """Name that a settings file gives its limits.
+
+    The manifest keeps it and ``rules test`` shows it; it changes no result.
+    """
 
     version: str = ""
     note: str = ""
@@ -70,7 +77,7 @@ class RulesLabel:
 
 @dataclass(frozen=True)
 class UserSettings:
-    """What the user set, as the dataclasses that are worked with: shipped values where nothing is set.
+    """Settings of the user as dataclasses, with shipped values where nothing is set.
 
     ``analyses`` holds the settings of every analysis by the name of their table.
     """
@@ -81,19 +88,25 @@ class UserSettings:
     session: "SessionSettings"
 
     def of(self, kind: type[S]) -> S:
-        """The settings of that type."""
+        """Return the settings of that type."""
         return next(found for found in self.analyses.values() if isinstance(found, kind))
 
 
 @dataclass(frozen=True)
 class References:
-    """Files that may judge flights; ``is_expected``: it is an error when none is of the time of the one log named."""
+    """Files that may judge flights.
+
+    ``is_expected``: it is an error when none is of the time of the one log named.
+    """
 
     paths: tuple[Path, ...] = ()
     is_expected: bool = False
 
     def besides(self, log: Path) -> "References":
-        """Those of several files that are not the log itself: it judges nothing."""
+        """Return these files without the log itself, which judges nothing.
+
+        A log that is the only file stays.
+        """
         others = tuple(path for path in self.paths if path.resolve() != log.resolve())
         return replace(self, paths=others or self.paths)
 
@@ -103,7 +116,9 @@ NO_REFERENCES = References()
 
 @dataclass(frozen=True)
 class Configuration:
-    """Everything a user may set for a run. Parsed once, when it is made; worker processes get the values.
+    """All settings of a user for a run.
+
+    Parsed once, when it is made; worker processes get the values.
 
     Parameters
     ----------
@@ -144,7 +159,7 @@ class Configuration:
     lessons: "tuple[Lesson, ...] | None" = None
 
     def __post_init__(self) -> None:
-        self.thresholds  # noqa: B018 -- a slip is told now
+        self.thresholds  # noqa: B018 -- raises now if a value is wrong
         self.rules  # noqa: B018
         self.isolation  # noqa: B018
         if self.tables.keys() - {"thresholds", "rules", ISOLATION}:
@@ -162,7 +177,7 @@ class Configuration:
 
     @cached_property
     def isolation(self) -> Isolation:
-        """What a log may take that is read apart."""
+        """Bounds of a log that is read in a process of its own."""
         return self._table(ISOLATION, Isolation)
 
     @cached_property
@@ -199,7 +214,7 @@ class Configuration:
         return Path(self.profile) if self.profile else None
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for the manifest and the MCAP; only what the user set."""
+        """Return plain values for the manifest and the MCAP; only what the user set."""
         document: dict[str, Any] = {name: dict(self.tables[name]) for name in tables() if self.tables.get(name)}
         for name in ("exclude", "force"):
             intervals = [{"from": part.start, "to": part.end, "reason": part.reason} for part in getattr(self, name)]
@@ -240,7 +255,7 @@ def load_configuration(
     icds: Iterable[str] | None = None,
     weather: Settings | None = None,
 ) -> Configuration:
-    """Put the user's settings, files or what would stand in them, into one configuration.
+    """Put the user's settings, files or their content, into one configuration.
 
     What is given for a section wins over that section of ``config``.
 
@@ -279,7 +294,9 @@ def load_configuration(
 
 
 def installed_as(configuration: Configuration, installation: Path | None) -> Configuration:
-    """The configuration with what earlier flights say of installations; as it is without a file.
+    """Return the configuration with what earlier flights taught about installations.
+
+    Unchanged without a file.
 
     Raises
     ------
@@ -294,9 +311,10 @@ def installed_as(configuration: Configuration, installation: Path | None) -> Con
 
 
 def applying(configuration: Configuration, apply: str) -> Configuration:
-    """The configuration with a deviation to add to the magnetic heading; as it is where ``apply`` is empty.
+    """Return the configuration with a deviation to add to the magnetic heading.
 
-    ``apply`` is ``own``, or names a flight folder, its summary.json or a deviation.csv.
+    Unchanged where ``apply`` is empty. ``apply`` is ``own``, or names a flight folder, its summary.json or a
+    deviation.csv.
 
     Raises
     ------
@@ -311,7 +329,7 @@ def applying(configuration: Configuration, apply: str) -> Configuration:
 
 
 def _refuse_wrong(icds: Iterable[str]) -> None:
-    """A slip in the name of an ICD is told before anything is read."""
+    """Refuse a misspelt ICD name before anything is read."""
     from groundstation.readers.icd import named_icd
 
     for one in icds:
@@ -345,7 +363,7 @@ def _intervals(listed: Any, where: str) -> tuple[Interval, ...]:
 
 
 def _weather(listed: Any, given: Settings | None, where: str) -> tuple[str, ...]:
-    """METAR lines that have a wind: of a text file or mapping given, else of the settings."""
+    """Return METAR lines with a wind: from the text file or mapping given, else the settings."""
     from groundstation.base.metar import metar_wind
 
     file = given if isinstance(given, Path) else None
@@ -362,7 +380,10 @@ def _weather(listed: Any, given: Settings | None, where: str) -> tuple[str, ...]
 
 
 def _time(value: Any, where: str) -> str:
-    """A time as text; what cannot be one in any flight is refused before the work begins."""
+    """Return a time as text; refuse text that is no time in any flight.
+
+    It is refused before the work begins.
+    """
     from groundstation.pipeline.one_flight.intervals import flight_seconds
 
     if isinstance(value, bool) or not isinstance(value, int | float | str | datetime):

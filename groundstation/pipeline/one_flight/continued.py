@@ -1,4 +1,4 @@
-"""Logs that a user says to be of one flight: which of them are one recording, that is read as one."""
+"""Logs that the user states to be of one flight: parts of one recording are read as one."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +12,7 @@ from groundstation.tables.table import Flight
 
 
 def with_strangers(logs: Sequence[Log], strangers: Sequence[Path]) -> tuple[list[Log], set[Path]]:
-    """Logs with those files behind them that cannot be read alone; second, the files that were taken.
+    """Put files that cannot be read alone after their logs; also return the files taken.
 
     A file is taken whose name differs from that of a log in a number alone, and which can be read behind it.
     """
@@ -28,7 +28,7 @@ def with_strangers(logs: Sequence[Log], strangers: Sequence[Path]) -> tuple[list
 
 
 def in_recordings(logs: Sequence[tuple[Log, Converted, Flight]]) -> list[Log]:
-    """Logs in their order, those of one recording put together behind the first of them.
+    """Join logs of one recording, each group at the place of its first log.
 
     Two are of one recording where format and aircraft are equal, and one goes on from the other, by UTC or by the
     device's counter.
@@ -46,14 +46,14 @@ def in_recordings(logs: Sequence[tuple[Log, Converted, Flight]]) -> list[Log]:
 
 
 def _is_behind(before: PartOfRun, behind: PartOfRun) -> bool:
-    """Whether a log of the same format and aircraft begins where another one has ended."""
+    """Tell whether a log of the same format and aircraft begins where another one has ended."""
     has_utc = before.utc_ns is not None, behind.utc_ns is not None
     is_same = before.reader == behind.reader and before.aircraft == behind.aircraft and has_utc[0] == has_utc[1]
     return is_same and gap_ns(before, behind) >= -LATE_S * NS_PER_S
 
 
 def _joined(logs: Sequence[Log | Path]) -> Log:
-    """Consecutive logs and files as one log."""
+    """Return consecutive logs and files as one log."""
     first = logs[0]
     assert isinstance(first, Log), "a recording begins with a log that can be read"
     paths: list[Path] = []

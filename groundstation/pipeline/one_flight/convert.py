@@ -1,4 +1,4 @@
-"""A log becomes an MCAP: its clock is repaired, its ledger is kept beside the data."""
+"""Conversion of a log to MCAP: clock repaired, ledger beside the data."""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
@@ -39,7 +39,7 @@ COUNTED_CAUSES = ("dropout", "stuck", "out_of_range", "sequence")  # of spans: c
 
 @dataclass(frozen=True)
 class Converted:
-    """What an MCAP holds and what was found while it was made.
+    """Content of an MCAP, and findings made while it was written.
 
     ``has_lost_data``: something of the log could not be kept (exit code 3). ``sha256`` is the digest of the MCAP.
     """
@@ -53,7 +53,9 @@ class Converted:
 def convert_log(
     log: Log, target: Path, thresholds: Thresholds | None = None, references: References = NO_REFERENCES
 ) -> Converted:
-    """Write a log's MCAP, under a temporary name until it is whole; several power-ups in a log stay together.
+    """Write a log's MCAP, under a temporary name until it is whole.
+
+    Several power-ups in a log stay together.
 
     Parameters
     ----------
@@ -81,7 +83,9 @@ def convert_log(
 def convert_flight(
     log: Log, target: Path, thresholds: Thresholds | None = None, references: References = NO_REFERENCES
 ) -> Converted | tuple[Log, ...]:
-    """Write the MCAP of a log of one flight; of one that holds several power-ups nothing, but the log of each.
+    """Write the MCAP of a log of one flight.
+
+    For a log with several power-ups nothing is written; a log for each is returned.
 
     Parameters and errors are those of :func:`convert_log`.
     """
@@ -117,13 +121,18 @@ def survey_of(log: Log, items: Iterable[Item], limits: Thresholds) -> "Survey":
 
 
 def why_nothing_is_placed(findings: Iterable[Finding]) -> str:
-    """Reason why a log has no topic: its records have no time, or it has no record that can be read."""
+    """Return the reason why a log has no topic.
+
+    Its records have no time, or no record can be read.
+    """
     timeless = next((one.count for one in findings if one.code == "clock.no_times"), 0)
     return f"no readable record has a time, of {timeless}" if timeless else "no readable record"
 
 
 def _segments(log: Log, found: "Survey") -> tuple[Segment, ...]:
-    """The power-ups of a log; none of one that is read for one of them alone, or of consecutive files.
+    """Return the power-ups of a log.
+
+    Empty for a log that is read for one of them alone, or of consecutive files.
 
     Raises
     ------
@@ -163,7 +172,7 @@ def _convert_recorded(log: Log, items: Replay, found: "Survey", target: Path, re
 
 
 def _facts_of(log: Log, found: "Survey", laid: Laid) -> StoreInfo:
-    """Facts of the MCAP of a log, with those of the reference that is laid beside it."""
+    """Return facts of the MCAP of a log, with those of the reference that is laid beside it."""
     from importlib import metadata as installed
 
     from groundstation.integrity.ledger_findings import ledger_findings
@@ -188,7 +197,7 @@ def _facts_of(log: Log, found: "Survey", laid: Laid) -> StoreInfo:
 
 
 def _told_joined(log: Log) -> tuple[Finding, ...]:
-    """That a flight was put together from consecutive files."""
+    """Return the finding that a flight was put together from consecutive files."""
     names = [path.name for path in log.parts]
     more = f" and {len(names) - PARTS_TOLD} more" if len(names) > PARTS_TOLD else ""
     text = f"{len(names)} consecutive files joined as one flight: {', '.join(names[:PARTS_TOLD])}{more}"
@@ -196,7 +205,7 @@ def _told_joined(log: Log) -> tuple[Finding, ...]:
 
 
 def _facts_of_parts(log: Log) -> dict[str, str]:
-    """Names and digests of the consecutive files of a flight, as metadata."""
+    """Return names and digests of the consecutive files of a flight, as metadata."""
     if not log.parts:
         return {}
     parts = [{"name": path.name, "sha256": sha256} for path, sha256 in zip(log.parts, log.digests, strict=True)]
@@ -204,7 +213,7 @@ def _facts_of_parts(log: Log) -> dict[str, str]:
 
 
 def parts_told(metadata: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    """Name and digest of each of the consecutive files of a flight, by its metadata."""
+    """Yield the name and digest of each of the consecutive files of a flight, by its metadata."""
     try:
         told = json.loads(metadata.get(PARTS, "[]"))
         yield from ((str(one["name"]), str(one["sha256"])) for one in told)
@@ -213,7 +222,7 @@ def parts_told(metadata: Mapping[str, str]) -> Iterator[tuple[str, str]]:
 
 
 def _with_truth(ledger: Ledger, laid: Laid, limits: Thresholds) -> Ledger:
-    """A ledger with the topic that a reference became."""
+    """Return a ledger with the topic of a reference."""
     if not laid.batches:
         return ledger
     census = Census(True, limits)
@@ -224,7 +233,7 @@ def _with_truth(ledger: Ledger, laid: Laid, limits: Thresholds) -> Ledger:
 
 
 def told_of_fields(remarks: tuple[Remark, ...]) -> dict[str, str]:
-    """What the analyses must know of a field: it stays with the flight.
+    """Return facts of fields that the analyses need, for the metadata of the flight.
 
     ``derived.<topic>.<field>``: what it was derived from; ``heading_is_track.<topic>.<field>``: in words.
     """
@@ -238,7 +247,10 @@ def told_of_fields(remarks: tuple[Remark, ...]) -> dict[str, str]:
 
 
 def _copy_store(log: Log, target: Path, limits: Thresholds, references: References) -> Converted:
-    """Write the intact content of a groundstation MCAP again; an undamaged one comes out equal in content."""
+    """Write the intact content of a groundstation MCAP again.
+
+    An undamaged one comes out equal in content.
+    """
     from groundstation.store.writer import StoreWriter
 
     info = log.info()
@@ -264,7 +276,10 @@ def _copy_store(log: Log, target: Path, limits: Thresholds, references: Referenc
 
 
 def _laid_beside_store(log: Log, info: StoreInfo, references: References) -> Laid:
-    """The reference of an MCAP, in place of that of an earlier run; a truth that came with the log stays its own."""
+    """Return the reference for an MCAP, in place of that of an earlier run.
+
+    A truth that came with the log is never replaced.
+    """
     has_truth = any(kind_of(topic) == TRUTH for topic in info.ledger.topics)
     if not references.paths:
         return Laid()
@@ -278,12 +293,12 @@ def _laid_beside_store(log: Log, info: StoreInfo, references: References) -> Lai
 
 
 def _without_truth(items: Iterable[Item], laid: Laid) -> Iterator[Item]:
-    """Items of a log, without the truth where another takes its place."""
+    """Yield items of a log, without the truth where another takes its place."""
     return (item for item in items if not (laid.batches and isinstance(item, RecordBatch) and item.topic == TRUTH))
 
 
 def _with_another_truth(info: StoreInfo, laid: Laid, limits: Thresholds) -> StoreInfo:
-    """Facts of a store file whose truth is another one."""
+    """Return the facts of a store file with another truth."""
     metadata = {name: value for name, value in info.metadata.items() if not name.startswith(FACTS)}
     findings = tuple(finding for finding in info.findings if not finding.code.startswith("reference."))
     return replace(
@@ -295,19 +310,20 @@ def _with_another_truth(info: StoreInfo, laid: Laid, limits: Thresholds) -> Stor
 
 
 def census_of(info: StoreInfo, limits: Thresholds) -> Census:
-    """Counts what is in a store file anew, by its kind of clock."""
+    """Count the content of a store file again, by its kind of clock."""
     return Census(info.has_utc, limits, is_counting=info.clock.is_counting)
 
 
 def has_other_limits(info: StoreInfo, limits: Thresholds) -> bool:
-    """Whether the ledger in a store file was made with other thresholds."""
+    """Tell whether the ledger in a store file was made with other thresholds."""
     return info.ledger.thresholds.sha256 != limits.sha256
 
 
 def recounted(info: StoreInfo, damages: list[Damage], census: Census) -> StoreInfo:
-    """Facts of a store file whose topics were counted anew: it is damaged, or other thresholds are asked for.
+    """Return the facts of a store file with its topics counted again.
 
-    What only the log could tell (its clock, the order of its records, what its reader lost) stays as it was found.
+    The file is damaged, or other thresholds are asked for. What only the log could tell (its clock, the order of its
+    records, what its reader lost) stays as it was found.
     """
     counts, before = census.ledger(damages), info.ledger
     ends = broken_off(counts)
@@ -339,7 +355,7 @@ def recounted(info: StoreInfo, damages: list[Damage], census: Census) -> StoreIn
 
 
 def _with_what_the_log_told(topic: TopicEntry, before: TopicEntry | None) -> TopicEntry:
-    """A topic counted anew, with what was out of order and unreadable in the log it came from."""
+    """Return a topic counted again, with the order and losses that only its log could tell."""
     if before is None:
         return topic
     told = {kind: count for kind, count in before.losses.items() if kind != BREAKS_OFF}
@@ -348,7 +364,7 @@ def _with_what_the_log_told(topic: TopicEntry, before: TopicEntry | None) -> Top
 
 
 def damage_finding(damage: Damage) -> Finding:
-    """A finding that tells of damage in an MCAP."""
+    """Return the finding on damage in an MCAP."""
     text = f"{damage.what}: {damage.count} at {damage.place}"
     severity: Severity = "warn" if damage.loses_data else "info"
     return Finding(severity, f"store.{damage.kind}", text, damage.topic, damage.place, damage.count)

@@ -1,8 +1,11 @@
-"""How many processes work at once."""
+"""Number of processes that work at once."""
 
 import os
 
 
 def cores() -> int:
-    """How many processes run at once unless somebody says otherwise: the cores that this process may use."""
+    """Return the number of processes that run at once by default.
+
+    It is the number of cores that this process may use.
+    """
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

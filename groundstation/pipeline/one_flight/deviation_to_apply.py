@@ -1,4 +1,4 @@
-"""What ``run --apply`` asks for: the deviation of another flight, or the flight's own."""
+"""Deviation that ``run --apply`` asks for: that of another flight, or the flight's own."""
 
 import hashlib
 import json
@@ -22,7 +22,7 @@ EXPECTED = f"{OWN}, a flight folder, its {SUMMARY} or a {DEVIATION_CSV}"
 
 @dataclass(frozen=True)
 class Apply:
-    """What ``--apply`` asks for; plain values, so that it travels to worker processes.
+    """Value of ``--apply`` as plain values, so that it travels to worker processes.
 
     ``deviation`` is None where it is to be the flight's own; ``sha256`` is of the file that another's was read from.
     """
@@ -31,14 +31,14 @@ class Apply:
     sha256: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for the manifest: whose it is."""
+        """Return plain values for the manifest: whose it is."""
         if self.deviation is None:
             return {"from": OWN}
         return {"from": self.deviation.flight_id, "sha256": self.sha256}
 
 
 def asked_for(text: str) -> Apply | None:
-    """What stands behind ``--apply``; None where it is empty.
+    """Return the deviation that the text of ``--apply`` asks for; None where it is empty.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""One log from beginning to end: MCAP, answers, recording and report in a folder of its own."""
+"""Run of one log into a folder of its own: MCAP, answers, recording and report."""
 
 import os
 import secrets
@@ -63,12 +63,12 @@ class Stopwatch:
 
 
 def run_flight(job: Job, listen: Listener = silent) -> Outcome:
-    """Run one log into a partial folder in ``out``; the caller moves it into place (see :func:`place`).
+    """Run one log into a partial folder in ``out``.
 
-    A log that cannot be read or computed gives an outcome with the reason, never an exception: one bad log never
-    stops the others. Nor does one part of a flight that fails by a defect (an analysis, a figure, a tab) stop the rest
-    of it: the flight is then incomplete, and a finding says what it lacks. Of a log with several power-ups each has its
-    own folder, those behind the first in ``more``.
+    The caller moves it into place (see :func:`place`). A log that cannot be read or computed gives an outcome with the
+    reason, never an exception: one bad log never stops the others. Nor does one part of a flight that fails by a defect
+    (an analysis, a figure, a tab) stop the rest of it: the flight is then incomplete, and a finding says what it lacks.
+    Of a log with several power-ups each has its own folder, those behind the first in ``more``.
     """
     watch = Stopwatch(listen, job.path.name)
     try:
@@ -87,7 +87,10 @@ def run_flight(job: Job, listen: Listener = silent) -> Outcome:
 
 
 def _run_log(log: Log, version: Version, job: Job, watch: Stopwatch) -> Outcome:
-    """Run a log, or one power-up of it, into a partial folder; of a log with several each into its own."""
+    """Run a log, or one power-up of it, into a partial folder.
+
+    Each power-up goes into its own.
+    """
     partial = partial_folder(job.out)
     try:
         with gathered_failures():
@@ -118,20 +121,23 @@ def _failed(job: Job, error: Exception, watch: Stopwatch, log: Log | None = None
 
 
 def partial_folder(out: Path) -> Path:
-    """Make a folder in ``out`` for unfinished work, open to whom the user's mask leaves it."""
+    """Make a folder in ``out`` for unfinished work, with the permissions of the user's mask."""
     partial = out / f"{PARTIAL_PREFIX}{secrets.token_hex(8)}"
     partial.mkdir()
     return partial
 
 
 def _version(path: Path) -> tuple[int, int]:
-    """What tells that a file was written to: time and size."""
+    """Return time and size of a file, which change when it is written to."""
     found = path.stat()
     return found.st_mtime_ns, found.st_size
 
 
 def _require_unchanged(log: Log, version: Version) -> None:
-    """Refuse a log that was written to while it was read: the digest is not of what was converted."""
+    """Refuse a log that was written to while it was read.
+
+    Its digest is not that of what was converted.
+    """
     digests = log.digests or (log.source.sha256,)
     for path, before, sha256 in zip(log.parts or (log.path,), version, digests, strict=True):
         if _version(path) != before and (log.is_store or digest_of(path) != sha256):
@@ -139,7 +145,10 @@ def _require_unchanged(log: Log, version: Version) -> None:
 
 
 def _run(log: Log, version: Version, job: Job, partial: Path, watch: Stopwatch) -> Outcome | tuple[Log, ...]:
-    """Run one flight into a folder; of a log with several power-ups nothing is run, they are told."""
+    """Run one flight into a folder.
+
+    For a log with several power-ups nothing is run; a log for each is returned.
+    """
     from groundstation.results.files import put_failures, save
 
     mcap = partial / "flight.mcap"
@@ -198,7 +207,7 @@ def _run(log: Log, version: Version, job: Job, partial: Path, watch: Stopwatch) 
 
 
 def _parts(log: Log, job: Job, path: str, converted: Converted, flight: Flight) -> tuple[PartOfRun, ...]:
-    """The consecutive logs of a flight, with what tells whether another one goes on from it.
+    """Return the consecutive logs of a flight, with the facts that show which one goes on.
 
     Raises
     ------
@@ -224,14 +233,17 @@ def _parts(log: Log, job: Job, path: str, converted: Converted, flight: Flight) 
 
 
 def _power_up(log: Log, job: Job) -> PowerUpOfRun | None:
-    """Which of several power-ups in its log a flight is."""
+    """Return which power-up of its log a flight is, None for a log with one."""
     if log.segment is not None:
         return PowerUpOfRun(log.segment.number, log.segment.count)
     return job.finished.power_up if job.step == "analysis" and job.finished is not None else None
 
 
 def _show(partial: Path, flight: Flight, results: FlightResults, job: Job, watch: Stopwatch) -> str:
-    """Write the recording and the reports of saved results, where they are asked for; returns what went wrong."""
+    """Write the recording and the reports of saved results, where asked for.
+
+    Returns what went wrong.
+    """
     if job.only_results:
         return _export(partial)
     with watch.stage("recording"):
@@ -253,7 +265,7 @@ def _export(folder: Path) -> str:
 
 
 def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
-    """The outcome of a flight that is finished, its reports made again where that is asked for."""
+    """Return the outcome of a finished flight, its reports made again where asked for."""
     from groundstation.results.files import put_failures
 
     problem = ""
@@ -292,7 +304,7 @@ def report_finished(folder: Path, *, with_page: bool, with_pdf: bool) -> str:
 
 
 def _taken_over(finished: Finished, target: Path) -> Converted:
-    """The MCAP of a finished flight, as if it had just been converted."""
+    """Return the MCAP of a finished flight, as if just converted."""
     from groundstation.store.reader import read_info
 
     try:
@@ -304,13 +316,13 @@ def _taken_over(finished: Finished, target: Path) -> Converted:
 
 
 def given_of(log: Log, converted: Converted, identity: str) -> Given:
-    """What is known of a converted log before anything is estimated."""
+    """Return the facts of a converted log before anything is estimated."""
     info = converted.info
     return Given(identity, log.source, info.ledger, info.clock, converted.findings, converted.has_lost_data)
 
 
 def read_flight(mcap: Path, converted: Converted) -> Flight:
-    """Tables of an MCAP that was just written."""
+    """Return tables of an MCAP that was just written."""
     from groundstation.store.reader import read
     from groundstation.tables.assemble import flight_from_batches
 
@@ -320,7 +332,7 @@ def read_flight(mcap: Path, converted: Converted) -> Flight:
 
 
 def state_of(findings: tuple[Finding, ...], has_lost_data: bool, fail_on: str) -> State:
-    """State of a run from its findings and whether data was lost."""
+    """Return the state of a run from its findings and whether data was lost."""
     if is_incomplete(findings):
         return "incomplete"
     gravest = worst(findings)
@@ -343,7 +355,7 @@ def sentence(results: FlightResults) -> str:
 
 
 def is_made(name: str, identity: str) -> bool:
-    """Whether a run makes that file of a flight folder; anything else in it is somebody's own.
+    """Tell whether a run makes that file of a flight folder; any other file is the user's.
 
     Examples
     --------
@@ -355,12 +367,18 @@ def is_made(name: str, identity: str) -> bool:
 
 
 def optional_files(identity: str) -> tuple[str, ...]:
-    """Files of a flight folder that not every run makes: those of an earlier one would tell of other results."""
+    """Return the files of a flight folder that not every run makes.
+
+    Left from an earlier run, they would show other results.
+    """
     return f"{identity}.rrd", REPORT, PDF, DEVIATION_CSV, STEER_CARD, corrected_name(identity)
 
 
 def remove(folder: Path) -> None:
-    """Remove a flight folder; where something else is in it, what a run made of it, its marks first."""
+    """Remove a flight folder.
+
+    Where it holds foreign files, only the run's own files are removed, its marks first.
+    """
     if all(is_made(entry.name, folder.name) for entry in folder.iterdir()):
         shutil.rmtree(folder.rename(folder.with_name(f"{PARTIAL_PREFIX}{folder.name}")))  # a kill leaves no part of it
         return
@@ -372,7 +390,10 @@ def remove(folder: Path) -> None:
 
 
 def place(partial: Path, target: Path) -> None:
-    """Move a finished flight folder into place; of a folder that is there, only what a run makes is replaced."""
+    """Move a finished flight folder into place.
+
+    In a folder that exists, only the files of a run are replaced.
+    """
     if not target.exists():
         partial.rename(target)
         return

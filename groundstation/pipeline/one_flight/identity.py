@@ -1,4 +1,4 @@
-"""Names of flights: the folder and file name a flight gets, from what the log itself says."""
+"""Names of flights: folder and file name, from the content of the log."""
 
 import hashlib
 import re
@@ -14,7 +14,7 @@ NOTIME = "NOTIME"
 
 
 def sha256_of(*paths: Path) -> str:
-    """SHA-256 of a file, hexadecimal; of several as of one that holds them in this order."""
+    """Return the SHA-256 of a file, hexadecimal; of several as of their concatenation."""
     digest = hashlib.sha256()
     for path in paths:
         with open_to_read(path) as stream:
@@ -23,7 +23,9 @@ def sha256_of(*paths: Path) -> str:
 
 
 def safe_part(text: str) -> str:
-    """Text made fit for a file name: other characters than A-Z a-z 0-9 _ - become ``-``, runs are joined.
+    """Return text fit for a file name.
+
+    Characters other than A-Z a-z 0-9 _ - become ``-``, runs are joined.
 
     Examples
     --------
@@ -37,7 +39,9 @@ def safe_part(text: str) -> str:
 def flight_id(
     start_utc_ns: int | None, metadata: Mapping[str, str], sha256: str, power_up: int = 0, *, add_suffix: bool = False
 ) -> str:
-    """Name of a flight: ``20260504T060000Z_<aircraft>_<flight>``, or ``NOTIME_<sha8>`` without absolute time.
+    """Return the name of a flight: ``20260504T060000Z_<aircraft>_<flight>``.
+
+    Without absolute time it is ``NOTIME_<sha8>``.
 
     Parameters
     ----------
@@ -61,7 +65,7 @@ def flight_id(
 
 
 def plain_id(identity: str, sha256: str) -> str:
-    """Name of a flight without the digest that it got because another had the same name.
+    """Return the name of a flight without the digest that keeps it apart from another.
 
     Examples
     --------

@@ -1,4 +1,7 @@
-"""Times as users write them: flight seconds, +mm:ss or ISO UTC, turned into flight seconds."""
+"""Times as users write them, turned into flight seconds.
+
+Flight seconds, +mm:ss or ISO UTC.
+"""
 
 import math
 import re
@@ -14,7 +17,7 @@ _CLOCK = re.compile(r"\+?(?:(\d+):)?(\d+):(\d+(?:\.\d*)?)$")
 
 
 def flight_seconds(text: str, start_ns: int, has_utc: bool) -> float:
-    """Flight seconds of a time as a user writes it.
+    """Return flight seconds of a time as a user writes it.
 
     Raises
     ------
@@ -58,7 +61,7 @@ class HasEnds(Protocol):
 
 
 def seconds_of(flight: Flight, intervals: Sequence[HasEnds]) -> tuple[tuple[float, float], ...]:
-    """Intervals as pairs of flight seconds.
+    """Return intervals as pairs of flight seconds.
 
     Raises
     ------

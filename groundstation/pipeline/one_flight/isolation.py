@@ -1,4 +1,7 @@
-"""What a log may take when it is read apart (``--isolate``): table ``[isolation]`` of the settings."""
+"""Bounds of a log that is read in a process of its own (``--isolate``).
+
+Table ``[isolation]`` of the settings.
+"""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What a run is to do of one log; plain values, so that it travels to a worker process."""
+"""Task of a run for one log; plain values, so that it travels to a worker process."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -37,7 +37,7 @@ class Job:
 
     @property
     def log(self) -> str:
-        """Its log as the user would type it."""
+        """Log as the user would type it."""
         return self.url or str(self.path)
 
     @property
@@ -46,7 +46,10 @@ class Job:
         return self.path.name
 
     def asked(self) -> tuple[str, Keys] | None:
-        """Digest of its log and the keys of what is asked for; None when only its run can tell what is wrong."""
+        """Return the digest of the log and the keys of its settings.
+
+        None when only the run of the log can tell what is wrong.
+        """
         try:
             source = open_log(self.path, self.configuration.profile_path, self.configuration.icds).source
             return source.sha256, keys_of(source, self.configuration)
@@ -54,19 +57,19 @@ class Job:
             return None
 
     def digest(self) -> str:
-        """Digest of its log, whether it can be read or not; empty where there is none."""
+        """Return the digest of its log, whether it can be read or not; empty where there is none."""
         try:
             return digest_of(as_log(self.path))
         except OSError:
             return ""
 
     def keys_of(self, finished: Finished) -> Keys:
-        """Keys of what is asked for of a flight of several logs, which are as they were."""
+        """Return the keys of this task for a flight of several unchanged logs."""
         digests = [part.sha256 for part in finished.parts]
         return keys_of(finished.source, self.configuration, digests=digests)
 
     def of_parts(self, parts: Sequence[PartOfRun], *, add_suffix: bool = False) -> "Job":
-        """The job of running consecutive logs as one flight."""
+        """Return the job of running consecutive logs as one flight."""
         first = Path(parts[0].path)
         path = self.path if self.path.absolute() == first else first
         return replace(
@@ -81,7 +84,7 @@ class Job:
         )
 
     def going_on(self, finished: Finished, keys: Keys) -> "Job":
-        """The job with what is left to do of it, its flight being finished."""
+        """Return the job of what is left to do for a finished flight."""
         step = finished.step(keys, with_pdf=self.with_pdf, only_results=self.only_results)
         add_suffix = step == "analysis" and finished.has_suffix
         power_up = finished.power_up.number if finished.power_up else 0

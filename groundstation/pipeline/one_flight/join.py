@@ -1,4 +1,7 @@
-"""Several logs of one flight become one MCAP: each is converted, put on one clock, and its topics get names apart."""
+"""Several logs of one flight as one MCAP.
+
+Each is converted and put on one clock, and its topics get names of their own.
+"""
 
 import hashlib
 import json
@@ -40,7 +43,10 @@ OF_THE_AIRCRAFT = ("aircraft", "flight", "start_utc")  # taken from another log 
 
 @dataclass(frozen=True)
 class _Part:
-    """One log, converted: its MCAP, its tables, and how its clock stands to that of the flight (None: it is that)."""
+    """One log, converted: its MCAP, its tables, and its clock against that of the flight.
+
+    ``relation`` is None for the log whose clock is that of the flight.
+    """
 
     label: str
     log: Log
@@ -50,21 +56,21 @@ class _Part:
     relation: LogRelation | None = None
 
     def name(self, topic: str) -> str:
-        """Name of one of its topics in the flight."""
+        """Return the name of one of its topics in the flight."""
         return f"{topic}.{self.label}" if self.label and topic else topic
 
     def time_ns(self, own_ns: Int64Array) -> Int64Array:
-        """Its times on the clock of the flight."""
+        """Return its times on the clock of the flight."""
         return own_ns if self.relation is None else self.relation.first_time_ns(own_ns)
 
     @property
     def start_ns(self) -> int:
-        """Its first sample on the clock of the flight."""
+        """Time of its first sample on the clock of the flight."""
         return int(self.time_ns(np.array([self.timed.flight.start_ns]))[0])
 
 
 def joined_name(logs: Sequence[Log]) -> str:
-    """Name of a flight of several logs."""
+    """Return the name of a flight of several logs."""
     return " + ".join(log.source.name for log in logs)
 
 
@@ -172,7 +178,10 @@ def _require_different(logs: Sequence[Log], left_out: int) -> None:
 def _converted(
     logs: Sequence[Log], folder: Path, limits: Thresholds, settings: TwoClocksSettings | None
 ) -> tuple[list[_Part], list[Damage]]:
-    """The logs that can be read, the first of them without a label, and a damage for each of the others."""
+    """Convert the logs that can be read, and return a damage for each of the others.
+
+    The first log has no label.
+    """
     parts: list[_Part] = []
     left_out: list[Damage] = []
     error: GroundstationError | None = None
@@ -203,7 +212,7 @@ def _told_left_out(left_out: Sequence[Damage]) -> Iterator[Finding]:
 
 
 def _alone(part: _Part, target: Path, left_out: Sequence[Damage]) -> StoreInfo:
-    """The MCAP of the one log that is left, as it is without the others but for what is told of them."""
+    """Write the MCAP of the only log that could be read, with findings on the others."""
     from groundstation.store.reader import read
     from groundstation.store.writer import StoreWriter
 
@@ -246,7 +255,7 @@ def _written(
 
 
 class _Mover:
-    """Yields the batches of a log with their times on the flight's clock and their topics' names in it."""
+    """Source of a log's batches, with times on the flight's clock and names in the flight."""
 
     def __init__(self, part: _Part) -> None:
         self._part = part
@@ -254,7 +263,10 @@ class _Mover:
         self.reordered = 0
 
     def batches(self) -> Iterator[RecordBatch]:
-        """Times of a topic never decrease: where a stretch begins with a step back, records wait for those before."""
+        """Yield batches whose times never decrease within a topic.
+
+        Where a stretch begins with a step back, records get the time of those before.
+        """
         from groundstation.store.reader import read
 
         part = self._part
@@ -271,7 +283,10 @@ class _Mover:
 
 
 def _renamed(part: _Part, of_clock: StoreInfo, start_ns: int) -> StoreInfo:
-    """Facts of a log with its topics' names in the flight, and places in time by the flight's clock."""
+    """Return the facts of a log with its topics' names in the flight.
+
+    Places in time are by the flight's clock.
+    """
     info = part.converted.info
     shift_s = (part.start_ns - start_ns) / NS_PER_S
     clock, log = ClockModel(is_absolute=of_clock.has_utc), part.log.source.name
@@ -347,7 +362,10 @@ def _merged(
 
 
 def _metadata(parts: Sequence[_Part], joining: Joining) -> dict[str, str]:
-    """What the first log says, what the others say under their labels, and how they were joined."""
+    """Return the metadata of all logs, and how they were joined.
+
+    The first log's keys stay as they are, the others' are under their labels.
+    """
     found = dict(parts[0].converted.info.metadata)
     for part in parts[1:]:
         for key, value in part.converted.info.metadata.items():
@@ -418,7 +436,7 @@ def _findings(joined: Sequence[JoinedLog]) -> Iterator[Finding]:
 
 
 def joined_text(log: JoinedLog) -> str:
-    """How a log was joined, in one line."""
+    """Return in one line how a log was joined."""
     longest = max(log.stretches, key=lambda one: one.end_s - one.start_s)
     if longest.half_width95_s is None:
         return f"{log.source_name} is joined by {log.reason}"

@@ -1,4 +1,4 @@
-"""One way to open whatever a user names: a recorded log, or an MCAP that groundstation wrote."""
+"""Log of any kind that a user names: a recorded log, or an MCAP from groundstation."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -52,7 +52,7 @@ class Log:
         return self.segment.of_store(items) if self.is_store else self.segment.of_log(items)
 
     def only(self, segment: Segment, whole: "Replay | None" = None) -> "Log":
-        """The log as if there were but one of its power-ups."""
+        """Return the log as if it held only one of its power-ups."""
         return replace(self, segment=segment, whole=whole)
 
     def _whole_items(self) -> Iterator[Item]:
@@ -69,7 +69,7 @@ class Log:
         return read_log(self._file, self.profile, self.loaded_icds)
 
     def info(self) -> "StoreInfo":
-        """Facts of an MCAP, or of the one power-up in it that is read."""
+        """Return facts of an MCAP, or of the one power-up in it that is read."""
         from groundstation.store.reader import read_info
 
         if self.segment is not None and self.segment.info is not None:
@@ -77,7 +77,7 @@ class Log:
         return read_info(self.path)
 
     def replay(self) -> "Replay":
-        """The items for two passes; of a file that is larger than what may be kept, nothing is."""
+        """Return the items for two passes; those of a large file are not kept."""
         is_small = self.source.size_bytes <= REPLAY_LIMIT_BYTES and self.whole is None
         return Replay(self.items, REPLAY_LIMIT_BYTES if is_small else 0)
 
@@ -92,7 +92,7 @@ class Log:
 
     @cached_property
     def _file(self) -> "LogFile":
-        """The file as readers see it: a compressed one is decompressed once, however often it is read."""
+        """File as readers see it; a compressed one is decompressed once, however often it is read."""
         from groundstation.readers.source import Source as LogFile
 
         if not self.parts:
@@ -103,24 +103,30 @@ class Log:
 
 
 def as_log(path: Path) -> Path:
-    """The file by which a log is opened: of a folder that is a bag of ROS 2 its metadata, else the path itself."""
+    """Return the file by which a log is opened: the path itself, or a ROS 2 bag's metadata.
+
+    The metadata for the folder of a bag.
+    """
     from groundstation.readers.bags.bag import METADATA, is_bag_folder
 
     return path / METADATA if path.is_dir() and is_bag_folder(path) else path
 
 
 def log_name(path: Path) -> str:
-    """Name of a log: that of its file, or of the folder that is a bag of ROS 2."""
+    """Return the name of a log: that of its file, or of the folder that is a bag of ROS 2."""
     return path.resolve().parent.name if _is_metadata(path) else path.name
 
 
 def digest_of(path: Path) -> str:
-    """SHA-256 of a log, over all its files."""
+    """Return the SHA-256 of a log, over all its files."""
     return sha256_of(*_files_of(path))
 
 
 def _files_of(path: Path) -> tuple[Path, ...]:
-    """The files of a log: of a bag of ROS 2 its metadata and what that names; a file that is read along with it."""
+    """Return the files of a log, including files that are read along with it.
+
+    A ROS 2 bag has its metadata and the files named there.
+    """
     from groundstation.readers.bags.bag import files_of
     from groundstation.readers.sbet import accuracies_beside
 
@@ -135,7 +141,9 @@ def _is_metadata(path: Path) -> bool:
 
 
 def open_log(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()) -> Log:
-    """Find out who can read a file. ``icds``, files or names, tell what the words of its buses mean.
+    """Find the reader of a file and open it.
+
+    ``icds``, files or names, tell what the words of its buses mean.
 
     Raises
     ------
@@ -162,7 +170,9 @@ def open_log(path: Path, profile: Path | None = None, icds: tuple[str, ...] = ()
 
 
 def open_parts(paths: Sequence[Path], profile: Path | None = None, icds: tuple[str, ...] = ()) -> Log:
-    """Find out who can read consecutive files of one recording as one; the first tells it.
+    """Find the reader of consecutive files of one recording and open them as one.
+
+    The first file decides.
 
     Raises
     ------
@@ -184,7 +194,7 @@ def open_parts(paths: Sequence[Path], profile: Path | None = None, icds: tuple[s
 
 
 def parts_name(names: Sequence[str]) -> str:
-    """Name of what several files are together.
+    """Return the name of several files together.
 
     Examples
     --------
@@ -195,7 +205,10 @@ def parts_name(names: Sequence[str]) -> str:
 
 
 def _is_store(path: Path, profile: Path | None) -> bool:
-    """Whether the store reads a file: an MCAP of ours, unless another log has but a part of one spliced into it."""
+    """Tell whether the store reads a file: an MCAP of ours.
+
+    A log that has only a part of one spliced into it does not count.
+    """
     from groundstation.readers.registry import identify
     from groundstation.store.recognition import is_groundstation_mcap, is_mostly_mcap
 
@@ -211,7 +224,9 @@ def _is_store(path: Path, profile: Path | None) -> bool:
 
 
 class Replay:
-    """Items of a log that are wanted twice: kept while they are small, read again when they are not.
+    """Items of a log that are needed twice.
+
+    Small logs are kept in memory, large ones read again.
 
     Examples
     --------

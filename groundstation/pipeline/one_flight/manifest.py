@@ -1,4 +1,7 @@
-"""manifest.json: when, where and with what a run was made; everything that may differ between two equal runs."""
+"""manifest.json: when, where and with what a run was made.
+
+Everything that may differ between two equal runs.
+"""
 
 import platform
 import sys
@@ -22,7 +25,9 @@ def manifest_of(
     power_up: PowerUpOfRun | None = None,
     parts: Sequence[PartOfRun] = (),
 ) -> Manifest:
-    """Describe a run of a flight, a session or a plan: source, settings, versions, host and time.
+    """Describe a run of a flight, a session or a plan.
+
+    Source, settings, versions, host and time.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What became of one log of a run, for the totals line, the index and the exit code."""
+"""Outcome of one log of a run, for the totals line, the index and the exit code."""
 
 import traceback
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ WORST_FIRST = (1, 4, 3, 0)
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one log, or of a session of several.
+    """Outcome of one log, or of a session of several.
 
     Parameters
     ----------
@@ -48,13 +48,13 @@ class Outcome:
     failures : tuple of Failure
         The parts that failed.
     is_beside : bool
-        Whether it is of what stands beside the flights, and of no log: the index, the page of all, another store.
+        Whether it is the outcome of no log, but of the index, the page of all flights, or another store.
     power_up : int
         Which of several power-ups in the log, from 1; 0 where the log holds one.
     more : tuple of Outcome
-        What became of the others.
+        Outcomes of the other power-ups.
     parts : tuple of PartOfRun
-        The consecutive logs of the flight: where a log begins and ends tells whether another one goes on from it.
+        The consecutive logs of the flight: their ends show whether another log continues it.
     """
 
     source: str
@@ -80,7 +80,10 @@ class Outcome:
 
 
 def reason_of(name: str, error: Exception) -> tuple[str, str]:
-    """Why a log failed, in one line, and where an error that is ours to mend came from (empty for the others)."""
+    """Return why a log failed, in one line, and the trace of an error that is our defect.
+
+    The trace is empty for other errors.
+    """
     if isinstance(error, GroundstationError):
         return str(error), ""
     if isinstance(error, OSError) and not lack_of_memory(error):
@@ -91,7 +94,7 @@ def reason_of(name: str, error: Exception) -> tuple[str, str]:
 
 
 def worst_code(outcomes: "tuple[Outcome, ...]") -> int:
-    """Exit code of several logs: the worst wins, in the order 1, 4, 3, 0.
+    """Return the exit code of several logs: the worst wins, in the order 1, 4, 3, 0.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Consecutive logs of one flight: where each begins and ends, and whether one goes on from another."""
+"""Consecutive logs of one flight: their ends, and which one continues another."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -29,7 +29,7 @@ _PLACES = ("latitude_deg", "longitude_deg")
 
 
 def part_of(log: Log, path: str, reader: str, flight: Flight) -> PartOfRun:
-    """Where a converted log begins and ends.
+    """Return beginning and end of a converted log.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def part_of(log: Log, path: str, reader: str, flight: Flight) -> PartOfRun:
 
 
 def _zero_ns(tables: Iterable[Table], at: int) -> int:
-    """Corrected time less the device's own at one end, as most topics have it."""
+    """Return corrected time minus the device's own at one end, the median of the topics."""
     zeros = [
         int(table.time_ns[at] - table.device_time_ns.values[at]) for table in tables if table.device_time_ns.mask[at]
     ]
@@ -68,7 +68,7 @@ def _zero_ns(tables: Iterable[Table], at: int) -> int:
 
 
 def _places(flight: Flight) -> tuple[tuple[float, float], ...]:
-    """Latitude and longitude at both ends, of the first topic that tells them."""
+    """Return latitude and longitude at both ends, of the first topic that tells them."""
     for topic in (*topics_of_kind("gnss", flight.topics()), *topics_of_kind("ins", flight.topics())):
         table = flight[topic]
         if not all(name in table for name in _PLACES):
@@ -81,7 +81,7 @@ def _places(flight: Flight) -> tuple[tuple[float, float], ...]:
 
 
 def goes_on(before: PartOfRun, behind: PartOfRun, *, is_beside: bool) -> bool:
-    """Whether a log goes on from another one.
+    """Tell whether a log continues another one.
 
     Parameters
     ----------
@@ -101,14 +101,20 @@ def goes_on(before: PartOfRun, behind: PartOfRun, *, is_beside: bool) -> bool:
 
 
 def gap_ns(before: PartOfRun, behind: PartOfRun) -> int:
-    """Time from the last record of a log to the first of another, by UTC where both have it, else by the device."""
+    """Return the time from the last record of a log to the first of another.
+
+    The clock is UTC where both have it, else the device's.
+    """
     if before.utc_ns is not None and behind.utc_ns is not None:
         return behind.utc_ns[0] - before.utc_ns[1]
     return behind.device_ns[0] - before.device_ns[1]
 
 
 def _is_near(before: PartOfRun, behind: PartOfRun, gap_s: float) -> bool:
-    """Whether a log begins where another one ended, as far as both tell it."""
+    """Tell whether a log begins at the place where another one ended.
+
+    True where one of them has no position.
+    """
     if not before.places_deg or not behind.places_deg:
         return True
     north_m, east_m = north_east_m(*behind.places_deg[0], *before.places_deg[-1])
@@ -116,7 +122,7 @@ def _is_near(before: PartOfRun, behind: PartOfRun, gap_s: float) -> bool:
 
 
 def family(name: str) -> str:
-    """What names of consecutive files have in common.
+    """Return the common part of the names of consecutive files.
 
     Examples
     --------
@@ -127,7 +133,7 @@ def family(name: str) -> str:
 
 
 def order_of(name: str) -> tuple[tuple[int, int | str], ...]:
-    """Order of names in which numbers count as numbers.
+    """Return the sort key of a name in which numbers count as numbers.
 
     Examples
     --------
@@ -139,10 +145,10 @@ def order_of(name: str) -> tuple[tuple[int, int | str], ...]:
 
 
 def behind_it(log: Log, before: PartOfRun, path: Path) -> PartOfRun | None:
-    """What a file that cannot be read alone has behind a log: where it begins and ends on the device's clock.
+    """Return the span of a file that cannot be read alone, on the clock of the log before it.
 
-    Its first and last bytes are read behind the beginning of the log, which has what they lack: a header, definitions.
-    None where they are not of the same recording.
+    The span is that of the device's clock. Its first and last bytes are read behind the beginning of the log, which has
+    what they lack: a header, definitions. None where they are not of the same recording.
 
     Parameters
     ----------
@@ -184,7 +190,7 @@ def behind_it(log: Log, before: PartOfRun, path: Path) -> PartOfRun | None:
 
 
 def _tail(file: "LogFile") -> bytes:
-    """The last bytes of a file."""
+    """Return the last bytes of a file."""
     with file.open() as stream:
         stream.seek(max(0, file.size - _LOOKED_AT))
         return stream.read()
@@ -197,12 +203,12 @@ def _read(log: Log, source: "LogFile") -> Iterator[Item]:
 
 
 def _last_index(log: Log, source: "LogFile") -> int:
-    """The last record of some bytes."""
+    """Return the index of the last record in some bytes."""
     return max((int(item.record_index[-1]) for item in _read(log, source) if isinstance(item, RecordBatch)), default=-1)
 
 
 def _times(log: Log, source: "LogFile", own: int) -> Sequence[Int64Array]:
-    """Device times of the records of some bytes behind the record ``own``, in their order."""
+    """Return device times of the records after record ``own`` in some bytes, in order."""
     index, time = [], []
     for item in _read(log, source):
         if isinstance(item, RecordBatch):

@@ -1,4 +1,4 @@
-"""Progress of a run, told as events: the pipeline says what happens, the command line decides how to show it."""
+"""Progress of a run as events: the pipeline sends them, the command line shows them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""A reference beside a log: any file that a reader knows, put on the flight's clock by UTC and kept as ``truth``."""
+"""Reference beside a log: any file that a reader knows.
+
+It is put on the flight's clock by UTC and kept as ``truth``.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -32,9 +35,10 @@ _FIELDS = frozenset(one.name for one in TOPICS[TRUTH])
 
 @dataclass(frozen=True)
 class Reference:
-    """A file that may judge a flight: its best topic, on UTC or on seconds of a GPS week that the flight must tell.
+    """File that may judge a flight, with its best topic.
 
-    ``damages`` are what its reader could not read.
+    Its times are UTC, or seconds of a GPS week that the flight must tell. ``damages`` are what its reader could not
+    read.
     """
 
     name: str
@@ -46,21 +50,21 @@ class Reference:
 
     @property
     def facts(self) -> Mapping[str, str]:
-        """What is kept of it in the metadata of a flight."""
+        """Facts about it for the metadata of a flight."""
         told = {"source_name": self.name, "sha256": self.sha256, "reader": self.reader, "topic": self.table.topic}
         return {FACTS + name: value for name, value in told.items()}
 
 
 @dataclass(frozen=True)
 class Laid:
-    """A reference on the clock of a flight: batches of ``truth``, facts for the metadata, findings."""
+    """Reference on the clock of a flight: batches of ``truth``, metadata, findings."""
 
     batches: tuple[RecordBatch, ...] = ()
     facts: Mapping[str, str] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
 
     def within(self, start_ns: int, end_ns: int) -> "Laid":
-        """What it has between two times, both included."""
+        """Return its part between two times, both included."""
         parts = []
         for batch in self.batches:
             assert batch.time_ns is not None, "a reference is on the flight's clock"
@@ -70,7 +74,7 @@ class Laid:
 
 
 def laid_beside(log_name: str, span_ns: tuple[int, int], has_utc: bool, references: References) -> Laid:
-    """Find the reference of a flight and put it on its clock; nothing where no file is given.
+    """Find the reference of a flight and put it on its clock; empty where no file is given.
 
     Parameters
     ----------
@@ -120,7 +124,10 @@ def laid_beside(log_name: str, span_ns: tuple[int, int], has_utc: bool, referenc
 
 
 def _of_its_time(path: Path, span_ns: tuple[int, int]) -> "Table | None":
-    """What a file has of the time of a log, on UTC; a file of another time is not read again for it."""
+    """Return the part of a reference at the time of a log, on UTC; None without one.
+
+    A file of another time is not read a second time.
+    """
     ends_ns, is_weekly = _ends_of(*_as_it_stands(path))
     spans = [_utc_of_week(week, ends_ns) for week in _weeks_about(span_ns)] if is_weekly else [ends_ns]
     if not any(first <= span_ns[1] and last >= span_ns[0] for first, last in spans):
@@ -176,7 +183,7 @@ def load_reference(path: Path) -> Reference:
 
 
 def _as_it_stands(path: Path) -> tuple[Path, int, int]:
-    """A file with the time of its last change and its size."""
+    """Return a file with the time of its last change and its size."""
     try:
         status = path.stat()
     except OSError as error:
@@ -186,7 +193,7 @@ def _as_it_stands(path: Path) -> tuple[Path, int, int]:
 
 @cache
 def _ends_of(path: Path, time_ns: int, size: int) -> tuple[Int64Array, bool]:
-    """First and last time of a file, shape (2,), and whether they are of a GPS week."""
+    """Return first and last time of a file, shape (2,), and whether they are of a GPS week."""
     reference = _load(path, time_ns, size)
     times_ns = reference.table.time_ns
     return np.array([times_ns.min(), times_ns.max()]), reference.is_weekly
@@ -214,7 +221,10 @@ def _load(path: Path, _time_ns: int, _size: int) -> Reference:
 
 
 def _read(log: Log) -> "tuple[Flight, tuple[Damage, ...], bool]":
-    """Tables of the canonical topics of a log, what of it is damaged, whether its times are UTC."""
+    """Read the tables of the canonical topics of a log.
+
+    Returns its damage too, and whether its times are UTC.
+    """
     from groundstation.integrity.ordering import corrected
     from groundstation.integrity.survey import survey
     from groundstation.store.reader import read_info
@@ -241,9 +251,10 @@ def _read(log: Log) -> "tuple[Flight, tuple[Damage, ...], bool]":
 
 
 def best_topic(flight: "Flight") -> str:
-    """The topic of a log that judges best: its truth, an INS that GNSS corrects, GNSS, then what there is.
+    """Return the topic of a log that judges best.
 
-    An INS left alone drifts; with GNSS in the same file GNSS is the reference.
+    Its truth, else an INS that GNSS corrects, else GNSS, else any. An INS left alone drifts; with GNSS in the same file
+    GNSS is the reference.
     """
     topics = [topic for topic in flight.topics() if len(flight[topic])]
     with_place = [topic for topic in topics if flight[topic].has(*POSITION)]
@@ -264,7 +275,7 @@ def _is_aided(flight: "Flight", topic: str) -> bool:
 
 
 def _on_utc(reference: Reference, span_ns: tuple[int, int]) -> "Table":
-    """The table on UTC; of seconds of a week, in the week in which it overlaps the log most."""
+    """Return the table on UTC; seconds of a week go to the week that overlaps the log most."""
     if not reference.is_weekly:
         return reference.table
     tables = [
@@ -274,7 +285,7 @@ def _on_utc(reference: Reference, span_ns: tuple[int, int]) -> "Table":
 
 
 def _weeks_about(span_ns: tuple[int, int]) -> tuple[int, ...]:
-    """GPS weeks in which a log may lie: that of its middle, and those beside it."""
+    """Return GPS weeks in which a log may lie: that of its middle, and those beside it."""
     middle_ns = (span_ns[0] + span_ns[1]) // 2
     week = (middle_ns + leap_seconds_at(middle_ns) * NS_PER_S - GPS_EPOCH_NS) // WEEK_NS
     return week, week - 1, week + 1
@@ -286,5 +297,8 @@ def _utc_of_week(week: int, week_ns: Int64Array) -> Int64Array:
 
 
 def _cropped(table: "Table", span_ns: tuple[int, int]) -> "Table":
-    """What of a reference is of the time of the log: the flight begins and ends with what was recorded."""
+    """Return the part of a reference at the time of the log.
+
+    The flight begins and ends with what was recorded.
+    """
     return table.take((table.time_ns >= span_ns[0]) & (table.time_ns <= span_ns[1]))

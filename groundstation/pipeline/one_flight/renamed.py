@@ -1,4 +1,7 @@
-"""An MCAP whose bus words are named by other ICDs: it is read as the log that it came from, without the log."""
+"""MCAP whose bus words are named by other ICDs.
+
+It is read as the log that it came from, without the log.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -15,7 +18,7 @@ from groundstation.store.reader import read, read_info
 
 
 def items_named(path: Path, icds: Sequence[Icd]) -> Iterator[Item]:
-    """Items of the log that an MCAP was made of, its bus words named anew.
+    """Return the items of the log behind an MCAP, with other names for its bus words.
 
     Signals that other ICDs gave are left out; times are those of the recorder again.
     """
@@ -42,7 +45,10 @@ def items_named(path: Path, icds: Sequence[Icd]) -> Iterator[Item]:
 
 
 def _zeros(batch: RecordBatch, segments: Sequence[Segment]) -> tuple[Int64Array, Int64Array]:
-    """Places of the records that have both times, and UTC of the recorder's zero by them; no UTC, no zero."""
+    """Return the records that have both times, and the UTC of the recorder's zero by them.
+
+    Records of power-ups without UTC are left out.
+    """
     index, timed = batch.record_index, batch.device_time_ns.mask
     for one in segments:
         if not one.has_utc:

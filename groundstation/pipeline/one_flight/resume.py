@@ -1,8 +1,9 @@
-"""What a run need not do again. A flight's manifest keeps a key for each stage; equal keys, equal results.
+"""Resumption of a run: a flight's manifest keeps a key for each stage.
 
-A key is a digest of everything that goes into a stage: the content of the log and of its profile, the settings that the
-stage reads, and the versions. The conversion reads the thresholds, the analysis everything else that a user sets. The
-reports of finished results are asked for by their files: report.pdf only where a PDF is asked for.
+Equal keys give equal results, so that a run need not repeat the stage. A key is a digest of everything that goes into a
+stage: the content of the log and of its profile, the settings that the stage reads, and the versions. The conversion
+reads the thresholds, the analysis everything else that a user sets. The reports of finished results are asked for by
+their files: report.pdf only where a PDF is asked for.
 """
 
 import hashlib
@@ -52,7 +53,7 @@ PACKAGES = (
 
 @dataclass(frozen=True)
 class Finished:
-    """A flight folder that is whole.
+    """Flight folder that is whole.
 
     Parameters
     ----------
@@ -98,20 +99,23 @@ class Finished:
 
     @property
     def mcap(self) -> Path:
-        """Its store file."""
+        """Path of its store file."""
         return self.folder / f"{self.flight_id}.mcap"
 
     def has(self, sha256: str) -> bool:
-        """Whether a log with a digest is the flight's, or one of its parts."""
+        """Tell whether a log with a digest is the flight's, or one of its parts."""
         return sha256 == self.sha256 or any(part.sha256 == sha256 for part in self.parts)
 
     @property
     def has_suffix(self) -> bool:
-        """Whether the digest of the log was put into the id, because another flight had the same."""
+        """Tell whether the flight id ends with the digest of the log.
+
+        It does where another flight had the same id.
+        """
         return plain_id(self.flight_id, self.sha256) != self.flight_id
 
     def step(self, keys: Keys, *, with_pdf: bool, only_results: bool = False) -> Step:
-        """What has to be done for the results to be those of ``keys``.
+        """Return the step that is still to be done for the results to be those of ``keys``.
 
         A file that somebody took away, or that is not as the run left it, is made again; "pdf" is report.pdf alone.
         One that is there stays, whether it is asked for or not: it tells of these results.
@@ -142,7 +146,7 @@ class Finished:
 
 @cache
 def versions() -> Mapping[str, str]:
-    """Versions of what results depend on."""
+    """Return the versions of the packages that results depend on."""
     return MappingProxyType({"groundstation": __version__, **{name: _version(name) for name in PACKAGES}})
 
 
@@ -154,7 +158,7 @@ def _version(package: str) -> str:
 
 
 def keys_of(source: Source, configuration: Configuration, *, digests: Sequence[str] = ()) -> Keys:
-    """Keys of the run of a log: its name counts too, as it stands in the results.
+    """Return keys of the run of a log: its name counts too, as it stands in the results.
 
     ``digests`` are those of the consecutive files of one recording.
 
@@ -178,12 +182,12 @@ def keys_of(source: Source, configuration: Configuration, *, digests: Sequence[s
 
 
 def digest_of_parts(*parts: Any) -> str:
-    """The SHA-256 of what keys are made of."""
+    """Return the SHA-256 of the parts of a key."""
     return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def _layouts_of(configuration: Configuration) -> list[str]:
-    """The content of the profile, the ICDs and the references; the name of a shipped ICD.
+    """Return the content of profile, ICDs and references; the name of a shipped ICD.
 
     Whether a reference is expected counts: without one of its time a log is then refused, else it is run.
     """
@@ -199,7 +203,7 @@ def _layouts_of(configuration: Configuration) -> list[str]:
 
 
 def _content_of(file: str, expected: str) -> str:
-    """Digest of a file, of all files of a bag, and of what is read along with a reference."""
+    """Return the digest of a file, of a bag's files, and of files read with a reference."""
     try:
         return digest_of(as_log(Path(file)))
     except OSError as error:
@@ -207,9 +211,10 @@ def _content_of(file: str, expected: str) -> str:
 
 
 def finished(folder: Path, sizes: Mapping[str, int] | None = None) -> Finished | None:
-    """What a flight folder remembers; None when it is not whole, or was not made by such a run.
+    """Return the finished run that a flight folder holds.
 
-    ``sizes`` are those of its files by their path in it, where ``folder`` holds but its documents.
+    None when it is not whole, or was not made by such a run. ``sizes`` are those of its files by their path in it,
+    where ``folder`` holds but its documents.
     """
     try:
         manifest, summary = load_manifest(folder), load_document(folder)
@@ -222,7 +227,10 @@ def finished(folder: Path, sizes: Mapping[str, int] | None = None) -> Finished |
 
 
 def _not_empty(folder: Path) -> set[str]:
-    """Names of the folders and files in a folder, without those that are empty: no file of a run is."""
+    """Return the names of the folders and of the files with content in a folder.
+
+    No file of a run is empty.
+    """
     with os.scandir(folder) as entries:
         return {entry.name for entry in entries if entry.is_dir() or (entry.is_file() and entry.stat().st_size)}
 

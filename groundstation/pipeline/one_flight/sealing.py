@@ -1,4 +1,7 @@
-"""Sizes of the files of a finished flight, in its manifest: a later run compares them with what it finds."""
+"""Sizes of the files of a finished flight, in its manifest.
+
+A later run compares them with what it finds.
+"""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -15,12 +18,12 @@ SizeOf = Callable[[str], int | None]  # bytes of a file by its path in a folder;
 
 
 def seal(folder: Path, manifest: Manifest, digests: Mapping[str, str] = MappingProxyType({})) -> None:
-    """Write the manifest with the sizes of all files of a folder, and all of them through to the disk.
+    """Write the manifest with the sizes of all files of a folder, and sync all to the disk.
 
     Parameters
     ----------
     folder : Path
-        That nobody takes for finished yet.
+        A folder that does not count as finished yet.
     manifest : Manifest
     digests : mapping of str to str
         SHA-256 of some of its files, by name.
@@ -38,7 +41,7 @@ def _file_of_run(path: Path, sha256: str = "") -> FileOfRun:
 
 
 def note(folder: Path, written: Iterable[Path], removed: Iterable[str] = ()) -> None:
-    """Take down the sizes of files of a finished flight that were made again, and those that are gone.
+    """Record the sizes of files of a finished flight that were made again, and files gone.
 
     The manifest of an earlier version, which has none, stays without.
     """
@@ -54,9 +57,10 @@ def note(folder: Path, written: Iterable[Path], removed: Iterable[str] = ()) -> 
 
 
 def spoiled_files(folder: Path, manifest: Manifest, size_of: SizeOf | None = None) -> frozenset[str]:
-    """Files that are missing or not as the run left them; of one with a digest, time and size are compared first.
+    """Return files that are missing or not as the run left them.
 
-    ``size_of`` is given where the files are elsewhere: then their sizes alone are compared.
+    For a file with a digest, time and size are compared first. ``size_of`` is given where the files are elsewhere: then
+    their sizes alone are compared.
     """
     if size_of is not None:
         return frozenset(name for name, file in manifest.files.items() if size_of(name) != file.size_bytes)

@@ -1,4 +1,7 @@
-"""Power-ups that one source holds: each is a flight of its own, whether it is read from the log or from its MCAP."""
+"""Power-ups that one source holds; each is a flight of its own.
+
+Whether it is read from the log or from its MCAP.
+"""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -53,7 +56,7 @@ class Segment:
     info: StoreInfo | None = None
 
     def of_log(self, items: Iterable[Item]) -> Iterator[Item]:
-        """What the items of a log hold of it, as if nothing else were in the log."""
+        """Yield its items of a log, as if the log held nothing else."""
         for item in items:
             if isinstance(item, RecordBatch):
                 if len(part := self._cut(item)):
@@ -70,7 +73,7 @@ class Segment:
                 yield item
 
     def of_store(self, items: Iterable[Item]) -> Iterator[Item]:
-        """What the items of an MCAP hold of it, at the times of a source that holds nothing else."""
+        """Yield its items of an MCAP, at the times of a source that holds nothing else."""
         for item in items:
             if not isinstance(item, RecordBatch):
                 yield item
@@ -87,12 +90,12 @@ class Segment:
 
     @property
     def has_utc(self) -> bool:
-        """Whether its times are UTC."""
+        """Tell whether its times are UTC."""
         return self.info.has_utc if self.info is not None else self.utc_of_zero_ns is not None
 
     @property
     def finding(self) -> Finding:
-        """That a flight is one of several in its source."""
+        """Return the finding that a flight is one of several in its source."""
         text = f"power-up {self.number} of {self.count} in the file"
         if self.utc_of_zero_ns:
             text += f"; its counter's zero is {utc_ns_to_iso(self.utc_of_zero_ns)}"
@@ -101,7 +104,7 @@ class Segment:
         return Finding("info", "log.power_up", text, place=f"record {self.first}")
 
     def _cut(self, batch: RecordBatch) -> RecordBatch:
-        """The rows of a batch that belong to it."""
+        """Return the rows of a batch that belong to it."""
         inside = (batch.record_index >= self.first) & (batch.record_index < self.end)
         return batch if inside.all() else batch.take(inside)
 
@@ -114,7 +117,10 @@ class Segment:
         return replace(header, metadata=metadata, utc_of_zero_ns=self.utc_of_zero_ns, utc_readings=readings)
 
     def _is_mine(self, damage: Damage) -> bool:
-        """Whether damage belongs to it: by the records around it, else by its rows; what is cut, to the last one."""
+        """Tell whether damage belongs to it.
+
+        The records around the damage decide, else its rows; a cut belongs to the last power-up.
+        """
         if damage.between_records is not None:
             return self.first <= damage.between_records[1] - 1 < self.end or damage.between_records[1] == self.first
         if damage.kind == "truncated":
@@ -124,7 +130,7 @@ class Segment:
 
 
 def segments_of(several: Sequence[PowerUpClock]) -> tuple[Segment, ...]:
-    """The power-ups that a survey found in a log."""
+    """Return the power-ups that a survey found in a log."""
     return tuple(
         Segment(
             number,
@@ -143,7 +149,10 @@ def segments_of(several: Sequence[PowerUpClock]) -> tuple[Segment, ...]:
 
 @dataclass(frozen=True)
 class PowerUpTold:
-    """One of several power-ups in a log, for people and scripts: times are text by the clock of the log."""
+    """One of several power-ups in a log, for people and scripts.
+
+    Times are text by the clock of the log.
+    """
 
     number: int
     first_record: int
@@ -153,7 +162,7 @@ class PowerUpTold:
 
 
 def told_of(segments: Sequence[Segment], is_absolute: bool) -> tuple[PowerUpTold, ...]:
-    """The power-ups of a log as they are told; ``is_absolute``: its times are UTC."""
+    """Return the power-ups of a log as text; ``is_absolute``: its times are UTC."""
     clock = ClockModel(is_absolute=is_absolute)
     return tuple(
         PowerUpTold(one.number, one.first, clock.text(one.start_ns), clock.text(one.end_ns), one.has_utc)
@@ -162,7 +171,10 @@ def told_of(segments: Sequence[Segment], is_absolute: bool) -> tuple[PowerUpTold
 
 
 def document_of(segment: Segment, info: StoreInfo, clock: ClockModel) -> dict[str, Any]:
-    """What an MCAP keeps of a power-up: where it is, and its facts, which are those of an MCAP of it alone."""
+    """Return what an MCAP keeps of a power-up: its place and its facts.
+
+    The facts are those of an MCAP of it alone.
+    """
     return {
         "number": segment.number,
         "first_record": segment.first,
@@ -178,7 +190,10 @@ def document_of(segment: Segment, info: StoreInfo, clock: ClockModel) -> dict[st
 
 
 def segments_in(info: StoreInfo) -> tuple[Segment, ...]:
-    """The power-ups that an MCAP holds; none where it holds one, or what it has of them is damaged."""
+    """Return the power-ups that an MCAP holds.
+
+    Empty where it holds one, or where its record of them is damaged.
+    """
     documents = [one for one in info.segments if isinstance(one, Mapping)]
     try:
         found = [_segment(one, len(documents)) for one in documents]

@@ -1,1 +1,1 @@
-"""What single verbs do beside running flights."""
+"""Verbs other than ``run``."""

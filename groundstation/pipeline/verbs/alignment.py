@@ -1,4 +1,4 @@
-"""Events by which the clocks of two saved flights are aligned, read off their saved results."""
+"""Events by which the clocks of two saved flights are aligned, from saved results."""
 
 import math
 from typing import get_args
@@ -51,10 +51,10 @@ def align(a: SavedFlight, b: SavedFlight, event: Event | None, *, is_same_log: b
 
 
 def events_of(saved: SavedFlight) -> dict[Event, float]:
-    """Events of a flight that others can be aligned on, in flight seconds; ``utc`` is no moment and not among them.
+    """Return the events of a flight that others can be aligned on, in flight seconds.
 
-    The first movement follows a standstill and the lift-off something else than an unknown phase: a log that begins
-    later shows neither. An outage is the first interval without GNSS.
+    ``utc`` is no moment and not among them. The first movement follows a standstill and the lift-off something else
+    than an unknown phase: a log that begins later shows neither. An outage is the first interval without GNSS.
     """
     found: dict[Event, float] = {"start": 0.0}
     phases = saved.rows_of(PhaseSpans)

@@ -1,8 +1,8 @@
-"""A flight without what names it: places turned about the earth's axis, dates moved by weeks, names and texts gone.
+"""Anonymous flight: places turned about the earth's axis, dates moved, names removed.
 
-Latitude and height stay, so that gravity, the rate of the earth, the convergence of meridians and all differences stay
-exactly what they were; time of day and week stay with the whole weeks. A magnetic heading is that of the new place and
-date: the true heading that follows from it is the same.
+Dates move by whole weeks; texts are removed too. Latitude and height stay, so that gravity, the rate of the earth, the
+convergence of meridians and all differences stay exactly what they were; time of day and week stay with the whole
+weeks. A magnetic heading is that of the new place and date: the true heading that follows from it is the same.
 """
 
 import hashlib
@@ -52,7 +52,7 @@ XYZ = "xyz"
 
 
 def _number(text: str) -> str:
-    """A number as it was written; empty where it is none."""
+    """Return a number as it was written; empty where it is none."""
     try:
         return text.strip() if math.isfinite(float(text)) else ""
     except ValueError:
@@ -60,7 +60,7 @@ def _number(text: str) -> str:
 
 
 def _word_of(*words: str) -> Callable[[str], str]:
-    """Makes of a text the known word that it is; empty where it is another."""
+    """Make a function that returns a text if it is a known word, else an empty text."""
     return lambda text: text.strip().lower() if text.strip().lower() in words else ""
 
 
@@ -77,16 +77,18 @@ _FACTS: Mapping[str, Callable[[str], str]] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Disguise:
-    """How a flight is made anonymous; the same seed gives the same disguise, so that a session stays one.
+    """Changes that make a flight anonymous.
+
+    The same seed gives the same disguise, so that the flights of a session still fit together.
 
     Parameters
     ----------
     seed : int
-        A secret: who knows or guesses it can undo the shift. ``secrets`` makes one that is not told.
+        A secret: whoever knows or guesses it can undo the shift. The default is drawn by ``secrets``.
     start_utc_ns : int, optional
         First corrected time; None for a flight without UTC, whose times stay.
     change_deg : mapping of topic to (time_ns (n,), degrees (n,))
-        What is added to magnetic headings: declination of the true place less that of the new one.
+        Added to magnetic headings: declination of the true place minus that of the new one.
     """
 
     seed: int = field(default_factory=lambda: secrets.randbits(128))
@@ -105,14 +107,17 @@ class Disguise:
 
     @property
     def shift_ns(self) -> int:
-        """What is added to every time: whole weeks, backwards but for old flights; nothing without UTC."""
+        """Time added to every time: whole weeks, backwards except for old flights.
+
+        Zero without UTC.
+        """
         if self.start_utc_ns is None:
             return 0
         is_old = 1970 + self.start_utc_ns // YEAR_NS < FORWARD_BEFORE_YEAR
         return (1 if is_old else -1) * self._drawn[1] * WEEK_NS
 
     def alias(self, name: str) -> str:
-        """Another name for a name, the same for the same seed.
+        """Return another name for a name, the same for the same seed.
 
         Examples
         --------
@@ -123,14 +128,14 @@ class Disguise:
         return f"N{digest[:6]}"
 
     def topic(self, topic: str) -> str | None:
-        """The name a topic gets; None for one that is left out."""
+        """Return the name a topic gets; None for one that is left out."""
         if not is_canonical(topic) or kind_of(topic) in LEFT_OUT:
             return None
         kind, _, name = topic.partition(".")
         return f"{kind}.{self.alias(name)}" if kind in NAMED and name else topic
 
     def batch(self, batch: RecordBatch) -> RecordBatch | None:
-        """Records in disguise; None for those of a topic that is left out."""
+        """Return records in disguise; None for those of a topic that is left out."""
         topic = self.topic(batch.topic)
         if topic is None:
             return None
@@ -146,25 +151,28 @@ class Disguise:
         )
 
     def zero(self, time_ns: int) -> RecordBatch:
-        """An event at flight time zero: it stays where it was, though the topic that began first may be left out."""
+        """Return an event at flight time zero.
+
+        It keeps zero in place when the topic that began first is left out.
+        """
         at = np.array([time_ns + self.shift_ns])
         name = Column(np.array([ZERO_EVENT]))
         unknown = Column(np.zeros(1, dtype=np.int64), np.zeros(1, dtype=bool))
         return RecordBatch("event", np.zeros(1, dtype=np.int64), unknown, {"name": name}, at)
 
     def damage(self, damage: Damage) -> Damage:
-        """Damage without texts."""
+        """Return damage without texts."""
         return replace(damage, place="", what=damage.kind, topic=self.topic(damage.topic) or "")
 
     def _device_time(self, column: Column) -> Column:
-        """The recorder's own time: moved where it is a date."""
+        """Return the recorder's own time: moved where it is a date."""
         if self.start_utc_ns is None:
             return column
         values = column.values.astype(np.int64)
         return Column(np.where(self._is_date(values), values + self.shift_ns, values), column.present)
 
     def _is_date(self, time_ns: Int64Array | FloatArray) -> BoolArray:
-        """Whether times count from 1970: those of the flight's years."""
+        """Tell whether times count from 1970: those of the flight's years."""
         return np.asarray(np.abs(time_ns - (self.start_utc_ns or 0)) < DATE_NS)
 
     def _column(self, name: str, column: Column, batch: RecordBatch) -> Column | None:
@@ -198,7 +206,7 @@ class Disguise:
         return None
 
     def _turned(self, columns: Mapping[str, Column]) -> dict[str, Column]:
-        """Positions and covariances about the earth's centre, turned about its axis."""
+        """Return positions and covariances about the earth's centre, turned about its axis."""
         names = [f"position_{axis}_m" for axis in XYZ]
         if not all(name in columns for name in names):
             return {}
@@ -220,7 +228,7 @@ class Disguise:
         return out
 
     def info(self, info: "StoreInfo") -> "StoreInfo":
-        """Facts of the flight without names, places, dates and free text."""
+        """Return facts of the flight without names, places, dates and free text."""
         facts = {}
         for name, value in info.metadata.items():
             fact = self._fact(name, value)
@@ -245,7 +253,10 @@ class Disguise:
         )
 
     def _fact(self, name: str, value: str) -> tuple[str, str] | None:
-        """A fact of the head of the log as it may be told: a known key with a number or a known word; else None."""
+        """Return a fact of the head of the log that may be kept, else None.
+
+        It has a known key with a number or a known word.
+        """
         if name in _FACTS:
             known = _FACTS[name](value)
             return (name, known) if known else None
@@ -260,7 +271,7 @@ class Disguise:
         return f"{code}.{shown}.{column}", origin if code == "derived" else code
 
     def _ledger(self, ledger: Ledger, start_utc_ns: int | None) -> Ledger:
-        """What only the log could tell of its damage, without texts and places."""
+        """Return the damage that only the log could tell, without texts and places."""
         spans = (self._span(one, start_utc_ns) for one in ledger.spans)
         return Ledger(
             spans=tuple(one for one in spans if one is not None),
@@ -279,7 +290,7 @@ class Disguise:
 
 
 def disguise_of(mcap: Path, info: "StoreInfo", seed: int | None) -> Disguise:
-    """The disguise of a flight, with what its magnetic headings must be changed by."""
+    """Return the disguise of a flight, with the change of its magnetic headings."""
     plain = Disguise() if seed is None else Disguise(seed)
     plain = replace(plain, start_utc_ns=info.start_ns if info.has_utc else None)
     if plain.start_utc_ns is None:
@@ -300,7 +311,10 @@ def _positions_of(mcap: Path, info: "StoreInfo") -> Flight:
 
 
 def _change(flight: Flight, topic: str, disguise: Disguise) -> tuple[Int64Array, FloatArray] | None:
-    """Declination of the true places less that of the new ones, over time; None where it cannot be known."""
+    """Return declination of the true places minus that of the new ones, over time.
+
+    None where it cannot be known.
+    """
     try:
         table = positions_for(flight, flight[topic])
         latitude, longitude = table.values("latitude_deg"), table.values("longitude_deg")

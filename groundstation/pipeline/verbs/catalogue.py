@@ -1,4 +1,4 @@
-"""``list``: the analyses, what each needs, and whether a log has it."""
+"""Verb ``list``: the analyses, what each needs, and whether a log has it."""
 
 import tempfile
 from pathlib import Path
@@ -11,7 +11,9 @@ from groundstation.systems import systems
 
 
 def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict[str, Any]]:
-    """List analyses, formats, scenarios and studies; with a log, whether each analysis would run on it and why not.
+    """List analyses, formats, scenarios and studies.
+
+    With a log, tell whether each analysis would run on it and why not.
 
     Raises
     ------
@@ -48,7 +50,7 @@ def _session_analyses() -> list[dict[str, Any]]:
 
 
 def _of_a_session(folder: Path) -> list[dict[str, Any]]:
-    """The analyses of a session, each with whether it ran and the reason why not."""
+    """Return the analyses of a session, each with whether it ran and why not."""
     found = load_document(folder)
     reasons = {entry.analysis: entry.reason for entry in found.not_assessable}
     return [
@@ -58,7 +60,7 @@ def _of_a_session(folder: Path) -> list[dict[str, Any]]:
 
 
 def _with_answers(path: Path, profile: Path | None) -> list[dict[str, Any]]:
-    """The analyses, each with whether it would run on a log and the reason why not."""
+    """Return the analyses, each with whether it would run on a log and why not."""
     from groundstation.base.errors import UsageError
     from groundstation.pipeline.one_flight.analyse import answers_of
     from groundstation.pipeline.one_flight.configuration import Configuration

@@ -1,4 +1,7 @@
-"""The verb ``check``: the integrity ledger of logs, and what they can be used for; written nowhere."""
+"""Verb ``check``: the integrity ledger of logs, and what they can be used for.
+
+It writes nothing.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -34,7 +37,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Checked:
-    """What a check of one log found.
+    """Result of the check of one log.
 
     Parameters
     ----------
@@ -60,7 +63,7 @@ class Checked:
     power_ups: tuple[PowerUpTold, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-able."""
+        """Return plain values for JSON."""
         return {
             "source": self.outcome.source,
             "state": self.outcome.state,
@@ -76,7 +79,10 @@ class Checked:
         }
 
     def judged(self, usability: "Usability", fail_on: str) -> "Checked":
-        """With what it can be used for: of no use, or of partial use under ``--fail-on warn``, is at the limit."""
+        """Return the result with its usability, at the limit where that falls short.
+
+        No use is at the limit; partial use is so under ``--fail-on warn``.
+        """
         is_short = usability.state == "no" or (usability.state == "in part" and fail_on == "warn")
         outcome = replace(self.outcome, state="limit_reached") if is_short else self.outcome
         return replace(self, outcome=outcome, usability=usability)
@@ -108,7 +114,7 @@ def check_many(
 
 
 def require_logs(paths: Sequence[Path], purpose: str) -> tuple[list[Path], bool]:
-    """The logs that are named, and whether the purpose is that of a session.
+    """Return the logs that are named, and whether the purpose is that of a session.
 
     Raises
     ------
@@ -138,7 +144,7 @@ def check_here(
     fail_on: str,
     listen: Listener,
 ) -> tuple[Checked, ...]:
-    """The checks of logs that are there; parameters as of :func:`check_many`."""
+    """Return the checks of logs that exist; parameters as of :func:`check_many`."""
     found = []
     flights: dict[int, Flight] = {}
     for number, path in enumerate(paths):
@@ -170,7 +176,10 @@ def _for_purpose(
 def _for_session(
     found: Sequence[Checked], purpose: str, flights: Mapping[int, "Flight"], configuration: Configuration, fail_on: str
 ) -> list[Checked]:
-    """The checks with what their logs can be used for together, with the stations beside the first of them."""
+    """Return the checks with what their logs can be used for together.
+
+    The stations are those beside the first log.
+    """
     from groundstation.pipeline.many_flights.found_sessions import STATIONS_TOML
     from groundstation.pipeline.many_flights.session import load_stations
     from groundstation.pipeline.verbs.usable import usability_of_session
@@ -193,14 +202,14 @@ def _check_or_reason(
 
 
 def unread(path: Path, reason: str, trace: str = "") -> Checked:
-    """The check of a log that could not be read."""
+    """Return the check of a log that could not be read."""
     return Checked(Outcome(str(path), "failed", reason, trace=trace), {}, Ledger(), Clock(), ())
 
 
 def checked_with_flight(
     log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool
 ) -> tuple[Checked, "Flight | None"]:
-    """The check of a log and, where it is wanted and anything can be read, its tables."""
+    """Return the check of a log and, where wanted and readable, its tables."""
     read = _stored if log.is_store else _recorded
     checked, flight = read(log, limits, fail_on, with_flight=with_flight)
     return checked, None if checked.outcome.state == "failed" else flight
@@ -257,7 +266,7 @@ def _stored(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) ->
     if not census.rows:
         raise UnreadableLogError(log.path.name, "no intact record", "", "the file is damaged beyond its index")
     anew = recounted(info, damages, census)
-    if damages or has_other_limits(info, limits):  # else what was found in the log is told as it was
+    if damages or has_other_limits(info, limits):  # else the facts found in the log stay
         info = anew
     facts = facts_of(log, info.metadata, anew.ledger)
     has_lost = any(entry.get("loses_data") for entry in info.damages)

@@ -1,4 +1,7 @@
-"""Checks and descriptions of logs, each in a process of its own: with a limit of time, or isolated."""
+"""Checks and descriptions of logs, each in a process of its own.
+
+The process has a limit of time, or is isolated.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -60,7 +63,7 @@ class _Told:
         return cls(**(vars(checked) | {"usability": usability}))
 
     def checked(self) -> Checked:
-        """The same as it was there."""
+        """Return the check as it was in the other process."""
         found = Checked(**(vars(self) | {"usability": None}))
         if self.usability is None:
             return found
@@ -88,9 +91,9 @@ def check_apart(
     fail_on: str = "none",
     listen: Listener = silent,
 ) -> tuple[Checked, ...]:
-    """Check logs as :func:`groundstation.pipeline.verbs.check.check_many` does, one process after the other.
+    """Check logs as :func:`~groundstation.pipeline.verbs.check.check_many`, in processes.
 
-    Logs of a session, which are judged together, are checked in one process.
+    The processes run one after the other. Logs of a session, which are judged together, are checked in one process.
 
     Raises
     ------
@@ -146,7 +149,7 @@ def describe_apart(path: Path, profile: Path | None, icds: tuple[str, ...], boun
 
 
 def suggest_icd_apart(path: Path, bounds: Bounds) -> str:
-    """The draft of an ICD that a process of its own makes of a log.
+    """Return the draft of an ICD that a process of its own makes of a log.
 
     Raises
     ------
@@ -174,6 +177,6 @@ def _described_apart(job: Job, bounds: Bounds) -> _Described:
 
 
 def _parts(line: str) -> tuple[str, str]:
-    """Where and what, of an error that was told in one line."""
+    """Split an error told in one line into where and what."""
     where, _, what = line.partition(": ")
     return where, what

@@ -1,4 +1,4 @@
-"""``clip``: a part of a flight as an MCAP of its own and, beside it, its recording."""
+"""Verb ``clip``: a part of a flight as an MCAP of its own, and its recording."""
 
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -40,7 +40,7 @@ CUT_FROM, CUT_SHA256, ZERO = "clip.source", "clip.source_sha256", "clip.zero_s"
 
 @dataclass(frozen=True)
 class Wanted:
-    """What to cut out of a flight.
+    """Part of a flight to cut out.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Wanted:
     anonymous : bool
         Without what names the flight (:mod:`groundstation.pipeline.verbs.anonymous`).
     seed : int, optional
-        Of the disguise; None: one that nobody knows.
+        Seed of the disguise; None: a random one.
     power_up : int
         Which of several power-ups in a log, from 1; 0: the only one, or that in which the range in UTC lies.
     """
@@ -69,7 +69,7 @@ class Wanted:
         return f"{self.start or 'the start'} to {self.end or 'the end'}"
 
     def wants(self, topic: str) -> bool:
-        """Whether a topic is to be kept.
+        """Tell whether a topic is to be kept.
 
         Examples
         --------
@@ -91,8 +91,8 @@ def clip(
 ) -> Outcome:
     """Write a part of a flight to ``target`` (.mcap) and, beside it, its recording (.rrd).
 
-    Device times, record indices and the clock's model stay as they are; the ledger is counted anew. What stands in
-    the metadata as ``clip.*`` is told in docs/compare.md.
+    Device times, record indices and the clock's model stay as they are; the ledger is counted again. docs/compare.md
+    describes ``clip.*`` of the metadata.
 
     Parameters
     ----------
@@ -142,7 +142,10 @@ def _expect_free(source: Path, target: Path, with_recording: bool, force: bool) 
 
 @contextmanager
 def _as_mcap(log: Log, folder: Path, limits: Thresholds, wanted: Wanted) -> Iterator[tuple[Log, Path]]:
-    """The log and its MCAP: itself, or one that is gone afterwards; of several power-ups that of the one wanted."""
+    """Yield the log and its MCAP: the log itself, or a temporary file.
+
+    From several power-ups it takes the one wanted.
+    """
     if log.is_store and not segments_in(log.info()):
         yield log, log.path
         return
@@ -156,7 +159,7 @@ def _as_mcap(log: Log, folder: Path, limits: Thresholds, wanted: Wanted) -> Iter
 
 
 def _wanted_of(logs: Sequence[Log], wanted: Wanted) -> Log:
-    """The power-up that is asked for by its number, or by a range in UTC."""
+    """Return the power-up that is asked for by its number, or by a range in UTC."""
     segments = [log.segment for log in logs if log.segment is not None]
     numbers = [one.number for one in segments if wanted.power_up in (0, one.number) and _may_hold(one, wanted)]
     if len(numbers) == 1:
@@ -166,7 +169,7 @@ def _wanted_of(logs: Sequence[Log], wanted: Wanted) -> Log:
 
 
 def _may_hold(segment: Segment, wanted: Wanted) -> bool:
-    """Whether a range that is given in UTC lies in a power-up; a range in seconds may lie in any."""
+    """Tell whether a range given in UTC lies in a power-up; one in seconds may lie in any."""
     texts = [text for text in (wanted.start, wanted.end) if text is not None]
     if segment.shift_ns or not texts or not all("T" in text for text in texts):
         return True
@@ -213,8 +216,8 @@ def _cut(log: Log, mcap: Path, target: Path, wanted: Wanted, limits: Thresholds)
         first_ns = first_ns if zero is None else zero_ns
         inside = _inside(info, zero_ns, first_ns, part)
         metadata = {**info.metadata, **_origin(log.source, info, zero_ns, first_ns, part, wanted)}
-        # Neither name nor digest of the log: the part is a log of its own, and two parts of one log are no twins.
-        # Nor its own name: equal parts are equal to the byte whatever they are called.
+        # Without name and digest of the log: the part is a log of its own, and two parts of one log are not the same.
+        # Without its own name: equal parts are equal to the byte under any name.
         cut = replace(inside, start_ns=first_ns, metadata=metadata)
         cut = cut if disguise is None else disguise.info(cut)
         cut = replace(cut, source_name="" if disguise is None else f"{ANONYMOUS}.mcap", source_sha256="")
@@ -223,9 +226,10 @@ def _cut(log: Log, mcap: Path, target: Path, wanted: Wanted, limits: Thresholds)
 
 
 def _zero_event(wanted: Wanted, disguise: Disguise | None, zero_ns: int, first_ns: int) -> RecordBatch | None:
-    """An event at flight time zero, where topics left out may be what began there; None where none is needed.
+    """Return an event at flight time zero, None where none is needed.
 
-    Analyses count from flight time zero: without it their grid would begin elsewhere.
+    It is needed where a topic that is left out may be what began at zero. Analyses count from flight time zero: without
+    it their grid would begin elsewhere.
     """
     is_whole = disguise is not None and not wanted.topics
     if wanted.start or not (is_whole or (wanted.topics and first_ns > zero_ns)):
@@ -234,7 +238,10 @@ def _zero_event(wanted: Wanted, disguise: Disguise | None, zero_ns: int, first_n
 
 
 def _zero_ns(mcap: Path, info: "StoreInfo") -> int:
-    """Corrected time of flight time zero; where the file lost it, of the first record that is left."""
+    """Return the corrected time of flight time zero.
+
+    Where the file lost it, that of the first record left.
+    """
     from groundstation.store.reader import read
 
     if info.start_ns is not None:
@@ -255,7 +262,10 @@ def _span_ns(wanted: Wanted, zero_ns: int, has_utc: bool) -> tuple[int, int]:
 
 
 def _nothing_in(log: Log, info: "StoreInfo", wanted: Wanted) -> UsageError:
-    """Why a part is empty: no topic is wanted, or the flight has no record of them then."""
+    """Return the error of an empty part.
+
+    No topic is wanted, or the flight has no record of them then.
+    """
     topics = info.ledger.topics
     if topics and not any(wanted.wants(topic) for topic in topics):
         asked = ", ".join(map(repr, wanted.topics))
@@ -270,9 +280,9 @@ def _nothing_in(log: Log, info: "StoreInfo", wanted: Wanted) -> UsageError:
 
 
 def _inside(info: "StoreInfo", zero_ns: int, first_ns: int, part: "Part") -> "StoreInfo":
-    """Facts of the flight without what lies outside the part: damaged spans, what was lost there, and findings on it.
+    """Return the facts of the flight without those of places outside the part.
 
-    Losses without a known place in time stay: they may lie within.
+    Damaged spans, losses there, and findings on them. Losses without a known place in time stay: they may lie within.
     """
     spans = info.ledger.spans
     low_s, high_s = ((end_ns - zero_ns) / NS_PER_S for end_ns in (part.start_ns, part.end_ns))
@@ -295,7 +305,7 @@ def _inside(info: "StoreInfo", zero_ns: int, first_ns: int, part: "Part") -> "St
 
 
 def _mark(damage: Mapping[str, Any]) -> tuple[Any, ...]:
-    """What a loss and its span have in common."""
+    """Return what a loss and its span have in common: kind, topic, count."""
     return damage.get("kind"), damage.get("topic"), damage.get("count")
 
 
@@ -306,7 +316,10 @@ def _mark_of_span(span: DamagedSpan) -> tuple[Any, ...]:
 def _origin(
     source: Source, info: "StoreInfo", zero_ns: int, first_ns: int, part: "Part", wanted: Wanted
 ) -> dict[str, str]:
-    """What the part was cut from; of a part of a part, in terms of the flight that both are of."""
+    """Return the source that the part was cut from.
+
+    A part of a part names the original flight.
+    """
     name, sha256 = source.name, source.sha256
     base_s = 0.0
     if CUT_FROM in info.metadata:
@@ -326,7 +339,9 @@ def _origin(
 
 
 def zero_s(metadata: Mapping[str, Any]) -> float:
-    """Flight time, of the flight that a part was cut from, at which the part's own begins; 0 for a whole flight.
+    """Return the flight time at which a part begins, in the flight it was cut from, s.
+
+    0 for a whole flight.
 
     Examples
     --------

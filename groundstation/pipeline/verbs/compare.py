@@ -1,4 +1,4 @@
-"""``compare``: two flight folders held against each other, from what ``run`` saved in them alone."""
+"""Verb ``compare``: two flight folders against each other, from their saved results alone."""
 
 import math
 import re
@@ -96,7 +96,9 @@ def compare(a: Path, b: Path, event: Event | None = None) -> tuple[Comparison, S
 
 
 def compare_to(a: Path, b: Path, folder: Path, event: Event | None = None, *, force: bool = False) -> Comparison:
-    """Compare two flight folders into a folder: ``compare.html``, ``compare.csv`` and ``compare.rrd``.
+    """Compare two flight folders and write the result into a folder.
+
+    ``compare.html``, ``compare.csv`` and ``compare.rrd``.
 
     Raises
     ------
@@ -131,7 +133,10 @@ def _load(folder: Path) -> SavedFlight:
 
 
 def session_errors(saved: SavedFlight) -> SessionErrors | None:
-    """Worst computed 2 sigma_r and RMS error of all aircraft with time, default algorithm; None for a flight."""
+    """Return the worst computed 2 sigma_r and the RMS error of all aircraft with time.
+
+    The algorithm is the default one; None for a flight.
+    """
     answer, tracks = saved.results.answer(CooperativeResult), saved.rows_of(CooperativeTracks)
     if answer is None or tracks is None:
         return None
@@ -161,7 +166,7 @@ def _side(saved: SavedFlight) -> Side:
 
 
 def _origin(saved: SavedFlight) -> str:
-    """Digest of the log a flight came from; of a part, that of the whole."""
+    """Return the digest of the log a flight came from; of a part, that of the whole."""
     return saved.results.metadata.get(CUT_SHA256) or saved.results.source.sha256
 
 
@@ -169,7 +174,9 @@ def _origin(saved: SavedFlight) -> str:
 
 
 def deltas_of(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Delta, ...]:
-    """Differences of every answer that two summaries have in common; texts of lesser weight only where they differ.
+    """Return the differences of every answer that two summaries have in common.
+
+    Texts of lesser weight only where they differ.
 
     Examples
     --------
@@ -208,7 +215,7 @@ def _is_main(name: str, methods: set[str]) -> bool:
 
 
 def _answers(summary: Mapping[str, Any]) -> dict[str, tuple[Value, float | None]]:
-    """Answers of a summary by name, each with the sigma it states."""
+    """Return answers of a summary by name, each with the sigma it states."""
     flight, completeness = mapping(summary, "flight"), mapping(summary, "completeness")
     found: dict[str, tuple[Value, float | None]] = {"status": (str(summary.get("status", "")), None)}
     found |= dict(_walk("flight", {"duration_s": flight.get("duration_s")}))
@@ -246,18 +253,18 @@ def _is_pair(value: Any) -> bool:
 
 
 def _pair_path(path: str, key: str) -> str:
-    """Path of the ends of an interval, the place of ``low`` and ``high`` before the unit."""
+    """Return the path of an interval's ends, with ``low`` and ``high`` before the unit."""
     stem, _, unit = key.rpartition("_")
     return f"{path}.{stem}_{{end}}_{unit}" if stem else f"{path}.{key}_{{end}}"
 
 
 def _told(key: str, value: Any) -> str:
-    """A row's identity: names as they are, numbers with the unit of their field."""
+    """Return the identity of a row: names as they are, numbers with the unit of their field."""
     return f"{value:g}{key.rpartition('_')[2]}" if is_number(value) else str(value)
 
 
 def _stated_sigma(node: Mapping[str, Any], key: str) -> float | None:
-    """The sigma that stands beside a number.
+    """Return the sigma beside a number.
 
     Examples
     --------
@@ -274,7 +281,7 @@ def _stated_sigma(node: Mapping[str, Any], key: str) -> float | None:
 
 
 def _settings(a: SavedFlight, b: SavedFlight) -> tuple[SettingPair, ...]:
-    """Settings in force, and versions, that are not the same."""
+    """Return the settings in force, and versions, that differ."""
     both = mapping(a.summary, "results").keys() & mapping(b.summary, "results").keys()
     ours, theirs = _settings_of(a, both), _settings_of(b, both)
     names = [*ours, *(name for name in theirs if name not in ours)]
@@ -283,7 +290,7 @@ def _settings(a: SavedFlight, b: SavedFlight) -> tuple[SettingPair, ...]:
 
 
 def _settings_of(saved: SavedFlight, analyses: AbstractSet[str]) -> dict[str, Value]:
-    """What the user set and, over it, what the analyses say they used."""
+    """Return the settings that the user set, with those that the analyses report over them."""
     found = dict(_leaves("", saved.manifest.configuration))
     for analysis in sorted(analyses):
         found |= dict(_leaves(f"{analysis}.", mapping(saved.summary, "results", analysis, "settings")))

@@ -146,7 +146,10 @@ def _converted(source: str, converted: Converted, target: Path, told: str = "") 
 
 
 def _to_chapter10(log: Log, target: Path, thresholds: Thresholds) -> tuple[Converted, str]:
-    """Write the flight of a log as Chapter 10; what became of the log, and which topics are on no bus."""
+    """Write the flight of a log as Chapter 10.
+
+    Returns the conversion of the log, and which topics are on no bus.
+    """
     from groundstation.pipeline.one_flight.flight import read_flight
     from groundstation.simulation.chapter10_writer import write_chapter10
 

@@ -1,4 +1,4 @@
-"""``cooperative``: the logs of several aircraft, named one by one, as a session."""
+"""Verb ``cooperative``: the logs of several aircraft, named one by one, as a session."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -65,7 +65,7 @@ def run_session(
 
 
 def _files_of(path: Path) -> list[Path]:
-    """A log, the MCAP of a flight folder, or those of the flights of a session."""
+    """Return a log, the MCAP of a flight folder, or those of the flights of a session."""
     if not path.exists():
         raise UsageError(str(path), "no such file")
     if is_session(path):
@@ -74,7 +74,7 @@ def _files_of(path: Path) -> list[Path]:
 
 
 def _opened(files: Sequence[Path], configuration: Configuration) -> tuple[tuple[Log, ...], tuple[Outcome, ...]]:
-    """The logs that a reader claims, in the order of their digests; why the others are none."""
+    """Return the logs that a reader claims, by digest, and the outcomes of the others."""
     logs, failed = [], []
     for path in dict.fromkeys(files):
         try:

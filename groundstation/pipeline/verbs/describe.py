@@ -1,4 +1,4 @@
-"""What a log is: format, clock, span and topics, for the verb ``info``."""
+"""Description of a log for the verb ``info``: format, clock, span and topics."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -47,7 +47,7 @@ class BusWord:
 
 @dataclass(frozen=True)
 class Description:
-    """A log described: facts for people (name to text), topics, findings, and what is on its buses.
+    """Description of a log: facts (name to text), topics, findings, and words on its buses.
 
     ``has_records``: at least one record of the log could be read; ``power_ups``: where it holds several.
     """
@@ -61,7 +61,7 @@ class Description:
     power_ups: tuple[PowerUpTold, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON."""
+        """Return plain values for JSON."""
         plain = asdict(self)
         del plain["has_records"]  # the exit code tells it
         if not self.power_ups:
@@ -110,7 +110,10 @@ def _recorded(log: Log) -> Description:
 
 
 def _bus_contents(ledger: Ledger) -> "BusContents | None":
-    """What counts the words on the buses; None of a log that has none, which then needs no numba either."""
+    """Return a counter of the words on the buses; None for a log without buses.
+
+    Such a log needs no numba either.
+    """
     if not any(topic.startswith(BUS_PREFIX) for topic in ledger.topics):
         return None
     from groundstation.readers.chapter10.contents import BusContents
@@ -119,7 +122,7 @@ def _bus_contents(ledger: Ledger) -> "BusContents | None":
 
 
 def _buses(contents: "BusContents | None", log: Log) -> tuple[BusWord, ...]:
-    """What is on the buses, in the order of the channels."""
+    """Return what is on the buses, in the order of the channels."""
     if contents is None:
         return ()
     from groundstation.readers.chapter10.contents import named_by
@@ -138,7 +141,7 @@ def _buses(contents: "BusContents | None", log: Log) -> tuple[BusWord, ...]:
 
 
 def suggest_icd(path: Path) -> str:
-    """The beginning of an ICD, as YAML, from what is on the buses of a log.
+    """Return the beginning of an ICD, as YAML, from what is on the buses of a log.
 
     Raises
     ------
@@ -181,12 +184,15 @@ def _stored(log: Log) -> Description:
 
 
 def _has_lost(info: StoreInfo, damages: list[Damage]) -> bool:
-    """Whether data was lost: when the log was converted, or of the MCAP since."""
+    """Tell whether data was lost: when the log was converted, or from the MCAP since."""
     return any(entry.get("loses_data") for entry in info.damages) or any(damage.loses_data for damage in damages)
 
 
 def facts_of(log: Log, metadata: Mapping[str, str], ledger: Ledger) -> dict[str, str]:
-    """What a log is, name to text: file, size, format, first and last sample, metadata."""
+    """Return facts of a log, name to text.
+
+    File, size, format, first and last sample, metadata.
+    """
     facts = {
         "file": log.source.name,
         "size": f"{log.source.size_bytes} bytes",

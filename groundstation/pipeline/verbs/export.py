@@ -1,4 +1,7 @@
-"""``export``: the tracks of a flight in the file of another program, chosen by the suffix of the file."""
+"""Verb ``export``: the tracks of a flight in a format that the file's suffix chooses.
+
+Formats are those of other programs.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -29,7 +32,9 @@ def export(
     configuration: Configuration | None = None,
     force: bool = False,
 ) -> Outcome:
-    """Write tracks of a flight to ``target``: .kml, .gpx, .csv, .parquet, .nmea, .sbet or .out (SBET).
+    """Write tracks of a flight to ``target`` in the format of its suffix.
+
+    .kml, .gpx, .csv, .parquet, .nmea, .sbet or .out (SBET).
 
     Parameters
     ----------
@@ -73,7 +78,9 @@ def require_suffix(target: Path, suffixes: Sequence[str]) -> None:
 
 
 def require_place(source: Path, target: Path, force: bool) -> None:
-    """Refuse a source that is not there, and a target that is, unless ``force`` is given and it is not the source.
+    """Refuse a source that does not exist, and a target that does.
+
+    With ``force`` a target may exist, unless it is the source.
 
     Raises
     ------
@@ -86,7 +93,7 @@ def require_place(source: Path, target: Path, force: bool) -> None:
 
 
 def _read(path: Path, configuration: Configuration) -> "tuple[Flight, SavedFlight | None, bool]":
-    """Tables of a flight, what a run saved of it, and whether data were lost on the way."""
+    """Return tables of a flight, its saved results, and whether data were lost on the way."""
     from groundstation.store.reader import read, read_info
     from groundstation.tables.assemble import flight_from_batches
 
@@ -108,7 +115,7 @@ def _read(path: Path, configuration: Configuration) -> "tuple[Flight, SavedFligh
 
 
 def saved_flight(folder: Path) -> "SavedFlight":
-    """What a run saved of a flight.
+    """Return the saved results of a flight.
 
     Raises
     ------
@@ -124,7 +131,7 @@ def saved_flight(folder: Path) -> "SavedFlight":
 
 
 def _compared_ins(saved: "SavedFlight") -> str:
-    """The INS whose errors were estimated; empty where none was."""
+    """Return the INS whose errors were estimated; empty where none was."""
     inertial = answer_of(saved.results.answers, InertialResult)
     return "" if inertial is None else inertial.ins_topic
 
@@ -140,7 +147,10 @@ def _wanted(tracks: tuple[Track, ...], names: Sequence[str], source: str) -> tup
 
 
 def _written_alone(write: Callable[[Path, Track], int], target: Path, tracks: tuple[Track, ...], is_named: bool) -> str:
-    """Write the one track of a format: the one named, else the first that has what the format needs. Tells of it."""
+    """Write the one track of a format, and return what was written in words.
+
+    The one named, else the first that has what the format needs.
+    """
     if is_named and len(tracks) > 1:
         raise UsageError(str(target), f"{len(tracks)} tracks", "one", "name one --track")
     reasons = []

@@ -1,4 +1,4 @@
-"""``export --figure``: what figures show, as CSV with the units in the names of the columns."""
+"""``export --figure``: the data of figures as CSV, with units in the column names."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,7 +18,9 @@ from groundstation.results.flight import UTC_OF
 
 
 def export_figures(folder: Path, target: Path, names: Sequence[str] = (), *, force: bool = False) -> Outcome:
-    """Write what figures of a flight show: one into the file ``target`` (.csv), several or all into that folder.
+    """Write the data of figures of a flight as CSV.
+
+    One into the file ``target`` (.csv), several or all into that folder.
 
     Parameters
     ----------
@@ -57,14 +59,17 @@ def export_figures(folder: Path, target: Path, names: Sequence[str] = (), *, for
 
 
 def _refuse_saved(place: Path) -> None:
-    """Refuse the tables of a run: summary.json and later runs count on them as they were written."""
+    """Refuse the tables of a run as a target.
+
+    summary.json and later runs rely on them as they were written.
+    """
     place = place.resolve()
     if place.name in (TABLES, ARRAYS) and (place.parent / FLIGHT_FOLDER_MARK).is_file():
         raise UsageError(str(place), "a folder of the run's own results", "another one: -f does not overwrite results")
 
 
 def _with_utc(figure: FigureData, start_utc_ns: int | None) -> FigureData:
-    """The figure with UTC before its columns of flight seconds, empty where these are unknown."""
+    """Return the figure with UTC before its columns of flight seconds, empty if unknown."""
     if start_utc_ns is None:
         return figure
     told = {UTC_OF[name]: _utc(numbers(figure, name), start_utc_ns) for name in UTC_OF if name in figure.columns}

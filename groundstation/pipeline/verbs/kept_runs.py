@@ -1,4 +1,4 @@
-"""Runs of a study kept in its folder as they end, so that a study that was stopped goes on where it was."""
+"""Runs of a study kept in its folder, so that a stopped study continues."""
 
 import json
 from pathlib import Path
@@ -12,9 +12,10 @@ R = TypeVar("R")
 
 
 class KeptRuns(Generic[R]):
-    """Outcomes by the name of their kind (family and seed) and their number: ``<folder>/<name>.jsonl``, a line each.
+    """Outcomes by name and number in files ``<folder>/<name>.jsonl``, a line each.
 
-    The first line has the version that made them; a last line that was cut is passed over and made again.
+    The name is that of their kind: family and seed. The first line has the version that made them; a last line that was
+    cut is passed over and made again.
     """
 
     def __init__(self, folder: Path, outcome: type[R]) -> None:
@@ -22,7 +23,7 @@ class KeptRuns(Generic[R]):
         self._runs: dict[str, dict[int, R]] = {}
 
     def get(self, name: str, number: int) -> R | None:
-        """The outcome of a run that ended before.
+        """Return the outcome of a run that ended before.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Plans from beginning to end: a scenario becomes answers, recording and report in a folder of its own."""
+"""Run of a plan into a folder of its own: scenario to answers, recording and report."""
 
 import hashlib
 import platform
@@ -49,7 +49,7 @@ def plan_of(name: str) -> Plan[Any]:
 
 
 def shipped_scenarios(name: str) -> tuple[ShippedScenario, ...]:
-    """The scenarios of a kind of plan that come with the package."""
+    """Return the scenarios of a kind of plan that come with the package."""
     plan = plan_of(name)
     return tuple(ShippedScenario(one, load_plan(plan, one).scenario.title) for one in plan_names(plan))
 
@@ -64,7 +64,9 @@ def run_plan(
     with_pdf: bool = False,
     listen: Listener = silent,
 ) -> Outcome:
-    """Make a plan into ``<out>/<name of the scenario>/``; of one that is finished only a PDF that is asked for.
+    """Make a plan into ``<out>/<name of the scenario>/``.
+
+    For a finished plan, only a PDF that is asked for is made.
 
     Parameters
     ----------
@@ -97,13 +99,19 @@ def run_plan(
 
 
 def _keys(plan: Plan[Any], loaded: LoadedPlan[Any]) -> Keys:
-    """Equal keys, equal results: the scenario and the versions go in."""
+    """Return the keys of a plan, made of the scenario and the versions.
+
+    Equal keys give equal results.
+    """
     key = digest_of_parts(plan.name, loaded.name, loaded.text, dict(versions()), platform.python_version())
     return Keys(key, key)
 
 
 def _kept(target: Path, keys: Keys) -> tuple[Resume, bool] | None:
-    """What a finished plan of such keys said, and whether it has its PDF; None where anything else is amiss."""
+    """Return the saved outcome of a finished plan of these keys, and whether it has its PDF.
+
+    None where anything else is amiss.
+    """
     try:
         manifest, findings = load_manifest(target), load_document(target).findings
     except GroundstationError:
@@ -117,7 +125,7 @@ def _kept(target: Path, keys: Keys) -> tuple[Resume, bool] | None:
 def _finished(
     loaded: LoadedPlan[Any], target: Path, kept: tuple[Resume, bool], fail_on: str, with_pdf: bool, watch: Stopwatch
 ) -> Outcome:
-    """The outcome of a finished plan, to which a PDF is added where it is asked for and missing."""
+    """Return the outcome of a finished plan; add its PDF where asked for and missing."""
     resume, has_pdf = kept
     problem = ""
     if with_pdf and not has_pdf:

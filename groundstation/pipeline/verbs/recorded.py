@@ -1,4 +1,4 @@
-"""Recorded robots from their folders: logs through the store into tables, and from these a session to run on."""
+"""Recorded robots from their folders: a session made of logs, store and tables."""
 
 import re
 import tempfile
@@ -41,7 +41,7 @@ BARCODES, LANDMARKS = "barcodes", "landmark_groundtruth"  # how the names of the
 
 
 def recorded_sets(folder: Path) -> tuple[RecordedSet, ...]:
-    """The sets in a folder and below it, in the order of their paths.
+    """Return the sets in a folder and below it, in the order of their paths.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def recorded_sets(folder: Path) -> tuple[RecordedSet, ...]:
 
 
 def _utias(place: Path, files: Sequence[Path]) -> RecordedSet:
-    """A set with a table of barcodes: one of landmarks, and three logs of each robot."""
+    """Return a set with a table of barcodes, one of landmarks, and three logs per robot."""
     barcode_file, landmark_file = (_only(place, files, start) for start in (BARCODES, LANDMARKS))
     numbers, bad = utias.barcodes(Source(barcode_file))
     marks, more = utias.landmarks(Source(landmark_file))
@@ -88,7 +88,7 @@ def _utias(place: Path, files: Sequence[Path]) -> RecordedSet:
 
 
 def _miluv(place: Path, files: Sequence[Path]) -> RecordedSet:
-    """A set with a table of tags: one of anchors, and one log of all vehicles."""
+    """Return a set with a table of tags: one of anchors, and one log of all vehicles."""
     tag_file, anchor_file = _only(place, files, TAGS), _only(place, files, ANCHORS)
     tags, constellations = (miluv.arms(Source(path)) for path in (tag_file, anchor_file))
     name, anchors = next(iter(constellations.items()))
@@ -102,7 +102,7 @@ def _miluv(place: Path, files: Sequence[Path]) -> RecordedSet:
 
 
 def _murp(place: Path, files: Sequence[Path]) -> list[RecordedSet]:
-    """Logs of pairs, one set for every run whose number they begin with."""
+    """Return logs of pairs, one set for every run whose number they begin with."""
     runs: dict[str, list[tuple[Path, re.Match[str]]]] = {}
     for path in files:
         if pair := MURP_PAIR.match(path.name):
@@ -125,7 +125,7 @@ def _murp(place: Path, files: Sequence[Path]) -> list[RecordedSet]:
 def _with_reckoning(
     name: str, kind: str, logs: Sequence[AntennaLog], points: tuple[GroundPoint, ...], findings: list[Finding]
 ) -> RecordedSet:
-    """A set whose dead reckoning is made from its truth, in several draws."""
+    """Return a set whose dead reckoning is made from its truth, in several draws."""
     zero_ns = start_ns(logs)
     poses = poses_of(logs, zero_ns)
     if not poses:
@@ -154,7 +154,7 @@ def _of_damage(damage: Damage, place: str) -> Finding:
 
 
 def _flights(files: Sequence[Path], findings: list[Finding]) -> list[Flight]:
-    """Tables of all logs, each by way of an MCAP; a file that nobody can read is a finding."""
+    """Return tables of all logs, each by way of an MCAP; an unreadable file is a finding."""
     flights = []
     with tempfile.TemporaryDirectory() as folder:
         for number, path in enumerate(files):

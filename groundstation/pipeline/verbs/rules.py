@@ -1,4 +1,7 @@
-"""``rules test``: which past verdicts other limits would change, from the gates that flights saved, without logs."""
+"""``rules test``: verdicts that other limits would change, from the saved gates.
+
+It needs no logs.
+"""
 
 import hashlib
 import json
@@ -32,9 +35,10 @@ SHIPPED = "shipped limits"
 
 @dataclass(frozen=True)
 class RulesRow:
-    """One gate of one verdict before and after; ``gate`` is empty where no gate has another limit or state.
+    """One gate of one verdict before and after.
 
-    ``needs_log`` names what else is set otherwise than in the run: it may change the value, which only a run shows.
+    ``gate`` is empty where no gate has another limit or state. ``needs_log`` names what else is set otherwise than in
+    the run: it may change the value, which only a run shows.
     """
 
     flight_id: str
@@ -73,13 +77,15 @@ class RulesTest:
     unread: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
+        """Return plain JSON values."""
         document: dict[str, Any] = to_json(self)
         return document
 
 
 def rules_test(new: Path, out: Path) -> RulesTest:
-    """Judge every verdict of a folder again with the settings of a file, as ``run --config`` would take it.
+    """Judge every verdict of a folder again with the settings of a file.
+
+    The file is like that of ``run --config``.
 
     Raises
     ------
@@ -118,13 +124,13 @@ def rules_test(new: Path, out: Path) -> RulesTest:
 
 
 def rules_name(configuration: Configuration) -> str:
-    """What the limits are called, and a digest of all that the file sets."""
+    """Return the name of the limits, and a digest of all that the file sets."""
     text = json.dumps(configuration.to_dict(), sort_keys=True, default=str)
     return f"{configuration.rules.version or 'unnamed'} ({hashlib.sha256(text.encode()).hexdigest()[:8]})"
 
 
 def csv_of(found: RulesTest) -> str:
-    """The table of every gate with another limit or state."""
+    """Return the table of every gate with another limit or state."""
     columns: dict[str, Any] = {}
     for field in fields(RulesRow):
         values = [getattr(row, field.name) for row in found.rows]
@@ -142,14 +148,17 @@ def write_rules(found: RulesTest, path: Path) -> None:
 
 
 def learned_in(out: Path) -> dict[str, InstalledFlight]:
-    """Flights with a heading answer that earlier ones taught, by their ids."""
+    """Return flights with a heading answer that earlier ones taught, by their ids."""
     found = installations_in(out)
     flights = () if found is None else (flight for one in found.installations for flight in one.flights)
     return {one.lesson.flight_id: one for one in flights if one.answer is not None and not one.answer.why_not}
 
 
 def _learned(flight: InstalledFlight, heading: Rejudged, settings: HeadingSettings) -> Rejudged:
-    """The verdict on the learned number under other limits, from the gates on the taxi as they were judged again."""
+    """Return the verdict on the learned number under other limits.
+
+    It rests on the gates on the taxi as they were judged again.
+    """
     assert flight.answer is not None
     failed = tuple(gate.name for gate in heading.gates_after if gate.required and gate.state != "passed")
     limit_deg = round(settings.whole_half_width_max_deg, digits_of("limit_deg"))  # as it is stored
@@ -178,7 +187,7 @@ def _learned(flight: InstalledFlight, heading: Rejudged, settings: HeadingSettin
 def _of_flight(
     saved: SavedFlight, configuration: Configuration, learned: InstalledFlight | None = None
 ) -> Iterator[tuple[Rejudged, str]]:
-    """Every verdict of a flight, judged again, and what of it only the log could tell."""
+    """Return every verdict of a flight, judged again, and what only its log could tell."""
     results, unsure = saved.results, set[str]()
     for analysis in systems().analyses:
         answer = results.answers.get(analysis.name)
@@ -198,7 +207,10 @@ def _of_flight(
 
 
 def _not_limits(settings: Any, stored: Mapping[str, Any], limits: frozenset[str]) -> list[str]:
-    """Settings that differ from those of the run, or that it did not tell, and are no mere limits."""
+    """Return settings that differ from those of the run and are no mere limits.
+
+    Or that the run did not report.
+    """
     found = dict.fromkeys(
         name.partition(".")[0] for name, value in to_json(_flat(settings)).items() if stored.get(name) != value
     )
@@ -206,7 +218,7 @@ def _not_limits(settings: Any, stored: Mapping[str, Any], limits: frozenset[str]
 
 
 def _flat(settings: Any) -> dict[str, Any]:
-    """Settings as an answer keeps them: a range as its two ends, nothing of what is left out."""
+    """Return settings as an answer keeps them: ranges as two ends, without those left out."""
     out: dict[str, Any] = {}
     for name, value in asdict(settings).items():
         if isinstance(value, tuple):
@@ -217,13 +229,16 @@ def _flat(settings: Any) -> dict[str, Any]:
 
 
 def _differs(saved: SavedFlight, configuration: Configuration, table: str) -> bool:
-    """Whether the file has a table that is not the one of the run."""
+    """Tell whether the file has a table that differs from that of the run."""
     given = configuration.tables.get(table)
     return bool(given) and dict(given or {}) != dict(mapping(saved.manifest.configuration, table))
 
 
 def _rows(saved: SavedFlight, one: Rejudged, needs_log: str, new: Configuration) -> Iterator[RulesRow]:
-    """A row for each gate with another limit or state; one without a gate where only the log can tell."""
+    """Yield a row for each gate with another limit or state.
+
+    One row without a gate where only the log can tell.
+    """
     label = mapping(saved.manifest.configuration, "rules").get("version")
     whole = RulesRow(
         flight_id=saved.folder.name,

@@ -1,4 +1,7 @@
-"""``python -m groundstation.pipeline.verbs.schema SUMMARY INSTALLATIONS`` writes the JSON Schemas of both files."""
+"""Command that writes the JSON Schemas of summary and installations.
+
+``python -m groundstation.pipeline.verbs.schema SUMMARY INSTALLATIONS``.
+"""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""``serve``: the recordings of a folder of flights through Rerun's own catalog server."""
+"""Verb ``serve``: the recordings of a folder of flights on Rerun's catalog server."""
 
 import ipaddress
 import os
@@ -75,7 +75,10 @@ def serve(
 
 @contextmanager
 def _set_by_signals(stop: threading.Event, *, asked: bool) -> Iterator[None]:
-    """Let Ctrl-C and an order to end set an event: an exception in the midst of anything might be lost."""
+    """Set an event at Ctrl-C or SIGTERM.
+
+    An exception in the midst of anything might be lost.
+    """
     if not asked or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -88,7 +91,9 @@ def _set_by_signals(stop: threading.Event, *, asked: bool) -> Iterator[None]:
 
 
 def recordings_in(out: Path, say: Callable[[str], None]) -> tuple[list[Path], list[Path], Path | None]:
-    """Recordings of the flights in a folder, of the sessions, and that of the fleet; folders without one are told.
+    """Return the recordings of the flights, the sessions and the fleet in a folder.
+
+    Folders without one are reported by ``say``.
 
     Raises
     ------
@@ -122,7 +127,7 @@ def _is_loopback(host: str) -> bool:
 
 
 def _serve_page(url: str, host: str) -> None:
-    """Serve the web viewer until it ends; it prints the address of its page itself."""
+    """Serve the web viewer until it ends; it prints the address of its page."""
     from groundstation.viewer.launch import viewer_command, viewer_environment
 
     command = viewer_command(url, web=True, host=host, headless=True)

@@ -60,7 +60,10 @@ def simulate_to(
 
 
 def is_session(scenario: str) -> bool:
-    """Whether a scenario is one of several aircraft: a shipped name of such, or a TOML file with ``[[aircraft]]``."""
+    """Tell whether a scenario has several aircraft.
+
+    A shipped name of such, or a TOML file with ``[[aircraft]]``.
+    """
     from groundstation.simulation.session_scenario import session_names
 
     if not scenario.endswith(".toml"):
@@ -70,7 +73,10 @@ def is_session(scenario: str) -> bool:
 
 
 def is_approach(scenario: str) -> bool:
-    """Whether a scenario is an approach on an ILS: a shipped name of such, or a TOML file with ``[recorded]``."""
+    """Tell whether a scenario is an approach on an ILS.
+
+    A shipped name of such, or a TOML file with ``[recorded]``.
+    """
     from groundstation.simulation.approach import approach_names
 
     if not scenario.endswith(".toml"):
@@ -164,7 +170,7 @@ def _resumed(
 
 
 def _study_of(name: str, recorded: Path) -> "Callable[..., StudyResult]":
-    """The study of recorded sets as a function that takes what the others take."""
+    """Return the study of recorded sets as a function with the parameters of other studies."""
     if name != "cooperative":
         raise UsageError("study", f"--recorded with {name}", "cooperative")
     from groundstation.pipeline.verbs.recorded import recorded_sets

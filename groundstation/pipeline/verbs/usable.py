@@ -1,4 +1,7 @@
-"""Whether logs can be used for a named purpose: what an analysis would lack, told without running it."""
+"""Usability of logs for a named purpose: what an analysis would lack.
+
+Told without running the analysis.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +21,7 @@ from groundstation.tables.table import Flight
 if TYPE_CHECKING:
     from groundstation.tables.session_settings import Stations
 
-LISTED = 3  # spans told of a shortfall
+LISTED = 3  # spans listed for a shortfall
 
 FLIGHT_PURPOSES: Mapping[str, Analysis] = MappingProxyType({one.name: one for one in systems().analyses if one.examine})
 SESSION_PURPOSES: Mapping[str, Analysis] = MappingProxyType(
@@ -28,7 +31,7 @@ SESSION_PURPOSES: Mapping[str, Analysis] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Usability:
-    """Whether data serve a purpose.
+    """Judgement whether data serve a purpose.
 
     Parameters
     ----------
@@ -45,7 +48,7 @@ class Usability:
 
     @property
     def text(self) -> str:
-        """One line: state, what is missing, and where.
+        """Judgement in one line: state, what is missing, and where.
 
         Examples
         --------
@@ -56,13 +59,13 @@ class Usability:
         return f"usable for {self.purpose}: {self.state}{f': {lacking}' if lacking else ''}"
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-able."""
+        """Return plain values for JSON."""
         lacking = [{"text": one.text, "spans_s": [list(span) for span in one.spans_s]} for one in self.shortfalls]
         return {"purpose": self.purpose, "state": self.state, "lacking": lacking}
 
 
 def usability_from(told: Mapping[str, Any]) -> Usability:
-    """What :meth:`Usability.to_dict` made of one, as it was."""
+    """Return the usability that :meth:`Usability.to_dict` was made of."""
     lacking = (
         Shortfall(one["text"], tuple((float(a), float(b)) for a, b in one["spans_s"])) for one in told["lacking"]
     )
@@ -82,7 +85,7 @@ def require_purpose(name: str) -> None:
 
 
 def usability_of_flight(purpose: str, flight: Flight, configuration: Configuration) -> Usability:
-    """Say whether a flight serves an analysis of flights."""
+    """Tell whether a flight serves an analysis of flights."""
     seen = seen_by_analyses(flight, configuration)
     return _examined(FLIGHT_PURPOSES[purpose], seen, known_of(seen, configuration))
 
@@ -90,7 +93,10 @@ def usability_of_flight(purpose: str, flight: Flight, configuration: Configurati
 def usability_of_session(
     purpose: str, flights: Sequence[Flight], configuration: Configuration, stations: "Stations"
 ) -> Usability:
-    """Say whether flights together serve an analysis of sessions; as in ``run``, some of them must range to others."""
+    """Tell whether flights together serve an analysis of sessions.
+
+    As in ``run``, some of them must range to others.
+    """
     from groundstation.tables.session_assemble import session_from_flights
 
     analysis = SESSION_PURPOSES[purpose]

@@ -1,4 +1,4 @@
-"""``view``: whatever stands for a flight - folder, recording, MCAP or log - opens in the Rerun viewer."""
+"""Verb ``view``: a folder, recording, MCAP or log of a flight in the Rerun viewer."""
 
 import os
 import tempfile
@@ -78,7 +78,10 @@ def look_at(
 
 
 def _sound(recording: Path) -> Path:
-    """A recording that Rerun can read from end to end: a damaged one may end the viewer without a word."""
+    """Return a recording that Rerun can read from end to end.
+
+    A damaged one may end the viewer without a word.
+    """
     from groundstation.viewer.verification import damaged
 
     if recording.stat().st_size <= MOST_VERIFIED_BYTES and (fault := damaged([recording])):
@@ -87,7 +90,7 @@ def _sound(recording: Path) -> Path:
 
 
 def _recording(path: Path) -> Path:
-    """A recording, or that of a folder: of a flight, of all flights, of a comparison."""
+    """Return a recording, or that in a folder of a flight, of all flights, of a comparison."""
     recording = file_in(path, ".rrd", FLEET_RECORDING, COMPARISON_RECORDING) if path.is_dir() else path
     with told_in_a_line(str(recording)), recording.open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:

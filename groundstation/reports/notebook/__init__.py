@@ -1,1 +1,4 @@
-"""The plots of a flight as matplotlib figures, for notebooks; the only package that imports matplotlib."""
+"""Plots of a flight as matplotlib figures, for notebooks.
+
+The only package that imports matplotlib.
+"""

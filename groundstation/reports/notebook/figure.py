@@ -1,6 +1,7 @@
-"""A plot as a matplotlib figure: the frames, ticks, legends and labels of the page's picture, and all samples.
+"""Plot as a matplotlib figure, with all samples.
 
-matplotlib is used through its object-oriented interface alone: no pyplot, no global figure.
+Frames, ticks, legends and labels are those of the page's picture. matplotlib is used through its object-oriented
+interface alone: no pyplot, no global figure.
 """
 
 import io
@@ -74,7 +75,10 @@ STYLE: dict[str, Any] = {
 
 
 class NotebookFigure(Figure):
-    """A matplotlib figure that a notebook shows without pyplot, on white whatever the notebook's ground."""
+    """Matplotlib figure that a notebook shows without pyplot, on white.
+
+    The background of the notebook has no effect.
+    """
 
     def _repr_png_(self) -> bytes:
         buffer = io.BytesIO()
@@ -101,7 +105,10 @@ def figure_of(plot: Plot) -> NotebookFigure:
 
 @contextmanager
 def _style() -> Iterator[None]:
-    """Set matplotlib's look to the report's for a while; a user's matplotlibrc does not reach it."""
+    """Set matplotlib's look to the report's for a while.
+
+    The user's matplotlibrc has no effect.
+    """
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(STYLE)  # type: ignore[arg-type]
@@ -119,7 +126,7 @@ class _Places(Locator):
         return self.tick_values(*self.axis.get_view_interval())  # type: ignore[union-attr]
 
     def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
-        """Places between two ends, by the length that the axis has now."""
+        """Return places between two ends, by the length that the axis has now."""
         size = self.axis.axes.bbox  # type: ignore[union-attr]
         pixels = size.height if self.is_upright else size.width
         length_pt = POINTS_PER_INCH * pixels / self.axis.get_figure(root=True).dpi  # type: ignore[union-attr]
@@ -129,7 +136,7 @@ class _Places(Locator):
 
 
 class _Texts(Formatter):
-    """What stands at the places of a locator."""
+    """Formatter of the texts at the places of a locator."""
 
     def __init__(self, places: _Places) -> None:
         self.places = places
@@ -187,12 +194,12 @@ def _frame(figure: Figure, box: Box, height: float) -> Axes:
 
 
 def _place(left: float, bottom: float, wide: float, high: float, height: float) -> tuple[float, float, float, float]:
-    """Shares of a figure from points, which are counted from its upper left corner."""
+    """Return shares of a figure from points, which are counted from its upper left corner."""
     return (MARGIN_PT + left) / WHOLE_WIDTH_PT, 1.0 - bottom / height, wide / WHOLE_WIDTH_PT, high / height
 
 
 def _ticks(axis: Axis, span: Span, ticks: Sequence[tuple[float, str]] | None, *, is_upright: bool) -> None:
-    """Ticks at given places, else where the page has them."""
+    """Set ticks at given places, else where the page has them."""
     axis.set_minor_locator(NullLocator())
     if ticks is None:
         places = _Places(span, is_upright=is_upright)
@@ -204,7 +211,7 @@ def _ticks(axis: Axis, span: Span, ticks: Sequence[tuple[float, str]] | None, *,
 
 
 def _legend(axes: Axes, entries: Sequence[Entry], corner: Corner, offset_pt: tuple[float, float]) -> None:
-    """One line or one column of a legend, off the upper right corner of a frame."""
+    """Draw one line or one column of a legend, off the upper right corner of a frame."""
     inches = axes.get_figure(root=True).dpi_scale_trans  # type: ignore[union-attr]
     shift = ScaledTranslation(offset_pt[0] / POINTS_PER_INCH, offset_pt[1] / POINTS_PER_INCH, inches)
     columns = len(entries) if corner == "lower right" else 1
@@ -221,7 +228,7 @@ def _legend(axes: Axes, entries: Sequence[Entry], corner: Corner, offset_pt: tup
 
 
 def _labels(axes: Axes, box: Box, height: float) -> None:
-    """Labels that stay at their places when the axes are moved."""
+    """Draw labels that stay at their places when the axes are moved."""
     pixels = axes.get_figure(root=True).dpi / POINTS_PER_INCH  # type: ignore[union-attr]
     to_data = axes.transData.inverted()
     for one in labels_of(box):

@@ -1,4 +1,4 @@
-"""Plots of a flight's report by the names that notebooks know them by."""
+"""Plots of a flight's report, by the names that notebooks use."""
 
 from groundstation.base.failures import attempt
 from groundstation.chapters.generic import SERIES as GENERIC_SERIES
@@ -35,7 +35,7 @@ def plots_of(saved: SavedFlight, systems: Systems) -> dict[str, Plot]:
 
 
 def name_of(figure: Figure) -> str:
-    """The name of a figure, with which of several alike it is.
+    """Return the name of a figure, and which of several alike it is.
 
     Examples
     --------

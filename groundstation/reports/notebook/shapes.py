@@ -69,7 +69,7 @@ def draw(mark: AnyMark, axes: Axes, box: Box, place: int) -> None:
 
 
 def handle_of(entry: Entry) -> Any:
-    """The sign of an entry of a legend."""
+    """Return the sign of an entry of a legend."""
     mark, colour = entry.mark, colours.COLOURS[entry.mark.role]
     if isinstance(mark, Spans):
         shade, alpha = colours.shade_of(entry.kind, mark.role, mark.emphasis)
@@ -107,7 +107,10 @@ def _begins(is_known: Any) -> Any:
 
 
 def _held(x: Floats, *values: Floats) -> tuple[Floats, ...]:
-    """Places and values of lines that hold each value about its place; NaN between pieces."""
+    """Return places and values of step lines; NaN between pieces.
+
+    A step line holds each value about its place.
+    """
     known = np.where(np.isfinite(values).all(axis=0), x, np.nan)
     rows, starts = shown_rows(known, known, len(x))
     wide, _, begins = stepped(x[rows], rows.astype(np.float64), starts)
@@ -169,7 +172,7 @@ def _spans(mark: Spans, axes: Axes, box: Box, look: Look) -> None:
 
 
 def _ranges(start: Floats, end: Floats, rows: Any) -> list[tuple[float, float]]:
-    """Starts and lengths of some rows, those that are known."""
+    """Return starts and lengths of the known rows."""
     known = rows & np.isfinite(start) & np.isfinite(end)
     return list(zip(start[known].tolist(), (end - start)[known].tolist(), strict=True))
 
@@ -213,7 +216,7 @@ def _symbol_look(symbol: Symbol, colour: str, *, is_hollow: bool = False) -> Loo
 
 
 def _reaching_out(lines: Sequence[Line2D], axes: Axes, box: Box) -> None:
-    """Have symbols cut a little beyond the frame, not at its edge."""
+    """Clip symbols a little beyond the frame, not at its edge."""
     x, y = BEYOND_PT / box.width, BEYOND_PT / box.height
     for line in lines:
         line.set_clip_box(TransformedBbox(Bbox([[-x, -y], [1.0 + x, 1.0 + y]]), axes.transAxes))

@@ -1,4 +1,7 @@
-"""The panels of a plot as a page draws them live, straight from its description; frames of what stays a picture."""
+"""Panels of a plot for the page's script, and frames of plots that stay pictures.
+
+They come straight from the description of the plot.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -38,13 +41,16 @@ JUST_BELOW = np.nextafter(np.float32(1.0), np.float32(0.0))
 
 
 def frames_of(panels: Sequence[Placed], height_pt: float) -> tuple[Frame, ...]:
-    """Frames of a picture, but for axes whose values the page does not tell."""
+    """Return the frames of a picture, except for axes whose values the page does not show."""
     boxes = [box for one in panels for box in one.boxes]
     return tuple(_frame(box, height_pt) for box in boxes if not _UNTOLD & {box.x.scale, box.y.scale})
 
 
 def panels_of(panels: Sequence[Placed], height_pt: float) -> tuple[live.Panel, ...]:
-    """The panels of a plot from left to right and from top to bottom; none where one of them cannot live."""
+    """Return the panels of a plot from left to right and from top to bottom.
+
+    Empty where one of them cannot be drawn live.
+    """
     found = []
     for one in panels:
         if not can_live(one):
@@ -63,13 +69,16 @@ def panels_of(panels: Sequence[Placed], height_pt: float) -> tuple[live.Panel, .
 
 
 def _held(curve: live.Curve) -> live.Curve:
-    """The curve with numbers that the page holds."""
+    """Return the curve with numbers that the page holds."""
     x, y, upper = (np.clip(values, -LARGEST, LARGEST) for values in (curve.x, curve.y, curve.upper))
     return replace(curve, x=x, y=y, upper=upper)
 
 
 def can_live(one: Placed) -> bool:
-    """Tell whether all that stands on a panel is known to the page's script: lines, dots, bands, lanes."""
+    """Tell whether the page's script can draw all marks of a panel.
+
+    It draws lines, dots, bands, lanes.
+    """
     panel = one.panel
     if panel.is_map or panel.nothing or panel.x.names or _UNTOLD & {panel.x.scale, panel.y.scale}:
         return False
@@ -108,13 +117,13 @@ def _frame(box: Box, height_pt: float) -> Frame:
 
 
 def _single(span: Span) -> tuple[float, float]:
-    """Ends of a scale as numbers that float32 holds."""
+    """Return the ends of a scale as float32 holds them."""
     low, high = (float(np.float32(min(max(end, -LARGEST), LARGEST))) for end in (span.low, span.high))
     return low, high
 
 
 def _samples(box: Box) -> Samples | None:
-    """Values that the cursor is told near a place: samples that say so, else those of cells."""
+    """Return the values shown near the cursor: those of samples, else those of cells."""
     told = next((mark for mark in box.panel.marks if isinstance(mark, Told)), None)
     if told is not None:
         columns = told.x, told.y, told.value
@@ -131,7 +140,7 @@ def _samples(box: Box) -> Samples | None:
 
 
 def _grounds(box: Box) -> tuple[tuple[float, float, str, str], ...]:
-    """Shaded spans; a kind has its name where the legend has it."""
+    """Return shaded spans; a kind that the legend names has its name."""
     found = []
     for mark in box.panel.marks:
         if isinstance(mark, Spans):
@@ -189,7 +198,10 @@ def _has_place(values: Floats, scale: str) -> np.ndarray[tuple[int, ...], np.dty
 
 
 def _line(mark: Curve, box: Box) -> tuple[Floats, Floats]:
-    """Samples of a curve from left to right; a gap has a place of its own, where there is none."""
+    """Return the samples of a curve from left to right.
+
+    A gap gets a sample of its own in its middle, NaN in y.
+    """
     x = np.where(_has_place(mark.x, box.x.scale), mark.x, np.nan)
     y = np.where(_has_place(mark.y, box.y.scale), mark.y, np.nan)
     if _is_backwards(x):
@@ -226,7 +238,7 @@ def _band(mark: Band, box: Box) -> tuple[Floats, Floats, Floats]:
 
 
 def _one_after_another(x: Floats) -> Floats:
-    """Places of steps: of two at one place the first stands just before."""
+    """Return the places of steps; of two at one place the first moves just before the second."""
     if not x.size:
         return x
     inner = x.copy()

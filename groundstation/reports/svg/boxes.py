@@ -1,4 +1,7 @@
-"""Places of frames in a picture: room for what is written around them, columns that agree, windows; points."""
+"""Places of frames in a picture.
+
+Room for the texts around them, columns that agree, windows; in points.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -27,7 +30,10 @@ _Rooms: TypeAlias = list[list[float]]  # of each panel, by rows
 
 @dataclass(frozen=True)
 class Box:
-    """One frame: a window of a panel. Places are points from the upper left corner of the picture."""
+    """One frame: a window of a panel.
+
+    Places are points from the upper left corner of the picture.
+    """
 
     panel: Panel
     left: float
@@ -44,11 +50,11 @@ class Box:
     y_title: str
 
     def across(self, values: Floats) -> Floats:
-        """Points from the left edge of the picture."""
+        """Return points from the left edge of the picture."""
         return np.asarray(self.left + self.width * self.x.shares(values))
 
     def down(self, values: Floats) -> Floats:
-        """Points from the upper edge of the picture."""
+        """Return points from the upper edge of the picture."""
         return np.asarray(self.top + self.height * (1.0 - self.y.shares(values)))
 
     @property
@@ -64,7 +70,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Placed:
-    """One panel: its frames from the left and what is written above and beside them."""
+    """One panel: its frames from the left, and the texts above and beside them."""
 
     panel: Panel
     boxes: tuple[Box, ...]
@@ -96,7 +102,7 @@ class _Told:
 
 
 def placed(plot: Plot) -> tuple[tuple[Placed, ...], float]:
-    """All panels with their places, row by row, and the height of the picture in points."""
+    """Return all panels with their places, row by row, and the height of the picture, points."""
     rows, lefts, rights, widths = _with_room(plot)
     found: list[Placed] = []
     y = 4.0
@@ -117,7 +123,10 @@ def placed(plot: Plot) -> tuple[tuple[Placed, ...], float]:
 
 
 def _with_room(plot: Plot) -> tuple[list[list[_Told]], _Rooms, _Rooms, _Rooms]:
-    """All panels, room left and right of them and their widths; maps leave room for the numbers that they come to."""
+    """Return all panels, the room left and right of them and their widths.
+
+    Maps leave room for the numbers of their final axes.
+    """
     rows = _told(plot)
     for _ in range(2):
         lefts, rights = _columns(plot, rows)
@@ -151,7 +160,10 @@ def _told(plot: Plot) -> list[list[_Told]]:
 
 
 def _chain(plot: Plot, row: int, column: int) -> range:
-    """Rows whose panel in a column shares its horizontal axis with that of a row, from the top."""
+    """Return the rows whose panel in a column shares its horizontal axis with that of a row.
+
+    The rows are in order from the top.
+    """
     first = last = row
     while first and plot.rows[first - 1].shares_x and column < len(plot.rows[first - 1].panels):
         first -= 1
@@ -170,17 +182,17 @@ def _y_ticks(panel: Panel, span: Span, length_pt: float) -> tuple[Tick, ...]:
 
 
 def widest(ticks: Sequence[Tick]) -> float:
-    """Width of the longest text among ticks, points."""
+    """Return the width of the longest text among ticks, points."""
     return max((width_pt(text) for _, text in ticks), default=0.0)
 
 
 def title_lines(title: str, room_pt: float) -> list[str]:
-    """The title of an upright axis in as many lines as it needs."""
+    """Return the title of an upright axis in as many lines as it needs."""
     return lines_of(label(title, MOST_OF_A_TITLE), room_pt) if title else []
 
 
 def _left_pt(panel: Panel, ticks: Sequence[Tick], height_pt: float) -> float:
-    """Room left of a panel for its numbers and its title."""
+    """Return the room left of a panel for its numbers and its title."""
     return TICK_PT + TO_TEXT_PT + widest(ticks) + _title_pt(panel, height_pt)
 
 
@@ -190,19 +202,25 @@ def _title_pt(panel: Panel, height_pt: float) -> float:
 
 
 def scale_of(panel: Panel) -> Cells | None:
-    """The cells whose scale stands beside a panel, None without any."""
+    """Return the cells whose scale stands beside a panel, None without any."""
     return next((mark for mark in panel.marks if isinstance(mark, Cells)), None)
 
 
 def _has_scale(row: Row, column: int) -> bool:
-    """Tell whether the scale of cells stands beside a panel: of several alike in a row beside the last."""
+    """Tell whether the scale of cells stands beside a panel.
+
+    Several alike in a row have one, beside the last.
+    """
     here = [scale_of(panel) for panel in row.panels[column : column + 2]]
     alike = [(one.low, one.high, one.title, one.is_log) for one in here if one is not None]
     return here[0] is not None and (len(alike) < 2 or alike[0] != alike[1])
 
 
 def _columns(plot: Plot, rows: list[list[_Told]]) -> tuple[_Rooms, _Rooms]:
-    """Room left and right of each panel: equal for those above each other, rows alike in their panels."""
+    """Return the room left and right of each panel, equal for panels above each other.
+
+    Rows count together only where their panels are equal.
+    """
     keys = [_shares(row) for row in plot.rows]
     lefts = [
         [
@@ -232,7 +250,7 @@ def _columns(plot: Plot, rows: list[list[_Told]]) -> tuple[_Rooms, _Rooms]:
 
 
 def _shares(row: Row) -> tuple[float, ...]:
-    """Shares of the width of a row, those of columns without a panel among them."""
+    """Return shares of the width of a row, those of columns without a panel among them."""
     shares = [round(max(panel.share, 1e-3), 3) for panel in row.panels]
     return (*shares, *[1.0] * (row.columns - len(shares)))
 
@@ -248,7 +266,10 @@ def _widths(plot: Plot, row: int, lefts: _Rooms, rights: _Rooms) -> list[float]:
 
 
 def _maps(plot: Plot, rows: list[list[_Told]], widths: _Rooms) -> list[list[_Told]]:
-    """Panels with both axes of maps at one scale; what shares the axis of a map is shown as far as it is."""
+    """Return the panels, both axes of maps at one scale.
+
+    A panel that shares the axis of a map shows the same range.
+    """
     rows = [list(row) for row in rows]
     for number, row in enumerate(plot.rows):
         for column, told in enumerate(rows[number]):
@@ -264,7 +285,7 @@ def _maps(plot: Plot, rows: list[list[_Told]], widths: _Rooms) -> list[list[_Tol
 
 
 def _gap_pt(told: _Told) -> float:
-    """Room between the windows of a panel, for the numbers of those with a range of their own."""
+    """Return the room between the windows of a panel, for the numbers of their own ranges."""
     has_own = len(set(told.y)) > 1
     return max(WINDOWS_PT, max(map(widest, told.y_ticks[1:])) + 10.0) if has_own else WINDOWS_PT
 

@@ -18,7 +18,10 @@ MOST_CELLS = 90  # along either axis
 
 
 def cells_shape(mark: Cells, box: Box) -> str:
-    """The cells of a grid: for each colour all that are at least as high, one over the other, so that no seam shows."""
+    """Return the cells of a grid as SVG, for each colour all cells at least as high.
+
+    One over the other, so that no seam shows.
+    """
     columns, rows = thin(len(mark.x), MOST_CELLS), thin(len(mark.y), MOST_CELLS)
     if not len(columns) or not len(rows) or mark.values.shape != (len(mark.y), len(mark.x)):
         return ""
@@ -36,12 +39,12 @@ def cells_shape(mark: Cells, box: Box) -> str:
 
 
 def colour_of_step(step: int) -> str:
-    """One of the colours of a scale, from the lowest."""
+    """Return one of the colours of a scale, from the lowest."""
     return "#" + "".join(f"{part:02x}" for part in viridis((step + 0.5) / STEPS))
 
 
 def _levels(mark: Cells, values: Floats) -> NDArray[np.int64]:
-    """The number of the colour of each cell, -1 for none."""
+    """Return the number of the colour of each cell, -1 for none."""
     shares = np.clip(span_of_colours(mark).shares(values), 0.0, 1.0)
     if mark.is_log:
         shares = np.where(values <= 0.0, 0.0, shares)
@@ -51,12 +54,15 @@ def _levels(mark: Cells, values: Floats) -> NDArray[np.int64]:
 
 
 def span_of_colours(mark: Cells) -> Span:
-    """The scale of the colours of cells with its ends."""
+    """Return the scale of the colours of cells with its ends."""
     return span_of("log" if mark.is_log else "linear", mark.low, mark.high, NO_PLACES, is_tight=True)
 
 
 def _blocks(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:
-    """Blocks of cells: first column and that behind the last, first row and that behind the last; no cell twice."""
+    """Return blocks of cells: first column and last + 1, first row and last + 1.
+
+    No cell is in two.
+    """
     padded = np.pad(mask.astype(np.int8), ((0, 0), (1, 1)))
     row, left = np.nonzero(np.diff(padded, axis=1) == 1)
     right = np.nonzero(np.diff(padded, axis=1) == -1)[1]
@@ -70,7 +76,7 @@ def _blocks(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:
 
 
 def scale_beside(mark: Cells, box: Box) -> str:
-    """The scale of colours right of a frame, with its ticks and title."""
+    """Return the scale of colours right of a frame, with its ticks and title."""
     span = span_of_colours(mark)
     left, step = box.right + TO_BAR_PT, box.height / STEPS
     parts = []

@@ -1,4 +1,4 @@
-"""The look of a picture: a colour for each role, widths of lines, shades of phases, the scale of cells."""
+"""Look of a picture: colours of roles, widths of lines, shades of phases, scale of cells."""
 
 from groundstation.plots.marks import Dash, Emphasis, Role
 
@@ -48,7 +48,7 @@ STEPS = 20  # colours of a scale
 
 
 def with_alpha(colour: str, alpha: float) -> str:
-    """Colour and opacity as one number.
+    """Return the colour and opacity as one number.
 
     Examples
     --------
@@ -59,7 +59,7 @@ def with_alpha(colour: str, alpha: float) -> str:
 
 
 def opacity(of: str, share: float) -> str:
-    """The attribute of an opacity, none of what is opaque.
+    """Return the attribute of an opacity, none of what is opaque.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def opacity(of: str, share: float) -> str:
 
 
 def dashes(dash: Dash) -> str:
-    """The attribute of a dashed line, none of a solid one.
+    """Return the attribute of a dashed line, none of a solid one.
 
     Examples
     --------
@@ -81,7 +81,9 @@ def dashes(dash: Dash) -> str:
 
 
 def shade_of(kind: str, role: Role, emphasis: Emphasis = "usual") -> tuple[str, float]:
-    """Colour and opacity of shaded ground: a phase of flight has its own, all else a faint one of its role.
+    """Return colour and opacity of shaded ground.
+
+    A phase of flight has its own, all else a faint one of its role.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Ticks of an axis of dates: hours, days, months or years of UTC, written as ISO 8601 has them."""
+"""Ticks of an axis of dates: hours, days, months or years of UTC, as in ISO 8601."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ _STEPS = (
 
 
 def date_ticks(low_s: float, high_s: float, length_pt: float) -> tuple[tuple[float, str], ...]:
-    """Round dates between two moments, seconds since 1970, each with its text.
+    """Return round dates between two moments, seconds since 1970, each with its text.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Text in a picture: how wide it is in DejaVu Sans, which characters it may have, how it is written as SVG.
+"""Text in a picture: its width in DejaVu Sans, its characters, its SVG.
 
 The two fonts beside this file are DejaVu Sans 2.37 cut down to Latin, Greek, Cyrillic, arrows, mathematics and signs
 (``python -m fontTools.subset``), without hints. Paper is set in them; a page has a font of the reader's machine, most
@@ -22,7 +22,7 @@ LINE_SHARE = 1.2  # from one line to the next, over the size
 
 @cache
 def widths(is_bold: bool = False) -> dict[int, float]:
-    """Widths of the characters that the font has, over its size, read off the font file.
+    """Return the widths of the font's characters over its size, read from the font file.
 
     Source: Microsoft, OpenType specification 1.9.1, tables ``cmap`` (format 4), ``hhea``, ``hmtx``.
 
@@ -44,7 +44,7 @@ def widths(is_bold: bool = False) -> dict[int, float]:
 
 
 def _glyphs(data: bytes, start: int) -> dict[int, int]:
-    """Glyphs by character, of the first table of format 4."""
+    """Return glyphs by character, of the first table of format 4."""
     for number in range(struct.unpack_from(">H", data, start + 2)[0]):
         offset = start + struct.unpack_from(">L", data, start + 8 + 8 * number)[0]
         if struct.unpack_from(">H", data, offset)[0] == 4:
@@ -67,7 +67,7 @@ def _glyphs(data: bytes, start: int) -> dict[int, int]:
 
 @lru_cache(4096)
 def width_pt(text: str, size_pt: float = SIZE_PT, is_bold: bool = False) -> float:
-    """Width of a line of text in DejaVu Sans, points.
+    """Return the width of a line of text in DejaVu Sans, points.
 
     Examples
     --------
@@ -81,12 +81,12 @@ def width_pt(text: str, size_pt: float = SIZE_PT, is_bold: bool = False) -> floa
 
 @lru_cache(4096)
 def label(text: Any, most: int = 40) -> str:
-    """Text of a log fit for a picture: characters the font has, one line, bounded length.
+    """Return text of a log fit for a picture: known characters, one line, bounded length.
 
     Examples
     --------
     >>> label("a\\u4e00b"), label("a" * 50, 4)
-    ('a\ufffdb', 'aaa…')
+    ('a�b', 'aaa…')
     """
     known = widths()
     kept = "".join(mark if ord(mark) in known else HIDDEN for mark in clean(str(text))[: 4 * most])
@@ -94,7 +94,9 @@ def label(text: Any, most: int = 40) -> str:
 
 
 def lines_of(text: str, room_pt: float, most: int = 2, size_pt: float = SIZE_PT) -> list[str]:
-    """Text broken between words into at most ``most`` lines, each within ``room_pt`` where words allow it.
+    """Break text between words into at most ``most`` lines.
+
+    Each is within ``room_pt`` where words allow it.
 
     Examples
     --------
@@ -114,7 +116,7 @@ def lines_of(text: str, room_pt: float, most: int = 2, size_pt: float = SIZE_PT)
 def written(
     text: str, x: float, y: float, anchor: str = "", *, size_pt: float = 0.0, look: str = "", is_upright: bool = False
 ) -> str:
-    """Text as an SVG element, its base line from (x, y) on; ``look`` are further attributes.
+    """Return text as an SVG element, its base line from (x, y) on; ``look`` are attributes.
 
     Upright text reads from below.
     """
@@ -127,5 +129,5 @@ def written(
 
 
 def middle(size_pt: float = SIZE_PT) -> float:
-    """From the middle of a line of text down to its base line, points."""
+    """Return the distance from the middle of a line of text down to its base line, points."""
     return 0.5 * CAP_SHARE * size_pt

@@ -1,4 +1,4 @@
-"""Places of labels in a frame: beside points, within outlines, at lines across, each where it covers no other."""
+"""Places of labels beside points, within outlines, at lines; no label covers another."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,7 +18,10 @@ Bounds = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Label:
-    """A text at a place (x, y), and where its line begins; points from the upper left corner of the picture."""
+    """Text at a place (x, y), and where its line begins.
+
+    Units are points from the upper left corner of the picture.
+    """
 
     text: str
     colour: str
@@ -29,12 +32,12 @@ class Label:
 
 
 def labels_of(box: Box) -> tuple[Label, ...]:
-    """Labels of lines across a frame, then those of points and outlines in it."""
+    """Return labels of lines across a frame, then those of points and outlines in it."""
     return (*_beside_lines(box), *_at_places(box))
 
 
 def _beside_lines(box: Box) -> Iterator[Label]:
-    """Labels above level lines and right of upright ones."""
+    """Yield labels above level lines and right of upright ones."""
     for mark in box.panel.marks:
         if not isinstance(mark, Limit) or not mark.label:
             continue
@@ -73,7 +76,10 @@ def _at_places(box: Box) -> Iterator[Label]:
 
 
 def _free(x: float, y: float, wide: float, taken: list[Bounds], box: Box, is_middle: bool) -> tuple[float, float]:
-    """Left end and base line of a label: above its place, below, right or left of it, where no other stands."""
+    """Return left end and base line of a label where no other stands.
+
+    Above its place, below, right or left of it.
+    """
     high = SIZE_PT
     above, below, level = y - 4.5, y + 4.0 + 2 * middle(), y + middle()
     tries = [(x - 0.5 * wide, above), (x - 0.5 * wide, below), (x + 5.0, level), (x - 5.0 - wide, level)]

@@ -1,4 +1,7 @@
-"""The legend of a panel: a sign and a name for each mark that has one, in lines above it or in a column beside it."""
+"""Legend of a panel: a sign and a name for each mark that has one.
+
+It stands in lines above the panel or in a column beside it.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,7 +47,7 @@ class Entry:
 
 
 def entries_of(panel: Panel) -> tuple[Entry, ...]:
-    """Entries of a panel, none twice; of shaded ground each kind."""
+    """Return entries of a panel, none twice; of shaded ground each kind."""
     if not panel.legend:
         return ()
     found: dict[tuple[str, str], Entry] = {}
@@ -64,7 +67,7 @@ def entries_of(panel: Panel) -> tuple[Entry, ...]:
 
 
 def ground(mark: Spans, kind: str) -> Entry:
-    """Shaded ground by its kind, where that is empty by its name."""
+    """Return shaded ground by its kind, or by its name where the kind is empty."""
     return Entry(mark, label(kind or mark.name, MOST_OF_A_NAME), kind)
 
 
@@ -72,7 +75,7 @@ _MORE = Told(x=NO_PLACES, y=NO_PLACES, value=NO_PLACES, title="")
 
 
 def above(entries: Sequence[Entry], room_pt: float) -> tuple[tuple[Entry, ...], ...]:
-    """Lines of a legend above a panel, each as full as its width allows."""
+    """Return lines of a legend above a panel, each as full as its width allows."""
     lines: list[list[Entry]] = []
     for entry in entries:
         if lines and sum(one.width_pt for one in lines[-1]) + entry.width_pt - BETWEEN_PT <= room_pt:
@@ -83,12 +86,12 @@ def above(entries: Sequence[Entry], room_pt: float) -> tuple[tuple[Entry, ...], 
 
 
 def beside_pt(entries: Sequence[Entry]) -> float:
-    """Room right of a panel for its legend."""
+    """Return the room right of a panel for its legend."""
     return max((entry.width_pt for entry in entries), default=0.0)
 
 
 def drawn_line(entries: Sequence[Entry], right: float, y: float) -> str:
-    """A line of a legend that ends at ``right``, its middle at ``y``; points."""
+    """Return a line of a legend that ends at ``right``, its middle at ``y``; points."""
     x = right - sum(entry.width_pt for entry in entries) + BETWEEN_PT
     parts = []
     for entry in entries:
@@ -98,7 +101,7 @@ def drawn_line(entries: Sequence[Entry], right: float, y: float) -> str:
 
 
 def drawn(entry: Entry, x: float, y: float) -> str:
-    """Sign and name of an entry from ``x`` on, their middle at ``y``; points."""
+    """Return the sign and name of an entry from ``x`` on, their middle at ``y``; points."""
     return _sign(entry, x, y) + written(entry.name, x + SIGN_PT + GAP_PT, y + middle())
 
 

@@ -1,4 +1,7 @@
-"""Numbers of a path: hundredths of a point (0.004 mm), each as a step from the one before, in few characters."""
+"""Numbers of a path in few characters.
+
+Hundredths of a point (0.004 mm), each as a step from the one before.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +15,9 @@ Steps = NDArray[np.int64]
 
 
 class _Words(dict[int, str]):
-    """Text of hundredths by their count, with a space before where no minus parts it from the number before.
+    """Texts of numbers in hundredths, by the number.
+
+    A space comes first where no minus separates it from the number before.
 
     Source: W3C, Scalable Vector Graphics 2, 9.3.9: the grammar of path data.
     """
@@ -30,7 +35,7 @@ _WORDS = _Words()
 
 
 def words(hundredths: NDArray[np.int64]) -> str:
-    """Numbers of a path one after another.
+    """Return numbers of a path one after another.
 
     Examples
     --------
@@ -41,12 +46,14 @@ def words(hundredths: NDArray[np.int64]) -> str:
 
 
 def hundredths(values: Floats) -> Steps:
-    """Places rounded to hundredths of a point."""
+    """Return places rounded to hundredths of a point."""
     return np.rint(100.0 * np.clip(values, -FAR_PT, FAR_PT)).astype(np.int64)
 
 
 def polyline(x: Floats, y: Floats, starts: NDArray[np.bool_]) -> str:
-    """Path through finite places, a new piece where ``starts`` says; one place alone is a stroke of no length.
+    """Return the path through finite places, with a new piece where ``starts`` is true.
+
+    A single place is a stroke of no length.
 
     Parameters
     ----------
@@ -74,7 +81,10 @@ def polyline(x: Floats, y: Floats, starts: NDArray[np.bool_]) -> str:
 
 
 def _corners(places: Steps, starts: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Rows of the places without which another line would be drawn: no doubles, none on the straight way of others."""
+    """Return the rows of the places that the line needs.
+
+    No doubles, none on the straight line between others.
+    """
     moves = np.ones(len(places), dtype=bool)
     moves[1:] = starts[1:] | np.any(places[1:] != places[:-1], axis=1)
     rows = np.flatnonzero(moves)
@@ -91,7 +101,7 @@ def _corners(places: Steps, starts: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 
 def strokes(start: Floats, end: Floats, y: Floats) -> str:
-    """Path of level strokes from ``start`` to ``end``."""
+    """Return the path of level strokes from ``start`` to ``end``."""
     if not start.size:
         return ""
     left, right, height = hundredths(start), hundredths(end), hundredths(y)
@@ -105,7 +115,7 @@ def strokes(start: Floats, end: Floats, y: Floats) -> str:
 
 
 def boxes(left: Floats, right: Floats, upper: Floats, lower: Floats) -> str:
-    """Path of boxes between places of their edges, whichever of two comes first."""
+    """Return the path of boxes between places of their edges, whichever of two comes first."""
     x, y = hundredths(np.minimum(left, right)), hundredths(np.minimum(upper, lower))
     wide, high = hundredths(np.maximum(left, right)) - x, hundredths(np.maximum(upper, lower)) - y
     moves = np.column_stack([np.diff(x, prepend=0), np.diff(y, prepend=0), wide, high, -wide])
@@ -118,7 +128,7 @@ def boxes(left: Floats, right: Floats, upper: Floats, lower: Floats) -> str:
 
 
 def dots(x: Floats, y: Floats) -> str:
-    """Path of strokes of no length: with round ends they are dots."""
+    """Return the path of strokes of no length: with round ends they are dots."""
     if not x.size:
         return ""
     places = np.column_stack([hundredths(x), hundredths(y)])
@@ -128,7 +138,9 @@ def dots(x: Floats, y: Floats) -> str:
 
 
 def each(counts: NDArray[np.int64]) -> list[str]:
-    """The numbers of a path one by one, given in hundredths; a space stands before one that has no minus.
+    """Return the numbers of a path one by one, from hundredths.
+
+    A space stands before a number without a minus.
 
     Examples
     --------

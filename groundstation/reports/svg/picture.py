@@ -1,4 +1,4 @@
-"""A plot as a picture: its description written as one SVG element, and the panels by which a page draws it live.
+"""Plot as a picture: one SVG element, and the panels by which a page draws it live.
 
 The element has neither style sheet nor script and refers to nothing outside of itself. Its text takes the font of where
 it stands. Equal descriptions give equal bytes.
@@ -30,7 +30,10 @@ _NOT_IN_AN_ID = re.compile(r"[^A-Za-z0-9_-]+")
 
 
 def picture_of(plot: Plot) -> Svg:
-    """Write a plot as an SVG element that can stand in a page, with its panels; its frames where it cannot live."""
+    """Write a plot as an SVG element for a page, with its panels.
+
+    A plot that cannot be drawn live has its frames instead.
+    """
     panels, height = placed(plot)
     key = key_of(plot.name)
     clips, parts, number = [], [], 0
@@ -49,7 +52,7 @@ def picture_of(plot: Plot) -> Svg:
 
 
 def key_of(name: str) -> str:
-    """The name of a plot as names within its picture begin.
+    """Return the prefix of all names within a plot's picture.
 
     Examples
     --------
@@ -61,7 +64,7 @@ def key_of(name: str) -> str:
 
 
 def _frame(box: Box, clip: str) -> str:
-    """One frame: grid, axes, what stands on it."""
+    """Return one frame as SVG: grid, axes, marks."""
     under: list[tuple[AnyMark, str]] = []
     over: list[tuple[AnyMark, str]] = []
     for mark in box.panel.marks:
@@ -84,7 +87,7 @@ def _y_places(box: Box) -> list[tuple[float, str]]:
 def _places(
     ticks: tuple[Tick, ...], along: Callable[[Floats], Floats], low: float, high: float
 ) -> list[tuple[float, str]]:
-    """Ticks by their points along an edge, those that lie on it."""
+    """Return ticks by their points along an edge, those that lie on it."""
     points = along(np.array([place for place, _ in ticks], dtype=np.float64))
     found = zip(points.tolist(), (text for _, text in ticks), strict=True)
     return [(point, text) for point, text in found if low - 0.1 <= point <= high + 0.1]
@@ -98,7 +101,7 @@ def _grid(box: Box) -> str:
 
 
 def _axes(box: Box) -> str:
-    """Edges, ticks and what is written there."""
+    """Return edges, ticks and their texts as SVG."""
     parts = [f"M{box.left:.2f} {box.top:.2f}V{box.bottom:.2f}H{box.right:.2f}"]
     texts = []
     for x, text in _x_places(box):
@@ -126,7 +129,7 @@ def _upright_title(box: Box) -> Iterator[str]:
 
 
 def _nothing(box: Box) -> str:
-    """Why a panel is empty, in the middle of its frame."""
+    """Return why a panel is empty, as text in the middle of its frame."""
     if not box.panel.nothing:
         return ""
     lines = lines_of(label(box.panel.nothing, 200), box.width - 8.0, 4)
@@ -139,13 +142,13 @@ def _nothing(box: Box) -> str:
 
 
 def _labels(box: Box) -> str:
-    """Labels in a frame, about their letters a halo of paper."""
+    """Return the labels in a frame as SVG, with a halo of paper around their letters."""
     told = (written(one.text, one.left, one.base, look=f' fill="{one.colour}"{HALO}') for one in labels_of(box))
     return "".join(told)
 
 
 def _around(one: Placed) -> str:
-    """Title and legend of a panel, and the scale of its cells."""
+    """Return the title and legend of a panel, and the scale of its cells."""
     first = one.boxes[0]
     parts = []
     y = first.top - 3.0 - 0.5 * legend.LINE_PT

@@ -1,4 +1,7 @@
-"""Marks drawn in a frame, as SVG; samples that are too many are thinned, what has no place is left out."""
+"""Marks drawn in a frame, as SVG.
+
+Too many samples are thinned, samples without a place are left out.
+"""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -35,7 +38,7 @@ LANE_PT, LEAST_LANE_PT, ROUND = 7.0, 0.25, ' style="stroke-linecap:round"'
 
 
 def shape(mark: AnyMark, box: Box) -> str:
-    """A mark as it stands in a frame; empty where nothing of it is to be seen."""
+    """Return a mark as SVG in its frame; empty where no part of it can be seen."""
     draw: Callable[[Any, Box], str] | None = _SHAPES.get(type(mark))
     return draw(mark, box) if draw else ""
 
@@ -62,7 +65,7 @@ def _curve(mark: Curve, box: Box) -> str:
 
 
 def stepped(x: Floats, y: Floats, starts: Any) -> tuple[Floats, Floats, Any]:
-    """A line that holds each value about its place, and where its pieces begin."""
+    """Return a line that holds each value about its place, and where its pieces begin."""
     wide, high, begins = [np.zeros(0)], [np.zeros(0)], [np.zeros(0, dtype=bool)]
     bounds = [*np.flatnonzero(starts).tolist(), len(x)]
     for first, last in pairwise(bounds):
@@ -111,12 +114,15 @@ def _band(mark: Band, box: Box) -> str:
 
 
 def _kept(places: Floats, box: Box) -> Floats:
-    """Edges of a band no farther out than is needed: what lies beyond the frame has no shape to be seen."""
+    """Clip the edges of a band not far beyond the frame.
+
+    Farther out they cannot be seen.
+    """
     return np.clip(places, box.top - 10.0, box.bottom + 10.0)
 
 
 def _both(x: Floats, low: Floats, high: Floats, most: int) -> tuple[Any, Any]:
-    """Rows of a band: half of them by its lower edge, half by its upper one."""
+    """Return rows of a band: half of them by its lower edge, half by its upper one."""
     known = np.where(np.isfinite(low) & np.isfinite(high), x, np.nan)
     if np.isfinite(known).sum() <= most:
         return shown_rows(known, low, most)

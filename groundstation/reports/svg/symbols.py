@@ -13,12 +13,12 @@ EDGE_PT, CROSS_PT = 1.1, 1.5
 
 
 def symbol(kind: Symbol, x: float, y: float, size_pt: float, colour: str, *, is_hollow: bool = False) -> str:
-    """A symbol about (x, y), so many points across; a hollow one is of paper within."""
+    """Return a symbol about (x, y), so many points across; a hollow one has paper within."""
     return f'<path d="{outline(kind, x, y, 0.5 * size_pt)}" {look(kind, colour, is_hollow=is_hollow)}/>'
 
 
 def look(kind: Symbol, colour: str, *, is_hollow: bool = False) -> str:
-    """Attributes by which the path of a symbol is painted."""
+    """Return attributes by which the path of a symbol is painted."""
     if kind == "cross":
         return f'fill="none" stroke="{colour}" stroke-width="{CROSS_PT:g}"'
     if kind == "ring" or is_hollow:
@@ -27,7 +27,7 @@ def look(kind: Symbol, colour: str, *, is_hollow: bool = False) -> str:
 
 
 def outline(kind: Symbol, x: float, y: float, half: float) -> str:
-    """The path of a symbol."""
+    """Return the path of a symbol."""
     if kind in ("dot", "circle", "ring"):
         half *= 1.0 if kind == "dot" else 1.2
         arc = f"a{half:.2f} {half:.2f} 0 1 0 "

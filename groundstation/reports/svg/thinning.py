@@ -9,10 +9,10 @@ Rows = NDArray[np.int64]
 
 
 def shown_rows(x: Floats, y: Floats, most: int) -> tuple[Rows, NDArray[np.bool_]]:
-    """Rows of finite samples that are drawn, at most ``most``, and where a piece begins: behind a gap.
+    """Return the rows of finite samples to draw, at most ``most``, and where pieces begin.
 
-    Samples are cut into spans of as many each; of each the least and the largest stay, and the ends of pieces while
-    these are not many.
+    A piece begins after a gap. Samples are cut into spans of as many each; of each the least and the largest stay, and
+    the ends of pieces while these are not many.
 
     Examples
     --------

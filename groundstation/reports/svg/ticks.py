@@ -1,4 +1,4 @@
-"""Ticks of axes: round places and what is written there."""
+"""Ticks of axes: round places and their texts."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -20,7 +20,7 @@ Tick = tuple[float, str]
 
 
 def ticks_of(span: Span, length_pt: float, *, is_upright: bool) -> tuple[Tick, ...]:
-    """Places along an axis of some length, each with its text.
+    """Return places along an axis of some length, each with its text.
 
     Examples
     --------
@@ -47,7 +47,7 @@ def ticks_of(span: Span, length_pt: float, *, is_upright: bool) -> tuple[Tick, .
 
 
 def own_ticks(places: Sequence[float]) -> tuple[Tick, ...]:
-    """Numbers at given places, with as many decimals as they need.
+    """Return numbers at given places, with as many decimals as they need.
 
     Examples
     --------
@@ -58,7 +58,7 @@ def own_ticks(places: Sequence[float]) -> tuple[Tick, ...]:
 
 
 def _multiples(step: float, low: float, high: float) -> list[float]:
-    """Multiples of a step from ``low`` to ``high``, ends with them."""
+    """Return the multiples of a step from ``low`` to ``high``, ends included."""
     slack = 1e-9 * step
     first, last = math.ceil((low - slack) / step), math.floor((high + slack) / step)
     return [count * step for count in range(first, min(last, first + 100) + 1)]
@@ -78,7 +78,7 @@ def _linear(low: float, high: float, length_pt: float, is_upright: bool) -> tupl
 
 
 def _at_steps(low: float, high: float, most: float) -> tuple[Tick, ...]:
-    """At most ``most`` spaces between round places."""
+    """Return ticks at round places, with at most ``most`` spaces between them."""
     most = min(most, MOST)
     power = 10.0 ** math.floor(math.log10((high - low) / most))
     step = next((power * part for part in (1.0, 2.0, 5.0, 10.0) if (high - low) / (power * part) <= most), 20.0 * power)
@@ -103,7 +103,7 @@ def _plain(value: float, places: int) -> str:
 
 
 def _powered(value: float, exponent: int, places: int) -> str:
-    """A number as a multiple of a power of ten."""
+    """Return a number as a multiple of a power of ten."""
     if value == 0.0:
         return "0"
     power = f"·10{str(exponent).translate(RAISED)}"
@@ -154,7 +154,10 @@ def _log(low: float, high: float, length_pt: float, is_upright: bool) -> tuple[T
 
 
 def _of_few_decades(low: float, high: float, room: float) -> list[float]:
-    """Whole decades, then twos and fives of them, each where there is room: a share of the axis."""
+    """Return whole decades, then twos and fives of them, where there is room.
+
+    ``room`` is a share of the axis.
+    """
     powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     kept: list[float] = []
     for part in (1.0, 2.0, 5.0):
@@ -166,7 +169,9 @@ def _of_few_decades(low: float, high: float, room: float) -> list[float]:
 
 
 def of_decade(value: float, *, as_power: bool = False) -> str:
-    """A round number of any size, its decade as a power of ten where that is far from one or ``as_power``.
+    """Return a round number of any size as text.
+
+    Its decade is a power of ten where that is far from one, or ``as_power``.
 
     Examples
     --------
@@ -185,7 +190,10 @@ def of_decade(value: float, *, as_power: bool = False) -> str:
 
 
 def _symlog(span: Span, length_pt: float, is_upright: bool) -> tuple[Tick, ...]:
-    """Zero, where it ceases to be linear, and round numbers beyond, those nearest to zero first."""
+    """Return ticks at zero, at the end of the linear part, and at round numbers beyond.
+
+    Where room is short, decades and numbers nearest to zero go first.
+    """
     low, high = min(span.low, span.high), max(span.low, span.high)
     reach = max(abs(low), abs(high))
     sizes = [0.0]
@@ -203,7 +211,7 @@ def _symlog(span: Span, length_pt: float, is_upright: bool) -> tuple[Tick, ...]:
 
 
 def _weight(size: float, linear_to: float) -> int:
-    """Rank of a mark where there is no room for all: zero, decades, fives and twos."""
+    """Return the rank of a mark where there is no room for all: zero, decades, fives and twos."""
     if size == 0.0:
         return 0
     part = size / 10.0 ** math.floor(math.log10(size) + 1e-9)

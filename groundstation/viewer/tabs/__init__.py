@@ -1,1 +1,1 @@
-"""The tabs of the recording: each module logs what its tab shows and returns the layout of it."""
+"""Tabs of the recording: each module logs the content of its tab and returns its layout."""

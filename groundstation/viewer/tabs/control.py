@@ -1,4 +1,7 @@
-"""Control of a session: the aircraft moving in space under the recommended law, the law, accuracy and geometry."""
+"""Tab on control of a session: the aircraft in space under the recommended law.
+
+The law, accuracy and geometry.
+"""
 
 import numpy as np
 import rerun as rr
@@ -37,7 +40,7 @@ def control(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
 
 
 def _space(recorder: Recorder, answer: ControlPlan, paths: ControlPaths, results: FlightResults) -> rrb.View:
-    """Aircraft and points in space, with a line from the judged aircraft to every source."""
+    """Log aircraft and points in space, with a line from the judged aircraft to every source."""
     law, aircraft = paths.law, paths.aircraft
     place = np.column_stack([paths.east_m, paths.north_m, paths.up_m])
     shades = colours.for_series(len(answer.aircraft))

@@ -1,4 +1,7 @@
-"""Cooperative: the aircraft of a session in space with their ellipsoids and links, errors, geometry, links in time."""
+"""Tab on cooperative navigation: aircraft in space with ellipsoids and links.
+
+Beside them: errors, geometry, and links in time.
+"""
 
 import numpy as np
 import rerun.blueprint as rrb
@@ -41,7 +44,7 @@ def cooperative(recorder: Recorder, results: FlightResults) -> rrb.Container:
 
 
 def _sources(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
-    """Sources that each aircraft hears with time: the page has them in its table."""
+    """Log the number of sources that each aircraft hears; the page has them in its table."""
     data = results.rows_of(CooperativeGeometry)
     if data is None or not np.isfinite(data.sources).any():
         return []
@@ -56,7 +59,7 @@ def _sources(recorder: Recorder, answer: CooperativeResult, results: FlightResul
 
 
 def _links(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
-    """A lane each for the worst links: ranging, gated, silent."""
+    """Log a lane each for the worst links: ranging, gated, silent."""
     data = results.rows_of(CooperativeLinks)
     if data is None:
         return []
@@ -78,7 +81,7 @@ def _links(recorder: Recorder, answer: CooperativeResult, results: FlightResults
 
 
 def link_spans(time_s: FloatArray, mark: Counts, end_s: float) -> tuple[FloatArray, FloatArray, Texts]:
-    """Stretches in which a link ranges, is gated, or is silent, until the end of the session.
+    """Return stretches in which a link ranges, is gated, or is silent, to the session's end.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Density of the heading error as bars: the growing one over its final state.
+"""Density of the heading error as bars: the growing density over the final one.
 
 Rerun has no x-y plots: the fitted normal is drawn as hairline bars. An invisible bar as high as the highest step keeps
 the axes still while one scrubs. Rerun takes the abscissa of a bar for its left edge.
@@ -28,7 +28,10 @@ UNSEEN: Colour = (0, 0, 0, 1)  # wholly transparent means "choose a colour" to R
 
 
 def heading_error(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    """Log the density of the differences d: growing with time, over the final one and the fitted normal."""
+    """Log the density of the differences d as it grows with time.
+
+    The final density and the fitted normal lie behind it.
+    """
     final = results.rows_of(HeadingDistribution)
     if final is None:
         return []
@@ -61,10 +64,10 @@ def _steps(growth: HeadingGrowth) -> Iterator[tuple[float, FloatArray, FloatArra
 
 
 def _growing(recorder: Recorder, growth: HeadingGrowth, bin_width: float, ceiling: float) -> float:
-    """Log one bar chart a step (the SDK drops bar charts sent as columns); the highest bar logged.
+    """Log one bar chart per step; return the highest bar.
 
-    The first few steps are left out while a bar of some later one rises above the ceiling: of ten samples three may
-    share a bin, and an axis that has to hold such a bar flattens the rest.
+    The SDK drops bar charts sent as columns. The first few steps are left out while a bar of some later one rises above
+    the ceiling: of ten samples three may share a bin, and an axis that has to hold such a bar flattens the rest.
     """
     steps = list(_steps(growth))
     peaks = np.array([float(np.nanmax(density, initial=0.0)) for _, _, density in steps])

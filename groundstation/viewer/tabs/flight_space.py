@@ -1,4 +1,4 @@
-"""The flight in space: the track by flight phase, and the aircraft on it with its attitude."""
+"""Flight in space: the track by flight phase, and the aircraft with its attitude."""
 
 import numpy as np
 import rerun as rr
@@ -33,7 +33,7 @@ SIDES = np.array([colours.ANSWER, colours.ANSWER, colours.INS, colours.INS, colo
 def flight_space(
     recorder: Recorder, figure: Overview, points_m: FloatArray | None, pieces: list[slice], shades: list[Colour]
 ) -> rrb.Spatial3DView | None:
-    """Log track and aircraft; None for a flight with neither a height along a track nor an attitude.
+    """Log track and aircraft; None with neither a height along a track nor an attitude.
 
     Parameters
     ----------
@@ -58,14 +58,14 @@ def flight_space(
 
 
 def _eye(place: FloatArray, size_m: float) -> rrb.EyeControls3D:
-    """An eye that sees the whole track from the south-west and above."""
+    """Return an eye that sees the whole track from the south-west and above."""
     low, high = place.min(axis=0), place.max(axis=0)
     middle, across = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 3.0 * size_m)
     return rrb.EyeControls3D(position=middle + across * EYE, look_target=middle, eye_up=(0.0, 0.0, 1.0))
 
 
 def _height_m(figure: Overview) -> FloatArray:
-    """Height above the lowest place; 0 where none is logged."""
+    """Return the height above the lowest place; 0 where none is logged."""
     for logged in (figure.altitude_m, figure.pressure_altitude_m, figure.height_above_airfield_m):
         if logged is not None and np.isfinite(logged).any():
             height = np.where(np.abs(logged) < MOST_HEIGHT_M, logged, np.nan)
@@ -74,7 +74,10 @@ def _height_m(figure: Overview) -> FloatArray:
 
 
 def _attitude(figure: Overview) -> FloatArray | None:
-    """Quaternions x y z w; without a true heading along the track, else by the compass, else to the north."""
+    """Return quaternions x y z w.
+
+    Without a true heading the aircraft points along the track, else by the compass, else to the north.
+    """
     roll, pitch = figure.roll_deg, figure.pitch_deg
     if roll is None or pitch is None:
         return None
@@ -104,7 +107,10 @@ def _aircraft(
     attitude: FloatArray | None,
     size_m: float,
 ) -> None:
-    """Log a body that moves and turns; where the attitude is not known it keeps the last one. Without any: a dot."""
+    """Log a body that moves and turns; a dot where no attitude is known at all.
+
+    Where the attitude is unknown for a while the body keeps the last one.
+    """
     is_shown = known if attitude is None else known & np.isfinite(attitude).all(axis=1)
     rows = np.flatnonzero(is_shown)
     turn = None if attitude is None else attitude[rows].astype(np.float32)

@@ -1,4 +1,7 @@
-"""Forecast: what the filter would have said had GNSS been lost, beside what GNSS later showed, and how good it is."""
+"""Tab on the forecast: what the filter would have said had GNSS been lost.
+
+GNSS of the same time and the errors of the forecast are beside it.
+"""
 
 import numpy as np
 import rerun as rr
@@ -59,7 +62,10 @@ def forecast(recorder: Recorder, results: FlightResults) -> rrb.Container | None
 
 
 def _fan(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    """Log the forecast from each start at its time: the latest start at the playhead is the one shown."""
+    """Log the forecast from each start at its time.
+
+    The playhead shows that from the latest start.
+    """
     fan = results.rows_of(ForecastFan)
     if fan is None or not np.isfinite(fan.lead_s).any():
         return []
@@ -78,7 +84,7 @@ def _fan(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
 
 
 def _radial(recorder: Recorder, fan: ForecastFan, minutes: FloatArray, x: Axis) -> rrb.View:
-    """Distance between forecast and GNSS, what the forecast claimed, and the error of the INS without it."""
+    """Log the distance between forecast and GNSS, the claimed error, and the raw INS error."""
     east, north = fan.east, fan.north
     raw = np.hypot(east.actual_m, north.actual_m)
     left = np.hypot(east.actual_m - east.forecast_m, north.actual_m - north.forecast_m)
@@ -127,7 +133,10 @@ def _starts(
 
 
 def _map(recorder: Recorder, results: FlightResults, answer: ForecastResult) -> list[rrb.View | rrb.Container]:
-    """The hindcast map, one tensor a method: radial error by start and horizon, all on one colour scale."""
+    """Log the hindcast map, one tensor per method: radial error by start and horizon.
+
+    All on one colour scale.
+    """
     figure = results.rows_of(ForecastMap)
     if figure is None:
         return []

@@ -1,4 +1,7 @@
-"""Tab of an answer that has none of its own: what its chapter tells, and its figures over time, one view per unit."""
+"""Tab of an answer that has no tab of its own.
+
+Its chapter, and its figures over time, one view per unit.
+"""
 
 import rerun.blueprint as rrb
 

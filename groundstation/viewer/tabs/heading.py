@@ -1,4 +1,4 @@
-"""Heading: the INS heading error found on straight taxi, how it grew, and what it rests on."""
+"""Tab on the heading: the INS heading error on straight taxi, its growth, its basis."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -50,12 +50,15 @@ def heading(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
 
 
 def _first_panel(told: Plot | None) -> Plot | None:
-    """The velocities over time alone: there is no room for their plane."""
+    """Return the plot of velocities over time alone; the tab has no room for their plane."""
     return None if told is None else replace(told, rows=one_panel(told.panels[0], told.rows[0].height_mm))
 
 
 def _on_ground(results: FlightResults) -> FlightResults:
-    """What the plots of the taxi are made of, without the samples after it: axes should show the taxi."""
+    """Return the results without heading samples after the taxi.
+
+    The axes of the taxi plots should show the taxi.
+    """
     samples = results.rows_of(HeadingSamples)
     ground = None if samples is None else samples.where(~np.isin(samples.gate, AFTER_TAXI))
     figures = ground, results.rows_of(HeadingRunning), results.rows_of(HeadingLanes)

@@ -1,4 +1,7 @@
-"""INS errors: what the filter says of position, velocity, tilt and drift of each channel, and how far to trust it."""
+"""Tab on INS errors: estimates of position, velocity, tilt and drift, and trust in them.
+
+Each channel has its own.
+"""
 
 from collections.abc import Sequence
 
@@ -17,7 +20,7 @@ from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.series import runs
 from groundstation.viewer.views import document, lanes
 
-# Of each page the name, what stands before the titles of its axes, and the figures: each has panels north and east.
+# Name of each page, prefixes of its axis titles, and its figures, each with panels north and east.
 PAGES: tuple[tuple[str, str, tuple[tuple[str, ...], ...]], ...] = (
     (
         "Position, velocity, tilt, drift",
@@ -40,7 +43,10 @@ PAGES: tuple[tuple[str, str, tuple[tuple[str, ...], ...]], ...] = (
 
 
 def inertial(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
-    """Log the tab of the INS errors; None when the flight was not assessed: the overview says why."""
+    """Log the tab of the INS errors; None when the flight was not assessed.
+
+    The overview says why.
+    """
     section = chapter(results)
     if section is None or results.answer(InertialResult) is None:
         return None
@@ -67,7 +73,10 @@ def _page(
 
 
 def _lanes(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    """When the filter had GNSS and when it forecast, under the flight phase that the overview logged."""
+    """Log when the filter had GNSS and when it forecast.
+
+    The flight phase, logged by the overview, is above it.
+    """
     states, answer = results.rows_of(InertialStates), results.answer(InertialResult)
     if states is None or answer is None:
         return []

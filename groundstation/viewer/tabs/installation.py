@@ -1,4 +1,4 @@
-"""Installation learned from earlier flights: what the chapter says."""
+"""Tab on the installation learned from earlier flights: the chapter."""
 
 import rerun.blueprint as rrb
 

@@ -1,4 +1,7 @@
-"""Landing: every final in space with the corridors of the categories, deviations, protection levels, the chapter."""
+"""Tab on landing: every final in space with the corridors of the categories.
+
+Deviations, protection levels, the chapter.
+"""
 
 import numpy as np
 import rerun as rr
@@ -54,14 +57,15 @@ def _approach(recorder: Recorder, results: FlightResults, one: Approach, data: L
 
 
 def _place(along_m: FloatArray, across_m: FloatArray, height_m: FloatArray) -> FloatArray:
-    """Forward along the runway, left, up, as drawn."""
+    """Return a place as drawn: forward along the runway, left, up."""
     return np.column_stack([along_m, -ENLARGED * across_m, ENLARGED * height_m]).astype(np.float32)
 
 
 def _space(recorder: Recorder, path: str, flown: LandingPath) -> list[rrb.View]:
-    """The end of the final between the frames of the categories, by positions (grey) and by the guidance.
+    """Log the end of the final between the frames of the categories.
 
-    The aircraft moves where the guidance has it, else along the positions.
+    One track is by positions (grey), one by the guidance. The aircraft moves where the guidance has it, else along the
+    positions.
     """
     distance = flown.distance_m
     seen = (distance < SEEN_M) & np.isfinite(flown.height_m) & np.isfinite(flown.across_m)

@@ -1,4 +1,7 @@
-"""Landing by locators: deviations from course and glide path of every approach, and what the chapter says."""
+"""Tab on landing by locators: deviations of every approach, and the chapter.
+
+Deviations are from course and glide path.
+"""
 
 import rerun.blueprint as rrb
 

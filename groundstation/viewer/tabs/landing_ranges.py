@@ -1,4 +1,7 @@
-"""Landing by ranges: the approach in space with the corridors of the categories, accuracy and errors with time."""
+"""Tab on landing by ranges: the approach in space with the corridors of the categories.
+
+Accuracy and errors with time.
+"""
 
 import numpy as np
 import rerun as rr
@@ -43,7 +46,7 @@ def landing_ranges(recorder: Recorder, results: FlightResults) -> rrb.Container 
 
 
 def _space(recorder: Recorder, answer: RangeLanding, space: RangesSpace, path: RangesPath) -> rrb.View:
-    """Aircraft and points in space, ranges as lines, corridor frames every half kilometre."""
+    """Log aircraft and points in space, ranges as lines, corridor frames every half kilometre."""
     name, time_s = space.label, space.time_s
     place = np.column_stack([space.along_m, -space.right_m, space.up_m])
     flown = place[name == "aircraft"]
@@ -78,7 +81,7 @@ def _space(recorder: Recorder, answer: RangeLanding, space: RangesSpace, path: R
 
 
 def _corridors(recorder: Recorder, flown: FloatArray) -> None:
-    """Frames of each category's corridor across the path, joined by its edges."""
+    """Log frames of each category's corridor across the path, joined by its edges."""
     for category, shade, part in zip(CATEGORIES, CORRIDORS, path_parts(one.name for one in CATEGORIES), strict=True):
         wide, high = TIMES_LARGER * category.horizontal_m, TIMES_LARGER * category.vertical_m
         corners = np.array([(0.0, wide, high), (0.0, -wide, high), (0.0, -wide, -high), (0.0, wide, -high)])
@@ -96,7 +99,7 @@ def _ranges(
     ground: list[tuple[str, FloatArray]],
     moving: FloatArray,
 ) -> None:
-    """A line from every point to the aircraft."""
+    """Log a line from every point to the aircraft."""
     ends = [np.broadcast_to(where, flown.shape) for _, where in ground] + ([moving] if len(moving) else [])
     strips = np.stack([np.stack([end, flown], axis=1) for end in ends], axis=1)
     drawn = rr.LineStrips3D.from_fields(colors=[colours.DIM], radii=rr.Radius.ui_points(RANGE))
@@ -116,7 +119,7 @@ def _ellipsoid(recorder: Recorder, path: RangesPath, flown: FloatArray) -> None:
 
 
 def _moving(recorder: Recorder, space: RangesSpace) -> list[rrb.View]:
-    """Speed of the moving point."""
+    """Log the speed of the moving point."""
     rows = space.label == "moving"
     if not rows.any():
         return []

@@ -1,4 +1,7 @@
-"""Log: findings and events as lines in time, beside the findings by their gravity; gaps apart, lest they bury them."""
+"""Tab of the log: findings and events as lines in time, and the findings by severity.
+
+Gaps have lines of their own, so that they do not bury the others.
+"""
 
 import numpy as np
 import rerun.blueprint as rrb
@@ -53,7 +56,9 @@ def _findings(recorder: Recorder, flight: Flight, results: FlightResults) -> Non
 
 
 def place_s(place: str, flight: Flight) -> float:
-    """Flight seconds a finding's place names; 0 when it names a row, a byte, nothing, or a time outside the flight.
+    """Return the flight seconds in the place of a finding.
+
+    0 when the place names a row, a byte, nothing, or a time outside the flight.
 
     Examples
     --------
@@ -66,7 +71,7 @@ def place_s(place: str, flight: Flight) -> float:
 
 
 def _tail(finding: Finding) -> str:
-    """Topic and place, where the text does not name them itself."""
+    """Return topic and place of a finding, where its text does not name them."""
     parts = [part for part in (finding.topic, finding.place) if part and part not in finding.text]
     return f" ({', '.join(parts)})" if parts else ""
 

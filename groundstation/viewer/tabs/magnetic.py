@@ -1,4 +1,7 @@
-"""Magnetic: the deviation by each method against heading, the branches, the errors and the field over time."""
+"""Tab on magnetic deviation: by each method against heading, branches, errors, field.
+
+Errors and field over time.
+"""
 
 import rerun.blueprint as rrb
 
@@ -18,7 +21,10 @@ DOT = 1.6
 
 
 def magnetic(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
-    """Log the tab of the magnetic deviation; None when the flight was not assessed: the overview says why."""
+    """Log the tab of the magnetic deviation; None when the flight was not assessed.
+
+    The overview says why.
+    """
     section = chapter(results)
     if section is None or not any(results.answer(kind) for kind in (MagneticResult, GroundDeviation)):
         return None
@@ -35,7 +41,7 @@ def magnetic(recorder: Recorder, results: FlightResults) -> rrb.Container | None
 
 
 def _applied(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    """Magnetic heading before and after a deviation was applied to the log."""
+    """Log the magnetic heading before and after a deviation was applied to the log."""
     figure = results.rows_of(CorrectedHeadingRows)
     if figure is None:
         return []

@@ -1,4 +1,4 @@
-"""Magnetic: the field as a sphere before and after."""
+"""Field of the magnetic tab as a sphere, before and after."""
 
 import numpy as np
 import rerun as rr
@@ -20,9 +20,10 @@ PARALLELS_DEG = (-60.0, -30.0, 0.0, 30.0, 60.0)
 
 
 def sphere(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
-    """The field along the body axes on the model's sphere, as read and freed of the iron, in microtesla.
+    """Log the field along the body axes on the model's sphere, in microtesla.
 
-    What the modulus differs by from the model's is drawn many times larger: iron of one per cent would not be seen.
+    The field is shown as read, and freed of the iron. What the modulus differs by from the model's is drawn many times
+    larger: iron of one per cent would not be seen.
     """
     figure = results.rows_of(MagneticField)
     if figure is None:
@@ -49,13 +50,13 @@ def sphere(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
 
 
 def _known_ut(field: BodyField) -> FloatArray:
-    """The rows that have a field, shape (n, 3)."""
+    """Return the rows that have a field, shape (n, 3)."""
     values = np.column_stack([field.forward_nt, field.right_nt, field.down_nt]) / NT_PER_UT
     return values[np.isfinite(values).all(axis=1)]
 
 
 def _radius_ut(results: FlightResults, field_ut: FloatArray) -> float:
-    """Strength of the model; without one the median of the readings."""
+    """Return the strength of the model; without one the median of the readings."""
     answer = results.answer(MagneticResult)
     declination = answer.declination if answer else None
     if declination is None or declination.horizontal_nt is None or declination.down_nt is None:
@@ -64,13 +65,13 @@ def _radius_ut(results: FlightResults, field_ut: FloatArray) -> float:
 
 
 def _exaggerated(field: FloatArray, radius: float, factor: float) -> FloatArray:
-    """The same directions, distances from the sphere times a factor; shape (n, 3)."""
+    """Return the same directions, distances from the sphere times a factor; shape (n, 3)."""
     length = np.maximum(np.linalg.norm(field, axis=1, keepdims=True), 1e-12)
     return np.asarray(field / length * (radius + factor * (length - radius)), dtype=np.float32)
 
 
 def _circles(radius: float) -> list[FloatArray]:
-    """Parallels and four meridians of a sphere."""
+    """Return parallels and four meridians of a sphere."""
     turn = np.linspace(0.0, 2.0 * np.pi, CIRCLE_POINTS)
     circles = []
     for latitude in np.deg2rad(PARALLELS_DEG):

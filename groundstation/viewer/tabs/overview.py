@@ -1,4 +1,4 @@
-"""Overview: where the aircraft went, how high, how fast, its attitude and state, and a row for each answer."""
+"""Tab of the overview: track, height, speed, attitude and state, a row for each answer."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ MARGIN_DEG = 10.0  # beyond 0 and 360: a nose that points north would be drawn o
 
 @dataclass(frozen=True)
 class OverviewLine:
-    """A line of a plot: end of its path, name, colour, and values, None where none is logged."""
+    """Line of a plot: end of its path, name, colour, and values (None where none is logged)."""
 
     part: str
     name: str
@@ -35,7 +35,7 @@ class OverviewLine:
 
 @dataclass(frozen=True)
 class OverviewRow:
-    """A plot: path, unit, lines, range of the axis, and whether its lines wrap at 360."""
+    """Plot: path, unit, lines, range of the axis, and whether its lines wrap at 360."""
 
     path: str
     unit: str
@@ -150,7 +150,10 @@ def _state_lanes(recorder: Recorder, results: FlightResults) -> list[str]:
 
 
 def _plots(recorder: Recorder, figure: Overview) -> list[rrb.View]:
-    """A view for each row of PLOTS that the flight has; its title names the lines, for a legend would cover them."""
+    """Log a view for each row of PLOTS that the flight has.
+
+    Its title names the lines: a legend would cover them.
+    """
     views: list[rrb.View] = []
     time_ns = recorder.time_ns(figure.time_s)
     for row in PLOTS:

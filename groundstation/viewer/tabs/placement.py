@@ -1,4 +1,7 @@
-"""Placement of ground points: the way in space over a map of accuracy, points, and accuracy along the way."""
+"""Tab on placement of ground points: way and points over a map of accuracy.
+
+The accuracy along the way is beside it.
+"""
 
 import numpy as np
 import rerun as rr
@@ -79,7 +82,10 @@ def _keep_out(recorder: Recorder, results: FlightResults) -> None:
 
 
 def _ground(recorder: Recorder, results: FlightResults) -> None:
-    """The map as a mesh on the ground, a colour for each place; where nothing may stand there is none."""
+    """Log the map as a mesh on the ground, a colour for each place.
+
+    No mesh where no point is allowed.
+    """
     data = results.rows_of(PlacementMap)
     if data is None:
         return

@@ -1,4 +1,4 @@
-"""Data quality: what each topic delivered, where data is missing, and how good GNSS said it was."""
+"""Tab on data quality: rates and gaps of each topic, and the quality that GNSS stated."""
 
 import numpy as np
 import rerun.blueprint as rrb
@@ -45,7 +45,7 @@ def quality(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.C
 
 
 def _coverage(recorder: Recorder, results: FlightResults) -> list[str]:
-    """One lane a topic: data from its first to its last sample, interrupted by its gaps."""
+    """Log one lane per topic: data from its first to its last sample, except in its gaps."""
     ledger = results.rows_of(LedgerRows)
     if ledger is None:
         return []

@@ -1,6 +1,7 @@
-"""Raw: every numeric field of every topic by family, every text and flag as a lane; long topics thinned, saying so.
+"""Tab of raw data: every numeric field of every topic by family, texts and flags as lanes.
 
-Topics that are no series (parameters, definitions, single records: most rows at one instant) are tables.
+Long topics are thinned, and their titles say so. Topics that are no series (parameters, definitions, single records:
+most rows at one instant) are tables.
 """
 
 import re
@@ -42,7 +43,7 @@ MAX_VIEWS = 24  # of one topic; the fields of the families beyond share the last
 MAX_TOPICS = 300  # with a page: the SDK never returns from sending a layout of some 5000 views
 MAX_ALL_VIEWS = 2_000  # where many topics have many families, each topic has fewer views
 MAX_LANE_ROWS = 5_000  # a lane with more changes is no lane
-MAX_LIST_ROWS, MAX_LIST_COLUMNS, MAX_CELL = 2_000, 40, 120  # of a table; what is beyond is told
+MAX_LIST_ROWS, MAX_LIST_COLUMNS, MAX_CELL = 2_000, 40, 120  # of a table; a note says what is cut off
 TICKS_NS = (1, 1_000, 1_000_000, 1_000_000_000)  # units in which devices count their time
 CLOCK_NS = 200_000_000  # a field that follows the time of its rows this closely only repeats it
 ALONE = 0.1  # share of rows without a neighbour above which a raw topic has no rate, and no gaps either
@@ -136,7 +137,10 @@ def _title(topic: str) -> str:
 
 
 def is_list(table_of_topic: Table) -> bool:
-    """Whether a raw topic is a list rather than a series: half of its rows or more at one instant."""
+    """Tell whether a raw topic is a list rather than a series.
+
+    Half of its rows or more are at one instant.
+    """
     if not table_of_topic.topic.startswith(RAW_PREFIX):
         return False
     times, counts = np.unique(table_of_topic.time_ns, return_counts=True)
@@ -144,7 +148,7 @@ def is_list(table_of_topic: Table) -> bool:
 
 
 def _list(table_of_topic: Table) -> str:
-    """Rows of a list as a table; one row alone stands upright."""
+    """Return the rows of a list as a table; a single row is transposed."""
     rows = table_of_topic.take(slice(0, MAX_LIST_ROWS))
     names = [name for name, column in rows.columns.items() if column.mask.any()]
     shown = names[:MAX_LIST_COLUMNS] if len(rows) > 1 else names
@@ -170,7 +174,10 @@ def _cells(column: Column) -> list[str]:
 
 
 def repeats_the_time(table_of_topic: Table, field: str) -> bool:
-    """Whether a field of a raw topic is the clock of its own rows: drawn, it would be a ramp on every page."""
+    """Tell whether a field of a raw topic is the clock of its own rows.
+
+    Drawn, it would be a ramp on every page.
+    """
     column = table_of_topic.columns[field]
     if not table_of_topic.topic.startswith(RAW_PREFIX) or len(column) < 3 or column.values.dtype.kind not in "iu":
         return False
@@ -183,7 +190,7 @@ def repeats_the_time(table_of_topic: Table, field: str) -> bool:
 
 
 def family_of(topic: str, field: str) -> str:
-    """Family of a field: fields of one family share a view.
+    """Return the family of a field: fields of one family share a view.
 
     Examples
     --------
@@ -206,9 +213,10 @@ def family_of(topic: str, field: str) -> str:
 
 
 def _families(table_of_topic: Table, gap_starts_ns: Int64Array, units: Mapping[str, str]) -> list[Family]:
-    """Numeric fields by family and by the rows where they are present: absent is not a gap, NaN from the device is.
+    """Return numeric fields by family and by the rows where they are present.
 
-    ``units`` are those that the source tells. Counts and codes, which hold until the next one, are stepped.
+    An absent value is not a gap, NaN from the device is. ``units`` are those that the source tells. Counts and codes,
+    which hold until the next one, are stepped.
     """
     groups: dict[tuple[str, str, bool, bytes], list[str]] = {}
     for field, column in table_of_topic.columns.items():
@@ -241,13 +249,16 @@ def _families(table_of_topic: Table, gap_starts_ns: Int64Array, units: Mapping[s
 
 
 def _isolates(breaks: BoolArray) -> bool:
-    """Whether breaks leave many rows alone: a line of one point is not drawn, and what comes so rarely has no gaps."""
+    """Tell whether breaks leave many rows alone.
+
+    A line of one point is not drawn, and a topic with so rare rows has no gaps.
+    """
     edges = np.concatenate([[True], breaks, [True]])
     return bool(np.count_nonzero(edges[1:] & edges[:-1]) > ALONE * (len(breaks) + 1))
 
 
 def columns_of(views: int) -> int:
-    """Columns of a page with so many views.
+    """Return the number of columns of a page with so many views.
 
     Examples
     --------
@@ -285,7 +296,10 @@ def _log_families(
 
 
 def _lanes(recorder: Recorder, base: str, table_of_topic: Table) -> tuple[list[rrb.View], list[str]]:
-    """Log texts and flags as lanes of their changes; the view, and the fields that change too often to be one."""
+    """Log texts and flags as lanes of their changes.
+
+    Returns the views, and the fields that change too often for a lane.
+    """
     fields = [name for name, column in table_of_topic.columns.items() if column.values.dtype.kind in "Ub"]
     paths, too_busy = [], []
     for field, part in zip(fields, path_parts(fields), strict=True):
@@ -301,9 +315,9 @@ def _lanes(recorder: Recorder, base: str, table_of_topic: Table) -> tuple[list[r
 
 
 def _held(time_ns: Int64Array, column: Column) -> tuple[Int64Array, np.ndarray]:
-    """Times and states of the rows that have the field, each held until the next one; empty behind a gap's last row.
+    """Return times and states of the rows that have the field, each held until the next.
 
-    Rows of other sources lie between them: they end no state.
+    Empty after the last row before a gap. Rows of other sources lie between them: they end no state.
     """
     rows = np.flatnonzero(column.mask)
     values = np.where(column.values, "yes", "no") if column.values.dtype.kind == "b" else column.values

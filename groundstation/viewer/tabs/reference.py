@@ -1,4 +1,4 @@
-"""Against the reference: errors of every subject over time in the band that is claimed, and what was found."""
+"""Tab on the reference: errors of every subject over time in the claimed band, findings."""
 
 import rerun.blueprint as rrb
 

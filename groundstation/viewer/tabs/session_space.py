@@ -1,4 +1,4 @@
-"""The aircraft of a session in space, with 2 sigma ellipsoids, and links in the colour of their residual."""
+"""Session in space: aircraft with 2 sigma ellipsoids, links coloured by residual."""
 
 import numpy as np
 import rerun as rr
@@ -50,7 +50,7 @@ def space(recorder: Recorder, answer: CooperativeResult, results: FlightResults)
 
 
 def _seen(position_m: FloatArray, origin: LocalFrame | None) -> FloatArray:
-    """East, north, up of positions in the frame of the session."""
+    """Return east, north, up of positions in the frame of the session."""
     plane = position_m if origin is None else origin.from_ecef_m(position_m)
     return np.column_stack([plane[:, 1], plane[:, 0], -plane[:, 2]])
 
@@ -88,9 +88,10 @@ def _aircraft(
 def ellipsoids(
     north_m: FloatArray, east_m: FloatArray, correlation: FloatArray, up_m: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Half axes of 2 sigma ellipsoids, shape (n, 3), and their turn from axes east, north, up, shape (n, 4), x y z w.
+    """Return half axes (n, 3) of 2 sigma ellipsoids and their turn (n, 4), x y z w.
 
-    The errors of height and place are taken as independent. Without a sigma up an ellipsoid is a disc.
+    The turn is from axes east, north, up. The errors of height and place are taken as independent. Without a sigma up
+    an ellipsoid is a disc.
 
     Examples
     --------
@@ -113,7 +114,10 @@ def _links(
     ways: dict[str, tuple[FloatArray, FloatArray]],
     stations: dict[str, FloatArray],
 ) -> None:
-    """Log the links of every frame as strips from source to receiver; a frame without any clears them."""
+    """Log the links of every frame as strips from source to receiver.
+
+    A frame without any clears them.
+    """
     receiver, source = links.receiver, links.source
     known = np.isin(receiver, list(ways)) & np.isin(source, [*ways, *stations])
     rows = np.flatnonzero(known)
@@ -135,7 +139,7 @@ def _links(
 def _one_a_frame(
     rows: Int64Array, frame: Int64Array, time_s: FloatArray, receiver: Texts, source: Texts
 ) -> tuple[Int64Array, Int64Array, FloatArray]:
-    """The last range of each link in each frame, in order of frames."""
+    """Return the last range of each link in each frame, in order of frames."""
     names = np.char.add(np.char.add(receiver[rows], "\n"), source[rows])
     _, link = np.unique(names, return_inverse=True)
     order = np.lexsort((time_s, link, frame))
@@ -151,7 +155,7 @@ def _places(
     ways: dict[str, tuple[FloatArray, FloatArray]],
     stations: dict[str, FloatArray],
 ) -> FloatArray:
-    """Where one end of each link was at its time."""
+    """Return the place of one end of each link at its time."""
     found = np.zeros((len(rows), 3))
     for name in np.unique(names[rows]).tolist():
         mine = names[rows] == name
@@ -170,7 +174,7 @@ def _residuals(links: CooperativeLinks, rows: Int64Array) -> list[tuple[float, b
 
 
 def shade_of(normal: float, is_used: bool) -> Colour:
-    """Colour of a link whose residual is ``normal`` sigmas.
+    """Return the colour of a link whose residual is ``normal`` sigmas.
 
     Examples
     --------

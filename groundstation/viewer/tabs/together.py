@@ -1,4 +1,7 @@
-"""Several logs of one flight: the motions of both over each other, the difference, and what the chapter says."""
+"""Tab on several logs of one flight: both motions, their difference, and the chapter.
+
+The motions lie over each other.
+"""
 
 import rerun.blueprint as rrb
 

@@ -1,7 +1,7 @@
-"""The track in space and from above: a plan that asks nobody for anything, and a map for who wants one.
+"""Track in space and from above: a plan that needs no network, and a map on demand.
 
-Rerun's map fetches tiles over the network for the very place flown over, whatever the provider. The plan is therefore
-what opens; the map is behind its own tab, and a hidden tab fetches nothing.
+Rerun's map fetches tiles over the network for the very place flown over, whatever the provider. Therefore the plan
+opens first; the map has its own tab, and a hidden tab fetches nothing.
 """
 
 import numpy as np
@@ -30,7 +30,10 @@ SMALLEST_M = 20.0  # side of the plan of an aircraft that never moved
 
 
 def track(recorder: Recorder, results: FlightResults, figure: Overview) -> rrb.Container | None:
-    """Log the track by flight phase with the aircraft at the cursor; None without positions on Earth and attitude."""
+    """Log the track by flight phase with the aircraft at the cursor.
+
+    None for a flight without positions on Earth and without attitude.
+    """
     time_s, positions = figure.time_s, np.column_stack(on_earth(figure.latitude_deg, figure.longitude_deg))
     known = np.asarray(np.isfinite(positions).all(axis=1), dtype=bool)
     if not known.any():
@@ -55,9 +58,9 @@ def _plan(
     shades: list[Colour],
     ellipses: str,
 ) -> rrb.Spatial2DView:
-    """Log the plan: ``points`` are metres east and south, for the axes of a Rerun picture run right and down.
+    """Log the plan: ``points`` are metres east and south.
 
-    ``ellipses`` says in the title what those on it are.
+    The axes of a Rerun picture run right and down. ``ellipses`` says in the title what those on it are.
     """
     low, high = bounds_of(points[known])
     recorder.static("plan/grid", grid(low, high))
@@ -90,7 +93,10 @@ def _plan(
 
 
 def _ellipses(recorder: Recorder, results: FlightResults, origin_deg: FloatArray, points: FloatArray) -> str:
-    """Log 95 % ellipses of the corrected position along the plan and at the cursor; what they are, empty for none."""
+    """Log 95 % ellipses of the corrected position along the plan and at the cursor.
+
+    Returns their description, empty for none.
+    """
     corrected = corrected_position(results)
     if corrected is None:
         return ""
@@ -115,14 +121,16 @@ def _ellipses(recorder: Recorder, results: FlightResults, origin_deg: FloatArray
 
 
 def bounds_of(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Lower and upper corner of a plan that shows points, shape (n, 2), with a margin."""
+    """Return lower and upper corner of a plan that shows points, shape (n, 2), with a margin."""
     low, high = points.min(axis=0), points.max(axis=0)
     side = max(float((high - low).max()), SMALLEST_M)
     return low - MARGIN * side, high + MARGIN * side
 
 
 def grid_step_m(side_m: float) -> float:
-    """Distance of grid lines, 1, 2 or 5 times a power of ten, for a plan that is ``side_m`` across.
+    """Return the distance of grid lines for a plan that is ``side_m`` across.
+
+    1, 2 or 5 times a power of ten.
 
     Examples
     --------
@@ -134,7 +142,9 @@ def grid_step_m(side_m: float) -> float:
 
 
 def grid_unit(side_m: float) -> tuple[str, float]:
-    """Unit of the grid's labels and its length in metres, for a plan that is ``side_m`` across.
+    """Return the unit of the grid's labels and its length in metres.
+
+    The plan is ``side_m`` across.
 
     Examples
     --------
@@ -145,7 +155,7 @@ def grid_unit(side_m: float) -> tuple[str, float]:
 
 
 def grid(low: FloatArray, high: FloatArray) -> rr.LineStrips2D:
-    """Lines of equal distance east and north; the label of each stands in its middle."""
+    """Return lines of equal distance east and north; the label of each stands in its middle."""
     side = float((high - low).max())
     step, (unit, metres) = grid_step_m(side), grid_unit(side)
     strips, labels = [], []
@@ -188,7 +198,9 @@ def _map(
 
 
 def zoom_of(positions_deg: FloatArray, pixels: float = MAP_PIXELS) -> float:
-    """Zoom of the map, in powers of two, at which positions (latitude, longitude), shape (n, 2), fill ``pixels``.
+    """Return the zoom of the map, in powers of two, at which positions fill ``pixels``.
+
+    Positions are latitude and longitude, shape (n, 2).
 
     Examples
     --------
@@ -202,7 +214,7 @@ def zoom_of(positions_deg: FloatArray, pixels: float = MAP_PIXELS) -> float:
 
 
 def _pieces(results: FlightResults, time_s: FloatArray, known: BoolArray) -> tuple[list[slice], list[Colour]]:
-    """Cut the track at gaps and where the phase changes; neighbouring pieces share their joint."""
+    """Cut the track at gaps and phase changes; neighbouring pieces share their joint."""
     phase = np.full(len(time_s), "unknown", dtype="U32")
     spans = results.rows_of(PhaseSpans)
     if spans is not None:

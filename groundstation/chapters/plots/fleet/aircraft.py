@@ -13,7 +13,7 @@ from groundstation.results.fleet import FleetResults
 
 
 def forest(fleet: FleetResults) -> Plot:
-    """Mean error of each aircraft."""
+    """Return the mean error of each aircraft."""
     by_name = {row.aircraft: row for row in assessed(fleet)}
     shown = [by_name[name] for name in rows_shown({row.aircraft: row.averaged for row in by_name.values()})]
     error, owner = fleet.flights["error_deg"], fleet.flights["aircraft"]
@@ -39,7 +39,7 @@ def forest(fleet: FleetResults) -> Plot:
 
 
 def rates(fleet: FleetResults) -> Plot:
-    """Error rate of the unaided INS of every flight."""
+    """Return the error rate of the unaided INS of every flight."""
     found = unaided_figures(fleet, RATE)
     shown = rows_shown({name: len(values) for name, values in found.items()})
     marks: list[AnyMark] = []

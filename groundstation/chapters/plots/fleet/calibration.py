@@ -23,7 +23,7 @@ SHORT = {
 
 
 def checks(fleet: FleetResults) -> Plot:
-    """Share of the checks inside, and where they fell."""
+    """Return the share of the checks inside, and where they fell."""
     rows = fleet.calibration
     marks: list[AnyMark] = [Limit(value=100.0 * rows[0].stated, is_upright=True)]
     for place, row in enumerate(rows):

@@ -1,4 +1,4 @@
-"""What the plots of the fleet report share: roles of aircraft, rows of names, axes of dates."""
+"""Parts that the plots of the fleet report share: roles, rows of names, axes of dates."""
 
 from collections.abc import Mapping, Sequence
 
@@ -17,7 +17,7 @@ HALF_A_DAY_S = 43_200.0
 
 
 def roles_of(fleet: FleetResults) -> dict[str, Role]:
-    """A role for each aircraft; one for all where there are more aircraft than roles of a series."""
+    """Return a role for each aircraft; one for all where aircraft outnumber the roles."""
     names = [name for name in fleet.aircraft if name]
     alike: tuple[Role, ...] = ("ins",)
     own = SERIES if len(names) <= len(SERIES) else alike * len(names)
@@ -25,29 +25,29 @@ def roles_of(fleet: FleetResults) -> dict[str, Role]:
 
 
 def rows_shown(counts: Mapping[str, int], most: int = MOST_ROWS) -> list[str]:
-    """Names for a plot in their order: all of them, or those with the most flights."""
+    """Return names for a plot in their order: all of them, or those with the most flights."""
     kept = set(sorted(counts, key=lambda name: (-counts[name], name))[:most])
     return [name for name in sorted(counts) if name in kept]
 
 
 def left_out(shown: int, total: int, noun: str = "aircraft") -> str:
-    """The sentence of a caption about what a plot leaves out; empty where it leaves out nothing."""
+    """Return the sentence of a caption on aircraft left out of a plot; empty without any."""
     return "" if shown >= total else f" The {shown} of {number(total, 0)} {noun} with the most flights."
 
 
 def name_axis(names: Sequence[str]) -> Axis:
-    """Axis with a row for each name, the first on top."""
+    """Return an axis with a row for each name, the first on top."""
     return Axis(low=len(names) - 0.4, high=-0.6, names=tuple((float(row), name) for row, name in enumerate(names)))
 
 
 def seconds_of(time: NDArray[np.datetime64]) -> Floats:
-    """Times as seconds since 1970, NaN where there is none."""
+    """Return times as seconds since 1970, NaN where there is none."""
     numbers = time.astype("datetime64[ns]").astype(np.int64) / NS_PER_S
     return np.where(np.isnat(time), np.nan, numbers)
 
 
 def date_axis(time: NDArray[np.datetime64]) -> Axis:
-    """Axis of dates around some times, NaT left out."""
+    """Return an axis of dates around some times, NaT left out."""
     known = seconds_of(time[~np.isnat(time)])
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
     margin = max(0.02 * (high - low), HALF_A_DAY_S)
@@ -55,7 +55,7 @@ def date_axis(time: NDArray[np.datetime64]) -> Axis:
 
 
 def log_limits(values: Floats) -> tuple[float, float]:
-    """Ends of a logarithmic axis around positive values, wide enough for two round ticks."""
+    """Return ends of a logarithmic axis around positive values, with two round ticks or more."""
     low, high = float(np.min(values)), float(np.max(values))
     middle = float(np.sqrt(low) * np.sqrt(high))
     return min(low / 1.2, middle / 3.0), max(high * 1.2, middle * 3.0)

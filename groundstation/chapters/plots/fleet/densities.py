@@ -1,4 +1,7 @@
-"""Plots: density of the heading error of every flight, overlaid with the fitted normal (figure 3 of the paper)."""
+"""Plots of the density of the heading error of every flight.
+
+Overlaid with the fitted normal (figure 3 of the paper).
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +25,7 @@ LEFT_OUT = 0.001  # share of all samples that each end of the axis may leave out
 
 
 def overlay(fleet: FleetResults) -> Plot:
-    """Density of every flight over each other."""
+    """Return the density of every flight over each other."""
     densities, normal, roles = fleet.densities, fleet.normal(), roles_of(fleet)
     low, high = _span(densities)
     marks, top = _flights(densities, np.arange(len(densities)), MOST_LINES, roles, is_named=True)
@@ -55,7 +58,7 @@ def _tell_apart(roles: dict[str, Role]) -> bool:
 
 
 def _span(densities: Densities) -> tuple[float, float]:
-    """Ends of the axis: almost all samples, and room for the outermost bins."""
+    """Return ends of the axis: almost all samples, and room for the outermost bins."""
     width = float(densities.edge_deg[1] - densities.edge_deg[0])
     below = np.append(0.0, np.cumsum(densities.pooled_per_deg) * width)
     first = int(np.searchsorted(below, LEFT_OUT, side="right")) - 1
@@ -72,7 +75,7 @@ def _beyond(densities: Densities, low: float, high: float) -> str:
 
 
 def _outline(densities: Densities, density: Floats) -> tuple[Floats, Floats]:
-    """Bin centres and density without the empty bins on both sides."""
+    """Return bin centres and density without the empty bins on both sides."""
     filled = np.flatnonzero(density > 0.0)
     if not len(filled):
         return np.zeros(0), np.zeros(0)
@@ -83,7 +86,7 @@ def _outline(densities: Densities, density: Floats) -> tuple[Floats, Floats]:
 def _flights(
     densities: Densities, rows: NDArray[np.intp], most: int, roles: dict[str, Role], *, is_named: bool
 ) -> tuple[list[AnyMark], float]:
-    """Flights as lines, or as bands where they are many, and the height that shows them."""
+    """Return flights as lines, or as bands where they are many, and the height of the axis."""
     if len(rows) > most:
         return _bands(densities, rows, is_named=is_named)
     told: set[str] = set()
@@ -122,7 +125,7 @@ def _normal(normal: FittedNormal | None, low: float, high: float, text: str) -> 
 
 
 def by_aircraft(fleet: FleetResults) -> Plot:
-    """Densities of each aircraft on axes of their own."""
+    """Return densities of each aircraft on axes of their own."""
     densities, roles = fleet.densities, roles_of(fleet)
     names, flights = np.unique(densities.aircraft, return_counts=True)
     counts = {name: count for name, count in zip(names.tolist(), flights.tolist(), strict=True) if name}

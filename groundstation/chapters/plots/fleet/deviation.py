@@ -16,7 +16,7 @@ MOST_CURVES = 60
 
 
 def curves(fleet: FleetResults) -> Plot:
-    """Deviation that every flight found."""
+    """Return the deviation that every flight found."""
     rows, roles = usable(fleet), roles_of(fleet)
     heading_deg = np.arange(0.0, 361.0, 2.0)
     marks: list[AnyMark] = [ZERO]

@@ -10,7 +10,7 @@ from groundstation.results.fleet import FleetResults
 
 
 def over_time(fleet: FleetResults, place: str) -> Plot | None:
-    """What was known before each flight of an installation; None with fewer than two."""
+    """Return what was known of an installation before each flight; None with fewer than two."""
     row = next(one for one in fleet.installations if str(one.place) == place)
     own = fleet.installation_flights.where(rows_of(fleet, row.place))
     if not np.isfinite(own.sum_deg).any():

@@ -14,7 +14,7 @@ CONFIDENCE = 95.0
 
 
 def growth(fleet: FleetResults) -> Plot:
-    """Error of each method against the horizon."""
+    """Return the error of each method against the horizon."""
     rows, shipped = drawn(fleet), shipped_method(fleet)
     methods = list(dict.fromkeys(row.method for row in rows))
     others = (name for name in methods if name not in ("raw_ins", shipped))
@@ -40,7 +40,7 @@ def growth(fleet: FleetResults) -> Plot:
 
 
 def flights(fleet: FleetResults) -> Plot:
-    """The shipped method on every flight, and how honest its band is."""
+    """Return the shipped method on every flight, and how honest its band is."""
     horizons = np.unique(fleet.skill_flights.horizon_min)
     horizon = HEADLINE_MIN if HEADLINE_MIN in horizons else float(horizons[-1])
     return Plot(

@@ -20,7 +20,7 @@ POSITIVE = "radial_error_rate_fit_nmiph"
 
 
 def charts(fleet: FleetResults, quantity: str) -> Plot | None:
-    """Control charts of a quantity, one for each aircraft; None where there is none."""
+    """Return control charts of a quantity, one for each aircraft; None where there is none."""
     names = charted(fleet, quantity)
     if not names:
         return None
@@ -73,6 +73,6 @@ def _chart(
 
 
 def _runs(*columns: Floats) -> Sequence[NDArray[np.intp]]:
-    """Stretches in which no column changes (NaN equals NaN)."""
+    """Return stretches in which no column changes (NaN equals NaN)."""
     same = [(column[1:] == column[:-1]) | (np.isnan(column[1:]) & np.isnan(column[:-1])) for column in columns]
     return np.split(np.arange(len(columns[0])), np.flatnonzero(~np.logical_and.reduce(same)) + 1)
