@@ -28,7 +28,10 @@ from groundstation.methods.link_dynamics import ROOMS
 
 
 class Members(NamedTuple):
-    """k vehicles: times, states, covariances, factors towards the others, rows of the error map."""
+    """Filters of k vehicles: times, states, covariances, factors towards the others, map rows.
+
+    The map rows are those of the error map.
+    """
 
     time_s: FloatArray  # (k,)
     x: FloatArray  # (k, n)
@@ -40,7 +43,7 @@ class Members(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Room of the loop."""
+    """Work arrays of the loop."""
 
     phi: FloatArray  # (n, n)
     noise: FloatArray
@@ -57,7 +60,7 @@ class Room(NamedTuple):
 
 
 def room_for(n: int, width: int) -> Room:
-    """Room for vehicles of n states and an error map of so many columns."""
+    """Make work arrays for vehicles of n states and an error map of so many columns."""
     return Room(
         np.zeros((n, n)),
         np.zeros((n, n)),
@@ -120,7 +123,7 @@ def _advance(fleet: Fleet, members: Members, who: int, to_s: float, room: Room) 
 
 @in_place
 def _scale_factors(n: int, who: int, but: int, by: FloatArray, members: Members, room: Room) -> None:
-    """Factors of a vehicle towards all others but one, times a matrix."""
+    """Multiply the factors of a vehicle towards all others but one by a matrix."""
     for other in range(len(members.time_s)):
         if other != but and members.has_factor[who, other]:
             turn_rows(n, by, members.factor[who, other], room.wide)
@@ -138,7 +141,7 @@ def _use(
     rows: Rows,
     log: Log,
 ) -> None:
-    """One measurement."""
+    """Use one measurement."""
     who, source, at_s = events.receiver[event], events.source[event], events.time_s[event]
     is_peer = events.kind[event] == PEER
     _advance(fleet, members, who, at_s, room)
@@ -179,7 +182,10 @@ def _passes(
     members: Members,
     log: Log,
 ) -> bool:
-    """Whether an innovation is inside the gate; counts, and opens clocks after many rejections."""
+    """Tell whether an innovation is inside the gate.
+
+    It also counts, and opens clocks after many rejections.
+    """
     passes = gate_sigma <= 0.0 or innovation**2 <= gate_sigma**2 * total
     write_down(event, innovation, total, passes, log)
     for end in range(2 if events.kind[event] == PEER else 1):
@@ -200,7 +206,7 @@ def _private(
     rows: Rows,
     log: Log,
 ) -> None:
-    """A range to a point or satellite: nobody is told."""
+    """Use a range to a point or satellite; no other vehicle is told."""
     who, source, variance = events.receiver[event], events.source[event], rows.variance[0]
     n, P, h, shared, gain = fleet.size[who], members.P[who], rows.receiver[0], room.shared, room.gain
     if events.kind[event] == POINT:
@@ -241,7 +247,7 @@ def _relative(
     rows: Rows,
     log: Log,
 ) -> None:
-    """A range between two: both are updated as one filter."""
+    """Use a range between two vehicles: both are updated as one filter."""
     one, two = events.receiver[event], events.source[event]
     n, m = fleet.size[one], fleet.size[two]
     both, h, shared = room.both, room.h, room.shared
@@ -273,7 +279,7 @@ def _relative(
 
 @in_place
 def _join(fleet: Fleet, one: int, two: int, members: Members, both: FloatArray) -> None:
-    """Covariance of two vehicles together."""
+    """Fill the joint covariance of two vehicles."""
     n, m = fleet.size[one], fleet.size[two]
     for i in range(n):
         for j in range(n):
@@ -291,7 +297,10 @@ def _join(fleet: Fleet, one: int, two: int, members: Members, both: FloatArray) 
 
 @in_place
 def _share(fleet: Fleet, one: int, two: int, innovation: float, members: Members, room: Room) -> None:
-    """Give both vehicles their part of the update; factors towards third ones are scaled by P(after) P(before)^-1."""
+    """Give both vehicles their part of the update.
+
+    Factors towards third ones are scaled by P(after) P(before)^-1.
+    """
     n, width = fleet.size[one], members.map_rows.shape[2]
     both, gain, h, mixed = room.both, room.gain, room.h, room.mixed
     for c in range(width):
@@ -327,7 +336,10 @@ def _share(fleet: Fleet, one: int, two: int, innovation: float, members: Members
 
 @in_place
 def _over(n: int, first: int, both: FloatArray, before: FloatArray, room: Room) -> None:
-    """Fill ``room.phi`` with after before^-1, scaled by the sigmas: states differ by eight powers of ten."""
+    """Fill ``room.phi`` with after before^-1, scaled by the sigmas.
+
+    States differ by eight powers of ten.
+    """
     normal, right = room.step[1], room.step[2]
     for i in range(n):
         for j in range(n):

@@ -1,4 +1,6 @@
-"""Decentralised filter with stored pairwise cross-covariances: close to the centralised one at the price of an answer.
+"""Decentralised filter with stored pairwise cross-covariances.
+
+It is close to the centralised one, at the price of an answer to each message.
 
 Each vehicle i keeps its own state and, for every other j, a factor s_ij so that the cross-covariance is s_ij s_ji'. It
 moves the factor on and corrects it by itself; only the two vehicles of a range exchange anything, and they update as
@@ -52,7 +54,7 @@ def run_pairwise(prepared: Prepared, settings: CooperativeSettings) -> Algorithm
 
 
 def _messages(prepared: Prepared) -> dict[str, tuple[int, int]]:
-    """Two messages a range between two: the source's state, and the receiver's answer."""
+    """Count the messages: with each range the source sends its state, the receiver answers."""
     events, vehicles = prepared.events, prepared.vehicles
     is_peer = events.kind == PEER
     pairs, counts = np.unique(np.stack([events.receiver[is_peer], events.source[is_peer]]), axis=1, return_counts=True)

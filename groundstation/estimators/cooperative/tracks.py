@@ -1,4 +1,4 @@
-"""What a run leaves behind: every vehicle's states at the times of output, and counts."""
+"""Results of a run: every vehicle's states at the times of output, and counts."""
 
 from dataclasses import dataclass
 
@@ -34,7 +34,7 @@ class Track:
     state : ndarray, shape (n, m)
     covariance : ndarray, shape (n, m, m)
     height : int
-        Place of the height in the state; -1 where there is none.
+        Index of the height in the state; -1 where there is none.
     """
 
     name: str
@@ -60,14 +60,14 @@ class Track:
 
     @property
     def correlation(self) -> FloatArray:
-        """Of the errors north and east, shape (n,); 0 where one is exact."""
+        """Correlation of the errors north and east, shape (n,); 0 where one is exact."""
         product = np.sqrt(self.covariance[:, 0, 0] * self.covariance[:, 1, 1])
         both = self.covariance[:, 0, 1]
         return np.asarray(np.divide(both, product, out=np.zeros(len(both)), where=product > 0.0))
 
     @property
     def sigma_up_m(self) -> FloatArray:
-        """Of the height, shape (n,); NaN for a vehicle whose height is no state."""
+        """Sigma of the height, shape (n,); NaN for a vehicle whose height is no state."""
         if self.height < 0:
             return np.full(len(self.time_s), np.nan)
         return np.sqrt(self.covariance[:, self.height, self.height])
@@ -75,7 +75,7 @@ class Track:
 
 @dataclass(frozen=True)
 class Judged:
-    """Every measurement as the filter judged it: innovation, its sigma, and whether it was used (1) or gated (-1).
+    """Measurements as the filter judged them: innovation, sigma, used (1) or gated (-1).
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ class AlgorithmRun:
 
 
 def log_for(prepared: Prepared, items: Items) -> Log:
-    """Room for what a run writes down."""
+    """Make an empty log for a run."""
     k, n = prepared.fleet.density.shape
     outputs, rows = int((items.vehicle >= 0).sum()), len(prepared.events.time_s)
     return Log(
@@ -151,7 +151,10 @@ def finished(
     messages: dict[str, tuple[int, int]],
     radius: tuple[list[float], list[float]] = ([], []),
 ) -> AlgorithmRun:
-    """Everything as one frozen answer; ``radius``: times, and spectral radii of the error map."""
+    """Return everything as one frozen answer.
+
+    ``radius``: times, and spectral radii of the error map.
+    """
     rows = int(log.counts[JUDGED])
     mark = log.mark[:rows]
     counts = {

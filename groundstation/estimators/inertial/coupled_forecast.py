@@ -1,4 +1,7 @@
-"""Forecasts of the coupled north-east model, their variance, and its gain over the two separate channels."""
+"""Forecasts of the coupled north-east model, their variance, and their gain.
+
+The gain is over the two separate channels.
+"""
 
 from collections.abc import Sequence
 
@@ -61,7 +64,8 @@ def hindcast_coupled(run: CoupledRun, at: Int64Array, lead_s: FloatArray, settin
 def coupled_variance(run: CoupledRun, at: Int64Array, lead_s: FloatArray) -> FloatArray:
     """Variance of what :func:`hindcast_coupled` forecasts by the model, m^2, shape (s, l, 2).
 
-    That of the states at the start (last epoch whose covariance was kept), position known, and of the noise since.
+    It is the variance of the states at the start (last epoch whose covariance was kept), position known, plus that of
+    the noise since.
     """
     out = np.zeros((len(at), len(lead_s), 2))
     if not len(lead_s):
@@ -107,7 +111,9 @@ def coupled_rows(
     horizons_min: Sequence[float] = HORIZONS_MIN,
     method: str = "last_estimate",
 ) -> tuple[CoupledRow, ...]:
-    """Gain of the coupled model over the separate channels: same starts, same horizons, last estimate of both.
+    """Compare the coupled model with the separate channels: the gain at every horizon.
+
+    Starts and horizons are the same, last estimate of both.
 
     Parameters
     ----------

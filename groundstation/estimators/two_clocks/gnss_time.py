@@ -1,4 +1,4 @@
-"""The clock of a log by GNSS time: what the log itself tells of it."""
+"""Clock of a log against GNSS time, as far as the log itself tells it."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,10 @@ OWN_SIGMA_S = 0.001
 
 @dataclass(frozen=True)
 class GnssStretch:
-    """A stretch of a log over which GNSS time = own time + ``offset_s`` - ``drift`` (own time - ``middle_ns``)."""
+    """Stretch of a log with one offset and drift to GNSS time.
+
+    GNSS time = own time + ``offset_s`` - ``drift`` (own time - ``middle_ns``).
+    """
 
     begin_ns: int
     middle_ns: int
@@ -30,13 +33,16 @@ class GnssStretch:
         return self.offset_s - self.drift * (time_ns - self.middle_ns) / NS_PER_S
 
     def sigma_at(self, time_ns: int) -> float:
-        """One sigma of it."""
+        """Return one sigma of :meth:`offset_at`, seconds."""
         return float(np.hypot(self.sigma_s, self.drift_sigma * (time_ns - self.middle_ns) / NS_PER_S))
 
 
 @dataclass(frozen=True)
 class GnssTime:
-    """GNSS time of a log; ``is_own``: it is the log's own clock, not one that messages told its recorder."""
+    """GNSS time of a log, in stretches.
+
+    ``is_own``: the log's own clock runs on it; else messages told it to the recorder.
+    """
 
     stretches: tuple[GnssStretch, ...]
     is_own: bool
