@@ -4,6 +4,7 @@ An analysis offers a role (``Analysis.offers``); another one finds it with ``kno
 offers it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -40,3 +41,13 @@ class HeadingOnGround:
     """Role of whoever estimates INS heading errors on the ground, by the user's settings and intervals."""
 
     find: FindHeadingError
+
+
+@dataclass(frozen=True)
+class InsKinds:
+    """Role of whoever tells an INS that GNSS corrects from one left alone, by the log and what the user states.
+
+    ``find(flight)`` gives the kind (:mod:`groundstation.tables.ins_kind`) of each INS topic that can be judged.
+    """
+
+    find: Callable[[Flight], dict[str, str]]
