@@ -4,11 +4,12 @@ import numpy as np
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.analysis import Shortfall
-from groundstation.estimators.inertial.differences import Differences, differences, seconds_covered
+from groundstation.estimators.inertial.differences import Differences, differences
 from groundstation.estimators.inertial.kind import WHY_NOT, kind_of, stated_kind
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.known import Known
 from groundstation.methods.roles import InsKinds
+from groundstation.tables.gaps import seconds_covered
 from groundstation.tables.ins_kind import UNAIDED
 from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight

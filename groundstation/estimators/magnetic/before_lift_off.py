@@ -13,11 +13,12 @@ from groundstation.estimators.magnetic.entered import corrections_entered
 from groundstation.estimators.magnetic.gyros import GyroDrift, gyro_drift
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.methods.roles import HeadingOnGround
-from groundstation.methods.taxi.pair import choose_pair
+from groundstation.methods.taxi.pair import HEADING_AND_VELOCITY
 from groundstation.results.arrays.heading import HeadingSamples
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.heading import HeadingResult
 from groundstation.tables.phases import Phases
+from groundstation.tables.sources import choose_pair
 from groundstation.tables.table import Flight
 
 ANALYSIS = "magnetic"
@@ -174,7 +175,7 @@ def _speed_min_mps(part: Flight, ins_topic: str, settings: MagneticSettings) -> 
     """Least speed by the velocity error allowed for, or by that which the receiver states where it is larger."""
     stated = np.zeros(0)
     with suppress(NotAssessableError):  # said when system 1 is run
-        _ins, gnss = choose_pair(part, ins_topic)
+        _ins, gnss = choose_pair(part, HEADING_AND_VELOCITY, ins_topic)
         stated = part[gnss].values("velocity_sigma_mps")
     stated = stated[np.isfinite(stated)]
     error_mps = max(settings.gnss_velocity_error_mps, float(np.median(stated)) if stated.size else 0.0)
