@@ -37,7 +37,8 @@ from groundstation.pipeline.one_flight.apply_deviation import ins_error_deg
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.answer import Answer, by_analysis
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.heading import Gate, HeadingResult
+from groundstation.results.gates import Gate
+from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import AzimuthEstimate, InertialResult
 from groundstation.results.magnetic import Alignment, MagneticResult
 from groundstation.simulation.flight import Simulated, simulate

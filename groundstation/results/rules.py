@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from groundstation.results.heading import Gate
+from groundstation.results.gates import Gate
 
 
 @dataclass(frozen=True)
