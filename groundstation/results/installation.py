@@ -13,6 +13,7 @@ from groundstation.results.heading import IntervalPart
 
 FORMAT_VERSION = 1
 METHOD_VERSION = 1  # of the model: another one makes every learned answer again
+NAMED_PROBABILITY = 0.5  # of a change, or an odd flight, above which it is named
 POOLED = ("compass_a_deg", "antenna_arm_m", "gnss_latency_s")  # figures of other sensors that stay as they are
 
 
