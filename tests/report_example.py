@@ -12,8 +12,8 @@ from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.results.answer import Answer, by_analysis
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source
+from groundstation.results.gates import Gate
 from groundstation.results.heading import (
-    Gate,
     HeadingResult,
     OnboardComparison,
     RunwayCheck,

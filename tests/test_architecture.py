@@ -29,11 +29,23 @@ MAY_IMPORT: dict[str, set[str]] = {
     "exports": {"base", "readers", "tables", "results"},
     "pipeline": {
         *("base", "readers", "store", "integrity", "tables", "results"),
-        *("plots", "chapters", "methods", "estimators", "simulation", "studies", "systems", "viewer", "reports", "exports"),
+        *(
+            "plots",
+            "chapters",
+            "methods",
+            "estimators",
+            "simulation",
+            "studies",
+            "systems",
+            "viewer",
+            "reports",
+            "exports",
+        ),
     },
     "cli": {"base", "results", "chapters", "pipeline"},
 }
 PARTS_OF_THE_PIPELINE = ("one_flight", "many_flights", "verbs", "")  # each imports those before it; "": the Python API
+SYSTEM_OF = {"installation": "heading", "two_clocks": "together"}  # folders of one system; else each is one
 ONLY_ROOM_OF = {"mcap": "store", "google": "store", "foxglove_schemas_protobuf": "store", "rerun": "viewer"}
 NOT_PUBLIC = re.compile(r"/?(rerun_|rerun-[a-z]+-|re_viewer|RERUN_|rerun\.(.*\.)?_)")
 OF_TUPLES = ("_replace", "_fields", "_asdict", "_make")  # public methods of named tuples, which cannot have others
@@ -131,6 +143,20 @@ def test_what_of_rerun_is_not_public_stands_in_one_file() -> None:
     inner = PACKAGE / "viewer" / "inner.py"
     assert found.keys() == {inner}, found
     assert {"rerun_bindings", "_from_native", "rerun_cli", "/re_viewer.js"} <= found[inner]
+
+
+def test_no_system_imports_another() -> None:
+    """What one needs of another is an answer (results) or a role (methods/roles.py)."""
+    systems = PACKAGE / "estimators"
+    forbidden = []
+    for path in (path for path in modules() if path.is_relative_to(systems) and path.parent != systems):
+        own = path.relative_to(systems).parts[0]
+        for name, line in imports_of(path):
+            parts = name.split(".")
+            other = parts[2] if parts[:2] == ["groundstation", "estimators"] and len(parts) > 2 else ""
+            if (systems / other).is_dir() and other and SYSTEM_OF.get(other, other) != SYSTEM_OF.get(own, own):
+                forbidden.append(f"{path}:{line}: {own} imports {name}")
+    assert not forbidden
 
 
 def test_no_file_imports_itself_through_others() -> None:

@@ -22,7 +22,8 @@ from groundstation.chapters.verdict import claim
 from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults, NotAssessable, Source
-from groundstation.results.heading import Gate, HeadingResult
+from groundstation.results.gates import Gate
+from groundstation.results.heading import HeadingResult
 from groundstation.results.latency import Latencies, Latency
 from tests.figure_arrays import filled
 from tests.inertial_example import forecast_result, inertial_result

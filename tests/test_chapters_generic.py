@@ -17,7 +17,7 @@ from groundstation.results.columns import AnswerColumn
 from groundstation.results.figures import FigureData
 from groundstation.results.files import load, save
 from groundstation.results.flight import FlightResults
-from groundstation.results.heading import Gate
+from groundstation.results.gates import Gate
 from groundstation.results.manifest import Manifest
 from groundstation.systems import systems
 from tests.report_example import example, heading_result

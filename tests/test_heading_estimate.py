@@ -14,7 +14,8 @@ from groundstation.estimators.heading.figures import IN_PAUSE
 from groundstation.estimators.heading.references import reference_findings
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.results.figures import FigureData
-from groundstation.results.heading import Gate, HeadingResult
+from groundstation.results.gates import Gate
+from groundstation.results.heading import HeadingResult
 from groundstation.simulation.taxi import TaxiCase, TaxiRun, noiseless, simulate_taxi, table_of, taxi_flight
 from groundstation.simulation.taxi_disturbance import Disturbance
 from groundstation.systems.known import AircraftData, SiteData, Stand

@@ -34,7 +34,7 @@ from groundstation.methods.taxi.gating import gate_samples, intervals_without_ep
 from groundstation.methods.taxi.intervals import Interval
 from groundstation.methods.taxi.samples import Samples, pair_samples, window_slope, without_arm
 from groundstation.methods.taxi.settings import GroundLimits
-from groundstation.results.heading import Gate
+from groundstation.results.gates import Gate
 from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.taxi import TaxiCase, noiseless, simulate_taxi, table_of, taxi_flight
 from groundstation.systems.known import AircraftData, Runway, SiteData, Stand

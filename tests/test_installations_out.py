@@ -28,7 +28,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration, insta
 from groundstation.pipeline.verbs.rules import RulesTest, rules_test
 from groundstation.reports.flight_report import REPORT, write_flight_report
 from groundstation.results.files import load
-from groundstation.results.heading import judged_gate
+from groundstation.results.gates import judged_gate
 from groundstation.results.inertial import InertialResult
 from groundstation.results.installation import InstallationResult, Installations, read_installations
 from groundstation.results.schema import installations_schema

@@ -16,12 +16,12 @@ from groundstation.base.records import Column
 from groundstation.base.toml_settings import settings_from
 from groundstation.base.units import NS_PER_S
 from groundstation.estimators.heading.estimate import estimate_heading_error
+from groundstation.estimators.heading.on_ground import Estimator
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.magnetic.alignment import NOT_IN_INTERVAL, against_heading, align, refused
 from groundstation.estimators.magnetic.attitude import field_in_body
 from groundstation.estimators.magnetic.before_lift_off import (
     GroundRuns,
-    HeadingBasis,
     find_ground_runs,
     least_speed_mps,
 )
@@ -29,13 +29,15 @@ from groundstation.estimators.magnetic.entered import corrections_entered
 from groundstation.estimators.magnetic.estimate import estimate_deviation
 from groundstation.estimators.magnetic.gyros import EARTH_DEG_PER_H, GyroDrift, gyro_drift
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.methods.roles import HeadingOnGround
 from groundstation.pipeline.one_flight import configuration as configured
 from groundstation.pipeline.one_flight.analyse import Given, analyse
 from groundstation.pipeline.one_flight.apply_deviation import ins_error_deg
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.answer import Answer, by_analysis
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.heading import Gate, HeadingResult
+from groundstation.results.gates import Gate
+from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import AzimuthEstimate, InertialResult
 from groundstation.results.magnetic import Alignment, MagneticResult
 from groundstation.simulation.flight import Simulated, simulate
@@ -64,6 +66,7 @@ LANDING = (
     {"kind": "taxi", "length_m": 300, "speed_mps": 10},
     {"kind": "parked", "duration_s": 5},
 )
+ON_GROUND = HeadingOnGround(Estimator())
 ERROR_DEG = 1.0  # of the INS heading in the default scenario, with a drift of 0.05 deg/h
 
 
@@ -85,9 +88,7 @@ def runs_of(
     flight: Flight, settings: MagneticSettings | None = None, heading: HeadingResult | None = None
 ) -> GroundRuns:
     settings, phases = settings or MagneticSettings(), flight_phases(flight)
-    return find_ground_runs(
-        flight, "ins", heading, phases, HeadingBasis(), settings, is_enough=lambda one: not refused(one)
-    )
+    return find_ground_runs(flight, "ins", heading, phases, ON_GROUND, settings, is_enough=lambda one: not refused(one))
 
 
 def aligned(flight: Flight, settings: MagneticSettings | None = None) -> Alignment:
@@ -203,8 +204,8 @@ def test_landing_roll_and_taxi_in_are_not_used() -> None:
     assert after is not None
     assert (after.error_deg, after.samples) == (before.error_deg, before.samples)
     settings = replace(HeadingSettings(), runs="all_ground")
-    basis = HeadingBasis(settings=settings)
-    whole = find_ground_runs(flight, "ins", None, flight_phases(flight), basis, ANY_SPEED).fast
+    on_ground = HeadingOnGround(Estimator(settings=settings))
+    whole = find_ground_runs(flight, "ins", None, flight_phases(flight), on_ground, ANY_SPEED).fast
     assert whole is not None
     assert whole.samples == before.samples
 
@@ -507,7 +508,7 @@ def test_truth_lies_within_the_sigma_as_often_as_it_should() -> None:
 def test_the_deviation_rests_on_the_heading_analysis_and_says_so() -> None:
     simulated = simulate(load_scenario("magnetic-eight"))
     heading = estimate_heading_error(simulated.flight)
-    result = estimate_deviation(simulated.flight, heading=heading)
+    result = estimate_deviation(simulated.flight, heading=heading, on_ground=ON_GROUND)
     alignment = result.alignment
     assert alignment.origin == f"straight taxi ({heading.samples} epochs), verdict advisory"
     assert (alignment.aligned_error_deg, alignment.aligned_sigma_deg) == (heading.error_deg, heading.standard_error_deg)

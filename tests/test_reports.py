@@ -23,7 +23,8 @@ from groundstation.results.answer import by_analysis
 from groundstation.results.figures import FigureData
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, NotAssessable, Source
-from groundstation.results.heading import Gate, HeadingResult
+from groundstation.results.gates import Gate
+from groundstation.results.heading import HeadingResult
 from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import MANIFEST, example, figure, heading_result
 from tests.saved import load, write_flight_report

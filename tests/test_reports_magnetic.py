@@ -15,7 +15,7 @@ from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.figures import FigureData
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, NotAssessable
-from groundstation.results.heading import Gate
+from groundstation.results.gates import Gate
 from groundstation.results.magnetic import ADVISORY, MagneticResult
 from groundstation.results.manifest import Manifest
 from tests.report_example import example

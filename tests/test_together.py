@@ -14,7 +14,7 @@ from groundstation.chapters.together import together as chapter
 from groundstation.estimators.latency.signals import pairs_of
 from groundstation.estimators.two_clocks.relation import NotOneFlightError
 from groundstation.methods.overview import overview
-from groundstation.methods.taxi.pair import choose_pair
+from groundstation.methods.taxi.pair import HEADING_AND_VELOCITY
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
@@ -27,7 +27,7 @@ from groundstation.store.reader import read
 from groundstation.store.writer import StoreWriter
 from groundstation.systems import systems
 from groundstation.tables.motion import motion_of
-from groundstation.tables.sources import TOGETHER, ranked, said_of, sources_of_kind, why_first
+from groundstation.tables.sources import TOGETHER, choose_pair, ranked, said_of, sources_of_kind, why_first
 from groundstation.tables.table import Flight, Table
 from tests.test_formats_agree import as_dataflash, as_ubx, as_ulog
 from tests.test_verbs import groundstation
@@ -86,7 +86,7 @@ def test_a_receivers_track_in_a_later_log_is_no_heading(logs: Path, tmp_path: Pa
         flight = read_flight(target, join_logs([open_log(logs / name) for name in names], target))
         ins, other = ("ins", "ins.b") if names[0] == "a.ulg" else ("ins.b", "ins")
         assert f"heading_is_track.{other}.true_heading_deg" in flight.metadata
-        assert choose_pair(flight)[0] == ins
+        assert choose_pair(flight, HEADING_AND_VELOCITY).ins == ins
 
 
 def test_the_first_logs_times_and_values_are_as_without_the_others(

@@ -11,7 +11,8 @@ from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.results.answer import by_analysis
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source
-from groundstation.results.heading import Gate, HeadingResult, OnboardComparison, Standstill, TaxiSegment
+from groundstation.results.gates import Gate
+from groundstation.results.heading import HeadingResult, OnboardComparison, Standstill, TaxiSegment
 from groundstation.tables.table import Flight, Table
 from tests.figure_arrays import figure
 from tests.inertial_example import forecast_result, inertial_result

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from groundstation.chapters.parts import Cell, Facts, Grid, Head, Mark
 from groundstation.chapters.wording import clean, number_with_unit, significant, typeset, unit_sign
-from groundstation.results.heading import Gate
+from groundstation.results.gates import Gate
 
 SENSE_SIGNS = {"at_most": "≤ ", "at_least": "≥ "}
 STATES = {

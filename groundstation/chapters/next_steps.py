@@ -10,7 +10,8 @@ from groundstation.chapters.inertial_claim import is_start_unknown
 from groundstation.chapters.parts import Facts, Section
 from groundstation.chapters.wording import number, significant
 from groundstation.results.flight import FlightResults
-from groundstation.results.heading import Gate, HeadingResult
+from groundstation.results.gates import Gate
+from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
 
 TITLE = "What to do next"

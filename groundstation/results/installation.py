@@ -13,6 +13,7 @@ from groundstation.results.heading import IntervalPart
 
 FORMAT_VERSION = 1
 METHOD_VERSION = 1  # version of the model: with another one every learned answer is made again
+NAMED_PROBABILITY = 0.5  # of a change, or an odd flight, above which it is named
 POOLED = ("compass_a_deg", "antenna_arm_m", "gnss_latency_s")  # figures of other sensors that stay as they are
 
 

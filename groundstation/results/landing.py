@@ -5,7 +5,7 @@ from typing import ClassVar, Literal
 
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
-from groundstation.results.heading import Gate
+from groundstation.results.gates import Gate
 
 Outcome = Literal["landing", "go-around"]
 PlacedBy = Literal["site file", "positions"]

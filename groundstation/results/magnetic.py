@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
-from groundstation.results.heading import Gate
+from groundstation.results.gates import Gate
 
 MagneticVerdict = Literal["accept", "reject", "undecided"]
 MethodName = Literal["compass_table", "poisson_attitude", "constant_modulus"]

@@ -5,7 +5,7 @@ They are judged from stored values.
 
 from dataclasses import dataclass
 
-from groundstation.results.heading import Gate
+from groundstation.results.gates import Gate
 
 
 @dataclass(frozen=True)

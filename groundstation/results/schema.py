@@ -97,7 +97,8 @@ def definition_name(cls: type) -> str:
 
     Examples
     --------
-    >>> from groundstation.results.heading import Gate, HeadingResult
+    >>> from groundstation.results.gates import Gate
+    >>> from groundstation.results.heading import HeadingResult
     >>> definition_name(Gate), definition_name(HeadingResult)
     ('gate', 'heading')
     """

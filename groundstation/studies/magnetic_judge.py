@@ -9,11 +9,13 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.records import frozen
 from groundstation.base.units import NS_PER_S
+from groundstation.estimators.heading.on_ground import Estimator
 from groundstation.estimators.magnetic.apply import corrected_by_iron, corrected_by_table
 from groundstation.estimators.magnetic.compass_table import CENTRES_DEG, filled_on_circle
 from groundstation.estimators.magnetic.estimate import estimate_deviation
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.methods import harmonics
+from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.arrays.magnetic import MagneticSamples, MagneticTable
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.heading import HeadingResult
@@ -142,9 +144,10 @@ def judge(
     middle = flown.field_ned_nt[len(flown.field_ned_nt) // 2]
     horizontal = float(np.hypot(middle[0], middle[1]))
     dip = float(np.rad2deg(np.arctan2(middle[2], horizontal)))
+    on_ground = HeadingOnGround(Estimator(latencies=latencies))
     try:
         result = estimate_deviation(
-            flown.flight, settings=UNREFUSED, heading=heading, latencies=latencies, phases=phases
+            flown.flight, settings=UNREFUSED, heading=heading, on_ground=on_ground, latencies=latencies, phases=phases
         )
     except NotAssessableError as error:
         nothing = np.full(len(METHODS), np.nan)

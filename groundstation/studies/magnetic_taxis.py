@@ -14,9 +14,11 @@ from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.estimators.heading.estimate import estimate_heading_error
+from groundstation.estimators.heading.on_ground import Estimator
 from groundstation.estimators.inertial.estimate import estimate_ins_errors
 from groundstation.estimators.latency.estimate import estimate_latencies
 from groundstation.estimators.magnetic.estimate import estimate_deviation
+from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
@@ -111,8 +113,9 @@ def taxi_outcome(name: str, seed: int) -> TaxiOutcome:
     truth = true_airframe_error(simulated)
     off = np.nan if heading is None else wrap_180(heading.error_deg - truth(heading.reference_time_s or 0.0))
     told = "none" if heading is None else heading.verdict
+    on_ground = HeadingOnGround(Estimator(latencies=latencies))
     try:
-        found = estimate_deviation(flight, heading=heading, inertial=inertial, latencies=latencies)
+        found = estimate_deviation(flight, heading=heading, on_ground=on_ground, inertial=inertial, latencies=latencies)
     except NotAssessableError as error:
         nan = float("nan")
         return TaxiOutcome(name, told, "not assessable", error.found, "", nan, nan, nan, float(off))

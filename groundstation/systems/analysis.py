@@ -1,8 +1,8 @@
 """One analysis as one object: needs, settings, answer, run, and its line for the terminal."""
 
 import dataclasses
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar, cast
 
 from groundstation.base.findings import Finding
@@ -131,6 +131,8 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
         analysis that has it is a purpose of ``check --for``.
     rules : Rules, optional
         Of an answer with gates.
+    offers : mapping of role to callable
+        What others may ask of it (:mod:`groundstation.methods.roles`): ``offers[role](known)`` makes it.
     judges : bool
         Whether it is given the truth, by which it judges the others: it runs where there is one, and last; every other
         analysis is given a flight without it.
@@ -155,6 +157,7 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     examine: Examine[Data, KnownT, SettingsT] | None = None
     judges: bool = False
     rules: Rules | None = None
+    offers: Mapping[type[Any], Callable[[KnownT], Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         known = {field.name for field in dataclasses.fields(cast(Any, self.answer))}

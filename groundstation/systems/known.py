@@ -4,7 +4,7 @@ It holds aircraft, airfield, the user's intervals and earlier answers.
 """
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Literal, TypeVar
@@ -224,6 +224,8 @@ class Known:
         What an earlier analysis computed on the way, by its name; it is not saved.
     lessons : tuple of Lesson, optional
         What earlier flights say of installations, where the user gives a file of them.
+    roles : mapping of role to callable
+        What the analyses offer to each other, whether they gave an answer or not: ``roles[kind](known)`` makes it.
     """
 
     phases: Phases
@@ -236,6 +238,7 @@ class Known:
     answers: Answers = field(default_factory=dict)
     workings: Mapping[str, Any] = field(default_factory=dict)
     lessons: tuple[Lesson, ...] | None = None
+    roles: Mapping[type[Any], Callable[["Known"], Any]] = field(default_factory=dict)
 
     @property
     def excluded_s(self) -> tuple[tuple[float, float], ...]:
@@ -249,6 +252,11 @@ class Known:
     def settings_of(self, kind: type[S]) -> S:
         """The settings of that type, the shipped ones where the user set none."""
         return next((found for found in self.settings.values() if isinstance(found, kind)), None) or kind()
+
+    def role(self, kind: type[S]) -> S | None:
+        """What an analysis offers under that type (:mod:`groundstation.methods.roles`), None where none does."""
+        make = self.roles.get(kind)
+        return None if make is None else make(self)
 
     def workings_of(self, kind: type[S]) -> S | None:
         """Return what an earlier analysis computed on the way, None where there is none."""

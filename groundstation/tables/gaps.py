@@ -47,6 +47,13 @@ def largest_step_s(time_ns: Int64Array, steps: float = STEPS_OF_A_GAP, at_least_
     return max(steps * float(np.median(steps_ns)) / NS_PER_S, at_least_s)
 
 
+def seconds_covered(time_s: FloatArray, longest_gap_s: float) -> float:
+    """Seconds that samples stand for: the steps between them that are no gap."""
+    steps = np.diff(time_s)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    return float(steps[steps <= max(longest_gap_s, 3.0 * usual)].sum())
+
+
 def find_gaps(table: Table, *names: str, largest_s: float | None = None) -> tuple[Gap, ...]:
     """Gaps of a table in order of time.
 

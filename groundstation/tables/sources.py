@@ -1,14 +1,15 @@
-"""Choice among sources of a kind when several logs of one flight have one.
-
-There is an order, and a reason why the first is first.
-"""
+"""The source of a kind to use: the order where several logs of a flight have one, and the choice by what is needed."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.records import HEADING_IS_TRACK
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
+from groundstation.tables.gaps import seconds_covered
 from groundstation.tables.ins_kind import AIDED, HALF
 from groundstation.tables.table import Flight, Table
 
@@ -19,6 +20,53 @@ SURER = 1.5  # times: a smaller difference of the stated sigma is none
 NEEDS = {"gnss": ("velocity_north_mps", "velocity_east_mps"), "ins": ("roll_deg", "pitch_deg")}
 FIX_FIELDS = ("latitude_deg", "velocity_north_mps", "ground_speed_mps")  # a receiver with a fix logs one of them
 NEVER_A_FIX = "GNSS never had a fix"
+LONGEST_STEP_S = 10.0  # between samples for a source to count as there
+
+
+@dataclass(frozen=True)
+class Need:
+    """What a method needs of the source it works with.
+
+    Parameters
+    ----------
+    kind : str
+        Of topic.
+    what : str
+        In words: "INS heading".
+    fields : tuple of str
+    or_else : tuple of str
+        Fields that serve where no source has the others.
+    is_nose : bool
+        A heading that is the receiver's own track does not serve: it does not tell where the nose points.
+    takes_longest : bool
+        Of a flight of one log, the source whose fields are known for the most minutes comes first.
+    """
+
+    kind: str
+    what: str
+    fields: tuple[str, ...]
+    or_else: tuple[str, ...] = ()
+    is_nose: bool = False
+    takes_longest: bool = False
+
+
+GNSS_VELOCITY = Need("gnss", "GNSS velocity", ("velocity_north_mps", "velocity_east_mps"))
+
+
+@dataclass(frozen=True)
+class PairNeed:
+    """What an analysis needs of an INS and of the GNSS that it compares with it."""
+
+    analysis: str
+    ins: Need
+    gnss: Need
+
+
+class Pair(NamedTuple):
+    """Topics of an INS and of the GNSS compared with it."""
+
+    ins: str
+    gnss: str
 
 
 @dataclass(frozen=True)
@@ -58,7 +106,62 @@ def sources_of_kind(flight: Flight, kind: str) -> tuple[str, ...]:
     topics = topics_of_kind(kind, flight.topics())
     if not is_joined(flight) or len(topics) < 2:
         return topics
-    return tuple(one.topic for one in ranked(flight, kind))
+    return flight.once(("sources", kind), lambda one: tuple(source.topic for source in ranked(one, kind)))
+
+
+def choose_pair(flight: Flight, need: PairNeed, ins_topic: str = "", gnss_topic: str = "") -> Pair:
+    """The INS and the GNSS that an analysis works with: those named, else the first that have what it needs.
+
+    Raises
+    ------
+    NotAssessableError
+        When there is no pair.
+    """
+    ins = choose_source(flight, need.ins, need.analysis, ins_topic)
+    gnss = choose_source(flight, need.gnss, need.analysis, gnss_topic)
+    if need.ins.is_nose and _is_track(flight, ins):
+        text = f"the heading of {ins} is the receiver's own track: their difference is zero whatever the nose does"
+        raise NotAssessableError(need.analysis, text)
+    return Pair(ins, gnss)
+
+
+def choose_source(flight: Flight, need: Need, analysis: str, named: str = "") -> str:
+    """The topic that an analysis works with: the one named, else the first that has what it needs.
+
+    Raises
+    ------
+    NotAssessableError
+        When there is none.
+    """
+    having = flight.once(need, lambda one: _having(one, need))
+    if named in having or (having and not named):
+        return named or having[0]
+    if named:
+        raise NotAssessableError(analysis, f"no {need.what} in {named}" if named in flight else f"no topic {named}")
+    is_gnss = need.kind == "gnss"
+    why = why_without_gnss(flight, need.what.removeprefix("GNSS ")) if is_gnss else f"no {need.what} in the log"
+    raise NotAssessableError(analysis, why)
+
+
+def _having(flight: Flight, need: Need) -> tuple[str, ...]:
+    """Topics that have what is needed, the one to use first."""
+    sources = sources_of_kind(flight, need.kind)
+    having = [topic for topic in sources if flight[topic].has(*need.fields)]
+    if need.or_else:
+        having += [topic for topic in sources if topic not in having and flight[topic].has(*need.or_else)]
+    if need.takes_longest and not is_joined(flight):
+        having.sort(key=lambda topic: -round(_known_s(flight[topic], need.fields) / 60.0))
+    return tuple(sorted(having, key=lambda topic: need.is_nose and _is_track(flight, topic)))
+
+
+def _is_track(flight: Flight, topic: str) -> bool:
+    """Whether its heading is a receiver's own track: no measurement of where the nose points."""
+    return f"{HEADING_IS_TRACK}.{topic}.true_heading_deg" in flight.metadata
+
+
+def _known_s(table: Table, fields: tuple[str, ...]) -> float:
+    times = table.time_ns[table.valid(*fields)] / NS_PER_S
+    return seconds_covered(times - times[0], LONGEST_STEP_S) if len(times) else 0.0
 
 
 def why_without_gnss(flight: Flight, what: str) -> str:

@@ -1,9 +1,9 @@
 """A table: the samples of one topic as named numpy columns on the corrected clock."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FloatArray = NDArray[np.float64]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, repr=False)
@@ -278,6 +279,7 @@ class Flight:
     start_ns: int = 0
     has_utc: bool = False
     source_name: str = ""
+    _made: dict[Hashable, Any] = field(default_factory=dict, init=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tables", MappingProxyType(dict(self.tables)))
@@ -298,6 +300,12 @@ class Flight:
     def topics(self) -> tuple[str, ...]:
         """Topics in alphabetical order."""
         return tuple(sorted(self.tables))
+
+    def once(self, key: Hashable, make: Callable[["Flight"], T]) -> T:
+        """What a function makes of the flight, made when it is first asked for under the key."""
+        if key not in self._made:
+            self._made[key] = make(self)
+        return cast(T, self._made[key])
 
     def without(self, kind: str) -> "Flight":
         """Return the flight without the topics of a kind; its clock stays as it is."""

@@ -6,7 +6,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.estimators.approaches.geometry import Against
 from groundstation.estimators.approaches.path import FlightPath
 from groundstation.estimators.approaches.settings import LandingSettings
-from groundstation.results.heading import Bound, Gate, judged_gate
+from groundstation.results.gates import Bound, Gate, judged_gate
 from groundstation.results.landing import LandingResult, StabilisedAt, StabilisedVerdict
 from groundstation.results.rules import Rejudged
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from groundstation.base.findings import Finding
 from groundstation.estimators.heading.columns import COLUMNS
 from groundstation.estimators.heading.settings import LIMITS, HeadingRequest, HeadingSettings
+from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.heading import HeadingResult
 from groundstation.results.latency import Latencies
@@ -101,6 +102,12 @@ def _sentence(answers: Answers) -> str:
     return f"{text} ({heading.verdict_reason})"
 
 
+def _on_ground(known: Known) -> HeadingOnGround:
+    from groundstation.estimators.heading.on_ground import offered
+
+    return offered(known)
+
+
 def _rejudge(answer: HeadingResult, settings: HeadingSettings) -> tuple[Rejudged, ...]:
     from groundstation.estimators.heading.verdict import rejudge
 
@@ -122,4 +129,5 @@ HEADING = Analysis(
     columns=COLUMNS,
     examine=_examine,
     rules=Rules(LIMITS, _rejudge),
+    offers={HeadingOnGround: _on_ground},
 )

@@ -12,12 +12,13 @@ from groundstation.estimators.heading.standstill import find_standstill
 from groundstation.estimators.heading.steady import steady_prior
 from groundstation.estimators.heading.steps import heading_steps
 from groundstation.estimators.heading.taxi import delay_of, straight_taxi
-from groundstation.methods.taxi.pair import choose_pair
+from groundstation.methods.taxi.pair import HEADING_AND_VELOCITY
 from groundstation.methods.taxi.samples import HeadingOf, OnGround, logged_heading
 from groundstation.results.heading import HeadingResult, HeadingStep
 from groundstation.results.latency import Latencies
 from groundstation.systems.known import AircraftData, SiteData
 from groundstation.tables.phases import Phases
+from groundstation.tables.sources import choose_pair
 from groundstation.tables.table import Flight
 
 
@@ -77,7 +78,7 @@ def estimate_heading_error(
     """
     settings, aircraft = settings or HeadingSettings(), aircraft or AircraftData()
     site, request = site or SiteData(), request or HeadingRequest()
-    ins_topic, gnss_topic = choose_pair(flight, request.ins_topic, request.gnss_topic)
+    ins_topic, gnss_topic = choose_pair(flight, HEADING_AND_VELOCITY, request.ins_topic, request.gnss_topic)
     delay = delay_of((ins_topic, gnss_topic), latencies, aircraft, settings)
     antenna = straight_taxi(
         *(flight, ins_topic, gnss_topic),

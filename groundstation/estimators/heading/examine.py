@@ -9,13 +9,14 @@ from groundstation.estimators.heading.standstill import find_standstill
 from groundstation.estimators.heading.taxi import delay_of, straight_taxi
 from groundstation.estimators.heading.verdict import STANDSTILL_GATE, Figures, build_gates
 from groundstation.estimators.heading.wording import told
-from groundstation.methods.taxi.pair import choose_pair
+from groundstation.methods.taxi.pair import HEADING_AND_VELOCITY
 from groundstation.methods.taxi.samples import Samples
 from groundstation.results.latency import Latencies
 from groundstation.systems.analysis import Shortfall
 from groundstation.systems.known import Known
 from groundstation.tables.headings import true_heading
 from groundstation.tables.phases import ground_mask
+from groundstation.tables.sources import choose_pair
 from groundstation.tables.table import Flight
 
 STANDSTILL = ("standstill_duration", STANDSTILL_GATE)
@@ -34,7 +35,7 @@ def examine_heading(flight: Flight, known: Known, settings: HeadingSettings) -> 
     if known.intervals_problem:
         raise known.intervals_problem
     request = HeadingRequest(intervals=known.intervals)
-    topics = choose_pair(flight, request.ins_topic, request.gnss_topic)
+    topics = choose_pair(flight, HEADING_AND_VELOCITY, request.ins_topic, request.gnss_topic)
     delay = delay_of(topics, known.answer(Latencies), known.aircraft, settings)
     samples = straight_taxi(
         *(flight, *topics),

@@ -13,7 +13,8 @@ from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.heading.wording import told
 from groundstation.methods.taxi.gating import NOT_TAXI, is_straight_and_fast
 from groundstation.methods.taxi.samples import VELOCITY_SIGMA, Samples
-from groundstation.results.heading import Bound, Gate, HeadingResult, HeadingStep, Standstill, Verdict, judged_gate
+from groundstation.results.gates import Bound, Gate, judged_gate
+from groundstation.results.heading import HeadingResult, HeadingStep, Standstill, Verdict
 from groundstation.results.rules import Rejudged
 
 # Required gates whose failure more data may cure; the failure of any other required gate rejects.

@@ -1,6 +1,6 @@
 """Gates in the words of a crew: what was found and what is needed, what people can see for themselves first."""
 
-from groundstation.results.heading import Gate
+from groundstation.results.gates import Gate
 
 # By the name of a gate, in the order they are told. {value}: what was found; {limit}: what is needed.
 FAILED = {

@@ -12,12 +12,13 @@ import numpy as np
 from groundstation.base.findings import Finding
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.inertial.differences import Differences, differences, seconds_covered
+from groundstation.estimators.inertial.differences import Differences, differences
 from groundstation.estimators.inertial.figures import differences_figure, own_innovations_figure, plain_track_figure
 from groundstation.estimators.inertial.kind import WHY_NOT
 from groundstation.estimators.inertial.model import FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.results.inertial import CHANNELS, Difference, InertialResult, OwnInnovation
+from groundstation.tables.gaps import seconds_covered
 from groundstation.tables.ins_kind import AIDED, UNKNOWN
 from groundstation.tables.own_filter import OwnInnovations, own_innovations
 from groundstation.tables.table import Flight

@@ -8,6 +8,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.estimators.inertial.columns import FORECAST_COLUMNS, INERTIAL_COLUMNS
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.methods.ins_noise import choose_class
+from groundstation.methods.roles import InsKinds
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.forecast import ForecastResult
 from groundstation.results.inertial import InertialResult
@@ -55,6 +56,12 @@ def _examine(flight: "Flight", known: Known, settings: InertialSettings) -> tupl
     from groundstation.estimators.inertial.examine import examine_inertial
 
     return examine_inertial(flight, known, settings)
+
+
+def _ins_kinds(known: Known) -> InsKinds:
+    from groundstation.estimators.inertial.examine import offered
+
+    return offered(known)
 
 
 def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -> Found[ForecastResult]:
@@ -127,6 +134,7 @@ INERTIAL = Analysis(
     check=_check,
     columns=INERTIAL_COLUMNS,
     examine=_examine,
+    offers={InsKinds: _ins_kinds},
 )
 FORECAST = Analysis(
     name="forecast",

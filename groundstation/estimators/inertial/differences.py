@@ -15,16 +15,21 @@ from groundstation.estimators.inertial import screening
 from groundstation.estimators.inertial.filter import Epochs
 from groundstation.estimators.inertial.model import FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.tables.gaps import seconds_covered
 from groundstation.tables.ins_kind import aided_share
 from groundstation.tables.resample import join
-from groundstation.tables.sources import is_joined, sources_of_kind, why_without_gnss
+from groundstation.tables.sources import Need, PairNeed, choose_pair
 from groundstation.tables.table import Flight, Table
 
 POSITION_FIELDS = ("latitude_deg", "longitude_deg")
 VELOCITY_FIELDS = ("velocity_north_mps", "velocity_east_mps")
+POSITIONS = PairNeed(
+    "inertial",
+    Need("ins", "INS position", POSITION_FIELDS, takes_longest=True),
+    Need("gnss", "GNSS position", POSITION_FIELDS, takes_longest=True),
+)
 UNUSED_MODES = ("align", "attitude")
 TRACK_MPS = 20.0  # slower, and the track is not the heading
-LONGEST_STEP_S = 10.0  # between samples for a topic to count as there
 LONGEST_FLIGHT_S = 4.0e6  # 46 days: a clock that jumps by years must not fill the memory
 
 
@@ -94,36 +99,6 @@ class Differences:
         return np.interp(np.arange(len(heading)), known, np.unwrap(heading[known]))
 
 
-def choose_pair(flight: Flight) -> tuple[str, str]:
-    """Choose the INS and GNSS topics to compare.
-
-    For each kind it is the topic whose positions cover the longest time; in a flight of several logs that of the better
-    source (:func:`groundstation.tables.sources.sources_of_kind`).
-
-    Raises
-    ------
-    NotAssessableError
-        When one of them is missing.
-    """
-    found: dict[str, str] = {}
-    for kind, title in (("ins", "INS"), ("gnss", "GNSS")):
-        covered = {name: _covered_s(flight[name]) for name in sources_of_kind(flight, kind)}
-        covered = {name: seconds for name, seconds in covered.items() if flight[name].has(*POSITION_FIELDS)}
-        if not covered:
-            why = why_without_gnss(flight, "position") if kind == "gnss" else f"no {title} position in the log"
-            raise NotAssessableError("inertial", why)
-        if is_joined(flight):
-            found[kind] = next(iter(covered))
-            continue
-        found[kind] = max(covered, key=lambda name: (round(covered[name] / 60.0), -list(covered).index(name)))
-    return found["ins"], found["gnss"]
-
-
-def _covered_s(table: Table) -> float:
-    times = table.time_ns[table.valid(*POSITION_FIELDS)] / NS_PER_S
-    return seconds_covered(times - times[0], LONGEST_STEP_S) if len(times) else 0.0
-
-
 def differences(
     flight: Flight, *, settings: InertialSettings, excluded_s: tuple[tuple[float, float], ...] = ()
 ) -> Differences:
@@ -137,7 +112,7 @@ def differences(
     NotAssessableError
         With the reason: no INS, no GNSS, or less GNSS than ``least_gnss_s``.
     """
-    ins_topic, gnss_topic = choose_pair(flight)
+    ins_topic, gnss_topic = choose_pair(flight, POSITIONS)
     ins, realigned_ns = _navigating(flight[ins_topic].unique_times())
     gnss = flight[gnss_topic].unique_times()
     if not len(ins):
@@ -200,13 +175,6 @@ def drag_per_s(latitude_deg: FloatArray, altitude_m: FloatArray, velocity_mps: F
     out[:, 1, 0] = slope * velocity_mps[:, 1]
     out[:, 1, 1] = -slope * velocity_mps[:, 0]
     return np.nan_to_num(out)
-
-
-def seconds_covered(time_s: FloatArray, longest_gap_s: float) -> float:
-    """Seconds that samples stand for: the steps between them that are no gap."""
-    steps = np.diff(time_s)
-    usual = float(np.median(steps)) if len(steps) else 0.0
-    return float(steps[steps <= max(longest_gap_s, 3.0 * usual)].sum())
 
 
 def only_used(epochs: Epochs, settings: InertialSettings) -> Epochs:

@@ -13,7 +13,7 @@ from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.estimators.inertial import figures
 from groundstation.estimators.inertial.azimuth import estimate_azimuth
 from groundstation.estimators.inertial.coupled import CoupledRun
-from groundstation.estimators.inertial.differences import Differences, differences, only_used, seconds_covered
+from groundstation.estimators.inertial.differences import Differences, differences, only_used
 from groundstation.estimators.inertial.filter import (
     Epochs,
     FilterRun,
@@ -33,6 +33,7 @@ from groundstation.estimators.inertial.tracks import corrected_tracks
 from groundstation.methods.ins_noise import InsNoise, choose_class
 from groundstation.methods.intervals import slope_through_origin
 from groundstation.results.inertial import ChannelResult, InertialResult, NavigationStart, StateEstimate
+from groundstation.tables.gaps import seconds_covered
 from groundstation.tables.ins_kind import UNAIDED
 from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight, Table

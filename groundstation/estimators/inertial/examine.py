@@ -2,11 +2,14 @@
 
 import numpy as np
 
-from groundstation.estimators.inertial.differences import Differences, differences, seconds_covered
+from groundstation.base.errors import NotAssessableError
+from groundstation.estimators.inertial.differences import Differences, differences
 from groundstation.estimators.inertial.kind import WHY_NOT, kind_of, stated_kind
 from groundstation.estimators.inertial.settings import InertialSettings
+from groundstation.methods.roles import InsKinds
 from groundstation.systems.analysis import Shortfall
 from groundstation.systems.known import Known
+from groundstation.tables.gaps import seconds_covered
 from groundstation.tables.ins_kind import UNAIDED
 from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight
@@ -26,6 +29,19 @@ def compared_with_kind(flight: Flight, known: Known, settings: InertialSettings)
     compared = differences(flight, settings=settings, excluded_s=known.excluded_s)
     said = said_of(flight, compared.ins_topic, "ins_kind")
     return compared, kind_of(compared, settings, stated_kind(known.aircraft.ins_kind, {"ins_kind": said}))
+
+
+def offered(known: Known) -> InsKinds:
+    """Kind of the INS that the inertial analysis compares with GNSS, none where it compares none."""
+
+    def find(flight: Flight) -> dict[str, str]:
+        try:
+            compared, (kind, _reason) = compared_with_kind(flight, known, known.settings_of(InertialSettings))
+        except NotAssessableError:
+            return {}
+        return {compared.ins_topic: kind}
+
+    return InsKinds(find)
 
 
 def examine_inertial(flight: Flight, known: Known, settings: InertialSettings) -> tuple[Shortfall, ...]:

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.records import Int64Array
-from groundstation.estimators.inertial.differences import seconds_covered
 from groundstation.estimators.inertial.filter import FilterRun
 from groundstation.estimators.inertial.leads import PAST_FROM_S, built_up, leads_of, start_epochs
 from groundstation.estimators.inertial.model import FloatArray
 from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.results.forecast import HORIZONS_MIN
+from groundstation.tables.gaps import seconds_covered
 
 LEAD_STEP_S = 60.0
 LEAST_STARTS = 3  # a horizon with fewer is not shown

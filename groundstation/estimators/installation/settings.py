@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from groundstation.results.installation import NAMED_PROBABILITY
+
 ALIGNMENTS: Mapping[str, float] = {"gyrocompass": 0.1, "stored": 1.0}  # sigma of the heading error, deg, by kind
 UNKNOWN_ALIGNMENT_DEG = 3.0  # wide enough to teach nothing and to move nothing
 MOUNTING_DEG = 0.2
@@ -42,7 +44,7 @@ class InstallationSettings:
     hypotheses: int = 48
     nodes: int = 15
     factor_sigmas: float = 3.5
-    named_probability: float = 0.5
+    named_probability: float = NAMED_PROBABILITY
 
 
 def alignment_sigma_deg(kind: str) -> float:

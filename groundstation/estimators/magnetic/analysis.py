@@ -4,10 +4,10 @@ from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.magnetic.columns import COLUMNS
 from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
 from groundstation.estimators.magnetic.settings import LIMITS, MagneticSettings
+from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
@@ -32,14 +32,11 @@ def _run(flight: "Flight", known: Known, settings: MagneticSettings) -> Found[Ma
         flight,
         settings=settings,
         heading=known.answer(HeadingResult),
-        heading_settings=known.settings_of(HeadingSettings),
-        heading_request=None if known.intervals_problem else HeadingRequest(intervals=known.intervals),
+        on_ground=known.role(HeadingOnGround),
         inertial=inertial,
         latencies=known.answer(Latencies),
         kinds={inertial.ins_topic: inertial.kind} if inertial else {},
         aircraft=known.aircraft,
-        site=known.site,
-        weather=known.weather,
         phases=known.phases,
     )
     return Found(found, (_verdict(found),))

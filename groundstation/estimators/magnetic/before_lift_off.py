@@ -3,40 +3,26 @@
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
-from groundstation.estimators.heading.estimate import estimate_heading_error
-from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.magnetic.entered import corrections_entered
 from groundstation.estimators.magnetic.gyros import GyroDrift, gyro_drift
 from groundstation.estimators.magnetic.settings import MagneticSettings
-from groundstation.methods.taxi.pair import choose_pair
+from groundstation.methods.roles import HeadingOnGround
+from groundstation.methods.taxi.pair import HEADING_AND_VELOCITY
 from groundstation.results.arrays.heading import HeadingSamples
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.heading import HeadingResult
-from groundstation.results.latency import Latencies
-from groundstation.systems.known import AircraftData, SiteData
-from groundstation.tables.phases import Phases, ground_mask
+from groundstation.tables.phases import Phases
+from groundstation.tables.sources import choose_pair
 from groundstation.tables.table import Flight
 
 ANALYSIS = "magnetic"
 NO_LIMIT_MPS = 1000.0  # lift-off ends the run, not a speed
-
-
-@dataclass(frozen=True)
-class HeadingBasis:
-    """What system 1 needs besides the flight: settings, aircraft, airfield, the user's intervals, latencies, METAR."""
-
-    settings: HeadingSettings = field(default_factory=HeadingSettings)
-    aircraft: AircraftData = field(default_factory=AircraftData)
-    request: HeadingRequest = field(default_factory=HeadingRequest)
-    latencies: Latencies | None = None
-    site: SiteData | None = None
-    weather: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -92,7 +78,7 @@ def find_ground_runs(
     ins_topic: str,
     heading: HeadingResult | None,
     phases: Phases,
-    basis: HeadingBasis,
+    on_ground: HeadingOnGround | None,
     settings: MagneticSettings,
     *,
     is_enough: Callable[[HeadingResult], bool] = lambda _found: False,
@@ -111,15 +97,13 @@ def find_ground_runs(
             return GroundRuns(why_not=reason, why_not_taxi=reason)
         return GroundRuns(taxi=heading, why_not=reason)
     part, taxi, why_not_taxi, since = _gnss_within(flight, window), heading, "", ""
-    basis = replace(basis, request=replace(basis.request, ins_topic=ins_topic))
     if window.is_by_event or (window.since and _begins_before(heading, window)):
-        taxi, why_not_taxi = _estimated(flight, part, basis.settings, basis)
+        taxi, why_not_taxi = _estimated(on_ground, part, flight, ins_topic)
         since = window.since
-    speed_min_mps = _speed_min_mps(part, basis, settings)
+    speed_min_mps = _speed_min_mps(part, ins_topic, settings)
     if settings.uses_slower_taxi and taxi is not None and taxi.ins_topic == ins_topic and is_enough(taxi):
         return GroundRuns(None, taxi, speed_min_mps, "taxi aligns", why_not_taxi, since)
-    limits = replace(basis.settings, taxi_speed_min_mps=speed_min_mps, taxi_speed_max_mps=NO_LIMIT_MPS)
-    fast, why_not = _estimated(flight, part, limits, basis)
+    fast, why_not = _estimated(on_ground, part, flight, ins_topic, (speed_min_mps, NO_LIMIT_MPS))
     seconds = _seconds(fast)
     if fast is not None and seconds < settings.ground_run_min_s:
         fast, why_not = None, f"{seconds:.1f} s straight above {speed_min_mps:.1f} m/s before lift-off"
@@ -187,11 +171,11 @@ def _gnss_within(flight: Flight, window: Window) -> Flight:
     return replace(flight, tables={**flight.tables, **cut})
 
 
-def _speed_min_mps(part: Flight, basis: HeadingBasis, settings: MagneticSettings) -> float:
+def _speed_min_mps(part: Flight, ins_topic: str, settings: MagneticSettings) -> float:
     """Least speed by the velocity error allowed for, or by that which the receiver states where it is larger."""
     stated = np.zeros(0)
     with suppress(NotAssessableError):  # said when system 1 is run
-        _ins, gnss = choose_pair(part, basis.request.ins_topic, basis.request.gnss_topic)
+        _ins, gnss = choose_pair(part, HEADING_AND_VELOCITY, ins_topic)
         stated = part[gnss].values("velocity_sigma_mps")
     stated = stated[np.isfinite(stated)]
     error_mps = max(settings.gnss_velocity_error_mps, float(np.median(stated)) if stated.size else 0.0)
@@ -207,23 +191,19 @@ def _seconds(found: HeadingResult | None) -> float:
 
 
 def _estimated(
-    flight: Flight, part: Flight, settings: HeadingSettings, basis: HeadingBasis
+    on_ground: HeadingOnGround | None,
+    part: Flight,
+    flight: Flight,
+    ins_topic: str,
+    speeds_mps: tuple[float, float] | None = None,
 ) -> tuple[HeadingResult | None, str]:
     """System 1's answer, or the reason. Ground contact is judged by the whole flight, not by the part."""
+    if on_ground is None:
+        return None, "no analysis estimates the heading error on the ground"
     try:
-        found = estimate_heading_error(
-            part,
-            on_ground=lambda time_ns: ground_mask(flight, time_ns),
-            settings=replace(settings, runs="before_take_off"),
-            aircraft=basis.aircraft,
-            request=basis.request,
-            latencies=basis.latencies,
-            site=basis.site,
-            weather=basis.weather,
-        )
+        return on_ground.find(part, flight, ins_topic, speeds_mps), ""
     except NotAssessableError as error:
         return None, _reason(error)
-    return found, ""
 
 
 def _reason(error: NotAssessableError) -> str:

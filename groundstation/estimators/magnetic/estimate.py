@@ -1,17 +1,16 @@
 """The magnetic estimator: from the tables of a flight to a deviation, a verdict and a card."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.records import BoolArray
-from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.estimators.magnetic.alignment import S_PER_H, align, refused
 from groundstation.estimators.magnetic.apply import corrected_by_table
-from groundstation.estimators.magnetic.before_lift_off import HeadingBasis, find_ground_runs, gyros_at_standstill
+from groundstation.estimators.magnetic.before_lift_off import find_ground_runs, gyros_at_standstill
 from groundstation.estimators.magnetic.compass_table import CompassTable, build_table
 from groundstation.estimators.magnetic.earth import earth_field
 from groundstation.estimators.magnetic.figures import draw, parts_of
@@ -34,6 +33,7 @@ from groundstation.estimators.magnetic.remarks import remarks_on
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.estimators.magnetic.swings import compare_swings, steer_card
 from groundstation.estimators.magnetic.verdict import build_gates, decide
+from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.heading import HeadingResult
 from groundstation.results.inertial import InertialResult
 from groundstation.results.latency import Latencies
@@ -47,7 +47,7 @@ from groundstation.results.magnetic import (
     Residual,
     SigmaPart,
 )
-from groundstation.systems.known import AircraftData, SiteData
+from groundstation.systems.known import AircraftData
 from groundstation.tables.phases import Phases, flight_phases
 from groundstation.tables.table import Flight
 
@@ -57,14 +57,11 @@ def estimate_deviation(
     *,
     settings: MagneticSettings | None = None,
     heading: HeadingResult | None = None,
-    heading_settings: HeadingSettings | None = None,
-    heading_request: HeadingRequest | None = None,
+    on_ground: HeadingOnGround | None = None,
     inertial: InertialResult | None = None,
     latencies: Latencies | None = None,
     kinds: Mapping[str, str] | None = None,
     aircraft: AircraftData | None = None,
-    site: SiteData | None = None,
-    weather: Iterable[str] = (),
     phases: Phases | None = None,
     ins_topic: str = "",
     magnetometer_topic: str = "",
@@ -78,8 +75,8 @@ def estimate_deviation(
     settings : MagneticSettings, optional
     heading : HeadingResult, optional
         System 1's answer: aligns the INS heading with its whole interval.
-    heading_settings, heading_request, site, weather : optional
-        With which system 1 looks at the ground run up to lift-off, where its answer does not align.
+    on_ground : HeadingOnGround, optional
+        Looks at the ground run up to lift-off, where the answer of system 1 does not align.
     inertial : InertialResult, optional
         System 2's answer: its azimuth by turns aligns too.
     latencies : Latencies, optional
@@ -112,10 +109,10 @@ def estimate_deviation(
     flown = find_flown(flight, topics, phases, kinds or {}, latencies, settings)
     readings, is_airborne, figures, turns = flown.readings, flown.is_airborne, flown.figures, flown.turns
     figure_at_s = float(np.mean([0.5 * (figure.start_s + figure.end_s) for figure in figures]))
-    request = heading_request or HeadingRequest()
     aircraft = aircraft or AircraftData()
-    basis = HeadingBasis(heading_settings or HeadingSettings(), aircraft, request, latencies, site, tuple(weather))
-    runs = find_ground_runs(flight, topics[0], heading, phases, basis, settings, is_enough=lambda one: not refused(one))
+    runs = find_ground_runs(
+        flight, topics[0], heading, phases, on_ground, settings, is_enough=lambda one: not refused(one)
+    )
     gyros = gyros_at_standstill(flight, topics[0], phases, settings)
     alignment = align(heading, topics[0], figure_at_s, settings, runs, gyros, inertial=inertial, aircraft=aircraft)
     readings = _aligned(readings, alignment, aircraft.mounting_deg)

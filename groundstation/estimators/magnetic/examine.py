@@ -2,14 +2,12 @@
 
 import numpy as np
 
-from groundstation.base.errors import NotAssessableError
-from groundstation.estimators.inertial.examine import compared_with_kind
-from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.estimators.magnetic.earth import earth_field
 from groundstation.estimators.magnetic.flown import Flown, find_flown
 from groundstation.estimators.magnetic.held_out import find_unseen, is_level
 from groundstation.estimators.magnetic.readings import choose_topics
 from groundstation.estimators.magnetic.settings import MagneticSettings
+from groundstation.methods.roles import InsKinds
 from groundstation.results.latency import Latencies
 from groundstation.systems.analysis import Shortfall
 from groundstation.systems.known import Known
@@ -40,12 +38,9 @@ def examine_magnetic(flight: Flight, known: Known, settings: MagneticSettings) -
 
 
 def _kinds(flight: Flight, known: Known) -> dict[str, str]:
-    """Whether GNSS corrects the INS, as the inertial analysis would say."""
-    try:
-        compared, (kind, _reason) = compared_with_kind(flight, known, known.settings_of(InertialSettings))
-    except NotAssessableError:
-        return {}
-    return {compared.ins_topic: kind}
+    """Whether GNSS corrects the INS, as far as an analysis can tell."""
+    kinds = known.role(InsKinds)
+    return {} if kinds is None else kinds.find(flight)
 
 
 def _level_readings(flown: Flown, settings: MagneticSettings) -> int:

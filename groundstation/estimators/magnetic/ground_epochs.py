@@ -26,11 +26,11 @@ from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.headings import FARTHEST_POSITION_S
 from groundstation.tables.phases import ground_mask
 from groundstation.tables.resample import join
-from groundstation.tables.sources import sources_of_kind, why_without_gnss
+from groundstation.tables.sources import GNSS_VELOCITY, Need, PairNeed
 from groundstation.tables.table import Flight
 
 ANALYSIS = "magnetic_ground"
-VELOCITIES = ("velocity_north_mps", "velocity_east_mps")
+PAIR = PairNeed(ANALYSIS, Need("ins", "magnetic heading", ("magnetic_heading_deg",)), GNSS_VELOCITY)
 SETTLING, NOT_GROUND = "after a turn", "not proven ground"
 WHY_LEFT_OUT = {
     "too slow": "slow",
@@ -57,27 +57,6 @@ class Epochs:
     def error_deg(self) -> FloatArray:
         """Magnetic heading + declination - track, in [-180, 180)."""
         return wrap_180(self.samples.difference_deg + self.declination_deg)
-
-
-def choose_topics(flight: Flight, ins_topic: str = "", gnss_topic: str = "") -> tuple[str, str]:
-    """The first unit with a magnetic heading and the first receiver with velocities, unless named.
-
-    Raises
-    ------
-    NotAssessableError
-        When the log has none.
-    """
-    found = []
-    for wanted, kind, names, what in (
-        (ins_topic, "ins", ("magnetic_heading_deg",), "magnetic heading"),
-        (gnss_topic, "gnss", VELOCITIES, "GNSS velocity"),
-    ):
-        having = [topic for topic in sources_of_kind(flight, kind) if flight[topic].has(*names)]
-        if not having or (wanted and wanted not in having):
-            why = why_without_gnss(flight, "velocity") if kind == "gnss" else f"no {what} in the log"
-            raise NotAssessableError(ANALYSIS, f"no {what} in {wanted}" if wanted else why)
-        found.append(wanted or having[0])
-    return found[0], found[1]
 
 
 def gated(

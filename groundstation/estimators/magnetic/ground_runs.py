@@ -15,8 +15,8 @@ from groundstation.base.units import DEG_PER_RAD
 from groundstation.estimators.magnetic.compass_table import CENTRES_DEG
 from groundstation.estimators.magnetic.ground_epochs import (
     ANALYSIS,
+    PAIR,
     Epochs,
-    choose_topics,
     count_left_out,
     declination_at,
     gated,
@@ -43,6 +43,7 @@ from groundstation.results.magnetic_ground import GroundDeviation, GroundRun, Le
 from groundstation.systems.known import AircraftData
 from groundstation.tables.phases import Phases, flight_phases
 from groundstation.tables.resample import join
+from groundstation.tables.sources import choose_pair
 from groundstation.tables.table import Flight, Table
 
 SMOOTHED_S = 5.0  # over which the heading is smoothed before its range is taken
@@ -99,7 +100,7 @@ def estimate_ground_deviation(
     """
     settings = settings or MagneticGroundSettings()
     phases = phases or flight_phases(flight)
-    topics = choose_topics(flight, ins_topic, gnss_topic)
+    topics = choose_pair(flight, PAIR, ins_topic, gnss_topic)
     if phases.method.startswith("none"):
         raise NotAssessableError(ANALYSIS, f"ground contact is not proven: {phases.method.removeprefix('none: ')}")
     samples = gated(flight, topics, settings, on_ground, aircraft or AircraftData(), latencies, excluded_s)

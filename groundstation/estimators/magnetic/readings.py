@@ -16,12 +16,14 @@ from groundstation.results.latency import Latencies
 from groundstation.tables.headings import FARTHEST_POSITION_S
 from groundstation.tables.ins_kind import AIDED, is_mostly_aided
 from groundstation.tables.resample import join, values_at
-from groundstation.tables.sources import sources_of_kind
+from groundstation.tables.sources import Need, choose_source
 from groundstation.tables.table import Flight, Table
 
 FIELD = ("field_forward_nt", "field_right_nt", "field_down_nt")
 ATTITUDE = ("roll_deg", "pitch_deg", "true_heading_deg")
 ALTITUDES = ("altitude_msl_m", "altitude_ellipsoid_m", "pressure_altitude_m")
+MAGNETOMETER = Need("magnetometer", "three-axis magnetometer", FIELD)
+UNIT = Need("ins", "INS with roll, pitch and true heading", ATTITUDE)
 LEAST_READINGS = 10
 ANALYSIS = "magnetic"
 NO_DATE = ("no date, so no declination", "UTC in the log, or declination_deg stated")
@@ -72,17 +74,8 @@ def choose_topics(flight: Flight, ins_topic: str = "", magnetometer_topic: str =
     NotAssessableError
         When the log has none.
     """
-    compasses = [topic for topic in sources_of_kind(flight, "magnetometer") if flight[topic].has(*FIELD)]
-    units = [topic for topic in sources_of_kind(flight, "ins") if flight[topic].has(*ATTITUDE)]
-    for wanted, found, what in (
-        (magnetometer_topic, compasses, "no three-axis magnetometer in the log"),
-        (ins_topic, units, "no INS with roll, pitch and true heading in the log"),
-    ):
-        if not found or (wanted and wanted not in found):
-            raise NotAssessableError(
-                ANALYSIS, f"{wanted}: {what.replace('in the log', 'of this name')}" if wanted else what
-            )
-    return ins_topic or units[0], magnetometer_topic or compasses[0]
+    sensor = choose_source(flight, MAGNETOMETER, ANALYSIS, magnetometer_topic)
+    return choose_source(flight, UNIT, ANALYSIS, ins_topic), sensor
 
 
 def why_not_independent(flight: Flight, ins_topic: str, kinds: dict[str, str], settings: MagneticSettings) -> str:

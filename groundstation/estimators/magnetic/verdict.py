@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from groundstation.estimators.magnetic.alignment import against_heading
 from groundstation.estimators.magnetic.settings import MagneticSettings
-from groundstation.results.heading import Bound, Gate, GateState, judged_gate
+from groundstation.results.gates import Bound, Gate, GateState, judged_gate
 from groundstation.results.magnetic import (
     Alignment,
     BankBias,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.results.arrays.fleet import FleetInstallationFlights
-from groundstation.results.installation import Installation, InstallationRow, InstalledFlight
+from groundstation.results.installation import NAMED_PROBABILITY, Installation, InstallationRow, InstalledFlight
 
 NUMBERS = (
     *("error_deg", "half_width_deg", "alone_error_deg", "alone_half_width_deg"),
@@ -16,7 +16,7 @@ NUMBERS = (
 BELIEVED = ("mounting_deg", "mounting_sigma_deg", "sum_deg", "sum_sigma_deg", "factor", "factor_sigma")
 
 
-def installation_rows(installations: Sequence[Installation], named_probability: float) -> tuple[InstallationRow, ...]:
+def installation_rows(installations: Sequence[Installation]) -> tuple[InstallationRow, ...]:
     """One row for each installation, numbered in their order."""
     rows = []
     for place, one in enumerate(installations, 1):
@@ -30,8 +30,8 @@ def installation_rows(installations: Sequence[Installation], named_probability: 
                 last_flight=one.lessons[-1].flight_id,
                 flights=len(one.flights),
                 taught=len(one.taught_by),
-                odd=_named(one.taught_by, one.odd, named_probability),
-                changed=_named(one.taught_by, one.changed, named_probability),
+                odd=_named(one.taught_by, one.odd),
+                changed=_named(one.taught_by, one.changed),
                 pooled=one.pooled,
                 **believed,
             )
@@ -39,8 +39,8 @@ def installation_rows(installations: Sequence[Installation], named_probability: 
     return tuple(rows)
 
 
-def _named(flights: Sequence[str], probability: Sequence[float], least: float) -> str:
-    return ", ".join(name for name, one in zip(flights, probability, strict=False) if one > least)
+def _named(flights: Sequence[str], probability: Sequence[float]) -> str:
+    return ", ".join(name for name, one in zip(flights, probability, strict=False) if one > NAMED_PROBABILITY)
 
 
 def installation_flights(installations: Sequence[Installation]) -> FleetInstallationFlights:

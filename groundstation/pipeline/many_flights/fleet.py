@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError
-from groundstation.estimators.installation.settings import InstallationSettings
 from groundstation.methods.fleet import answer
 from groundstation.methods.fleet.changes import ChangeSettings
 from groundstation.methods.fleet.density import densities_of
@@ -187,7 +186,7 @@ def _results(found: Scan, flights: FigureData, shares: Any, unread: list[NotInFl
         deviations=deviations(flights),
         sessions=tuple(sessions),
         stated=answer.stated_rates(settings),
-        installations=installation_rows(installations, InstallationSettings().named_probability),
+        installations=installation_rows(installations),
         installation_flights=installation_flights(installations),
     )
 

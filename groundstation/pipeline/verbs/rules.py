@@ -22,7 +22,7 @@ from groundstation.pipeline.many_flights.installations import installations_in
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, csv_text, load, mapping, write_text
-from groundstation.results.heading import Gate, judged_gate
+from groundstation.results.gates import Gate, judged_gate
 from groundstation.results.installation import InstalledFlight
 from groundstation.results.rules import Rejudged
 from groundstation.systems import systems

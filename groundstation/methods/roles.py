@@ -1,0 +1,53 @@
+"""Roles: what one system needs of another and asks by type, without importing the system that meets it.
+
+An analysis offers a role (``Analysis.offers``); another one finds it with ``known.role(kind)``, None where nobody
+offers it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from groundstation.results.heading import HeadingResult
+from groundstation.tables.table import Flight
+
+
+class FindHeadingError(Protocol):
+    """Estimate of an INS heading error from the ground before lift-off."""
+
+    def __call__(
+        self, part: Flight, whole: Flight, ins_topic: str, speeds_mps: tuple[float, float] | None = None
+    ) -> HeadingResult:
+        """Estimate it from the GNSS epochs of a part of a flight.
+
+        Parameters
+        ----------
+        part : Flight
+        whole : Flight
+            By which ground contact is judged.
+        ins_topic : str
+        speeds_mps : (float, float), optional
+            Lowest and highest ground speed of an epoch used; None: those of taxi.
+
+        Raises
+        ------
+        NotAssessableError
+            With the reason.
+        """
+
+
+@dataclass(frozen=True)
+class HeadingOnGround:
+    """Role of whoever estimates INS heading errors on the ground, by the user's settings and intervals."""
+
+    find: FindHeadingError
+
+
+@dataclass(frozen=True)
+class InsKinds:
+    """Role of whoever tells an INS that GNSS corrects from one left alone, by the log and what the user states.
+
+    ``find(flight)`` gives the kind (:mod:`groundstation.tables.ins_kind`) of each INS topic that can be judged.
+    """
+
+    find: Callable[[Flight], dict[str, str]]
