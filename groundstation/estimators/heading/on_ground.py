@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.estimators.known import AircraftData, Known, SiteData
+from groundstation.systems.known import AircraftData, Known, SiteData
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.heading import HeadingResult
 from groundstation.results.latency import Latencies
