@@ -93,11 +93,11 @@ class Clock:
     first_device_time : str
         Reading of the clock at the first record; empty where nothing is known of the clock.
     is_absolute : bool
-        Whether corrected time is UTC.
+        True where corrected time is UTC.
     is_counting : bool
         Records of several sources may share a time.
     shift_s : float
-        What was added to all times so that none is negative.
+        Seconds added to all times so that none is negative.
     start : {'utc', 'unset', 'own_zero'}
         Where it began: at a date, at one before its recorder can have been built, or at its own zero.
     """

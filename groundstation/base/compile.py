@@ -151,11 +151,11 @@ class Loop:
     ----------
     function : callable
     is_kept : bool
-        Whether its machine code may be kept: it makes no array, and answers with a number or nothing.
+        True where its machine code may be kept: it makes no array, and answers with a number or nothing.
     is_inlined : bool
-        Whether its code is put into each loop that calls it.
+        True where its code is put into each loop that calls it.
     small_bytes : int
-        Of its first argument: up to so many are gone through in plain Python where no machine code is kept.
+        Length of its first argument up to which it is gone through in plain Python where no machine code is kept.
     """
 
     def __init__(

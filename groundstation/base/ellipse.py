@@ -17,9 +17,9 @@ def principal_axes(
     Parameters
     ----------
     sigma_north, sigma_east : ndarrays, shape (n,)
-        Of one unit.
+        Both in the same unit.
     correlation : ndarray, shape (n,)
-        Of the errors north and east, -1 to 1.
+        Correlation of the errors north and east, -1 to 1.
 
     Returns
     -------

@@ -22,11 +22,11 @@ class GroundstationError(Exception):
     where : str
         File, topic and time or row: ``"flight3.ulg, vehicle_gps at 12.4 s"``.
     found : str
-        What stands there: ``"latitude 912"``.
+        Text or value that stands there: ``"latitude 912"``.
     expected : str, optional
-        What should stand there: ``"within [-90, 90]"``.
+        Text or value that should stand there: ``"within [-90, 90]"``.
     next_step : str, optional
-        What the user can do about it: ``"check the scale in the profile"``.
+        Action of the user: ``"check the scale in the profile"``.
 
     Examples
     --------
@@ -75,7 +75,7 @@ class UnknownNameError(UsageError, KeyError):
     Parameters
     ----------
     where : str
-        What was asked: ``"table ins"``.
+        Place that was asked: ``"table ins"``.
     name : str
     known : iterable of str
         Names there are.

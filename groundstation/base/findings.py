@@ -29,7 +29,7 @@ class Finding:
     place : str
         Where: a time, a row, a byte.
     count : int, optional
-        How many, where that makes sense.
+        Number of cases, where that makes sense.
     """
 
     severity: Severity

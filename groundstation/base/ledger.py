@@ -194,7 +194,7 @@ class Ledger:
     bytes_skipped : int
         Bytes that no record was made of; ``skipped_spans`` are [first, last, bytes].
     damages, remarks : tuples
-        What the reader lost, and what it remarked.
+        Losses and remarks of the reader.
     spans, spans_more
         Damaged spans of time, in order of time; how many more there are.
     topics : mapping of topic to TopicEntry

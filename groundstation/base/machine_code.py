@@ -284,9 +284,9 @@ class Linked:
     function : callable
         The loop in Python.
     plain : sequence of forms
-        Of its arguments, those in tuples in their place.
+        Forms of its arguments, with those in tuples in their place.
     written : sequence of int
-        Which of them are arrays that it may write to.
+        Numbers of the arrays that it may write to.
     """
 
     def __init__(

@@ -151,10 +151,11 @@ class LogHeader:
         Device times count up from power-up and nothing sets them: a record that comes after a later one of another
         topic was written late, and is no step of the clock.
     clock_offsets : tuple of (int, int)
-        What another clock of the log says of the device's: from the record of this index on, so many nanoseconds are to
-        be added to device times (and to times of validity). The records before the first are moved by its offset too.
+        Offsets of the device's clock by another clock of the log: from the record of this index on, so many nanoseconds
+        are to be added to device times (and to times of validity). The records before the first are moved by its offset
+        too.
     utc_readings : UtcReadings, optional
-        What ``utc_of_zero_ns`` is from, where the device's clock starts again: each stretch has a zero of its own.
+        Source of ``utc_of_zero_ns`` where the device's clock starts again: each stretch has a zero of its own.
     """
 
     reader: str
@@ -174,7 +175,7 @@ class NewLog:
     record_index : int
         Its first record has this place or a later one.
     metadata : mapping of str to str
-        What it says of itself.
+        Metadata of that log.
     utc_of_zero_ns : int, optional
         UTC of its device time zero, where it says so.
     """
@@ -195,9 +196,9 @@ class Damage:
     place : str
         ``"row 1207"``, ``"byte 40960"``, ``"gnss.latitude_deg, rows 14 to 15"``.
     count : int
-        How many (records, cells or bytes, as ``what`` says).
+        Number of items (records, cells or bytes, as ``what`` says).
     what : str
-        What is counted, and why it was lost: ``"rows with 13 cells instead of 25"``.
+        Items counted, and the reason of the loss: ``"rows with 13 cells instead of 25"``.
     topic : str
         Topic it belongs to; empty when it concerns the whole log.
     loses_data : bool

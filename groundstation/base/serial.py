@@ -37,7 +37,7 @@ class MismatchError(Exception):
     place : str
         Dotted path within the document; empty while it is not known.
     next_step : str
-        What the user can do about it.
+        Action of the user.
     """
 
     def __init__(self, found: str, expected: str, place: str = "", next_step: str = "") -> None:
@@ -227,9 +227,9 @@ def new_reader(
     Parameters
     ----------
     wanted : mapping of plain type to text
-        What is expected of a value of that type, for messages.
+        Expectation of a value of that type, for messages.
     table : str
-        What a mapping is called.
+        Name of a mapping, for messages.
     float_of : callable
         Reads a number; raises TypeError for anything else.
     """

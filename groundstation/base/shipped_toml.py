@@ -33,7 +33,7 @@ class ShippedToml:
     package, folder : str
         ``"groundstation.simulation"``, ``"scenarios"``.
     what : str
-        What a file of it is, for errors: ``"scenario"``.
+        Kind of its files, for errors: ``"scenario"``.
     """
 
     package: str

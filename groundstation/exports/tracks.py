@@ -49,7 +49,7 @@ class Track:
         Time of flight second zero.
     latitude_deg, longitude_deg : ndarrays, shape (n,)
     columns : mapping of str to ndarray, shape (n,)
-        What else is known of each position, altitudes among it, NaN where it is not.
+        Further data of each position, altitudes among it, NaN where it is not.
     """
 
     name: str

@@ -32,7 +32,7 @@ class ClockModel:
     Parameters
     ----------
     is_absolute : bool
-        Whether corrected time is UTC nanoseconds since 1970; else nanoseconds since the log's zero.
+        True where corrected time is UTC nanoseconds since 1970; else nanoseconds since the log's zero.
     period_ns : int
         Nominal time between timed records; 0 when there are fewer than two.
     starts, offsets_ns : ndarray of int64, shape (segments,)
@@ -44,7 +44,7 @@ class ClockModel:
         Records without a time, with a time that cannot be true, and out of order.
     is_unordered : bool
     shift_ns : int
-        What was added to all times so that none is negative (logs without UTC).
+        Nanoseconds added to all times so that none is negative (logs without UTC).
     has_times : bool
         False when no record has a time: then nothing can be placed.
     stray_index : ndarray of int64
@@ -52,7 +52,7 @@ class ClockModel:
     stale_times : int
         Records of a counting clock with the time of an earlier publication (see ``integrity.counting``).
     lateness_ns : mapping of topic to int
-        How far a record comes after a later one of its topic, at most: the hold-back that restores order.
+        Largest time by which a record comes after a later one of its topic: the hold-back that restores order.
     is_counting : bool
         A counting clock (see ``integrity.counting``): records of several sources may share a time.
     start : {'utc', 'unset', 'own_zero'}
@@ -61,7 +61,7 @@ class ClockModel:
     first_device_ns : int
         Device time of the first record that has one; UTC of a clock that tells UTC.
     relations : tuple of ClockRelation
-        How corrected time runs by other clocks of the log; it is never changed by that.
+        Comparisons of corrected time with other clocks of the log; they never change it.
     longest_step_ns : int
         The longest step ahead between two records.
     wraps : tuple of Wrap

@@ -81,7 +81,7 @@ def fit_relation(
     observable_ppm : float
         A drift is observed when twice its standard error is less, or it is four times its standard error.
     bound_s : float
-        How far readings of the reference may be rounded, in a way that scatter need not show.
+        Largest rounding of readings of the reference, in a way that scatter need not show.
 
     Returns
     -------

@@ -48,7 +48,7 @@ class ReferenceField:
     Parameters
     ----------
     clock : str
-        Whose time it is: ``gnss``, ``ins``.
+        Owner of the time: ``gnss``, ``ins``.
     topic : str
         Raw topic, * for any text.
     field : str

@@ -68,7 +68,7 @@ class ClockBreak:
         One standard error.
     kind : {'step', 'rate'}
     step_s : float
-        By how much reference minus recorder steps; 0 for a change of rate.
+        Step of reference minus recorder; 0 for a change of rate.
     step_sigma_s : float
     drift_change_ppm : float or None
         Drift after less drift before, where both are observed.
@@ -94,7 +94,7 @@ class Mistake:
     time_ns : int or None
         Corrected time of the step, or of the first of the readings; None when it holds throughout, or at the end.
     readings : int
-        How many readings have it, where it is neither a step nor holds at the end; they are left out of all else.
+        Number of readings that have it, where it is neither a step nor holds at the end; they are left out of all else.
     """
 
     kind: str
@@ -145,9 +145,9 @@ class ClockRelation:
     residual_s : float
         Scatter about the segments: 1.4826 times the median.
     resolution_s : float
-        What a reading may be rounded to.
+        Step to which a reading may be rounded.
     is_utc, is_absolute : bool
-        Whether the other clock tells UTC, and its date too.
+        True where the other clock tells UTC, and its date too.
     mistakes : tuple of Mistake
     reason : str
         Why nothing is known.

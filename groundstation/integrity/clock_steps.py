@@ -50,9 +50,9 @@ class ClockStep:
     records_before : int
         Timed records since the previous step.
     shift_s : float
-        What was added to the times of those records.
+        Seconds added to the times of those records.
     set_s : float
-        By how much the clock was set: the step less the nominal time between the two records.
+        Seconds by which the clock was set: the step less the nominal time between the two records.
     """
 
     record_index: int

@@ -29,7 +29,7 @@ class CountingSettings:
     tolerance_s : float
         A record may be written so much later than others of its time: slow topics are up to two seconds old.
     run_records : int
-        So many records in a row, each within the tolerance of the one before, are believed wherever they stand.
+        Number of records in a row, each within the tolerance of the one before, that are believed wherever they stand.
     """
 
     tolerance_s: float = number(3.0, 0.001, 1e6)

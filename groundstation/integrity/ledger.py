@@ -106,7 +106,7 @@ class TopicCounts:
     gaps : Gaps
     fields : tuple of FieldCounts
     sequences : tuple of Sequence
-        What record counters say is missing.
+        Losses that record counters show.
     """
 
     topic: str

@@ -100,9 +100,9 @@ class Thresholds:
     Parameters
     ----------
     version : int
-        Of the layout of the file.
+        Version of the layout of the file.
     name : str
-        Whose limits they are: ``"default"`` those that are shipped.
+        Name of the limits; ``"default"`` are those that are shipped.
     ranges : mapping of topic kind to field to (low, high)
         Physical ranges; those of ``base.signals`` but for what the file states.
     """

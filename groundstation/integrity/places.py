@@ -102,7 +102,7 @@ class Places:
     Attributes
     ----------
     records : int
-        How many are kept.
+        Number of records kept.
     """
 
     def __init__(self) -> None:

@@ -55,7 +55,7 @@ class Wrap:
     record_index : int
         First record behind it.
     modulus_ns : int
-        What is added to the times from there on.
+        Nanoseconds added to the times from there on.
     what : str
         The counter, in words.
     middle_ns : int
@@ -120,8 +120,8 @@ class Evidence:
     new_logs : sequence of int
         Places where another log begins, by what stands there.
     steps_back : callable
-        Whether most topics go back by themselves at a place, of those with times beyond the middle of what is before
-        it: topic behind topic is no power-up.
+        Tells whether most topics go back by themselves at a place, among those with times beyond the middle of what is
+        before it: topic behind topic is no power-up.
     zero_ns : callable
         UTC of device time zero by the readings between two places; None without any.
     """

@@ -26,7 +26,7 @@ class Rhythm:
     steps_ns : ndarray of int64
         All steps, none below zero.
     ahead : int
-        How many lead ahead in time.
+        Number of steps ahead in time.
     period_ns : float
         Usual step; of a topic whose usual step is no period, the mean one.
     has_rate : bool

@@ -29,7 +29,7 @@ class Sequence:
     lost : int
         Records missing between records of the log; of losses, by how much the counter grew.
     before : int
-        Of losses, where the counter stood at the first record.
+        Value of a counter of losses at the first record.
     resets : int
         Steps back, or too far ahead, that are no wrap.
     places : tuple of (int, int)

@@ -34,9 +34,9 @@ class PowerUpClock:
     start_ns, end_ns : int
         Corrected time of its first and last record, on the clock of the source.
     shift_ns : int
-        What was added to lay it beside the others; 0 where its time is UTC.
+        Nanoseconds added to lay it beside the others; 0 where its time is UTC.
     metadata : mapping of str to str
-        What the source says of it alone.
+        Metadata of the source for it alone.
     """
 
     records: PowerUp

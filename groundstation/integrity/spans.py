@@ -38,7 +38,7 @@ class Span:
     cause : str
         ``dropout``, ``stuck``, ``out_of_range``, ``sequence``, or the kind of damage (``dropped_rows`` ...).
     topic, field : str
-        What is damaged; an empty topic is the whole log, an empty field the whole topic.
+        Damaged topic and field; an empty topic is the whole log, an empty field the whole topic.
     start_ns, end_ns : int
         Corrected time.
     is_exact : bool

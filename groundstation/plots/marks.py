@@ -182,7 +182,7 @@ class Intervals(Mark):
     thin, thick : pair of floats, optional
         Ends of the outer and the inner interval.
     symbol
-        Of the value.
+        Symbol of the value.
     """
 
     row: int

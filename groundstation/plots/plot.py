@@ -27,11 +27,11 @@ class Axis:
     names : tuple of (float, str)
         Places that have a name instead of a number: lanes, rows.
     linear_to : float
-        Of a symlog axis: linear up to here.
+        Value up to which a symlog axis is linear.
     windows : tuple of (float, float)
         Spans of time that are shown, each in a frame of its own: the axis is broken between them.
     ranges : tuple of (float, float)
-        Of an upright axis: its own range in each window of the other axis; none: ``low`` to ``high`` in all.
+        Range of an upright axis in each window of the other axis; none: ``low`` to ``high`` in all.
     ticks : tuple of float
         Places of numbers, where they are not at the usual steps.
     """
@@ -63,7 +63,7 @@ class Panel:
     nothing : str
         Why the panel is empty, where it is: written in its middle.
     share : float
-        Of the width of its row.
+        Share of the width of its row.
     """
 
     marks: Sequence[AnyMark]
@@ -98,7 +98,7 @@ class Plot:
     Parameters
     ----------
     name : str
-        What the chapter calls it; unique on a page.
+        Name in the chapter; unique on a page.
     title, caption, alt : str
         The caption says what one sees, how many samples, what the lines are; alt is for those who cannot see it.
     rows : tuple of Row

@@ -96,11 +96,11 @@ class Standard:
     ----------
     title, source : str
     read : str
-        How far the text was at hand when the figures were written down; shown beside them.
+        Parts of the text at hand when the figures were written down; shown beside them.
     layout : str
         Order and titles of the page: ``"acceptance"``, or ``"irig261"``.
     confidence : float
-        Of every claim, one-sided.
+        Confidence of every claim, one-sided.
     claim : str
         ``"type"``: the INS flown stand for all of their kind, flights of one count by their correlation; ``"units"``:
         the same, every INS counts once; ``"these"``: the claim is on the INS flown alone, every flight counts.

@@ -32,7 +32,7 @@ class AnswerColumn(FlightColumn, Generic[AnswerT]):
     of : callable, optional
         ``of(answer)``: its value, None where there is none. Left out: the field of the answer that has its name.
     is_indexed : bool
-        Whether it stands in index.json and index.csv as well as in fleet.parquet.
+        True where it stands in index.json and index.csv as well as in fleet.parquet.
     """
 
     of: Callable[[AnswerT], Any] | None = None

@@ -60,9 +60,9 @@ class Delta:
     delta : float or None
         B less A; of directions within [-180, 180).
     sigma : float or None
-        Of the difference, from the sigmas both state, taken as independent; None where one states none.
+        Sigma of the difference, from the sigmas both state, taken as independent; None where one states none.
     is_main : bool
-        Whether it stands in the short table.
+        True where it stands in the short table.
     """
 
     name: str
@@ -117,7 +117,7 @@ class Comparison:
         Every answer both have.
     settings : tuple of SettingPair
     findings_a, findings_b : tuple of Finding
-        What only one of them has, by severity, code and topic.
+        Findings that only one of them has, by severity, code and topic.
     not_assessable_a, not_assessable_b : tuple of NotAssessable
         Analyses that only the other one has.
     are_sessions : bool

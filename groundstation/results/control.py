@@ -19,11 +19,11 @@ class LawRow:
     law : str
         ``uncontrolled``, ``determinant``, ``eigenvalue``, ``dop`` or ``covariance``.
     horizon : {'none', 'each step', 'end'}
-        What its criterion looks at.
+        Part of the flight that its criterion looks at.
     two_sigma_north_m, two_sigma_east_m, two_sigma_up_m, two_sigma_r_m : float
         At the end, as the centralised filter computes them; r: root of the summed variances north and east.
     determinant, eigenvalue, dop : float
-        Of H'H at the end, in the axes asked for; dop is NaN where the sources do not tell them apart.
+        Figures of H'H at the end, in the axes asked for; dop is NaN where the sources do not tell them apart.
     gram_determinant : float
         Determinant of the mean of H'H over the interval.
     dop_worst : float
@@ -31,7 +31,7 @@ class LawRow:
     least_range_m, least_separation_m : float
         To any source, and between any two aircraft.
     bounded_share : float
-        Of all control values, those that stand at a bound or change by as much as they may.
+        Share of all control values that stand at a bound or change by as much as they may.
     gap : float
         Largest first-order gain that any control within the bounds still has, over the loss; of a local law in its
         worst step.

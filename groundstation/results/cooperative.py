@@ -31,7 +31,8 @@ class AlgorithmRow:
     bound_ratio : float or None
         RMS error over the Cramer-Rao bound (of the same session, best centralised filter).
     spectral_radius : float or None
-        Of the joint error map of the decentralised filters, per window, worst window: above 1 errors feed themselves.
+        Spectral radius of the joint error map of the decentralised filters, per window, worst window: above 1 errors
+        feed themselves.
     diverges : bool or None
         Horizontal error above three computed sigma_r over the last tenth of the session, any vehicle.
     is_consistent : bool or None
@@ -39,7 +40,7 @@ class AlgorithmRow:
     accepted, gated, lost : int
         Measurements used, rejected by the gate, and not usable (nobody broadcast, unknown position).
     messages, bytes_per_slot : float
-        What a data link would carry for this algorithm, mean over slots.
+        Traffic that a data link would carry for this algorithm, mean over slots.
     """
 
     algorithm: str

@@ -36,7 +36,7 @@ class Deviation:
     Parameters
     ----------
     flight_id, aircraft : str
-        Whose it is; empty where that is not known.
+        Flight and aircraft it is of; empty where they are not known.
     method, verdict, verdict_reason : str
     magnetometer_topic : str
         Sensor that it belongs to; empty where that is not known.
@@ -44,7 +44,7 @@ class Deviation:
         To be added in the middle of each degree of the uncorrected magnetic heading; empty where the coefficients stand
         for it.
     coefficients_deg : mapping of A ... E to deg
-        Of the error, the negative of what is added; empty where the table stands for it.
+        Coefficients of the error, the negative of what is added; empty where the table stands for it.
     iron : PoissonParameters, optional
         For readings of the field along three axes.
     """

@@ -272,7 +272,7 @@ def load(folder: Path, answer_types: Mapping[str, type[Answer]]) -> SavedFlight:
     ----------
     folder : Path
     answer_types : mapping of analysis name to dataclass
-        What ``results`` of summary.json become.
+        Types of the ``results`` of summary.json.
 
     Raises
     ------

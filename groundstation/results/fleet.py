@@ -177,7 +177,7 @@ class FleetCalibration:
     share_inside, confidence95 : float, (float, float)
         Share and its exact (Clopper and Pearson) interval: honest sigmas have ``stated`` inside it.
     z_mean, z_sigma : float
-        Of residual / sigma: honest are 0 and 1.
+        Mean and sigma of residual / sigma: honest are 0 and 1.
     pit : tuple of int
         Checks per tenth of the probability integral transform; honest is flat.
     """
@@ -308,7 +308,7 @@ class FleetResults:
         Every check, those of rejected flights too.
     outliers : tuple of OutlierRow
     not_in_fleet : tuple of NotInFleet
-        What failed or was skipped and why, failed first, by source.
+        Logs and folders that failed or were skipped and why, failed first, by source.
     stated : mapping of str to number
         Rates and limits the statistics keep to, by name: chance of a false change point per aircraft, and so on.
     deviations : tuple of DeviationRow

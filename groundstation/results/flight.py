@@ -71,7 +71,7 @@ class FlightResults(Tabular):
     figures : sequence of FigureData
         Arrays behind every figure, those of the analyses among them.
     chosen : tuple of ChosenInterval
-        What the user left out or forced.
+        Intervals that the user left out or forced.
     """
 
     flight_id: str
@@ -123,7 +123,7 @@ class FlightResults(Tabular):
         ----------
         kind : type of Arrays
         *of : str
-            Whose they are, where there are several of a kind: ``together_<of>_motion``.
+            Names that tell several of a kind apart: ``together_<of>_motion``.
 
         Raises
         ------

@@ -134,7 +134,8 @@ class ForecastResult(Answer):
     first_start_s, start_step_s : float
         Starts of ``skill``: every ``start_step_s`` from ``first_start_s`` of flight time on.
     is_calibrated : bool
-        Whether the log holds at least one Schuler period before the first outage; ``calibration_reason`` says why not.
+        True where the log holds at least one Schuler period before the first outage; ``calibration_reason`` says why
+        not.
     skill, gaps, phases, classic_starts, calibration, coupled
         Tables; see the rows. ``skill`` of the short term (up to 10 min) and of the long term differ by horizon alone.
     best_method : dict

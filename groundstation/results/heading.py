@@ -141,7 +141,7 @@ class HeadingResult(Answer):
         other, and for steady sideslip. The error is the airframe's, as a theodolite on it judges: the mounting of the
         INS is a part of it and needs no sigma.
     interval_parts : tuple of IntervalPart
-        What the interval is made of: this taxi, the wind, the installation.
+        Parts of the interval: this taxi, the wind, the installation.
     platform_error_deg, platform_standard_error_deg, platform_confidence95_deg
         Azimuth error of the INS itself, as navigation has it: the mounting is taken off, its sigma is in the interval.
     wind, aircraft_class, sideslip_deg
@@ -172,8 +172,8 @@ class HeadingResult(Answer):
     lever_arm_m, lever_arm_sigma_m, lever_arm_origin
         Longitudinal antenna arm, its sigma, and ``"aircraft file"``, ``"estimated"`` or ``"not observable"``.
     latency_used_s, latency_used_sigma_s, latency_origin
-        By how much GNSS was taken to be later than the INS and shifted back, and whence: ``"aircraft file"``,
-        ``"motion"``; None and empty where nothing was shifted. ``time_offset_s`` is what the turns then still show.
+        Delay of GNSS behind the INS that was taken out, its sigma and its origin: ``"aircraft file"``, ``"motion"``;
+        None and empty where nothing was shifted. ``time_offset_s`` is what the turns then still show.
     uncorrected_error_deg : float
         Plain mean of the differences with the velocity of the antenna as logged: what an on-board computer without arm
         correction would find.

@@ -222,7 +222,7 @@ class InertialResult(Answer):
     outages : tuple of RealOutage
         Intervals of the log itself without GNSS or without the INS.
     reopened : int
-        How often GNSS was rejected for so long that the filter was opened to it again.
+        Number of times that GNSS was rejected for so long that the filter was opened to it again.
     other_ins : tuple of str
         INS topics of the log that were not used.
     settings : dict
@@ -303,7 +303,7 @@ def is_left_alone(name: str, sigma: Any, observability: Any, settings: Mapping[s
     name : str
         Name of the state; ``drift``, ``drift_rate`` and ``random_drift`` are the ones a class may leave out.
     sigma, observability
-        Of the :class:`StateEstimate`; what is not a number is not judged.
+        Values of the :class:`StateEstimate`; what is not a number is not judged.
     settings : mapping
         ``InertialResult.settings``: the sigma at the start stands there.
 

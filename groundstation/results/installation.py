@@ -54,17 +54,16 @@ class Lesson:
         Heading error of the INS against a theodolite at the stand or a runway: mounting in it, sideslip not.
     aircraft_class : str
     factor, factor_sigma, steady_sigma_deg, mounting_deg, mounting_sigma_deg : float
-        What is known beforehand of the crosswind factor (deg per m/s), the sideslip that is the same in every
-        direction, the mounting.
+        Prior of the crosswind factor (deg per m/s), the sideslip that is the same in every direction, the mounting.
     verdict, failed
-        Of this taxi alone, and the required gates that failed or were not measured.
+        Verdict of this taxi alone, and the required gates that failed or were not measured.
     error_deg, half_width_deg, platform_error_deg
-        Of this taxi alone.
+        Errors and half width of this taxi alone.
     limit_deg : float, optional
-        Of the whole half width; None where it does not decide.
+        Limit of the whole half width; None where it does not decide.
     entry_step_deg : float
     measured : tuple of Measured
-        What the flight says of the compass, the antenna and GNSS.
+        Figures that the flight measured of the compass, the antenna and GNSS.
     """
 
     flight_id: str
@@ -156,11 +155,11 @@ class InstallationResult(Answer):
     alone_error_deg, alone_half_width_deg
         The answer of this taxi alone, for comparison.
     half_width_deg : float
-        Of the airframe's interval: from the number to the farther end.
+        Half width of the airframe's interval: from the number to the farther end.
     installed : Installed
-        What the earlier flights say.
+        Posterior of the earlier flights.
     odd, changed : tuple of str
-        Of them those that were taken for flights of another unit, and those from which on it sits otherwise.
+        Earlier flights that were taken for flights of another unit, and those from which on it sits otherwise.
     residual_deg, residual_sigma_deg : float, optional
         The platform's error less the azimuth that the same flight showed later, and the sigma of that difference:
         nothing of that azimuth is in the number.
@@ -229,7 +228,7 @@ class Installation:
     ----------
     ins_serial, aircraft : str
     installed : Installed, optional
-        What the next flight can rely on; None where nothing was taught.
+        Posterior that the next flight can rely on; None where nothing was taught.
     taught_by : tuple of str
         Flights that taught; ``odd`` and ``changed`` go with them.
     odd, changed : tuple of float

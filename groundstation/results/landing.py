@@ -21,8 +21,8 @@ class RunwayUsed:
     name : str
         As in the site file; empty where none of it fits.
     placed_by : {'site file', 'positions'}
-        Whose threshold and course these are. By positions: the line through the positions of the final, the threshold
-        where ``place_reason`` says.
+        Source of threshold and course. By positions: the line through the positions of the final, the threshold where
+        ``place_reason`` says.
     true_course_deg, course_sigma_deg : float
     localizer_width_m, localizer_distance_m : float
         Full width of the course sector at the threshold, distance from there to the antenna.
@@ -124,14 +124,14 @@ class PositionError:
     Parameters
     ----------
     topic : str
-        Whose positions.
+        Topic of the positions.
     state : {'measured', 'not measured'}
-        Of ``error_m``; ``reason`` says why not.
+        State of ``error_m``; ``reason`` says why not.
     error_m, sigma_m : float or None
         Position minus what the localizer says, right of the course positive, as the threshold is crossed.
     confidence95_m : (float, float) or None
     rate_mps, rate_sigma_mps : float or None
-        How fast it grows across the course.
+        Growth of the error across the course.
     rollout_error_m, rollout_sigma_m : float or None
         The same once more by the roll-out on the centre line.
     change_m, change_sigma_m : float or None
@@ -169,7 +169,7 @@ class HeightError:
     Parameters
     ----------
     topic : str
-        Whose altitude.
+        Topic of the altitude.
     state : {'measured', 'not measured'}
         ``reason`` says why not.
     samples : int
@@ -178,7 +178,7 @@ class HeightError:
         Altitude less what elevation and height above the wheels say, upwards positive.
     confidence95_m : (float, float) or None
     parts : tuple of ErrorPart
-        Of sigma.
+        Parts of sigma.
     """
 
     topic: str

@@ -37,10 +37,11 @@ class BeaconApproachRow:
     speed_mps : float
         At which the distance shrinks.
     ground_speed_mps, heading_difference_deg : float or None
-        Of the INS, and heading by the bearings minus its heading: both show whether bearings and beacons belong.
+        Ground speed of the INS, and heading by the bearings minus its heading: both show whether bearings and beacons
+        belong.
     terrain_m : float or None
-        How much the ground under the approach rises and falls, by radio altitude against altitude, less the profile of
-        the site file.
+        Rise and fall of the ground under the approach, by radio altitude against altitude, less the profile of the site
+        file.
     """
 
     approach: int

@@ -19,14 +19,14 @@ class Latency:
     reference, other : str
         Topics; the reference is an INS.
     quantity : {'velocity', 'altitude', 'field', 'attitude'}
-        What of the other is compared with the reference.
+        Quantity of the other that is compared with the reference.
     state : {'observed', 'not_observable'}
     reason : str
         Why it is not observable, or what it rests on.
     latency_s, sigma_s, confidence95_s
         Positive: the other shows a motion later, by its time stamps, than the reference. None where not observable.
     samples, windows, effective_windows
-        What it rests on; the last is the degrees of freedom of the interval.
+        Data it rests on; the last is the degrees of freedom of the interval.
     motion, residual : float or None
         RMS rate of the reference in the windows, slow motion taken away, and RMS of what is left unexplained, in
         ``unit`` per second and ``unit``.

@@ -188,7 +188,7 @@ class Method:
     reason : str
         Why it is refused, or what it cannot see.
     condition_number : float or None
-        Of the scaled normal problem; large: hardly observable.
+        Condition number of the scaled normal problem; large: hardly observable.
     fit_rms_nt : float or None
         RMS of what the fit leaves of the field, per axis.
     held_out_before_deg, held_out_after_deg : float or None
@@ -197,7 +197,7 @@ class Method:
         Mean of the error after correction, and the sigma it should have. The heading expected comes from the same INS
         and model: of their errors only what the method does not take over counts.
     coefficients_deg, coefficients_sigma_deg : mapping of A ... E to deg
-        Of level flight; empty where refused. The modulus does not show A.
+        Coefficients of level flight; empty where refused. The modulus does not show A.
     """
 
     name: MethodName
@@ -288,7 +288,7 @@ class MagneticResult(Answer):
     verdict, verdict_reason
         accept: every required gate passed; undecided: nothing failed, a required gate was not measured.
     recommended_method, recommendation
-        What to correct by, and why.
+        Method to correct by, and the reason.
     coefficients_deg, coefficients_sigma_deg : mapping of A ... E to deg
         error(c) = A + B sin c + C cos c + D sin 2c + E cos 2c, c the uncorrected magnetic heading, error = magnetic
         heading - true magnetic heading, declination removed: of the table. The sigma of A holds alignment, drift and

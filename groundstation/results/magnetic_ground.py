@@ -27,9 +27,9 @@ class GroundRun:
     error_deg : float or None
         Magnetic heading + declination - track: the error of the sensor at this heading. None where rejected.
     noise_sigma_deg : float or None
-        Of the mean over the run, correlated noise and the steps of the log in it.
+        Sigma of the mean over the run, correlated noise and the steps of the log in it.
     sigma_deg : float or None
-        Of the error, besides with that of slip and of declination (the latter common to all runs).
+        Sigma of the error, with that of slip and of declination (the latter common to all runs).
     heading_change_deg : float
         Range of the smoothed heading along the run.
     """

@@ -115,14 +115,14 @@ class Manifest:
         Version that made the run.
     made_utc : str
     configuration : mapping
-        What the user set, table by table, as TOML has it.
+        Settings of the user, table by table, as TOML has it.
     heading_settings : mapping
         Settings of the heading correction in force.
     versions : mapping of package to version
     logs : tuple of LogOfSession
-        Of a session; absent for a flight.
+        Logs of a session; absent for a flight.
     is_found : bool
-        Whether a run found the session among its flights, and may replace it; not what ``cooperative`` made.
+        True where a run found the session among its flights, and may replace it; not what ``cooperative`` made.
     resume : Resume, optional
         Absent where no run made the folder.
     files : mapping of str to FileOfRun

@@ -18,7 +18,7 @@ class DesignRow:
     design : str
         ``given``, or criterion and what it is best for: ``determinant_fixed``, ``covariance_way``, ``covariance_lost``.
     determinant, eigenvalue, dop : float
-        Of H'H at the fixed point, in the axes asked for.
+        Figures of H'H at the fixed point, in the axes asked for.
     two_sigma_north_m, two_sigma_east_m, two_sigma_up_m : float
         At the fixed point, as the filter computes them on its way there.
     worst_two_sigma_north_m, worst_two_sigma_east_m, worst_two_sigma_up_m : float

@@ -33,9 +33,9 @@ class Spread:
     Parameters
     ----------
     effective_samples : float
-        How many independent errors would know the mean as well as these correlated ones do.
+        Number of independent errors that would know the mean as well as these correlated ones do.
     mean, std, rmse, median, smallest, largest : float
-        Of the error with its sign; ``largest`` of a length (axis ``horizontal``) is the worst.
+        Statistics of the error with its sign; ``largest`` of a length (axis ``horizontal``) is the worst.
     """
 
     samples: int
@@ -137,7 +137,7 @@ class Placed:
     arm_forward_m, arm_right_m : float, optional
         From the reference's point to the subject's, body axes.
     arm_half_width_m : float, optional
-        Of the 95 % interval of an observed arm, the wider of the two.
+        Half width of the 95 % interval of an observed arm, the wider of the two.
     clock_offset_s : float, optional
         Positive: the subject shows a position later, by its time stamps, than the reference.
     rmse_with_arm_m, rmse_m : float
@@ -201,7 +201,7 @@ class ReferenceResult(Answer):
     is_judge : bool
         False: the reference judges nothing, ``reason`` says why, and the errors are told for what they are.
     interval_s, covered_share, longest_gap_s
-        Of the reference: median time between samples, the share of the flight that it covers, its longest gap.
+        Figures of the reference: median time between samples, the share of the flight that it covers, its longest gap.
     placed : tuple of Placed
     errors, claims, paths, relative : tuples of rows
     headings : tuple of HeadingCheck

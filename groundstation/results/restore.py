@@ -21,7 +21,7 @@ def restored(summary: Mapping[str, Any], where: str, answer_types: Mapping[str, 
     summary : mapping
         The content of summary.json.
     where : str
-        What the summary came from, for errors.
+        Source of the summary, for errors.
     answer_types : mapping of analysis name to dataclass
         Answers of other analyses are left out.
 

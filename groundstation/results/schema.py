@@ -77,7 +77,7 @@ def summary_schema(answer_types: Mapping[str, type]) -> Schema:
     Parameters
     ----------
     answer_types : mapping of analysis name to dataclass
-        What may stand in ``results``.
+        Answers that may stand in ``results``.
     """
     definitions: dict[str, Schema] = {}
     whole = _object(SummaryDocument, definitions)

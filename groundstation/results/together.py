@@ -50,17 +50,17 @@ class JoinedLog:
     reordered : int
         Records that were moved to keep order where the relation of the clocks steps.
     method : str
-        What its place rests on; ``own_clock`` is the log whose clock the flight has.
+        Basis of its place in time; ``own_clock`` is the log whose clock the flight has.
     reason : str
         The same in words, with what could not be used and why.
     remarks : tuple of str
         Contradictions and steps.
     signals : tuple of str
-        Of the motion of ``reference_topic`` and ``topic`` that was compared.
+        Signals of ``reference_topic`` and ``topic`` that were compared.
     correlation : float or None
-        Of the two motions.
+        Correlation of the two motions.
     gnss_less_motion_s, gnss_less_motion_half_width95_s : float or None
-        What GNSS time says of the offset less what the motion says.
+        Offset by GNSS time less the offset by motion.
     stretches : tuple of JoinedStretch
     """
 

@@ -110,7 +110,7 @@ def channel_truth(
     rng : numpy.random.Generator
     channels : int
     gravity_mps2, radius_m : float
-        Of the model; the filter that shall be matched needs the same.
+        Gravity and radius of the model; the filter to match needs the same.
     """
     transition, factor = _step_of(ins, step_s, gravity_mps2, radius_m)
     states = rng.standard_normal((channels, epochs, 6))

@@ -94,7 +94,7 @@ def deviation_truth(
     field_ned_nt : ndarray, shape (3,)
     roll_deg, pitch_deg, current_a : float
     roll_error_deg, pitch_error_deg : float
-        Of the attitude it is levelled with.
+        Errors of the attitude it is levelled with.
 
     Examples
     --------

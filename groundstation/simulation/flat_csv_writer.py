@@ -56,7 +56,7 @@ def write_flat_csv(
     resolution : mapping of ``<topic>.<field>`` to float, optional
         Steps of the fields, which set their decimals; without one the decimals of the unit's default.
     with_truth : bool
-        Whether ``truth.*`` is written.
+        True to write ``truth.*``.
     cut_bytes : int
         Bytes missing at the end, as after a loss of power.
     """

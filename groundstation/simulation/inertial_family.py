@@ -58,7 +58,7 @@ class FamilySettings:
     earth_rate, deflection : bool
         Switches of the full truth.
     body_fixed : bool, optional
-        Whether sensor errors turn with the body; None: as the class says.
+        True where sensor errors turn with the body; None: as the class says.
     each_its_own : bool
         Every flight has an instrument of its own, better or worse than the class (:func:`ins_class.draw_instrument`).
     """
@@ -97,8 +97,8 @@ class ErrorBatch:
     latitude_deg, longitude_deg, altitude_m, velocity_north_mps, velocity_east_mps, heading_deg : ndarray, shape (f, n)
         Truth.
     position_error_m, velocity_error_mps, tilt_rad, drift_radps : ndarray, shape (f, n, 2)
-        Of the INS: position in metres on the local tangent, d_lat (M + h) and d_lon (N + h) cos(lat); tilt positive
-        where it makes the velocity error fall; drift is all of tilt' - velocity / R but white noise.
+        Errors of the INS: position in metres on the local tangent, d_lat (M + h) and d_lon (N + h) cos(lat); tilt
+        positive where it makes the velocity error fall; drift is all of tilt' - velocity / R but white noise.
     azimuth_error_rad : ndarray, shape (f, n)
         Heading error of the platform, INS - truth (-phi_D).
     heading_error_rad : ndarray, shape (f, n)
@@ -138,7 +138,7 @@ def simulate_family(family: FamilySettings, runs: int, seed: int, *, first_run: 
     family : FamilySettings
     runs : int
     seed : int
-        Of the family; run k draws from streams of (seed, k).
+        Seed of the family; run k draws from streams of (seed, k).
     first_run : int
 
     Returns

@@ -49,7 +49,7 @@ class TrueMotion:
         Increasing.
     latitude_deg, altitude_m, velocity_north_mps, velocity_east_mps, velocity_down_mps : ndarray, shape (f, n)
     heading_deg, roll_deg : ndarray, shape (f, n)
-        Of the nose; pitch is taken as level.
+        Heading of the nose, and roll; pitch is taken as level.
     """
 
     time_s: FloatArray

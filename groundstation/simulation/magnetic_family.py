@@ -58,13 +58,14 @@ class MagneticFamilySettings:
     latency_s : float
         Largest of a uniform draw.
     coupling_sigma_nt_per_a, load_a : float
-        Of the field of the current; with a load there is a topic ``electric``: ``load_a`` is on 40 s of every 100 s.
+        Sigma of the field of the current; with a load there is a topic ``electric``: ``load_a`` is on 40 s of every 100
+        s.
     heading_error_sigma_deg, drift_sigma_dph, attitude_error_sigma_deg, attitude_wander_deg : float
-        Of the INS: azimuth error and its drift, constant and wandering errors of roll and pitch.
+        Errors of the INS: azimuth error and its drift, constant and wandering errors of roll and pitch.
     attitude_wander_s : float
         Correlation time of the latter.
     field_error_sigmas : float
-        What the world's field differs from the model's, north, east and down: a normal draw of so many of the sigmas
+        Difference of the world's field from the model's, north, east and down: a normal draw of so many of the sigmas
         that the model states.
     anomaly_nt, anomaly_wavelength_m : float, tuple of two float
         Amplitude of an anomaly of the crust, ends of a uniform draw of its wavelength; direction and phase are drawn.

@@ -35,13 +35,13 @@ class VehicleErrors:
     position_m, velocity_mps : ndarray, shape (n, 2)
         North and east.
     tilt_rad, drift_radps : ndarray, shape (n, 3)
-        Of the platform about north, east and down; zeros in a local frame.
+        Tilt and drift of the platform about north, east and down; zeros in a local frame.
     height_m : ndarray, shape (n,)
-        Of the barometric height, up positive.
+        Error of the barometric height, up positive.
     clock_m, clock_mps : ndarray, shape (n,)
         Offset and frequency offset of the link's clock, times the speed of light.
     receiver_clock_m, receiver_clock_mps : ndarray, shape (n,)
-        Of the satellite receiver's clock; the same arrays where there is one clock.
+        Errors of the satellite receiver's clock; the same arrays where there is one clock.
     """
 
     position_m: FloatArray

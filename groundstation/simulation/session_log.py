@@ -40,7 +40,7 @@ def write_session(scenario: SessionScenario, folder: Path, name: str, seed: int 
     folder : Path
         Made when missing.
     name : str
-        Of the session; what the logs give as their flight.
+        Name of the session, which the logs give as their flight.
     seed : int, optional
 
     Returns

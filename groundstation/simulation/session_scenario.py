@@ -121,7 +121,7 @@ class SessionScenario:
     frame : {'ecef', 'local'}
         Global frame with 13 error states an aircraft, or local with 7.
     latitude_deg, longitude_deg : float
-        Of the origin; only the global frame has them.
+        Place of the origin; only the global frame has them.
     """
 
     title: str

@@ -70,7 +70,7 @@ class Disturbance:
     factor, wind_mps : float, (float, float)
         Sideslip by crosswind, deg per m/s, and the velocity of the air, north and east.
     aircraft_class, metar : str
-        What the estimator is told: class of the aircraft and a METAR line; empty where nothing is stated.
+        Knowledge of the estimator: class of the aircraft and a METAR line; empty where nothing is stated.
     take_off_crab_deg : float or None
         The log goes on with a take-off run with so much sideslip; None: it ends at the holding point.
     """

@@ -56,8 +56,8 @@ class GroundSettings:
     low_height_m
         The same for what is as fast as ``speed_share`` of sure flight all the time: a low hop between two standstills.
     speed_share
-        Of the lowest speed while surely airborne (first percentile): nothing faster is proven. A vehicle that hovers is
-        never proven to roll; a float above the runway does not pass.
+        Share of the lowest speed while surely airborne (first percentile): nothing faster is proven. A vehicle that
+        hovers is never proven to roll; a float above the runway does not pass.
     unlearnt_speed_mps
         The limit of speed in a log without sure flight.
     lift_off_share

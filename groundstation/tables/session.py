@@ -46,7 +46,7 @@ class DeadReckoning:
     latitude_deg : ndarray, shape (n,)
         NaN in a local frame.
     heading_deg : ndarray, shape (n,)
-        Of the nose, NaN where unknown; only a lever arm needs it.
+        Heading of the nose, NaN where unknown; only a lever arm needs it.
     """
 
     name: str
@@ -127,7 +127,7 @@ class Ranges:
     Parameters
     ----------
     time_s : ndarray, shape (n,)
-        Of transmission, on the session's clock; not decreasing.
+        Times of transmission, on the session's clock; not decreasing.
     receiver, source : ndarrays of text, shape (n,)
         The source is a vehicle or a ground point.
     pseudorange_m, sigma_m : ndarrays, shape (n,)
@@ -191,7 +191,7 @@ class SatelliteRanges:
         Time of reception.
     receiver, satellite : ndarrays of text, shape (n,)
     position_m : ndarray, shape (n, 3)
-        Of the satellite at emission, ECEF of the instant of emission.
+        Positions of the satellite at emission, ECEF of the instant of emission.
     """
 
     time_s: FloatArray

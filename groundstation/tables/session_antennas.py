@@ -120,10 +120,10 @@ def antenna_ranges(
     ----------
     logs : sequence of AntennaLog
     believed : mapping of str to Poses
-        Whose attitude turns the lever arms.
+        Poses whose attitude turns the lever arms.
     points : sequence of str
     sigma_m : float
-        Of one range.
+        Sigma of one range.
 
     Returns
     -------

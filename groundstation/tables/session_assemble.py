@@ -58,15 +58,15 @@ class AssembledSession:
     ----------
     session : Session
     truth : mapping of str to (time_s (n,), position_m (n, 3))
-        Of the aircraft whose log has it, frame of the session; only judges.
+        Truth of the aircraft whose log has it, frame of the session; only judges.
     findings : tuple of Finding
     clocks : tuple of ClockRow
-        Of every log that has a place in the session.
+        Clock of every log that has a place in the session.
     start_ns : int
         Session time zero: the first dead reckoning; UTC where ``has_utc``.
     has_utc : bool
     origin : LocalFrame, optional
-        Of a session in a local frame.
+        Origin of a session in a local frame.
     """
 
     session: Session
@@ -110,7 +110,7 @@ def session_from_flights(
     Returns
     -------
     AssembledSession
-        What cannot be used is left out, each with a finding; a session without a vehicle where nothing is left.
+        Parts that cannot be used are left out, each with a finding; a session without a vehicle where nothing is left.
     """
     stations, settings = stations or Stations(), settings or SessionSettings()
     members = _named(flights)

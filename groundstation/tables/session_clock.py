@@ -79,9 +79,9 @@ class PlacedLog:
     ----------
     clock : LogClock
     residual_ns : ndarray of int64, shape (m,)
-        How far the clock of each stretch stood from that of the group; empty without ranges.
+        Offset of the clock of each stretch from that of the group; empty without ranges.
     shift_ns : ndarray of int64, shape (m or 1,)
-        What is taken off.
+        Nanoseconds taken off.
     """
 
     clock: LogClock

@@ -51,7 +51,7 @@ def gather_ranges(
     ----------
     flights, placed : mappings by aircraft
     vehicles, points
-        Whose names a range may have as its source.
+        Vehicles and points whose names a range may have as its source.
     start_ns, group_ns : int
         Session time zero, and session time less link time.
     settings : SessionSettings

@@ -83,7 +83,7 @@ def session_of_robots(
     Returns
     -------
     RobotSession
-        What cannot be used is left out, each with a finding; without a vehicle where nothing is left.
+        Parts that cannot be used are left out, each with a finding; without a vehicle where nothing is left.
     """
     settings, findings = settings or RobotSettings(), list[Finding]()
     robots = _joined(flights, findings)

@@ -57,7 +57,7 @@ class SessionSettings:
     Parameters
     ----------
     range_sigma_m, satellite_range_sigma_m : float
-        Of one pseudo-range over the link, and to a satellite: no log tells them.
+        Sigma of one pseudo-range over the link, and to a satellite: no log tells them.
     epoch_s : float
         Dead reckoning is thinned to this step.
     clock_limit_s : float

@@ -197,7 +197,7 @@ class TimedTable(Table):
     start_ns : int
         Corrected time of flight time zero.
     has_utc : bool
-        Whether corrected time is UTC.
+        True where corrected time is UTC.
     units : mapping of str to str
         Units by column, where the name or the log tells one; ``frame.attrs["units"]`` has them too.
     """
@@ -269,7 +269,7 @@ class Flight:
     start_ns : int
         Corrected time of the first sample of any topic: flight time zero.
     has_utc : bool
-        Whether corrected time is UTC; False means NOTIME: nanoseconds since the log's own zero.
+        True where corrected time is UTC; False means NOTIME: nanoseconds since the log's own zero.
     source_name : str
         Name of the log file, without folders.
     """

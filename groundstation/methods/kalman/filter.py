@@ -40,7 +40,7 @@ class Measurements:
     value : ndarray, shape (m, c) or (m,)
         One column for each right-hand side; NaN in any of them: absent.
     row : ndarray of int, shape (m,)
-        Which row of ``lines`` each measures.
+        Row of ``lines`` that each measures.
     lines : Lines
     """
 
@@ -118,7 +118,8 @@ class Gate:
     sigmas : float
         Largest ratio of an innovation to its sigma; infinite: nothing is rejected.
     patience : ndarray of int, shape (kinds,) or ()
-        So many rejections of a kind in a row, and it is the filter that is wrong: it is opened and goes on.
+        Number of rejections of a kind in a row after which the filter itself is taken to be wrong: it is opened and
+        goes on.
     opened : ndarray, shape (kinds, n) or (n,)
         Variances that opening adds.
     is_by_innovation : bool
@@ -182,7 +183,7 @@ class FilterRun:
     end : Start
         Where it stands after the last epoch: another run may go on from it.
     reopened : int
-        How often it was opened again.
+        Number of times it was opened again.
     """
 
     transition: Transition
@@ -256,7 +257,8 @@ def run_filter(
     ----------
     transition : Transition
     step : ndarray of int, shape (n,)
-        Which of the transition's steps leads to each epoch, -1 none: usually the first, which the start belongs to.
+        Number of the transition's step that leads to each epoch, -1 none: usually the first, which the start belongs
+        to.
     measurements : Measurements
         Used one after the other (sequential scalar updates, Joseph's form). Without right-hand sides (value of shape
         (m, 0), start x of shape (n, 0)) the run is one of the covariance alone.
@@ -267,9 +269,9 @@ def run_filter(
     jump, jumps : ndarrays, shapes (n,), (j, states)
         Variances added before the measurements of epoch k: row ``jump[k]``, -1 none.
     drive : Drive, optional
-        What moves a state besides F.
+        Known motion of a state besides F.
     kept : Kept, optional
-        What is written down.
+        Arrays to keep.
 
     Raises
     ------
@@ -356,10 +358,10 @@ def forecast(
     transition : Transition
         Sparse.
     step : ndarray of int, shape (k,)
-        Which of the transition's steps follow each other.
+        Numbers of the transition's steps in order.
     start : ndarray, shape (states, c, s)
     known : ndarray, shape (c, s)
-        What the driven state had built up before the start: it is dragged as well.
+        Error that the driven state had built up before the start: it is dragged as well.
     every : int
         Steps between two leads.
     drive : Drive

@@ -227,11 +227,11 @@ def run_forecast(
     dynamics : Dynamics
         Sparse.
     step : ndarray of int, shape (k,)
-        Which of the distinct steps each is; k = ``every`` times the leads.
+        Number of the distinct step that each is; k = ``every`` times the leads.
     drive : Drive
         ``mix`` of shape (k, c, c, s), or of no length; it drags what stands in the state and ``known`` together.
     known : ndarray, shape (c, s)
-        What the state had built up before the start.
+        Error that the state had built up before the start.
     x : ndarray, shape (n, c, s)
         States of s starts, changed in place.
     w, dragged : ndarrays, shapes (n, c, s), (c, s)

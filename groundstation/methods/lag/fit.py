@@ -91,7 +91,7 @@ def fit_delay(
     windows : Windows
         Two or more.
     prior_sigma : ndarray, shape (q,)
-        Of each nuisance about zero.
+        Prior sigma of each nuisance about zero.
     wanted : int, optional
         The nuisance that is told of with its standard error.
 

@@ -29,7 +29,7 @@ def known_delay(
     latencies : Latencies, optional
         Those found on this flight.
     stated_s, stated_sigma_s : float or None, float
-        What the aircraft file states: it stands above them.
+        Latency that the aircraft file states; it goes before them.
     """
     if stated_s is not None:
         return KnownDelay(stated_s, stated_sigma_s, "aircraft file")

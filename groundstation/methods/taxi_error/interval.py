@@ -201,7 +201,7 @@ def error_posterior(
     draws : int
         Draws of the noise parameters (up to three times as many where the posterior is awkward).
     seed : int
-        Of the draws: the same data always give the same interval.
+        Seed of the draws: the same data always give the same interval.
     growth : int
         Steps at which the growing precision is reported.
     """

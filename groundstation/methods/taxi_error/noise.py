@@ -173,7 +173,7 @@ def taxi_filter(
     columns : ndarray, shape (n, c)
         Column 0 the differences, degrees, the others the regressors.
     from_north, from_east : ndarray, shape (n,)
-        What one m/s of GNSS velocity error does to the difference, degrees.
+        Change of the difference, degrees, by one m/s of GNSS velocity error.
     is_start : ndarray of bool, shape (n,)
         First sample of a segment: its own error is drawn afresh there.
     start_gap_s, start
@@ -408,7 +408,7 @@ def evaluate(
     log_likelihood, estimate, variance : ndarray, shapes (k,), (k, c - 1), (k, m, c - 1)
         Out: log likelihood, coefficients, and the variances of the coefficients at the checkpoints.
     prior_of_alone : (mean, precision), shapes (a,)
-        Of the first ``a`` coefficients, taken without the others.
+        Prior of the first ``a`` coefficients, taken without the others.
     alone : ndarray, shape (k, 2)
         Out: the first coefficient and its variance, were the coefficients after the first ``a`` known to be zero.
     """

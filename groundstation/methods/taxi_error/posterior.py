@@ -32,7 +32,7 @@ class ErrorPosterior:
     effective_draws : float
         1 / sum of squared weights: a small figure means a badly sampled posterior.
     has_converged : bool
-        Whether the search for the maximum ended at one.
+        True where the search for the maximum ended at one.
     """
 
     mean_deg: FloatArray
