@@ -22,8 +22,9 @@ import pyarrow as pa
 
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.fleet import write_fleet
+from groundstation.pipeline.many_flights.fleet_rows import share_of
 from groundstation.pipeline.many_flights.fleet_samples import SAMPLES
-from groundstation.pipeline.many_flights.fleet_share import share_of, to_arrow
+from groundstation.pipeline.many_flights.fleet_share import to_arrow
 from groundstation.pipeline.many_flights.fleet_store import (
     Scan,
     put_month,

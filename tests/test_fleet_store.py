@@ -20,12 +20,11 @@ import pytest
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.estimators.fleet.moments import merged, moments_of
-from groundstation.pipeline.many_flights import fleet_share
+from groundstation.pipeline.many_flights import fleet_rows
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, gather, write_fleet
-from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
+from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, FlightShare
 from groundstation.pipeline.many_flights.fleet_samples import MEANINGS, SAMPLES, SampleStore, partition
-from groundstation.pipeline.many_flights.fleet_share import FlightShare
 from groundstation.pipeline.many_flights.fleet_store import FLIGHTS, refresh
 from groundstation.pipeline.many_flights.publishing import write_beside
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -159,7 +158,7 @@ def test_a_month_is_written_again_by_what_changed_in_it_alone(tmp_path: Path, mo
 
     def share_of(folder: Path, store: SampleStore | None = None) -> FlightShare:
         read.append(folder.name)
-        return fleet_share.share_of(folder, store)
+        return fleet_rows.share_of(folder, store)
 
     monkeypatch.setattr("groundstation.pipeline.many_flights.fleet_store.share_of", share_of)
     write(tmp_path)

@@ -1,5 +1,6 @@
 """The files of one flight: summary.json, manifest.json, arrays/*.parquet and its readable copies tables/*.csv."""
 
+import io
 import json
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
@@ -353,3 +354,17 @@ def csv_text(figure: FigureData, line_end: str = "\n") -> str:
     lines = [",".join(csv_cell(name) for name in figure.columns)]
     lines += [",".join(row) for row in zip(*cells, strict=True)]
     return line_end.join(lines) + line_end
+
+
+def parquet_bytes(table: Any) -> bytes:
+    """Encode a table: the same rows in the same order give the same bytes, whatever they were put together from."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    for place, one in enumerate(table.schema):
+        if pa.types.is_dictionary(one.type):
+            again = table.column(place).cast(pa.string()).combine_chunks().dictionary_encode()
+            table = table.set_column(place, pa.field(one.name, again.type), again)
+    buffer = io.BytesIO()
+    pq.write_table(table.combine_chunks(), buffer, compression="zstd", write_page_checksum=True)
+    return buffer.getvalue()

@@ -11,6 +11,7 @@ from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import IntervalPart
 
+INSTALLATIONS = "installations.json"
 FORMAT_VERSION = 1
 METHOD_VERSION = 1  # of the model: another one makes every learned answer again
 POOLED = ("compass_a_deg", "antenna_arm_m", "gnss_latency_s")  # figures of other sensors that stay as they are
@@ -335,3 +336,11 @@ def read_installations(path: Path) -> Installations:
         return from_json(Installations, document)
     except MismatchError as error:
         raise SettingsError(f"{path}, {error.place}", error.found, error.expected or expected) from error
+
+
+def installations_in(out: Path) -> Installations | None:
+    """What installations.json of an OUT holds; None where there is none that can be read."""
+    try:
+        return read_installations(out / INSTALLATIONS)
+    except SettingsError:
+        return None

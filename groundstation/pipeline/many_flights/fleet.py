@@ -19,24 +19,23 @@ from groundstation.estimators.fleet.installations import installation_flights, i
 from groundstation.estimators.fleet.moments import Moments
 from groundstation.estimators.fleet.skill import SkillMerger
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
-from groundstation.pipeline.many_flights.fleet_rows import session_row
+from groundstation.pipeline.many_flights.fleet_rows import session_row, share_of
 from groundstation.pipeline.many_flights.fleet_share import (
     check_rows_of,
     fleet_parquet,
     flights_of,
     histograms_of,
-    share_of,
     skill_rows_of,
     to_arrow,
 )
 from groundstation.pipeline.many_flights.fleet_store import MOST_LISTED, Scan, scan
-from groundstation.pipeline.many_flights.installations import installations_in
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights
 from groundstation.results.figures import FigureData
 from groundstation.results.file_names import INDEX_JSON, SUMMARY
 from groundstation.results.files import load, write_bytes
 from groundstation.results.fleet import FleetResults, NotInFleet, SessionRow
+from groundstation.results.installation import installations_in
 
 FLEET_PARQUET = "fleet.parquet"
 SKILL_COLUMNS = {

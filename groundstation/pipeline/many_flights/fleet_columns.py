@@ -1,11 +1,19 @@
 """The columns of the tables of flights: what every flight has, and between it what each analysis gives."""
 
+import json
+import math
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any
 
 from groundstation.estimators.analyses import FLIGHT_ANALYSES
+from groundstation.estimators.fleet.density import SampleHistogram
+from groundstation.estimators.fleet.skill import SkillOfFlight
+from groundstation.reports.index import IndexRow
 from groundstation.results.columns import FlightColumn
 from groundstation.results.flight import FlightResults
+from groundstation.results.installation import Lesson
 
 BEFORE = (
     FlightColumn("flight_id", "text", "name of the flight and of its folder"),
@@ -35,6 +43,121 @@ FLIGHT_COLUMNS: tuple[FlightColumn, ...] = (
     *BEHIND,
 )
 INDEXED = tuple(column.name for analysis in FLIGHT_ANALYSES for column in analysis.columns if column.is_indexed)
+
+
+TEXTS = ("text", "category")
+SKILL_FIELDS = {
+    "method": "string",
+    "horizon_min": "double",
+    "starts": "int64",
+    "rms_m": "double",
+    "coverage95": "double",
+    "is_within": "bool",
+}  # of SkillOfFlight
+CHECK_FIELDS = {
+    "quantity": "string",
+    "z": "double",
+    "is_inside": "bool",
+    "residual_deg": "double",
+    "sigma_deg": "double",
+    "verdict": "string",
+}  # of Check
+DETAILS = {
+    "index": "JSON: the flight's row of index.json",
+    "shipped": "the shipped method of the forecast",
+    "skill": "forecast skill of each method and horizon",
+    "checks": "what independent thing each estimate was compared with",
+    "sample_cell": "cells of 0.01 deg that hold used heading samples",
+    "sample_count": "how many samples each of them holds",
+    "lesson": "JSON: what the flight says of the installation of its INS; empty without a serial",
+}
+
+
+@dataclass(frozen=True)
+class Check:
+    """Something independent of the estimate beside it: residual, the sigma claimed for it, inside 95 % or not.
+
+    ``z`` is the residual over the sigma. ``verdict`` is that on the estimate; empty where it was not judged.
+    """
+
+    quantity: str
+    z: float
+    is_inside: bool
+    residual_deg: float = math.nan
+    sigma_deg: float = math.nan
+    verdict: str = ""
+
+
+@dataclass(frozen=True)
+class FlightShare:
+    """What one flight adds to the fleet, and what a run must know of it when it does not touch it.
+
+    Parameters
+    ----------
+    row : mapping
+        A value for each of :data:`FLIGHT_COLUMNS`.
+    index : IndexRow
+    histogram : SampleHistogram
+        Of its used heading samples.
+    shipped, skill
+        The shipped method of the forecast, and the skill of each.
+    checks : sequence of Check
+    path : str
+        Of its log.
+    link_name, hears : str, tuple of str
+        Name of its aircraft on the data link, and of those whom it heard.
+    samples : str
+        File of its heading samples in the dataset of samples; empty without any.
+    parts : tuple of str
+        Digests of its consecutive logs but the first.
+    lesson : Lesson, optional
+        What it says of the installation of its INS; None where it states no serial.
+    """
+
+    row: Mapping[str, Any]
+    index: IndexRow
+    histogram: SampleHistogram
+    shipped: str
+    skill: Sequence[SkillOfFlight]
+    checks: Sequence[Check]
+    path: str
+    link_name: str
+    hears: tuple[str, ...]
+    samples: str
+    parts: tuple[str, ...] = ()
+    lesson: Lesson | None = None
+
+
+def dataset_schema() -> Any:
+    """Arrow schema of flights.parquet/: the columns of a flight and the details; metadata ``columns`` has meanings."""
+    import pyarrow as pa
+
+    kinds = {
+        "number": pa.float64(),
+        "count": pa.int64(),
+        "flag": pa.bool_(),
+        "time": pa.timestamp("ns", tz="UTC"),
+        "text": pa.string(),
+        "category": pa.dictionary(pa.int32(), pa.string()),
+    }
+    cells = pa.list_(pa.field("element", pa.int32()))  # as Parquet names it
+    lists = {
+        "skill": _rows_of(SKILL_FIELDS),
+        "checks": _rows_of(CHECK_FIELDS),
+        "sample_cell": cells,
+        "sample_count": cells,
+    }
+    fields = [(column.name, kinds[column.kind]) for column in FLIGHT_COLUMNS]
+    fields += [(name, lists.get(name, pa.string())) for name in DETAILS]
+    meanings = {column.name: column.meaning for column in FLIGHT_COLUMNS} | DETAILS
+    return pa.schema(fields, metadata={"columns": json.dumps(meanings)})
+
+
+def _rows_of(fields: Mapping[str, str]) -> Any:
+    import pyarrow as pa
+
+    struct = pa.struct([(name, pa.type_for_alias(kind)) for name, kind in fields.items()])
+    return pa.list_(pa.field("element", struct))  # as Parquet names it
 
 
 def answer_values(results: FlightResults) -> dict[str, Any]:

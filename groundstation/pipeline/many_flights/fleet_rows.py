@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,56 +11,35 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.records import MAX_TEXT_CHARACTERS
+from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.chapters.cooperative import REFERENCE, trusted
+from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.fleet.density import SampleHistogram, histogram_of
 from groundstation.estimators.fleet.moments import Moments, moments_of
 from groundstation.estimators.fleet.skill import SkillOfFlight
 from groundstation.estimators.heading.figures import IN_PAUSE
 from groundstation.estimators.heading.references import REFERENCE_SIGMA_DEG, logged_reference
-from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, answer_values
+from groundstation.estimators.installation.lesson import lesson_of_flight
+from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, Check, FlightShare, answer_values
+from groundstation.pipeline.many_flights.fleet_samples import FleetSamples, SampleStore
 from groundstation.reports.index import index_row, reasons_of
 from groundstation.results.arrays.heading import HeadingSamples
 from groundstation.results.arrays.reference import ReferenceChecks
 from groundstation.results.columns import Kind
 from groundstation.results.cooperative import CooperativeResult
-from groundstation.results.files import SavedFlight, utf8_text
+from groundstation.results.files import SavedFlight, load, mapping, utf8_text
 from groundstation.results.fleet import SessionRow
 from groundstation.results.forecast import TOO_FEW, WITHIN, CalibrationRow, ForecastResult, honesty
 from groundstation.results.heading import HeadingResult
+from groundstation.results.installation import Lesson
 from groundstation.results.reference import ReferenceResult
+from groundstation.tables.session_tracks import aircraft_named
 
 FloatArray = NDArray[np.float64]
 NORMAL_95 = 1.959964
 LARGEST = 1e15  # no figure of a flight is larger: what is comes from a file that is damaged
 LATEST_NS = 7_000_000_000_000_000_000  # 2191: times of samples must fit beside the start
-
-
-@dataclass(frozen=True)
-class Check:
-    """Something independent of the estimate beside it: residual, the sigma claimed for it, inside 95 % or not.
-
-    ``z`` is the residual over the sigma. ``verdict`` is that on the estimate; empty where it was not judged.
-    """
-
-    quantity: str
-    z: float
-    is_inside: bool
-    residual_deg: float = math.nan
-    sigma_deg: float = math.nan
-    verdict: str = ""
-
-
-@dataclass(frozen=True)
-class FleetSamples:
-    """The heading samples of a flight, without the rows that only break lines; ``error_deg`` is NaN below walking pace.
-
-    ``moments`` and ``histogram`` are of the used ones, about the flight's estimate, so that none is cut at 180 deg.
-    """
-
-    columns: Mapping[str, NDArray[Any]]
-    moments: Moments
-    histogram: SampleHistogram
 
 
 def to_number(value: Any) -> float:
@@ -235,3 +215,38 @@ def _is_within(row: CalibrationRow) -> bool | None:
         return None
     says = honesty(int(figures[0]), *figures[1:])
     return None if says == TOO_FEW else says == WITHIN
+
+
+def share_of(folder: Path, store: SampleStore | None = None) -> FlightShare:
+    """Read a flight folder; with ``store`` its heading samples are put there.
+
+    Raises
+    ------
+    GroundstationError
+        When the folder cannot be read.
+    OSError
+        When the samples cannot be written.
+    """
+    saved = load(folder, ANSWER_TYPES)
+    results, samples = saved.results, heading_samples(saved)
+    row = flight_row(saved, samples)
+    empty = SampleHistogram(np.zeros(0, np.int32), np.zeros(0, np.int32))
+    return FlightShare(
+        row,
+        index_row(saved, "flight", answer_values(results)),
+        samples.histogram if samples is not None else empty,
+        *skill_of(saved),
+        checks_of(saved),
+        saved.manifest.source.path,
+        aircraft_named(results.metadata, results.source.name),
+        tuple(topic.partition(".")[2] for topic in topics_of_kind("link", tuple(results.ledger.topics))),
+        store.put(row, samples) if samples is not None and store is not None else "",
+        tuple(part.sha256 for part in saved.manifest.parts[1:]),
+        lesson_of(saved),
+    )
+
+
+def lesson_of(saved: SavedFlight) -> Lesson | None:
+    """What a flight teaches of its installation; None where the INS has no serial number."""
+    lesson = lesson_of_flight(saved.results, mapping(saved.manifest.configuration, "aircraft"), saved.folder.name)
+    return lesson if lesson.ins_serial else None

@@ -6,14 +6,17 @@ import json
 import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.many_flights.fleet_rows import FleetSamples
+from groundstation.estimators.fleet.density import SampleHistogram
+from groundstation.estimators.fleet.moments import Moments
 from groundstation.results.files import write_bytes
 
 SAMPLES = "samples.parquet"
@@ -34,6 +37,18 @@ MEANINGS = {
     "gate": "why not",
     "weight": "in the estimate, 1 on average over the used samples",
 }
+
+
+@dataclass(frozen=True)
+class FleetSamples:
+    """The heading samples of a flight, without the rows that only break lines; ``error_deg`` is NaN below walking pace.
+
+    ``moments`` and ``histogram`` are of the used ones, about the flight's estimate, so that none is cut at 180 deg.
+    """
+
+    columns: Mapping[str, NDArray[Any]]
+    moments: Moments
+    histogram: SampleHistogram
 
 
 class SampleStore:

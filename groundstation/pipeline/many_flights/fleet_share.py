@@ -1,153 +1,44 @@
 """What one flight adds to the fleet, as the dataset of flights keeps it: its folder is read once, when it changes."""
 
-import io
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.serial import from_json, to_json_exactly
-from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.fleet.density import SampleHistogram
-from groundstation.estimators.fleet.skill import SkillOfFlight
-from groundstation.estimators.installation.lesson import lesson_of_flight
-from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, answer_values
-from groundstation.pipeline.many_flights.fleet_rows import Check, checks_of, flight_row, heading_samples, skill_of
-from groundstation.pipeline.many_flights.fleet_samples import SampleStore
-from groundstation.reports.index import IndexRow, index_row
+from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, TEXTS, FlightShare, dataset_schema
+from groundstation.reports.index import IndexRow
 from groundstation.results.columns import FlightColumn
 from groundstation.results.figures import FigureData
-from groundstation.results.files import SavedFlight, load, mapping, utf8_text
+from groundstation.results.files import parquet_bytes, utf8_text
 from groundstation.results.installation import Lesson
-from groundstation.tables.session_tracks import aircraft_named
 
-TEXTS = ("text", "category")
-SKILL_FIELDS = {
-    "method": "string",
-    "horizon_min": "double",
-    "starts": "int64",
-    "rms_m": "double",
-    "coverage95": "double",
-    "is_within": "bool",
-}  # of SkillOfFlight
-CHECK_FIELDS = {
-    "quantity": "string",
-    "z": "double",
-    "is_inside": "bool",
-    "residual_deg": "double",
-    "sigma_deg": "double",
-    "verdict": "string",
-}  # of Check
 MOST_WIDE_CHARACTERS = 10_000_000  # of a column of texts as wide as its longest; beyond it each is an object
-DETAILS = {
-    "index": "JSON: the flight's row of index.json",
-    "shipped": "the shipped method of the forecast",
-    "skill": "forecast skill of each method and horizon",
-    "checks": "what independent thing each estimate was compared with",
-    "sample_cell": "cells of 0.01 deg that hold used heading samples",
-    "sample_count": "how many samples each of them holds",
-    "lesson": "JSON: what the flight says of the installation of its INS; empty without a serial",
-}
-
-
-@dataclass(frozen=True)
-class FlightShare:
-    """What one flight adds to the fleet, and what a run must know of it when it does not touch it.
-
-    Parameters
-    ----------
-    row : mapping
-        A value for each of :data:`FLIGHT_COLUMNS`.
-    index : IndexRow
-    histogram : SampleHistogram
-        Of its used heading samples.
-    shipped, skill
-        The shipped method of the forecast, and the skill of each.
-    checks : sequence of Check
-    path : str
-        Of its log.
-    link_name, hears : str, tuple of str
-        Name of its aircraft on the data link, and of those whom it heard.
-    samples : str
-        File of its heading samples in the dataset of samples; empty without any.
-    parts : tuple of str
-        Digests of its consecutive logs but the first.
-    lesson : Lesson, optional
-        What it says of the installation of its INS; None where it states no serial.
-    """
-
-    row: Mapping[str, Any]
-    index: IndexRow
-    histogram: SampleHistogram
-    shipped: str
-    skill: Sequence[SkillOfFlight]
-    checks: Sequence[Check]
-    path: str
-    link_name: str
-    hears: tuple[str, ...]
-    samples: str
-    parts: tuple[str, ...] = ()
-    lesson: Lesson | None = None
-
-
-def share_of(folder: Path, store: SampleStore | None = None) -> FlightShare:
-    """Read a flight folder; with ``store`` its heading samples are put there.
-
-    Raises
-    ------
-    GroundstationError
-        When the folder cannot be read.
-    OSError
-        When the samples cannot be written.
-    """
-    saved = load(folder, ANSWER_TYPES)
-    results, samples = saved.results, heading_samples(saved)
-    row = flight_row(saved, samples)
-    empty = SampleHistogram(np.zeros(0, np.int32), np.zeros(0, np.int32))
-    return FlightShare(
-        row,
-        index_row(saved, "flight", answer_values(results)),
-        samples.histogram if samples is not None else empty,
-        *skill_of(saved),
-        checks_of(saved),
-        saved.manifest.source.path,
-        aircraft_named(results.metadata, results.source.name),
-        tuple(topic.partition(".")[2] for topic in topics_of_kind("link", tuple(results.ledger.topics))),
-        store.put(row, samples) if samples is not None and store is not None else "",
-        tuple(part.sha256 for part in saved.manifest.parts[1:]),
-        lesson_of(saved),
-    )
-
-
-def lesson_of(saved: SavedFlight) -> Lesson | None:
-    """What a flight teaches of its installation; None where the INS has no serial number."""
-    lesson = lesson_of_flight(saved.results, mapping(saved.manifest.configuration, "aircraft"), saved.folder.name)
-    return lesson if lesson.ins_serial else None
 
 
 def to_arrow(shares: Sequence[FlightShare]) -> Any:
     """Put shares into a table of Arrow; its metadata ``columns`` tells the meanings."""
     import pyarrow as pa
 
+    schema = dataset_schema()
     arrays = {column.name: _arrow(column, [share.row[column.name] for share in shares]) for column in FLIGHT_COLUMNS}
     arrays["index"] = pa.array([_json(to_json_exactly(share.index)) for share in shares], pa.string())
     arrays["shipped"] = pa.array([utf8_text(share.shipped) for share in shares], pa.string())
-    arrays["skill"] = pa.array([list(map(_finite, share.skill)) for share in shares], _rows_of(SKILL_FIELDS))
-    arrays["checks"] = pa.array([list(map(_finite, share.checks)) for share in shares], _rows_of(CHECK_FIELDS))
+    for name in ("skill", "checks"):
+        rows = [list(map(_finite, getattr(share, name))) for share in shares]
+        arrays[name] = pa.array(rows, schema.field(name).type)
     for name, part in (("sample_cell", "cell"), ("sample_count", "count")):
         counts = [getattr(share.histogram, part) for share in shares]
-        arrays[name] = pa.array(counts, pa.list_(pa.field("element", pa.int32())))  # as Parquet names it
+        arrays[name] = pa.array(counts, schema.field(name).type)
     lessons = ["" if share.lesson is None else _json(to_json_exactly(share.lesson)) for share in shares]
     arrays["lesson"] = pa.array(lessons, pa.string())
-    meanings = {column.name: column.meaning for column in FLIGHT_COLUMNS} | DETAILS
-    return pa.table(arrays).replace_schema_metadata({"columns": json.dumps(meanings)})
+    return pa.table(arrays, schema=schema)
 
 
 def flights_of(table: Any) -> FigureData:
@@ -210,13 +101,6 @@ def _values(array: Any, missing: float) -> NDArray[Any]:
     return arrow.column(array)
 
 
-def _rows_of(fields: Mapping[str, str]) -> Any:
-    import pyarrow as pa
-
-    struct = pa.struct([(name, pa.type_for_alias(kind)) for name, kind in fields.items()])
-    return pa.list_(pa.field("element", struct))  # as Parquet names it
-
-
 def histograms_of(table: Any) -> Iterator[SampleHistogram]:
     """The histogram of the used samples of each flight in a table of shares."""
     yield from map(SampleHistogram, *(_lists(table.column(name)) for name in ("sample_cell", "sample_count")))
@@ -230,20 +114,6 @@ def fleet_parquet(table: Any) -> bytes:
     meanings = json.dumps({column.name: column.meaning for column in FLIGHT_COLUMNS})
     flights = table.select([column.name for column in FLIGHT_COLUMNS])
     return parquet_bytes(flights.replace_schema_metadata({"columns": meanings}))
-
-
-def parquet_bytes(table: Any) -> bytes:
-    """Encode a table: the same rows in the same order give the same bytes, whatever they were put together from."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    for place, one in enumerate(table.schema):
-        if pa.types.is_dictionary(one.type):
-            again = table.column(place).cast(pa.string()).combine_chunks().dictionary_encode()
-            table = table.set_column(place, pa.field(one.name, again.type), again)
-    buffer = io.BytesIO()
-    pq.write_table(table.combine_chunks(), buffer, compression="zstd", write_page_checksum=True)
-    return buffer.getvalue()
 
 
 def _finite(row: Any) -> dict[str, Any]:

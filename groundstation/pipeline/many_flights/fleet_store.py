@@ -16,14 +16,15 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.errors import GroundstationError
+from groundstation.base.units import NS_PER_S
 from groundstation.base.version import __version__
-from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
+from groundstation.pipeline.many_flights.fleet_columns import DETAILS, FLIGHT_COLUMNS, FlightShare, dataset_schema
+from groundstation.pipeline.many_flights.fleet_rows import share_of
 from groundstation.pipeline.many_flights.fleet_samples import SampleStore
-from groundstation.pipeline.many_flights.fleet_share import DETAILS, parquet_bytes, share_of, to_arrow
+from groundstation.pipeline.many_flights.fleet_share import to_arrow
 from groundstation.pipeline.many_flights.flight_keys import (
     Key,
     Keys,
-    key_of,
     key_path,
     month_of,
     read_keys,
@@ -34,7 +35,7 @@ from groundstation.pipeline.many_flights.workers import Crew, in_turn
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.results.file_names import ARRAYS, SUMMARY
-from groundstation.results.files import write_bytes
+from groundstation.results.files import parquet_bytes, utf8_text, write_bytes
 
 FLIGHTS = "flights.parquet"
 _COLUMNS = [(column.name, column.kind, column.meaning) for column in FLIGHT_COLUMNS]
@@ -108,7 +109,8 @@ class Scan:
         """
         import pyarrow as pa
 
-        empty = to_arrow([]) if columns is None else to_arrow([]).select(_with_id(columns))
+        empty = dataset_schema().empty_table()
+        empty = empty if columns is None else empty.select(_with_id(columns))
         return _sorted(pa.concat_tables([empty, *self.months_of(columns)]))
 
     def months_of(self, columns: Sequence[str] | None = None) -> Iterator[Any]:
@@ -349,7 +351,7 @@ def _read(path: Path) -> Any:
     """A file of the dataset; an empty one where there is none, or one of another version."""
     import pyarrow.parquet as pq
 
-    empty = to_arrow([])
+    empty = dataset_schema().empty_table()
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             found = file.read()
@@ -365,3 +367,15 @@ def _chosen(table: Any, keys: Iterable[str]) -> Any:
         return table
     places = {name: place for place, name in enumerate(names)}
     return table.take(np.array([places[name] for name in wanted if name in places], dtype=np.int64))
+
+
+def key_of(share: FlightShare, stamp: int) -> Key:
+    """What a run must know of a flight whose folder had a stamp when its share was read."""
+    row, start_ns = share.row, share.row["start_utc"]
+    duration_s = row["duration_s"]
+    is_timed = start_ns is not None and duration_s == duration_s
+    end_ns = start_ns + round(duration_s * NS_PER_S) if is_timed else None
+    path, name, hears = map(utf8_text, (share.path, share.link_name, "\n".join(share.hears)))
+    sha256 = str(share.index.sha256)
+    parts = "\n".join(share.parts)
+    return Key(row["flight_id"], stamp, path, sha256, name, hears, start_ns, end_ns, share.samples, parts)

@@ -10,9 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.many_flights.fleet_share import FlightShare, parquet_bytes
-from groundstation.results.files import utf8_text, write_bytes
+from groundstation.results.files import parquet_bytes, write_bytes
 
 KEYS, UNKNOWN = ".flights", "unknown"
 DAY_CHARACTERS = 9  # of a flight id: date and the letter behind it, from which the month follows
@@ -189,15 +187,3 @@ def write_keys(out: Path, month: str, keys: Keys) -> None:
     path = key_path(out, month)
     path.parent.mkdir(exist_ok=True)
     write_bytes(path, parquet_bytes(keys.table))
-
-
-def key_of(share: FlightShare, stamp: int) -> Key:
-    """What a run must know of a flight whose folder had a stamp when its share was read."""
-    row, start_ns = share.row, share.row["start_utc"]
-    duration_s = row["duration_s"]
-    is_timed = start_ns is not None and duration_s == duration_s
-    end_ns = start_ns + round(duration_s * NS_PER_S) if is_timed else None
-    path, name, hears = map(utf8_text, (share.path, share.link_name, "\n".join(share.hears)))
-    sha256 = str(share.index.sha256)
-    parts = "\n".join(share.parts)
-    return Key(row["flight_id"], stamp, path, sha256, name, hears, start_ns, end_ns, share.samples, parts)

@@ -5,13 +5,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from groundstation.base.errors import SettingsError
 from groundstation.base.serial import from_json
 from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.installation.analysis import sentence_of
 from groundstation.estimators.installation.series import Series, installation_of, series_of
 from groundstation.estimators.installation.settings import InstallationSettings
-from groundstation.pipeline.many_flights.fleet_share import lesson_of, lessons_of
+from groundstation.pipeline.many_flights.fleet_rows import lesson_of
+from groundstation.pipeline.many_flights.fleet_share import lessons_of
 from groundstation.pipeline.many_flights.fleet_store import Scan
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.sealing import note
@@ -19,17 +19,16 @@ from groundstation.reports.flight_report import REPORT
 from groundstation.reports.installation import with_installation
 from groundstation.results.files import load, write_text
 from groundstation.results.installation import (
+    INSTALLATIONS,
     METHOD_VERSION,
     Installation,
     InstallationResult,
     Installations,
     LeftOut,
     Lesson,
+    installations_in,
     installations_text,
-    read_installations,
 )
-
-INSTALLATIONS = "installations.json"
 
 
 def refresh_installations(out: Path, found: Scan, remade: Iterable[str]) -> list[str]:
@@ -112,14 +111,6 @@ def _text(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         return ""
-
-
-def installations_in(out: Path) -> Installations | None:
-    """What installations.json of an OUT holds; None where there is none that can be read."""
-    try:
-        return read_installations(out / INSTALLATIONS)
-    except SettingsError:
-        return None
 
 
 def answers_in(found: Installations | None) -> dict[str, InstallationResult]:

@@ -30,7 +30,7 @@ from groundstation.pipeline.many_flights.inputs import (
     plan_folders,
     session_folders,
 )
-from groundstation.pipeline.many_flights.installations import INSTALLATIONS, refresh_installations, show_installation
+from groundstation.pipeline.many_flights.installations import refresh_installations, show_installation
 from groundstation.pipeline.one_flight.flight import REPORT_FILES
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.sealing import note
@@ -39,6 +39,7 @@ from groundstation.reports.fleet_report import PDF as FLEET_PDF
 from groundstation.reports.fleet_report import write_fleet_report
 from groundstation.reports.index import IndexRow, Kind
 from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
+from groundstation.results.installation import INSTALLATIONS
 
 MOST_SKIPPED = 1000  # files that the index lists
 FLEET_RECORDING = "fleet.rrd"

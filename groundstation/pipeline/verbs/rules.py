@@ -16,12 +16,11 @@ from groundstation.estimators.analyses import ANSWER_TYPES, FLIGHT_ANALYSES
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.installation.answer import verdict_of
 from groundstation.pipeline.many_flights.inputs import saved_flights
-from groundstation.pipeline.many_flights.installations import installations_in
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, csv_text, load, mapping, write_text
 from groundstation.results.heading import Gate, judged_gate
-from groundstation.results.installation import InstalledFlight
+from groundstation.results.installation import InstalledFlight, installations_in
 from groundstation.results.rules import Rejudged
 
 LEARNED_GATE = "whole_half_width_learned"
