@@ -16,8 +16,9 @@ from groundstation.base.errors import GroundstationError, SettingsError, UsageEr
 from groundstation.pipeline.many_flights import apart, watched_batch
 from groundstation.pipeline.many_flights import batch as batch_of_logs
 from groundstation.pipeline.many_flights.apart import DIED, bounds_of, outcomes_apart
-from groundstation.pipeline.many_flights.batch import _crew, run_many
+from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.many_flights.confined import Bounds
+from groundstation.pipeline.many_flights.crews import crew_for
 from groundstation.pipeline.many_flights.watched_batch import Batch
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.pipeline.one_flight.isolation import Isolation
@@ -205,7 +206,7 @@ def test_a_system_without_limits_says_so(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_one_log_is_read_apart_too() -> None:
-    assert _crew("", 1, 1, silent, bounds=ISOLATED).func is outcomes_apart
+    assert crew_for("", 1, 1, silent, bounds=ISOLATED).func is outcomes_apart
 
 
 def test_a_watch_that_isolates_reads_no_log_in_its_own_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,8 +24,9 @@ from groundstation.pipeline.many_flights import fleet_rows
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, gather, write_fleet
 from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, FlightShare
+from groundstation.pipeline.many_flights.fleet_refresh import refresh
 from groundstation.pipeline.many_flights.fleet_samples import MEANINGS, SAMPLES, SampleStore, partition
-from groundstation.pipeline.many_flights.fleet_store import FLIGHTS, refresh
+from groundstation.pipeline.many_flights.fleet_store import FLIGHTS
 from groundstation.pipeline.many_flights.publishing import write_beside
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome

@@ -17,7 +17,8 @@ from groundstation.estimators.installation.lesson import Stored, lesson_of
 from groundstation.estimators.installation.series import answer_from
 from groundstation.estimators.installation.settings import InstallationSettings
 from groundstation.pipeline.many_flights.batch import run_many
-from groundstation.pipeline.many_flights.fleet_store import refresh, scan
+from groundstation.pipeline.many_flights.fleet_refresh import refresh
+from groundstation.pipeline.many_flights.fleet_store import scan
 from groundstation.pipeline.many_flights.installations import refresh_installations, show_installation
 from groundstation.pipeline.many_flights.publishing import write_beside
 from groundstation.pipeline.one_flight.configuration import Configuration, installed_as

@@ -10,7 +10,7 @@ import pytest
 from groundstation.pipeline.many_flights import batch, strangers
 from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.many_flights.dry_run import plan_many
-from groundstation.pipeline.many_flights.publishing import MOST_SKIPPED
+from groundstation.pipeline.many_flights.fleet_index import MOST_SKIPPED
 from groundstation.pipeline.many_flights.strangers import MEMORY, Strangers
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome

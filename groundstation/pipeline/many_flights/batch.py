@@ -12,13 +12,15 @@ from types import MappingProxyType
 
 from groundstation.base.errors import UsageError
 from groundstation.base.to_disk import sync_folder
-from groundstation.pipeline.many_flights.apart import bounds_of, outcomes_apart
-from groundstation.pipeline.many_flights.confined import Bounds
-from groundstation.pipeline.many_flights.consecutive import run_joined
+from groundstation.pipeline.many_flights.apart import bounds_of
+from groundstation.pipeline.many_flights.consecutive import flights_of_parts
+from groundstation.pipeline.many_flights.crews import crew_for
 from groundstation.pipeline.many_flights.delta_sink import delta_place, put_flights
-from groundstation.pipeline.many_flights.fleet_store import Scan, refresh
-from groundstation.pipeline.many_flights.found_sessions import Asked, find_sessions, run_sessions
-from groundstation.pipeline.many_flights.inputs import session_folders
+from groundstation.pipeline.many_flights.fleet_index import write_index_of
+from groundstation.pipeline.many_flights.fleet_refresh import refresh
+from groundstation.pipeline.many_flights.fleet_store import Scan
+from groundstation.pipeline.many_flights.found_sessions import Asked, find_sessions, sweep_sessions
+from groundstation.pipeline.many_flights.inputs import is_remote, session_folders
 from groundstation.pipeline.many_flights.installations import told
 from groundstation.pipeline.many_flights.known_flights import KnownFlights
 from groundstation.pipeline.many_flights.listed_logs import (
@@ -29,17 +31,17 @@ from groundstation.pipeline.many_flights.listed_logs import (
     without_parts,
 )
 from groundstation.pipeline.many_flights.out_folder import alone_in, clear_unfinished, prepare, refuse_foreign
-from groundstation.pipeline.many_flights.output import LocalOutput, RemoteOutput
-from groundstation.pipeline.many_flights.placement import Placement
-from groundstation.pipeline.many_flights.publishing import FLEET_FILES, write_beside, write_index_of
-from groundstation.pipeline.many_flights.remote import is_remote
+from groundstation.pipeline.many_flights.output import RemoteOutput
+from groundstation.pipeline.many_flights.placement import LocalOutput, Placement
+from groundstation.pipeline.many_flights.publishing import FLEET_FILES, write_beside
 from groundstation.pipeline.many_flights.remote_runs import RemoteJob, digest_remote, run_remote
-from groundstation.pipeline.many_flights.session import load_stations
+from groundstation.pipeline.many_flights.session import load_stations, run_one
 from groundstation.pipeline.many_flights.strangers import Strangers
-from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJob, Crew, in_turn, side_by_side
+from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJob, Crew, in_turn
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.cores import cores
 from groundstation.pipeline.one_flight.flight import Job, run_flight
+from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 
@@ -110,7 +112,7 @@ def run_many(
     skipped = skipped_files(inputs, strangers) if is_near and configuration.profile is None else {}
     logs = len(inputs) - len(skipped)
     bounds = bounds_of(configuration.isolation, timeout_s) if is_isolated else None
-    crew = _crew(scheduler, jobs or cores(), logs, listen, timeout_s, bounds)
+    crew = crew_for(scheduler, jobs or cores(), logs, listen, timeout_s, bounds)
     make = partial(
         Job,
         configuration=configuration,
@@ -134,7 +136,7 @@ def run_many(
         ]
         return _run_remote(remote, asked, crew, force, listen)
     near = [make(Path(one.url), Path(out), is_named=one.is_named) for one in inputs]
-    refresher = _crew(scheduler, jobs or cores(), TASKS_PER_PROCESS + 1, listen)
+    refresher = crew_for(scheduler, jobs or cores(), TASKS_PER_PROCESS + 1, listen)
     outcomes = _run_here(near, asked, crew, force, listen, refresher, skipped, is_isolated=is_isolated)
     strangers.keep(outcomes)
     return outcomes
@@ -231,13 +233,13 @@ def _run_here(
             return replace(work[number % len(work)], add_suffix=True, power_up=placement.power_up(number))
 
         _run_into(placement, out, left(), run, suffixed, crew, listen, len(work))
-        apart = run_joined(placement, work, in_out, crew, listen, is_isolated=is_isolated)
+        apart = _run_joined(placement, work, in_out, crew, listen, is_isolated=is_isolated)
         clear_unfinished(out)  # of processes that died or took too long
         found, unwritten = _swept(placement, out, refresher)
         sessions = _run_sessions(placement, asked, found, crew, listen)
         outcomes = (*placement.outcomes(), *sessions)
         found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
-        problems = _write_beside(out, outcomes, asked, found)
+        problems = write_beside(out, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found)
         sync_folder(out)
         stored = put_flights(asked.store, found, outcomes) if asked.store else ()
         if asked.configuration.lessons is None:  # else the answer by the file is told
@@ -245,15 +247,35 @@ def _run_here(
         return (*outcomes, *apart, *unwritten, *problems, *stored)
 
 
-def _write_beside(out: Path, outcomes: Sequence[Outcome], asked: Asked, found: Scan) -> tuple[Outcome, ...]:
-    """Write everything that stands beside the flights of a run; returns what went wrong."""
-    return write_beside(
-        out,
-        outcomes,
-        with_pdf=asked.with_pdf,
-        only_results=asked.only_results,
-        found=found,
-    )
+def _run_joined(
+    placement: Placement,
+    work: Sequence[Job],
+    known: KnownFlights,
+    crew: Crew,
+    listen: Listener,
+    *,
+    is_isolated: bool = False,
+) -> tuple[Outcome, ...]:
+    """Run as one flight the consecutive logs among those in place; returns what could not be joined, and why.
+
+    Isolated, files that cannot be read alone are not looked at: that would read them in this process.
+    """
+    outcomes = {number: one for number, one in placement.flights().items() if one.flight_id or not is_isolated}
+    found = flights_of_parts(outcomes, known, work[0].configuration)
+    if not found:
+        return ()
+    tasks: list[tuple[int, Job]] = []
+    for number, stretch in enumerate(found):
+        first = outcomes[stretch.numbers[0]]
+        add_suffix = bool(first.flight_id) and plain_id(first.flight_id, first.sha256) != first.flight_id
+        tasks.append((number, work[stretch.numbers[0] % len(work)].of_parts(stretch.parts, add_suffix=add_suffix)))
+    apart = []
+    with closing(crew(tasks, run_flight)) as ended:
+        for number, outcome in ended:
+            listen(Event("end", tasks[number][1].name, outcome.text))
+            problem = placement.put_joined(found[number].numbers, outcome)
+            apart += [problem] if problem else []
+    return tuple(apart)
 
 
 def _swept(placement: Placement, out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, ...]]:
@@ -265,11 +287,17 @@ def _swept(placement: Placement, out: Path, crew: Crew | None = None) -> tuple[S
 def _run_sessions(placement: Placement, asked: Asked, among: Scan, crew: Crew, listen: Listener) -> tuple[Outcome, ...]:
     """Run the sessions among the flights that are in place; interrupted, the index at least is written."""
     flights = placement.outcomes()
+    outcomes: dict[int, Outcome] = {}
     try:
         found = find_sessions(asked, among, {one.flight_id for one in flights if one.flight_id})
         if found.jobs:
             listen(Event("begin", total=len(flights) + len(found.jobs)))
-        return run_sessions(found, crew, listen)
+            with closing(crew(enumerate(found.jobs), run_one)) as ended:
+                for number, outcome in ended:
+                    listen(Event("end", outcome.source, outcome.text))
+                    outcomes[number] = outcome
+            sweep_sessions([(job, outcomes[number]) for number, job in enumerate(found.jobs)])
+        return (*(outcome for _, outcome in sorted(outcomes.items())), *found.told)
     except BaseException:
         write_index_of(asked.out, flights)
         raise
@@ -298,7 +326,9 @@ def _run_remote(
                 sessions = _run_remote_sessions(placement, output, asked, found, listen)
                 outcomes = (*placement.outcomes(), *sessions)
                 found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
-                beside = _write_beside(copy, outcomes, asked, found)
+                beside = write_beside(
+                    copy, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found
+                )
                 stored = put_flights(asked.store, found, outcomes) if asked.store else ()
                 problems = (*unwritten, *beside, *stored)
                 outcomes = told(outcomes, copy)
@@ -378,23 +408,3 @@ def _run_into(
     except BaseException:
         write_index_of(out, placement.outcomes())
         raise
-
-
-def _crew(
-    scheduler: str,
-    workers: int,
-    logs: int,
-    listen: Listener,
-    timeout_s: float = math.inf,
-    bounds: Bounds | None = None,
-) -> Crew:
-    """Who does the work: a cluster, processes, or this process alone, where there is little and no limit of time."""
-    if bounds is not None:
-        return partial(outcomes_apart, workers=workers, listen=listen, bounds=bounds)
-    if scheduler:
-        from groundstation.pipeline.many_flights.cluster import on_cluster
-
-        return partial(on_cluster, scheduler=scheduler, timeout_s=timeout_s)
-    if min(workers, logs) <= 1 and logs <= TASKS_PER_PROCESS and math.isinf(timeout_s):
-        return partial(in_turn, listen=listen)
-    return partial(side_by_side, workers=min(workers, logs), listen=listen, timeout_s=timeout_s)

@@ -2,7 +2,6 @@
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from itertools import chain, pairwise
 from pathlib import Path
@@ -10,15 +9,10 @@ from pathlib import Path
 from groundstation.base.errors import GroundstationError
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.known_flights import KnownFlights
-from groundstation.pipeline.many_flights.placement import Placement
-from groundstation.pipeline.many_flights.workers import Crew
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.flight import Job, run_flight
-from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.log import Log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.parts import LATE_S, LONGEST_GAP_S, behind_it, family, gap_ns, goes_on, order_of
-from groundstation.pipeline.one_flight.progress import Event, Listener
 from groundstation.results.manifest import PartOfRun
 
 _NOT_JOINED = "groundstation-mcap"  # how readers of MCAPs that we wrote begin: a recorder's files are joined
@@ -74,38 +68,6 @@ def flights_of_parts(
     grown = [_with_strangers(one, strangers, folders, configuration) for one in stretches]
     known_ones = {_digests(one) for one in stretches}
     return [one for one in _chained(grown, folders) if one.numbers and _digests(one) not in known_ones]
-
-
-def run_joined(
-    placement: Placement,
-    work: Sequence[Job],
-    known: KnownFlights,
-    crew: Crew,
-    listen: Listener,
-    *,
-    is_isolated: bool = False,
-) -> tuple[Outcome, ...]:
-    """Run as one flight the consecutive logs among those in place; returns what could not be joined, and why.
-
-    Isolated, files that cannot be read alone are not looked at: that would read them in this process.
-    """
-    outcomes = {number: one for number, one in placement.flights().items() if one.flight_id or not is_isolated}
-    found = flights_of_parts(outcomes, known, work[0].configuration)
-    if not found:
-        return ()
-    tasks: list[tuple[int, Job]] = []
-    for number, stretch in enumerate(found):
-        first = outcomes[stretch.numbers[0]]
-        add_suffix = bool(first.flight_id) and plain_id(first.flight_id, first.sha256) != first.flight_id
-        tasks.append((number, work[stretch.numbers[0] % len(work)].of_parts(stretch.parts, add_suffix=add_suffix)))
-    apart = []
-    with closing(crew(tasks, run_flight)) as ended:
-        for number, outcome in ended:
-            stretch = found[number]
-            listen(Event("end", tasks[number][1].name, outcome.text))
-            problem = placement.put_joined(stretch.numbers, outcome)
-            apart += [problem] if problem else []
-    return tuple(apart)
 
 
 def _digests(stretch: Stretch) -> tuple[str, ...]:

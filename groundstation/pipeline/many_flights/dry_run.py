@@ -7,10 +7,10 @@ from pathlib import Path
 from groundstation.base.errors import UnclaimedLogError, UsageError
 from groundstation.pipeline.many_flights.fleet_store import Scan, scan
 from groundstation.pipeline.many_flights.found_sessions import STATIONS_TOML, Asked, FoundSessions, find_sessions
+from groundstation.pipeline.many_flights.inputs import is_remote
 from groundstation.pipeline.many_flights.known_flights import KnownFlights
 from groundstation.pipeline.many_flights.listed_logs import inputs_of, skipped_files, with_steps, without_parts
 from groundstation.pipeline.many_flights.out_folder import refuse_foreign
-from groundstation.pipeline.many_flights.remote import is_remote
 from groundstation.pipeline.many_flights.session import load_stations, planned_session
 from groundstation.pipeline.many_flights.strangers import Strangers
 from groundstation.pipeline.one_flight.configuration import Configuration

@@ -2,16 +2,15 @@
 
 from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, SettingsError
 from groundstation.base.findings import Finding
 from groundstation.pipeline.many_flights.fleet_store import Scan
-from groundstation.pipeline.many_flights.inputs import file_in
-from groundstation.pipeline.many_flights.remote import is_remote
-from groundstation.pipeline.many_flights.session import SessionJob, load_stations, run_one, sessions_of
+from groundstation.pipeline.many_flights.inputs import file_in, is_remote
+from groundstation.pipeline.many_flights.session import SessionJob, load_stations, sessions_of
 from groundstation.pipeline.many_flights.session_search import (
     Member,
     Span,
@@ -20,12 +19,10 @@ from groundstation.pipeline.many_flights.session_search import (
     ranging_with,
     sessions_among,
 )
-from groundstation.pipeline.many_flights.workers import Crew
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import remove
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
-from groundstation.pipeline.one_flight.progress import Event, Listener
 from groundstation.results.files import load_manifest
 from groundstation.tables.session_settings import Stations
 
@@ -89,21 +86,6 @@ def _heard(mcap_in: Callable[[Path], Path], folder: Path) -> Span | None:
         return None
 
 
-def run_sessions(found: FoundSessions, crew: Crew, listen: Listener) -> tuple[Outcome, ...]:
-    """Run sessions, each into its place; returns their outcomes in the order of the jobs, and what else is told.
-
-    Sessions that an earlier run found of the same flights, and that are others now, are removed.
-    """
-    outcomes: dict[int, Outcome] = {}
-    if found.jobs:
-        with closing(crew(enumerate(found.jobs), run_one)) as ended:
-            for number, outcome in ended:
-                listen(Event("end", outcome.source, outcome.text))
-                outcomes[number] = outcome
-        _sweep([(job, outcomes[number]) for number, job in enumerate(found.jobs)])
-    return (*(outcome for _, outcome in sorted(outcomes.items())), *found.told)
-
-
 def _job(asked: Asked, group: Sequence[Member]) -> SessionJob:
     logs = [open_log(asked.mcap_in(one.folder)) for one in group]
     stations, notes = (asked.stations, ()) if asked.stations is not None else _stations_beside(group)
@@ -145,7 +127,10 @@ def _stations_beside(group: Sequence[Member]) -> tuple[Stations, tuple[Finding, 
     return found[0], (Finding("info", "session.stations", text, place=STATIONS_TOML),)
 
 
-def _sweep(done: Sequence[tuple[SessionJob, Outcome]]) -> None:
+def sweep_sessions(done: Sequence[tuple[SessionJob, Outcome]]) -> None:
+    """Remove sessions that an earlier run found of the same flights, and that are others now."""
+    if not done:
+        return
     placed = {outcome.flight_id for _, outcome in done}
     logs = {log.source.sha256 for job, outcome in done if outcome.flight_id for log in job.logs}
     for folder, manifest in sessions_of(done[0][0].out):

@@ -154,3 +154,14 @@ def _walk(folder: Path, out: Path | None) -> Iterator[tuple[Path, Input]]:
                 folders.append((path, place / entry.name))
             elif entry.is_file():
                 yield path.resolve() if entry.is_symlink() else place / entry.name, Input(path, is_named=False)
+
+
+def is_remote(place: str) -> bool:
+    """Whether a place is named by URL.
+
+    Examples
+    --------
+    >>> is_remote("s3://flights/2026"), is_remote("flights/2026")
+    (True, False)
+    """
+    return "://" in place

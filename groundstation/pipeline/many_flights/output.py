@@ -6,14 +6,13 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Protocol
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, SESSION_ARRAYS
 from groundstation.pipeline.many_flights.lease import LOCKS, Lease, alone_elsewhere
 from groundstation.pipeline.many_flights.remote import RemoteFolder
 from groundstation.pipeline.many_flights.remote_runs import BY_LOG, STAGING, array_files, remember_flight
-from groundstation.pipeline.one_flight.flight import is_made, place, remove
+from groundstation.pipeline.one_flight.flight import is_made
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
 from groundstation.reports.fleet_report import PDF as FLEET_PDF
@@ -24,51 +23,6 @@ FLEET_ARRAYS = (
     "heading_samples.parquet",
     "reference_checks.parquet",
 )  # of a flight's arrays, what the fleet is made from
-
-
-class Output(Protocol):
-    """Takes finished flights in.
-
-    Attributes
-    ----------
-    root : Path
-        A folder on this machine with what index and fleet are made from: the flight folders, or what of them it takes.
-    """
-
-    root: Path
-
-    def has_in_place(self, outcome: Outcome) -> bool:
-        """Whether the flight stands where it shall."""
-
-    def place(self, outcome: Outcome) -> str:
-        """Move a finished flight to its place, which is told."""
-
-    def discard(self, folder: str) -> None:
-        """Throw a flight folder away; what somebody else put into one that is in place stays."""
-
-
-class LocalOutput:
-    """A folder on this machine."""
-
-    def __init__(self, root: Path) -> None:
-        self.root = root
-
-    def has_in_place(self, outcome: Outcome) -> bool:
-        """Whether the flight stands where it shall."""
-        return Path(outcome.folder) == self.root / outcome.flight_id
-
-    def place(self, outcome: Outcome) -> str:
-        """Move a finished flight to its place, which is told."""
-        target = self.root / outcome.flight_id
-        place(Path(outcome.folder), target)
-        return str(target)
-
-    def discard(self, folder: str) -> None:
-        """Throw a flight folder away; what somebody else put into one that is in place stays."""
-        if Path(folder).name.startswith("."):
-            shutil.rmtree(folder, ignore_errors=True)
-        else:
-            remove(self.root / Path(folder).name)
 
 
 class RemoteOutput:

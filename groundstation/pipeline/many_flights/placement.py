@@ -1,21 +1,67 @@
 """Where finished flights are put, one after the other, so that a run that is killed keeps what it had finished."""
 
 import json
+import shutil
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from groundstation.base.errors import GroundstationError
 from groundstation.pipeline.many_flights.fleet_store import Scan
 from groundstation.pipeline.many_flights.flight_keys import Keys
-from groundstation.pipeline.many_flights.output import Output
-from groundstation.pipeline.many_flights.remote import is_remote
+from groundstation.pipeline.many_flights.inputs import is_remote
+from groundstation.pipeline.one_flight.flight import place, remove
 from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.file_names import MANIFEST
 from groundstation.results.files import utf8_text
+
+
+class Output(Protocol):
+    """Takes finished flights in.
+
+    Attributes
+    ----------
+    root : Path
+        A folder on this machine with what index and fleet are made from: the flight folders, or what of them it takes.
+    """
+
+    root: Path
+
+    def has_in_place(self, outcome: Outcome) -> bool:
+        """Whether the flight stands where it shall."""
+
+    def place(self, outcome: Outcome) -> str:
+        """Move a finished flight to its place, which is told."""
+
+    def discard(self, folder: str) -> None:
+        """Throw a flight folder away; what somebody else put into one that is in place stays."""
+
+
+class LocalOutput:
+    """A folder on this machine."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    def has_in_place(self, outcome: Outcome) -> bool:
+        """Whether the flight stands where it shall."""
+        return Path(outcome.folder) == self.root / outcome.flight_id
+
+    def place(self, outcome: Outcome) -> str:
+        """Move a finished flight to its place, which is told."""
+        target = self.root / outcome.flight_id
+        place(Path(outcome.folder), target)
+        return str(target)
+
+    def discard(self, folder: str) -> None:
+        """Throw a flight folder away; what somebody else put into one that is in place stays."""
+        if Path(folder).name.startswith("."):
+            shutil.rmtree(folder, ignore_errors=True)
+        else:
+            remove(self.root / Path(folder).name)
 
 
 class _Origin(NamedTuple):

@@ -9,22 +9,12 @@ from groundstation.base.errors import GroundstationError, UsageError, told_in_a_
 from groundstation.base.failures import attempt, failures, gathered_failures
 from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, write_fleet
-from groundstation.pipeline.many_flights.fleet_columns import INDEXED, answer_values
+from groundstation.pipeline.many_flights.fleet_index import rows_without_flight, told_beside, write_index_of
+from groundstation.pipeline.many_flights.fleet_refresh import forget_month, refresh, restamp
 from groundstation.pipeline.many_flights.fleet_samples import SAMPLES
-from groundstation.pipeline.many_flights.fleet_share import index_rows_of
-from groundstation.pipeline.many_flights.fleet_store import (
-    FLIGHTS,
-    MOST_LISTED,
-    DamagedMonthError,
-    Scan,
-    forget_month,
-    refresh,
-    restamp,
-    scan,
-)
+from groundstation.pipeline.many_flights.fleet_store import FLIGHTS, DamagedMonthError, Scan
 from groundstation.pipeline.many_flights.inputs import (
     FLIGHT_FOLDER_MARK,
-    OUT_FOLDER_MARK,
     flight_folders,
     is_ours,
     plan_folders,
@@ -32,16 +22,15 @@ from groundstation.pipeline.many_flights.inputs import (
 )
 from groundstation.pipeline.many_flights.installations import refresh_installations, show_installation
 from groundstation.pipeline.one_flight.flight import REPORT_FILES
-from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
+from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.sealing import note
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
 from groundstation.reports.fleet_report import PDF as FLEET_PDF
 from groundstation.reports.fleet_report import write_fleet_report
-from groundstation.reports.index import IndexRow, Kind
+from groundstation.reports.index import IndexRow
 from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
 from groundstation.results.installation import INSTALLATIONS
 
-MOST_SKIPPED = 1000  # files that the index lists
 FLEET_RECORDING = "fleet.rrd"
 FLEET_FILES = (
     *(INDEX_JSON, INDEX_CSV, FLEET_PARQUET, FLIGHTS, SAMPLES, INSTALLATIONS),
@@ -80,7 +69,7 @@ def write_beside(
                     shown = attempt("installations", "fleet", learn, unless=(OSError, GroundstationError))
                     restamp(out, shown or ())
                     problems += _write_beside(out, outcomes, kept_rows, found, with_pdf, only_results)
-                    problems += [_beside(out, "failed", f"{out}: {one.text}", one.trace) for one in failures()]
+                    problems += [told_beside(out, "failed", f"{out}: {one.text}", one.trace) for one in failures()]
                     break
                 except DamagedMonthError as error:
                     if error.month in again:  # making it again did not help
@@ -88,16 +77,11 @@ def write_beside(
                     again.add(error.month)
                     forget_month(out, error.month)
                     text = f"{error.where}: damaged ({error.found}), made again from the flight folders"
-                    problems.append(_beside(out, "skipped", text))
+                    problems.append(told_beside(out, "skipped", text))
                     found = None
     except Exception as error:  # the flights are done, and told of in any case
-        problems.append(_beside(out, "failed", *reason_of(str(out), error)))
+        problems.append(told_beside(out, "failed", *reason_of(str(out), error)))
     return tuple({(one.source, one.text): one for one in problems}.values())
-
-
-def _beside(place: Path, state: State, text: str, trace: str = "") -> Outcome:
-    """Outcome of something beside the flights, or of a flight folder that was there before."""
-    return Outcome(str(place), state, text, trace=trace, is_beside=True)
 
 
 def _write_beside(
@@ -121,53 +105,7 @@ def _write_beside(
     recording = out / FLEET_RECORDING
     attempt("recording", "fleet", write_fleet_recording, recording, fleet, unless=(OSError, GroundstationError))
     problem = write_fleet_report(out, fleet, with_pdf=with_pdf).problem
-    return [*problems, _beside(out, "skipped", f"{out}: {problem}")] if problem else problems
-
-
-def write_index_of(
-    out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[IndexRow] = (), found: Scan | None = None
-) -> tuple[Outcome, ...]:
-    """Write index.json and index.csv: every flight and session in ``out``, and the logs of this run that gave none.
-
-    Of more than 20 000 flights they say where the rows are. Returns what could not be listed: folders that cannot be
-    read, an index that cannot be written.
-    """
-    from groundstation.reports.index import failed_row, index_row, write_index
-    from groundstation.results.files import load
-
-    found = scan(out) if found is None else found
-    is_large = len(found) > MOST_LISTED
-    problems: list[Outcome] = []
-    rows = [*kept_rows, *([] if is_large else index_rows_of(found.table(["index"])))]
-    unread = [out / name for name in found.stale]
-    listed: tuple[tuple[Kind, list[Path]], ...] = (("flight", unread), ("session", found.sessions))
-    for kind, folder in ((kind, folder) for kind, folders in listed for folder in folders):
-        if is_large and kind == "flight" and len(unread) > MOST_LISTED:
-            continue
-        try:
-            saved = load(folder, ANSWER_TYPES)
-            rows.append(index_row(saved, kind, answer_values(saved.results)))
-        except Exception as error:
-            problems.append(_beside(folder, "failed", *reason_of(folder.name, error)))
-    logs = [one for one in outcomes if not one.is_beside]
-    without_flight = [one for one in logs if not one.flight_id and not (one.is_session and one.state == "skipped")]
-    rows += [failed_row(one.source, one.state, one.text) for one in (*_listed(without_flight), *problems)]
-    try:
-        write_index(out, rows, INDEXED, elsewhere=f"{len(found)} flights: {FLIGHTS}/" if is_large else "")
-    except OSError as error:
-        problems.append(_beside(out, "failed", f"{out}: the index cannot be written ({error.strerror or error})"))
-    return tuple(problems)
-
-
-def _listed(without_flight: Sequence[Outcome]) -> list[Outcome]:
-    """Logs without a flight as the index lists them: of very many skipped files the rest is one row."""
-    skipped = [one for one in without_flight if one.state == "skipped"]
-    rest = skipped[MOST_SKIPPED:]
-    if not rest:
-        return list(without_flight)
-    others = [one for one in without_flight if one.state != "skipped"]
-    told = Outcome(f"{len(rest)} more files", "skipped", f"skipped as these {MOST_SKIPPED}, and not listed")
-    return [*others, *skipped[:MOST_SKIPPED], told]
+    return [*problems, told_beside(out, "skipped", f"{out}: {problem}")] if problem else problems
 
 
 class ReportedAgain(NamedTuple):
@@ -212,12 +150,14 @@ def report_again(out: Path, *, with_pdf: bool = False) -> ReportedAgain:
         except GroundstationError as error:
             if is_flight:
                 raise
-            problems.append(_beside(folder, "failed", str(error)))
+            problems.append(told_beside(folder, "failed", str(error)))
             continue
         paths += written.paths
         if written.problem:
-            problems.append(_beside(folder, "done", f"{folder.name}: {written.problem}"))
-        problems += [_beside(folder, "incomplete", f"{folder.name}: {one.text}", one.trace) for one in written.failures]
+            problems.append(told_beside(folder, "done", f"{folder.name}: {written.problem}"))
+        problems += [
+            told_beside(folder, "incomplete", f"{folder.name}: {one.text}", one.trace) for one in written.failures
+        ]
     if is_flight:
         show_installation(out.absolute())
         return ReportedAgain(paths, tuple(problems), _gone(pdfs, with_pdf=with_pdf))
@@ -234,18 +174,3 @@ def report_again(out: Path, *, with_pdf: bool = False) -> ReportedAgain:
 def _gone(pdfs: Sequence[Path], *, with_pdf: bool) -> list[Path]:
     """Those that are not there any more; none where PDFs were asked for: then it was told why."""
     return [] if with_pdf else [path for path in pdfs if not path.exists()]
-
-
-def rows_without_flight(out: Path) -> list[IndexRow]:
-    """Rows of the logs that gave no flight, from the index as it stands: nothing else remembers them."""
-    import json
-
-    from groundstation.base.serial import MismatchError, from_json
-
-    try:
-        listed = json.loads((out / OUT_FOLDER_MARK).read_text(encoding="utf-8"))["rows"]
-        rows = [from_json(IndexRow, row) for row in listed]
-    except (OSError, ValueError, KeyError, TypeError, MismatchError):
-        return []
-    folders = {str(folder) for folder in (*flight_folders(out), *session_folders(out))}
-    return [row for row in rows if row.kind in ("failed", "skipped") and row.source not in folders]

@@ -9,17 +9,6 @@ from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, NO_LOGS, OUT_FOLDER_MARK
 
 
-def is_remote(place: str) -> bool:
-    """Whether a place is named by URL.
-
-    Examples
-    --------
-    >>> is_remote("s3://flights/2026"), is_remote("flights/2026")
-    (True, False)
-    """
-    return "://" in place
-
-
 class RemoteFolder:
     """A folder named by URL.
 

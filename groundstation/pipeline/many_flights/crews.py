@@ -1,0 +1,29 @@
+"""The crew of a run: a cluster, processes side by side, a process for each log, or this process alone."""
+
+import math
+from functools import partial
+
+from groundstation.pipeline.many_flights.apart import outcomes_apart
+from groundstation.pipeline.many_flights.confined import Bounds
+from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, Crew, in_turn, side_by_side
+from groundstation.pipeline.one_flight.progress import Listener
+
+
+def crew_for(
+    scheduler: str,
+    workers: int,
+    logs: int,
+    listen: Listener,
+    timeout_s: float = math.inf,
+    bounds: Bounds | None = None,
+) -> Crew:
+    """Who does the work: a cluster, processes, or this process alone, where there is little and no limit of time."""
+    if bounds is not None:
+        return partial(outcomes_apart, workers=workers, listen=listen, bounds=bounds)
+    if scheduler:
+        from groundstation.pipeline.many_flights.cluster import on_cluster
+
+        return partial(on_cluster, scheduler=scheduler, timeout_s=timeout_s)
+    if min(workers, logs) <= 1 and logs <= TASKS_PER_PROCESS and math.isinf(timeout_s):
+        return partial(in_turn, listen=listen)
+    return partial(side_by_side, workers=min(workers, logs), listen=listen, timeout_s=timeout_s)
