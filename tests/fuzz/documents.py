@@ -185,7 +185,7 @@ LOADERS: dict[str, Callable[[Path], Any]] = {
     "thresholds": _settings("thresholds"),
     "profile": _profile,
     "icd": _icd,
-    "stations": _load("groundstation.pipeline.many_flights.session", "load_stations"),
+    "stations": _load("groundstation.pipeline.many_flights.session_job", "load_stations"),
     "scenario": _load("groundstation.simulation.scenario", "load_scenario"),
     "session": _load("groundstation.simulation.session_scenario", "load_session"),
     "approach": _load("groundstation.simulation.approach", "load_approach"),

@@ -35,7 +35,8 @@ from groundstation.pipeline.many_flights.output import RemoteOutput
 from groundstation.pipeline.many_flights.placement import LocalOutput, Placement
 from groundstation.pipeline.many_flights.publishing import FLEET_FILES, write_beside
 from groundstation.pipeline.many_flights.remote_runs import RemoteJob, digest_remote, run_remote
-from groundstation.pipeline.many_flights.session import load_stations, run_one
+from groundstation.pipeline.many_flights.session import run_one
+from groundstation.pipeline.many_flights.session_job import load_stations
 from groundstation.pipeline.many_flights.strangers import Strangers
 from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJob, Crew, in_turn
 from groundstation.pipeline.one_flight.configuration import Configuration

@@ -11,7 +11,7 @@ from groundstation.pipeline.many_flights.inputs import is_remote
 from groundstation.pipeline.many_flights.known_flights import KnownFlights
 from groundstation.pipeline.many_flights.listed_logs import inputs_of, skipped_files, with_steps, without_parts
 from groundstation.pipeline.many_flights.out_folder import refuse_foreign
-from groundstation.pipeline.many_flights.session import load_stations, planned_session
+from groundstation.pipeline.many_flights.session_job import load_stations, planned_session
 from groundstation.pipeline.many_flights.strangers import Strangers
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job

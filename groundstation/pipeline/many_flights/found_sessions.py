@@ -10,7 +10,7 @@ from groundstation.base.errors import GroundstationError, SettingsError
 from groundstation.base.findings import Finding
 from groundstation.pipeline.many_flights.fleet_store import Scan
 from groundstation.pipeline.many_flights.inputs import file_in, is_remote
-from groundstation.pipeline.many_flights.session import SessionJob, load_stations, sessions_of
+from groundstation.pipeline.many_flights.session_job import SessionJob, load_stations, sessions_of
 from groundstation.pipeline.many_flights.session_search import (
     Member,
     Span,

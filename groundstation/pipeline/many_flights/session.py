@@ -1,32 +1,28 @@
 """One session from beginning to end: MCAPs of its logs, answers, recording and report in a folder of its own."""
 
-import hashlib
-import platform
 import shutil
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from groundstation.base.clock import Clock
 from groundstation.base.errors import GroundstationError, NotAssessableError
-from groundstation.base.failures import attempt, failures, gathered_failures, is_incomplete, with_failures
+from groundstation.base.failures import attempt, failures, gathered_failures, with_failures
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import RecordBatch
 from groundstation.base.signals import kind_of
-from groundstation.base.toml_settings import settings_from
 from groundstation.chapters.cooperative import names_or_count
 from groundstation.estimators.analyses import ANSWER_TYPES, SESSION_ANALYSES
 from groundstation.estimators.cooperative.analysis import SessionKnown
-from groundstation.pipeline.many_flights.inputs import session_folders
-from groundstation.pipeline.many_flights.session_figures import session_figures
+from groundstation.pipeline.many_flights.session_job import SessionJob, kept_session
 from groundstation.pipeline.one_flight.analyse import run_analyses
-from groundstation.pipeline.one_flight.configuration import Configuration, read_toml, session_tables
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import (
     OF_THE_WORLD,
-    REPORT_FILES,
     Stopwatch,
     partial_folder,
     place,
@@ -34,17 +30,17 @@ from groundstation.pipeline.one_flight.flight import (
     state_of,
 )
 from groundstation.pipeline.one_flight.identity import MAX_PART_CHARACTERS, flight_id, safe_part
-from groundstation.pipeline.one_flight.log import Log
 from groundstation.pipeline.one_flight.manifest import manifest_of
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Listener, silent
-from groundstation.pipeline.one_flight.resume import TO_DO, Step, digest_of_parts, versions
-from groundstation.pipeline.one_flight.sealing import seal, spoiled_files
-from groundstation.reports.flight_report import PDF, REPORT, write_flight_report
+from groundstation.pipeline.one_flight.sealing import seal
+from groundstation.reports.flight_report import write_flight_report
+from groundstation.results.arrays.cooperative import SessionClocks, SessionPoints
+from groundstation.results.figures import FigureData
 from groundstation.results.file_names import MANIFEST
 from groundstation.results.files import load_document, load_manifest, put_failures, save
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.manifest import Keys, LogOfSession, Manifest, Resume
+from groundstation.results.manifest import LogOfSession, Manifest, Resume
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.session_assemble import AssembledSession, session_from_flights
 from groundstation.tables.session_settings import Stations
@@ -55,82 +51,6 @@ if TYPE_CHECKING:
 
 KINDS = frozenset(("ins", "baro", "link", "satellite", "truth"))  # of topics that a session reads
 MCAPS = "mcap"  # folder of those that the session converted itself
-
-
-@dataclass(frozen=True)
-class SessionJob:
-    """One session to run.
-
-    Parameters
-    ----------
-    logs : tuple of Log
-        Those that a reader claims, in the order of their digests.
-    stations : Stations
-    out : Path
-    configuration : Configuration
-    fail_on : str
-    with_pdf : bool
-    redo : bool
-        Whether it is run though a session with equal keys is finished.
-    is_found : bool
-        Whether a run found it among its flights; it then leaves what the verb ``cooperative`` made of these logs.
-    notes : tuple of Finding
-        What is known of it before its logs are read.
-    only_results : bool
-        Whether there is neither a recording nor a report.
-    is_copy : bool
-        Whether ``out`` is a copy of a folder elsewhere, which has most files by name alone.
-    """
-
-    logs: tuple[Log, ...]
-    stations: Stations
-    out: Path
-    configuration: Configuration
-    fail_on: str = "none"
-    with_pdf: bool = False
-    redo: bool = False
-    is_found: bool = False
-    notes: tuple[Finding, ...] = ()
-    only_results: bool = False
-    is_copy: bool = False
-
-    @property
-    def log(self) -> str:
-        """Its logs as the user would type them."""
-        return self.name
-
-    @property
-    def name(self) -> str:
-        """Names of its logs."""
-        return ", ".join(sorted(log.source.name for log in self.logs))
-
-    @property
-    def sha256(self) -> str:
-        """Digest over those of the logs, whatever their order."""
-        return hashlib.sha256("\n".join(sorted(log.source.sha256 for log in self.logs)).encode()).hexdigest()
-
-    def keys(self) -> Keys:
-        """Equal keys, equal results: logs, stations, settings and versions go in."""
-        logs = [asdict(log.source) for log in self.logs]
-        tables = dict(self.configuration.tables)
-        thresholds = tables.get("thresholds", {})
-        used = {name: tables.get(name, {}) for name in session_tables()}
-        conversion = digest_of_parts(
-            logs, thresholds, self.configuration.profile, dict(versions()), platform.python_version()
-        )
-        analysis = digest_of_parts(conversion, asdict(self.stations), used, [asdict(note) for note in self.notes])
-        return Keys(conversion, analysis)
-
-
-def load_stations(path: Path | None) -> Stations:
-    """Ground stations from a TOML file; none without one.
-
-    Raises
-    ------
-    SettingsError
-        For a file that cannot be read, an unknown key or a value out of range, naming file and key.
-    """
-    return Stations() if path is None else settings_from(Stations, read_toml(path), str(path))
 
 
 def run_one(job: SessionJob, listen: Listener = silent) -> Outcome:
@@ -168,63 +88,9 @@ def _outcome(
     )
 
 
-def sessions_of(out: Path) -> Iterator[tuple[Path, Manifest]]:
-    """Whole sessions of a folder, each with its manifest."""
-    for folder in session_folders(out):
-        try:
-            yield folder, load_manifest(folder)
-        except GroundstationError:
-            continue
-
-
-class _Kept(NamedTuple):
-    """A session of the same logs and settings that an earlier run left, and what of its report is to be made."""
-
-    folder: Path
-    resume: Resume
-    step: Step
-    with_pdf: bool = False
-
-
-def _kept(job: SessionJob) -> _Kept | None:
-    keys = job.keys()
-    for folder, manifest in sessions_of(job.out):
-        resume = manifest.resume
-        if resume is None or manifest.source.sha256 != job.sha256:
-            continue
-        is_of_the_verb = job.is_found and not manifest.is_found
-        spoiled = frozenset() if job.is_copy else spoiled_files(folder, manifest)
-        is_whole = resume.keys.analysis == keys.analysis and not _is_incomplete(folder)
-        is_whole &= spoiled <= {f"{folder.name}.rrd", *REPORT_FILES}
-        if not job.only_results:
-            is_whole &= _is_whole(folder / f"{folder.name}.rrd", spoiled)
-        if not is_of_the_verb and (job.redo or not is_whole):
-            continue
-        if job.only_results:
-            return _Kept(folder, resume, "nothing")
-        has_pdf = PDF in manifest.files and _is_whole(folder / PDF, spoiled)
-        step: Step = "pdf" if job.with_pdf and not has_pdf else "nothing"
-        if not _is_whole(folder / REPORT, spoiled):
-            step = "reports"
-        return _Kept(folder, resume, step, job.with_pdf or has_pdf)  # one that is there stays
-    return None
-
-
-def _is_incomplete(folder: Path) -> bool:
-    """Tell whether a part of a session failed: it is then run again."""
-    try:
-        return is_incomplete(load_document(folder).findings)
-    except GroundstationError:
-        return True
-
-
-def _is_whole(file: Path, spoiled: Collection[str]) -> bool:
-    return file.is_file() and file.name not in spoiled
-
-
 def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
     """The outcome of a session that is finished, its reports made again where they are missing; None without one."""
-    kept = _kept(job)
+    kept = kept_session(job)
     if kept is None:
         return None
     folder, resume, problem = kept.folder, kept.resume, ""
@@ -234,16 +100,6 @@ def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
     state = state_of(load_document(folder).findings, resume.has_lost_data, job.fail_on)
     found = _outcome(job, state, "; ".join(filter(None, (resume.text, problem))), folder, watch)
     return replace(found, was_finished=kept.step == "nothing")
-
-
-def planned_session(job: SessionJob) -> Outcome:
-    """What :func:`run_one` would do of a session; nothing is written."""
-    kept = _kept(job)
-    if kept is None:
-        return Outcome(job.name, "done", "session to run", is_session=True)
-    is_finished = kept.step == "nothing"
-    text = f"session {TO_DO[kept.step]}"
-    return Outcome(job.name, "done", text, kept.folder.name, is_session=True, was_finished=is_finished)
 
 
 def _run_into(partial: Path, job: SessionJob, watch: Stopwatch) -> Outcome:
@@ -350,7 +206,7 @@ def _results(
         findings=tuple(findings),
         not_assessable=found.not_assessable,
         answers=found.answers,
-        figures=(*session_figures(assembled), *(one for answer in found.answers.values() for one in answer.figures)),
+        figures=(*_session_figures(assembled), *(one for answer in found.answers.values() for one in answer.figures)),
     )
 
 
@@ -402,3 +258,33 @@ def _sentence(results: FlightResults) -> str:
 def _manifest(job: SessionJob, results: FlightResults, logs: tuple[LogOfSession, ...], resume: Resume) -> Manifest:
     configuration = job.configuration.to_dict() | {"stations": asdict(job.stations)}
     return replace(manifest_of(results, configuration, resume=resume), logs=logs, is_found=job.is_found)
+
+
+def _session_figures(assembled: AssembledSession) -> tuple[FigureData, ...]:
+    """``session_clocks``, a row a log, and ``session_points`` where the session has ground points."""
+    clocks, points = assembled.clocks, assembled.session.points
+    offsets = [float("nan") if row.offset_s is None else row.offset_s for row in clocks]
+    found: list[FigureData] = [
+        SessionClocks(
+            aircraft=np.array([row.aircraft for row in clocks], dtype=np.str_),
+            log=np.array([row.log for row in clocks], dtype=np.str_),
+            has_utc=np.array([row.has_utc for row in clocks], dtype=bool),
+            ranges=np.array([row.ranges for row in clocks], dtype=np.int64),
+            offset_s=np.array(offsets, dtype=np.float64),
+            leaps=np.array([row.leaps for row in clocks], dtype=np.int64),
+            is_corrected=np.array([row.is_corrected for row in clocks], dtype=bool),
+        )
+    ]
+    if points:
+        places = np.array([point.position_m for point in points])
+        x_m, y_m, z_m = places.T
+        found.append(
+            SessionPoints(
+                label=np.array([point.name for point in points], dtype=np.str_),
+                x_m=x_m,
+                y_m=y_m,
+                z_m=z_m,
+                position_sigma_m=np.array([point.position_sigma_m for point in points]),
+            )
+        )
+    return tuple(found)
