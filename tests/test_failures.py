@@ -22,8 +22,8 @@ from groundstation.chapters.plots.fleet import FLEET_PLOTS
 from groundstation.cli.main import main
 from groundstation.estimators.analyses import FLIGHT_ANALYSES, SESSION_ANALYSES
 from groundstation.estimators.analysis import Analysis
-from groundstation.pipeline.many_flights import publishing
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.fleet import publishing
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight import analyse as analysing
 from groundstation.pipeline.one_flight import flight as running
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -269,7 +269,7 @@ def test_a_chapter_on_a_fleet_that_fails_leaves_the_others(
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    from groundstation.pipeline.many_flights.fleet import gather
+    from groundstation.pipeline.many_flights.fleet.statistics import gather
     from tests.fleet_example import save_flight
 
     out: Path = tmp_path_factory.mktemp("fleet")

@@ -16,11 +16,11 @@ from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.installation.lesson import Stored, lesson_of
 from groundstation.estimators.installation.series import answer_from
 from groundstation.estimators.installation.settings import InstallationSettings
-from groundstation.pipeline.many_flights.batch import run_many
-from groundstation.pipeline.many_flights.fleet_refresh import refresh
-from groundstation.pipeline.many_flights.fleet_store import scan
-from groundstation.pipeline.many_flights.installations import refresh_installations, show_installation
-from groundstation.pipeline.many_flights.publishing import write_beside
+from groundstation.pipeline.many_flights.fleet.installations import refresh_installations, show_installation
+from groundstation.pipeline.many_flights.fleet.publishing import write_beside
+from groundstation.pipeline.many_flights.fleet.refresh import refresh
+from groundstation.pipeline.many_flights.fleet.scan import scan
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration, installed_as
 from groundstation.pipeline.verbs.rules import RulesTest, rules_test
 from groundstation.reports.flight_report import REPORT, write_flight_report

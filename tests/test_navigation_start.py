@@ -15,7 +15,7 @@ from groundstation.chapters import inertial as chapter
 from groundstation.cli.main import app
 from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
 from groundstation.estimators.known import AircraftData
-from groundstation.pipeline.many_flights.acceptance import accept
+from groundstation.pipeline.verbs.acceptance import accept
 from groundstation.results.inertial import InertialResult
 from groundstation.tables.table import Flight
 from tests.acceptance_example import save_fleet, save_flight

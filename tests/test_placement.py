@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.pipeline.many_flights.fleet_refresh import refresh
-from groundstation.pipeline.many_flights.fleet_store import scan
-from groundstation.pipeline.many_flights.placement import LocalOutput, Placement
+from groundstation.pipeline.many_flights.fleet.refresh import refresh
+from groundstation.pipeline.many_flights.fleet.scan import scan
+from groundstation.pipeline.many_flights.runs.destination import LocalOutput, Placement
 from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX, remove
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.files import load_manifest, save_manifest

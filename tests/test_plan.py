@@ -14,8 +14,8 @@ from groundstation.estimators.analyses import ANSWER_TYPES, PLANS
 from groundstation.estimators.control.scenario import SessionPlan
 from groundstation.estimators.landing_ranges.scenario import RangeApproach
 from groundstation.estimators.plan import Plan
+from groundstation.pipeline.many_flights.fleet.publishing import report_again
 from groundstation.pipeline.many_flights.inputs import flight_folders, plan_folders
-from groundstation.pipeline.many_flights.publishing import report_again
 from groundstation.pipeline.verbs.plan import run_plan, shipped_scenarios
 from groundstation.results.files import load, load_manifest
 from groundstation.studies.shipped_plans import load_plan, plan_names

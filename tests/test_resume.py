@@ -19,13 +19,13 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import UsageError
 from groundstation.cli.main import app
-from groundstation.pipeline.many_flights import workers
-from groundstation.pipeline.many_flights.batch import run_many
-from groundstation.pipeline.many_flights.crews import crew_for
-from groundstation.pipeline.many_flights.dry_run import plan_many
-from groundstation.pipeline.many_flights.flight_keys import KEYS
-from groundstation.pipeline.many_flights.out_folder import LOCK
-from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, _teller, in_turn, side_by_side
+from groundstation.pipeline.many_flights.fleet.keys import KEYS
+from groundstation.pipeline.many_flights.processes import workers
+from groundstation.pipeline.many_flights.processes.crews import crew_for
+from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS, _teller, in_turn, side_by_side
+from groundstation.pipeline.many_flights.runs.batch import run_many
+from groundstation.pipeline.many_flights.runs.dry_run import plan_many
+from groundstation.pipeline.many_flights.runs.out_folder import LOCK
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job
 from groundstation.pipeline.one_flight.outcome import Outcome
@@ -239,7 +239,7 @@ def test_workers_end_with_a_run_that_is_killed(tmp_path: Path) -> None:
         "from groundstation.pipeline.one_flight.configuration import Configuration;"
         "from groundstation.pipeline.one_flight.flight import Job;"
         "from groundstation.pipeline.one_flight.progress import silent;"
-        "from groundstation.pipeline.many_flights.workers import side_by_side;"
+        "from groundstation.pipeline.many_flights.processes.workers import side_by_side;"
         "job = Job(Path('x'), Path(sys.argv[1]), Configuration());"
         "list(side_by_side([(0, job)], tell_and_sleep, workers=1, listen=silent))"
     )

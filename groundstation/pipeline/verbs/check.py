@@ -171,8 +171,8 @@ def _for_session(
     found: Sequence[Checked], purpose: str, flights: Mapping[int, "Flight"], configuration: Configuration, fail_on: str
 ) -> list[Checked]:
     """The checks with what their logs can be used for together, with the stations beside the first of them."""
-    from groundstation.pipeline.many_flights.found_sessions import STATIONS_TOML
-    from groundstation.pipeline.many_flights.session_job import load_stations
+    from groundstation.pipeline.many_flights.sessions.found import STATIONS_TOML
+    from groundstation.pipeline.many_flights.sessions.job import load_stations
     from groundstation.pipeline.verbs.usable import usability_of_session
 
     file = Path(found[min(flights)].outcome.source).with_name(STATIONS_TOML)

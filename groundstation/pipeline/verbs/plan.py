@@ -13,7 +13,7 @@ from groundstation.base.findings import worst
 from groundstation.estimators.analyses import ANSWER_TYPES, PLANS
 from groundstation.estimators.plan import Plan, Planned
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, PLAN_MARK
-from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
+from groundstation.pipeline.many_flights.runs.out_folder import alone_in, prepare, refuse_foreign
 from groundstation.pipeline.one_flight.flight import (
     OF_THE_WORLD,
     Stopwatch,

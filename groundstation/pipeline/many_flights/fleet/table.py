@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.serial import from_json, to_json_exactly
 from groundstation.estimators.fleet.density import SampleHistogram
-from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, TEXTS, FlightShare, dataset_schema
+from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS, TEXTS, FlightShare, dataset_schema
 from groundstation.reports.index import IndexRow
 from groundstation.results.columns import FlightColumn
 from groundstation.results.figures import FigureData

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.many_flights.fleet_store import names_in, remembered
+from groundstation.pipeline.many_flights.fleet.scan import names_in, remembered
 from groundstation.pipeline.one_flight.parts import LONGEST_GAP_S, family
 from groundstation.pipeline.one_flight.resume import Finished, finished
 from groundstation.results.files import load_manifest

@@ -3,9 +3,9 @@
 import math
 from functools import partial
 
-from groundstation.pipeline.many_flights.apart import outcomes_apart
-from groundstation.pipeline.many_flights.confined import Bounds
-from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, Crew, in_turn, side_by_side
+from groundstation.pipeline.many_flights.processes.apart import outcomes_apart
+from groundstation.pipeline.many_flights.processes.confined import Bounds
+from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS, Crew, in_turn, side_by_side
 from groundstation.pipeline.one_flight.progress import Listener
 
 
@@ -21,7 +21,7 @@ def crew_for(
     if bounds is not None:
         return partial(outcomes_apart, workers=workers, listen=listen, bounds=bounds)
     if scheduler:
-        from groundstation.pipeline.many_flights.cluster import on_cluster
+        from groundstation.pipeline.many_flights.processes.cluster import on_cluster
 
         return partial(on_cluster, scheduler=scheduler, timeout_s=timeout_s)
     if min(workers, logs) <= 1 and logs <= TASKS_PER_PROCESS and math.isinf(timeout_s):

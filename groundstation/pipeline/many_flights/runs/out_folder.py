@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.many_flights.fleet_index import write_index_of
+from groundstation.pipeline.many_flights.fleet.index import write_index_of
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, is_ours
 from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX
 from groundstation.results.file_names import INDEX_CSV, INDEX_JSON

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.many_flights.remote import RemoteFolder
+from groundstation.pipeline.many_flights.remote.folder import RemoteFolder
 
 LOCKS = ".lock"  # folder of an OUT; names in it are numbers, the highest one counts
 LEASE_S, RENEW_S = 600.0, 60.0

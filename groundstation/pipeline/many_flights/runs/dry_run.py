@@ -5,14 +5,14 @@ from functools import partial
 from pathlib import Path
 
 from groundstation.base.errors import UnclaimedLogError, UsageError
-from groundstation.pipeline.many_flights.fleet_store import Scan, scan
-from groundstation.pipeline.many_flights.found_sessions import STATIONS_TOML, Asked, FoundSessions, find_sessions
+from groundstation.pipeline.many_flights.fleet.scan import Scan, scan
 from groundstation.pipeline.many_flights.inputs import is_remote
-from groundstation.pipeline.many_flights.known_flights import KnownFlights
-from groundstation.pipeline.many_flights.listed_logs import inputs_of, skipped_files, with_steps, without_parts
-from groundstation.pipeline.many_flights.out_folder import refuse_foreign
-from groundstation.pipeline.many_flights.session_job import load_stations, planned_session
-from groundstation.pipeline.many_flights.strangers import Strangers
+from groundstation.pipeline.many_flights.runs.known_flights import KnownFlights
+from groundstation.pipeline.many_flights.runs.listed_logs import inputs_of, skipped_files, with_steps, without_parts
+from groundstation.pipeline.many_flights.runs.out_folder import refuse_foreign
+from groundstation.pipeline.many_flights.runs.strangers import Strangers
+from groundstation.pipeline.many_flights.sessions.found import STATIONS_TOML, Asked, FoundSessions, find_sessions
+from groundstation.pipeline.many_flights.sessions.job import load_stations, planned_session
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job
 from groundstation.pipeline.one_flight.log import open_log

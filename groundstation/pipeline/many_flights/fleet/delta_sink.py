@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from groundstation.base.errors import GroundstationError, UsageError
-from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
-from groundstation.pipeline.many_flights.fleet_store import Scan
+from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
+from groundstation.pipeline.many_flights.fleet.scan import Scan
 from groundstation.pipeline.one_flight.outcome import Outcome
 
 KIND = "delta:"

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from groundstation.estimators.analyses import ANSWER_TYPES
-from groundstation.pipeline.many_flights.fleet_columns import INDEXED, answer_values
-from groundstation.pipeline.many_flights.fleet_share import index_rows_of
-from groundstation.pipeline.many_flights.fleet_store import FLIGHTS, MOST_LISTED, Scan, scan
+from groundstation.pipeline.many_flights.fleet.columns import INDEXED, answer_values
+from groundstation.pipeline.many_flights.fleet.scan import FLIGHTS, MOST_LISTED, Scan, scan
+from groundstation.pipeline.many_flights.fleet.table import index_rows_of
 from groundstation.pipeline.many_flights.inputs import OUT_FOLDER_MARK, flight_folders, session_folders
 from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.reports.index import IndexRow, Kind

@@ -12,11 +12,11 @@ from pathlib import Path
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.many_flights.inputs import collect
-from groundstation.pipeline.many_flights.out_folder import refuse_foreign
-from groundstation.pipeline.many_flights.watched_batch import Batch, run_batch
+from groundstation.pipeline.many_flights.runs.out_folder import refuse_foreign
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Listener, silent
+from groundstation.pipeline.verbs.watched_batch import Batch, run_batch
 from groundstation.readers.bags.bag import METADATA
 
 UNFINISHED = (".part", ".partial", ".tmp", ".filepart", ".crdownload")  # what programs call a file that still comes

@@ -120,8 +120,8 @@ def _end_with_the_watch() -> None:
 
 
 def _outcomes(batch: Batch, listen: Listener) -> tuple[Outcome, ...]:
-    from groundstation.pipeline.many_flights.batch import run_many
-    from groundstation.pipeline.many_flights.fleet_index import rows_without_flight
+    from groundstation.pipeline.many_flights.fleet.index import rows_without_flight
+    from groundstation.pipeline.many_flights.runs.batch import run_many
 
     strangers = [one for path in batch.paths if (one := _unclaimed(path, batch)) is not None]
     claimed = sorted({*map(str, batch.paths)} - {one.source for one in strangers})
@@ -180,8 +180,8 @@ def _unclaimed(path: Path, batch: Batch) -> Outcome | None:
 
 def _list_too(batch: Batch, before: "list[IndexRow]", strangers: list[Outcome]) -> None:
     """List in the index the logs without a flight of earlier batches, and the files that no reader claims."""
-    from groundstation.pipeline.many_flights.fleet_index import rows_without_flight, write_index_of
-    from groundstation.pipeline.many_flights.out_folder import alone_in
+    from groundstation.pipeline.many_flights.fleet.index import rows_without_flight, write_index_of
+    from groundstation.pipeline.many_flights.runs.out_folder import alone_in
 
     now = {str(path) for path in batch.paths}
     kept = [row for row in before if row.source not in now]

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, SettingsError
 from groundstation.base.findings import Finding
-from groundstation.pipeline.many_flights.fleet_store import Scan
+from groundstation.pipeline.many_flights.fleet.scan import Scan
 from groundstation.pipeline.many_flights.inputs import file_in, is_remote
-from groundstation.pipeline.many_flights.session_job import SessionJob, load_stations, sessions_of
-from groundstation.pipeline.many_flights.session_search import (
+from groundstation.pipeline.many_flights.sessions.job import SessionJob, load_stations, sessions_of
+from groundstation.pipeline.many_flights.sessions.search import (
     Member,
     Span,
     heard_span_ns,

@@ -20,7 +20,7 @@ from groundstation.base.records import RecordBatch
 from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.many_flights.fleet_store import Scan
+from groundstation.pipeline.many_flights.fleet.scan import Scan
 from groundstation.results.files import load_document
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.session_clock import transmission_ns

@@ -15,8 +15,8 @@ import numpy as np
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.version import __version__
-from groundstation.pipeline.many_flights.fleet_columns import DETAILS, FLIGHT_COLUMNS, dataset_schema
-from groundstation.pipeline.many_flights.flight_keys import (
+from groundstation.pipeline.many_flights.fleet.columns import DETAILS, FLIGHT_COLUMNS, dataset_schema
+from groundstation.pipeline.many_flights.fleet.keys import (
     Keys,
     read_keys,
 )

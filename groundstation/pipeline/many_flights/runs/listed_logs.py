@@ -7,9 +7,9 @@ from pathlib import Path
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.many_flights.inputs import collect, is_ours, is_remote
-from groundstation.pipeline.many_flights.known_flights import KnownFlights
-from groundstation.pipeline.many_flights.remote import FarLog, far_logs
-from groundstation.pipeline.many_flights.strangers import Strangers
+from groundstation.pipeline.many_flights.remote.folder import FarLog, far_logs
+from groundstation.pipeline.many_flights.runs.known_flights import KnownFlights
+from groundstation.pipeline.many_flights.runs.strangers import Strangers
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.log import as_log, digest_of

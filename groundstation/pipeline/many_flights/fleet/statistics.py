@@ -18,9 +18,10 @@ from groundstation.estimators.fleet.deviation import deviations
 from groundstation.estimators.fleet.installations import installation_flights, installation_rows
 from groundstation.estimators.fleet.moments import Moments
 from groundstation.estimators.fleet.skill import SkillMerger
-from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
-from groundstation.pipeline.many_flights.fleet_rows import session_row, share_of
-from groundstation.pipeline.many_flights.fleet_share import (
+from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
+from groundstation.pipeline.many_flights.fleet.rows import session_row, share_of
+from groundstation.pipeline.many_flights.fleet.scan import MOST_LISTED, Scan, scan
+from groundstation.pipeline.many_flights.fleet.table import (
     check_rows_of,
     fleet_parquet,
     flights_of,
@@ -28,7 +29,6 @@ from groundstation.pipeline.many_flights.fleet_share import (
     skill_rows_of,
     to_arrow,
 )
-from groundstation.pipeline.many_flights.fleet_store import MOST_LISTED, Scan, scan
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights
 from groundstation.results.figures import FigureData
@@ -94,7 +94,7 @@ def write_fleet(out: Path, found: Scan) -> tuple[FleetResults, tuple[Outcome, ..
     ----------
     out : Path
     found : Scan
-        What :func:`groundstation.pipeline.many_flights.fleet_store.refresh` gave.
+        What :func:`groundstation.pipeline.many_flights.fleet.refresh.refresh` gave.
 
     Returns
     -------

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, OUT_FOLDER_MARK, SESSION_ARRAYS
-from groundstation.pipeline.many_flights.lease import LOCKS, Lease, alone_elsewhere
-from groundstation.pipeline.many_flights.remote import RemoteFolder
-from groundstation.pipeline.many_flights.remote_runs import BY_LOG, STAGING, array_files, remember_flight
+from groundstation.pipeline.many_flights.remote.folder import RemoteFolder
+from groundstation.pipeline.many_flights.remote.jobs import BY_LOG, STAGING, array_files, remember_flight
+from groundstation.pipeline.many_flights.remote.lease import LOCKS, Lease, alone_elsewhere
 from groundstation.pipeline.one_flight.flight import is_made
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE

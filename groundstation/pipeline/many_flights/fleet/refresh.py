@@ -13,13 +13,13 @@ from typing import Any
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.many_flights.fleet_columns import FlightShare, dataset_schema
-from groundstation.pipeline.many_flights.fleet_rows import share_of
-from groundstation.pipeline.many_flights.fleet_samples import SampleStore
-from groundstation.pipeline.many_flights.fleet_share import to_arrow
-from groundstation.pipeline.many_flights.fleet_store import FLIGHTS, Scan, month_path, rows_of, scan, stamp_of
-from groundstation.pipeline.many_flights.flight_keys import Key, Keys, key_path, month_of, read_keys, write_keys
-from groundstation.pipeline.many_flights.workers import Crew, in_turn
+from groundstation.pipeline.many_flights.fleet.columns import FlightShare, dataset_schema
+from groundstation.pipeline.many_flights.fleet.keys import Key, Keys, key_path, month_of, read_keys, write_keys
+from groundstation.pipeline.many_flights.fleet.rows import share_of
+from groundstation.pipeline.many_flights.fleet.samples import SampleStore
+from groundstation.pipeline.many_flights.fleet.scan import FLIGHTS, Scan, month_path, rows_of, scan, stamp_of
+from groundstation.pipeline.many_flights.fleet.table import to_arrow
+from groundstation.pipeline.many_flights.processes.workers import Crew, in_turn
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.results.files import parquet_bytes, utf8_text, write_bytes

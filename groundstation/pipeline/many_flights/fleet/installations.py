@@ -10,9 +10,9 @@ from groundstation.estimators.analyses import ANSWER_TYPES
 from groundstation.estimators.installation.analysis import sentence_of
 from groundstation.estimators.installation.series import Series, installation_of, series_of
 from groundstation.estimators.installation.settings import InstallationSettings
-from groundstation.pipeline.many_flights.fleet_rows import lesson_of
-from groundstation.pipeline.many_flights.fleet_share import lessons_of
-from groundstation.pipeline.many_flights.fleet_store import Scan
+from groundstation.pipeline.many_flights.fleet.rows import lesson_of
+from groundstation.pipeline.many_flights.fleet.scan import Scan
+from groundstation.pipeline.many_flights.fleet.table import lessons_of
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.sealing import note
 from groundstation.reports.flight_report import REPORT

@@ -12,33 +12,33 @@ from types import MappingProxyType
 
 from groundstation.base.errors import UsageError
 from groundstation.base.to_disk import sync_folder
-from groundstation.pipeline.many_flights.apart import bounds_of
-from groundstation.pipeline.many_flights.consecutive import flights_of_parts
-from groundstation.pipeline.many_flights.crews import crew_for
-from groundstation.pipeline.many_flights.delta_sink import delta_place, put_flights
-from groundstation.pipeline.many_flights.fleet_index import write_index_of
-from groundstation.pipeline.many_flights.fleet_refresh import refresh
-from groundstation.pipeline.many_flights.fleet_store import Scan
-from groundstation.pipeline.many_flights.found_sessions import Asked, find_sessions, sweep_sessions
+from groundstation.pipeline.many_flights.fleet.delta_sink import delta_place, put_flights
+from groundstation.pipeline.many_flights.fleet.index import write_index_of
+from groundstation.pipeline.many_flights.fleet.installations import told
+from groundstation.pipeline.many_flights.fleet.publishing import FLEET_FILES, write_beside
+from groundstation.pipeline.many_flights.fleet.refresh import refresh
+from groundstation.pipeline.many_flights.fleet.scan import Scan
 from groundstation.pipeline.many_flights.inputs import is_remote, session_folders
-from groundstation.pipeline.many_flights.installations import told
-from groundstation.pipeline.many_flights.known_flights import KnownFlights
-from groundstation.pipeline.many_flights.listed_logs import (
+from groundstation.pipeline.many_flights.processes.apart import bounds_of
+from groundstation.pipeline.many_flights.processes.crews import crew_for
+from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS, AnyJob, Crew, in_turn
+from groundstation.pipeline.many_flights.remote.jobs import RemoteJob, digest_remote, run_remote
+from groundstation.pipeline.many_flights.remote.output import RemoteOutput
+from groundstation.pipeline.many_flights.runs.consecutive import flights_of_parts
+from groundstation.pipeline.many_flights.runs.destination import LocalOutput, Placement
+from groundstation.pipeline.many_flights.runs.known_flights import KnownFlights
+from groundstation.pipeline.many_flights.runs.listed_logs import (
     inputs_of,
     run_known,
     skipped_files,
     with_steps,
     without_parts,
 )
-from groundstation.pipeline.many_flights.out_folder import alone_in, clear_unfinished, prepare, refuse_foreign
-from groundstation.pipeline.many_flights.output import RemoteOutput
-from groundstation.pipeline.many_flights.placement import LocalOutput, Placement
-from groundstation.pipeline.many_flights.publishing import FLEET_FILES, write_beside
-from groundstation.pipeline.many_flights.remote_runs import RemoteJob, digest_remote, run_remote
-from groundstation.pipeline.many_flights.session import run_one
-from groundstation.pipeline.many_flights.session_job import load_stations
-from groundstation.pipeline.many_flights.strangers import Strangers
-from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, AnyJob, Crew, in_turn
+from groundstation.pipeline.many_flights.runs.out_folder import alone_in, clear_unfinished, prepare, refuse_foreign
+from groundstation.pipeline.many_flights.runs.strangers import Strangers
+from groundstation.pipeline.many_flights.sessions.found import Asked, find_sessions, sweep_sessions
+from groundstation.pipeline.many_flights.sessions.job import load_stations
+from groundstation.pipeline.many_flights.sessions.session import run_one
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.cores import cores
 from groundstation.pipeline.one_flight.flight import Job, run_flight

@@ -21,8 +21,8 @@ from groundstation.estimators.fleet.skill import SkillOfFlight
 from groundstation.estimators.heading.figures import IN_PAUSE
 from groundstation.estimators.heading.references import REFERENCE_SIGMA_DEG, logged_reference
 from groundstation.estimators.installation.lesson import lesson_of_flight
-from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, Check, FlightShare, answer_values
-from groundstation.pipeline.many_flights.fleet_samples import FleetSamples, SampleStore
+from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS, Check, FlightShare, answer_values
+from groundstation.pipeline.many_flights.fleet.samples import FleetSamples, SampleStore
 from groundstation.reports.index import index_row, reasons_of
 from groundstation.results.arrays.heading import HeadingSamples
 from groundstation.results.arrays.reference import ReferenceChecks

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from groundstation.base.errors import GroundstationError
-from groundstation.pipeline.many_flights.fleet_store import Scan
-from groundstation.pipeline.many_flights.flight_keys import Keys
+from groundstation.pipeline.many_flights.fleet.keys import Keys
+from groundstation.pipeline.many_flights.fleet.scan import Scan
 from groundstation.pipeline.many_flights.inputs import is_remote
 from groundstation.pipeline.one_flight.flight import place, remove
 from groundstation.pipeline.one_flight.identity import plain_id

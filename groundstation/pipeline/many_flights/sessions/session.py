@@ -18,7 +18,7 @@ from groundstation.base.signals import kind_of
 from groundstation.chapters.cooperative import names_or_count
 from groundstation.estimators.analyses import ANSWER_TYPES, SESSION_ANALYSES
 from groundstation.estimators.cooperative.analysis import SessionKnown
-from groundstation.pipeline.many_flights.session_job import SessionJob, kept_session
+from groundstation.pipeline.many_flights.sessions.job import SessionJob, kept_session
 from groundstation.pipeline.one_flight.analyse import run_analyses
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import (

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.many_flights.known_flights import KnownFlights
+from groundstation.pipeline.many_flights.runs.known_flights import KnownFlights
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.log import Log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome

@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 
 from groundstation.base.errors import GroundstationError
 from groundstation.pipeline.many_flights.inputs import is_remote
-from groundstation.pipeline.many_flights.remote import RemoteFolder
+from groundstation.pipeline.many_flights.remote.folder import RemoteFolder
 from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.log import digest_of
 from groundstation.pipeline.one_flight.outcome import Outcome

@@ -8,11 +8,12 @@ from typing import NamedTuple
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
 from groundstation.base.failures import attempt, failures, gathered_failures
 from groundstation.estimators.analyses import ANSWER_TYPES
-from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, write_fleet
-from groundstation.pipeline.many_flights.fleet_index import rows_without_flight, told_beside, write_index_of
-from groundstation.pipeline.many_flights.fleet_refresh import forget_month, refresh, restamp
-from groundstation.pipeline.many_flights.fleet_samples import SAMPLES
-from groundstation.pipeline.many_flights.fleet_store import FLIGHTS, DamagedMonthError, Scan
+from groundstation.pipeline.many_flights.fleet.index import rows_without_flight, told_beside, write_index_of
+from groundstation.pipeline.many_flights.fleet.installations import refresh_installations, show_installation
+from groundstation.pipeline.many_flights.fleet.refresh import forget_month, refresh, restamp
+from groundstation.pipeline.many_flights.fleet.samples import SAMPLES
+from groundstation.pipeline.many_flights.fleet.scan import FLIGHTS, DamagedMonthError, Scan
+from groundstation.pipeline.many_flights.fleet.statistics import FLEET_PARQUET, write_fleet
 from groundstation.pipeline.many_flights.inputs import (
     FLIGHT_FOLDER_MARK,
     flight_folders,
@@ -20,7 +21,6 @@ from groundstation.pipeline.many_flights.inputs import (
     plan_folders,
     session_folders,
 )
-from groundstation.pipeline.many_flights.installations import refresh_installations, show_installation
 from groundstation.pipeline.one_flight.flight import REPORT_FILES
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.sealing import note
@@ -49,8 +49,8 @@ def write_beside(
     remade: Sequence[str] | None = None,
 ) -> tuple[Outcome, ...]:
     """Write everything that stands beside the flight folders; returns what could not be written or read.
-
-    ``found`` is what :func:`groundstation.pipeline.many_flights.fleet_store.refresh` gave, where it was called already.
+    ``found`` is what :func:`~groundstation.pipeline.many_flights.fleet.refresh.refresh` gave, where it was called.
+    :func:`groundstation.pipeline.many_flights.fleet.refresh.refresh` gave, where it was called already.
     With ``only_results`` the page and the recording of all flights are removed: they would tell of an earlier run.
     ``remade`` are the flights whose reports are new; left out: those of ``outcomes`` that were not finished before.
     """
