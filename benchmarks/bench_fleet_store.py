@@ -29,7 +29,7 @@ from groundstation.pipeline.many_flights.fleet.samples import SAMPLES
 from groundstation.pipeline.many_flights.fleet.scan import Scan, remembered, scan, stamp_of
 from groundstation.pipeline.many_flights.fleet.statistics import write_fleet
 from groundstation.pipeline.many_flights.fleet.table import to_arrow
-from groundstation.pipeline.many_flights.runs.destination import LocalOutput, Placement
+from groundstation.pipeline.many_flights.runs.destination import Destination, LocalOutput
 from groundstation.pipeline.many_flights.runs.known_flights import KnownFlights
 from groundstation.pipeline.many_flights.runs.out_folder import clear_unfinished, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.sessions.search import members_of
@@ -126,7 +126,7 @@ def one_more(out: Path, identity: str) -> None:
     KnownFlights(out)
     clear_unfinished(out)
     found, problems = refresh(out)
-    Placement(LocalOutput(out), []).sweep(found)
+    Destination(LocalOutput(out), []).sweep(found)
     members_of(found, {identity})
     assert not problems and not found.stale
     write_index_of(out, (), (), found)

@@ -49,8 +49,8 @@ def write_beside(
     remade: Sequence[str] | None = None,
 ) -> tuple[Outcome, ...]:
     """Write everything that stands beside the flight folders; returns what could not be written or read.
+
     ``found`` is what :func:`~groundstation.pipeline.many_flights.fleet.refresh.refresh` gave, where it was called.
-    :func:`groundstation.pipeline.many_flights.fleet.refresh.refresh` gave, where it was called already.
     With ``only_results`` the page and the recording of all flights are removed: they would tell of an earlier run.
     ``remade`` are the flights whose reports are new; left out: those of ``outcomes`` that were not finished before.
     """

@@ -25,7 +25,7 @@ from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROC
 from groundstation.pipeline.many_flights.remote.jobs import RemoteJob, digest_remote, run_remote
 from groundstation.pipeline.many_flights.remote.output import RemoteOutput
 from groundstation.pipeline.many_flights.runs.consecutive import flights_of_parts
-from groundstation.pipeline.many_flights.runs.destination import LocalOutput, Placement
+from groundstation.pipeline.many_flights.runs.destination import Destination, LocalOutput
 from groundstation.pipeline.many_flights.runs.known_flights import KnownFlights
 from groundstation.pipeline.many_flights.runs.listed_logs import (
     inputs_of,
@@ -212,9 +212,9 @@ def _run_here(
         known = KnownFlights() if is_isolated else in_out  # isolated, no log is read in this process
         run = partial(run_known, redo=asked.redo) if is_isolated else run_flight
         skipped = without_parts(skipped, known)
-        placement = Placement(LocalOutput(out), [job.log for job in work])
+        destination = Destination(LocalOutput(out), [job.log for job in work])
         for number, outcome in skipped.items():
-            placement.put(number, outcome)
+            destination.put(number, outcome)
 
         def left() -> Iterator[tuple[int, Job]]:
             for outcome in skipped.values():
@@ -224,21 +224,21 @@ def _run_here(
                 if twin is None:
                     yield number, job
                 elif flight is not None and len(flight.parts) > 1:
-                    placement.put_part(number, twin, flight.flight_id, "", was_finished=job.step == "nothing")
+                    destination.put_part(number, twin, flight.flight_id, "", was_finished=job.step == "nothing")
                     listen(Event("end", job.name, "part of a flight"))
                 else:
-                    placement.put_twin(number, Outcome(job.log, "skipped", ""), twin)
+                    destination.put_twin(number, Outcome(job.log, "skipped", ""), twin)
                     listen(Event("end", job.name, "same content as another log"))
 
         def suffixed(number: int) -> Job:
-            return replace(work[number % len(work)], add_suffix=True, power_up=placement.power_up(number))
+            return replace(work[number % len(work)], add_suffix=True, power_up=destination.power_up(number))
 
-        _run_into(placement, out, left(), run, suffixed, crew, listen, len(work))
-        apart = _run_joined(placement, work, in_out, crew, listen, is_isolated=is_isolated)
+        _run_into(destination, out, left(), run, suffixed, crew, listen, len(work))
+        apart = _run_joined(destination, work, in_out, crew, listen, is_isolated=is_isolated)
         clear_unfinished(out)  # of processes that died or took too long
-        found, unwritten = _swept(placement, out, refresher)
-        sessions = _run_sessions(placement, asked, found, crew, listen)
-        outcomes = (*placement.outcomes(), *sessions)
+        found, unwritten = _swept(destination, out, refresher)
+        sessions = _run_sessions(destination, asked, found, crew, listen)
+        outcomes = (*destination.outcomes(), *sessions)
         found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
         problems = write_beside(out, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found)
         sync_folder(out)
@@ -249,7 +249,7 @@ def _run_here(
 
 
 def _run_joined(
-    placement: Placement,
+    destination: Destination,
     work: Sequence[Job],
     known: KnownFlights,
     crew: Crew,
@@ -261,7 +261,7 @@ def _run_joined(
 
     Isolated, files that cannot be read alone are not looked at: that would read them in this process.
     """
-    outcomes = {number: one for number, one in placement.flights().items() if one.flight_id or not is_isolated}
+    outcomes = {number: one for number, one in destination.flights().items() if one.flight_id or not is_isolated}
     found = flights_of_parts(outcomes, known, work[0].configuration)
     if not found:
         return ()
@@ -274,20 +274,22 @@ def _run_joined(
     with closing(crew(tasks, run_flight)) as ended:
         for number, outcome in ended:
             listen(Event("end", tasks[number][1].name, outcome.text))
-            problem = placement.put_joined(found[number].numbers, outcome)
+            problem = destination.put_joined(found[number].numbers, outcome)
             apart += [problem] if problem else []
     return tuple(apart)
 
 
-def _swept(placement: Placement, out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, ...]]:
+def _swept(destination: Destination, out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, ...]]:
     """Bring the dataset of flights up to date, flights that these logs have no longer being removed."""
     found, unwritten = refresh(out, crew)
-    return refresh(out) if placement.sweep(found) else (found, unwritten)
+    return refresh(out) if destination.sweep(found) else (found, unwritten)
 
 
-def _run_sessions(placement: Placement, asked: Asked, among: Scan, crew: Crew, listen: Listener) -> tuple[Outcome, ...]:
+def _run_sessions(
+    destination: Destination, asked: Asked, among: Scan, crew: Crew, listen: Listener
+) -> tuple[Outcome, ...]:
     """Run the sessions among the flights that are in place; interrupted, the index at least is written."""
-    flights = placement.outcomes()
+    flights = destination.outcomes()
     outcomes: dict[int, Outcome] = {}
     try:
         found = find_sessions(asked, among, {one.flight_id for one in flights if one.flight_id})
@@ -309,7 +311,7 @@ def _run_remote(
 ) -> tuple[Outcome, ...]:
     def suffixed(number: int) -> RemoteJob:
         one = work[number % len(work)]
-        job = replace(one.job, add_suffix=True, power_up=placement.power_up(number))
+        job = replace(one.job, add_suffix=True, power_up=destination.power_up(number))
         return replace(one, job=job, redo=True)
 
     with tempfile.TemporaryDirectory(prefix="groundstation-") as folder:
@@ -318,14 +320,14 @@ def _run_remote(
         output.refuse_foreign(force=force)
         with output.alone():
             output.copy_all()
-            placement = Placement(output, [one.log for one in work])
+            destination = Destination(output, [one.log for one in work])
             is_whole = False
             try:
-                tasks = _once(work, placement, crew, listen)
-                _run_into(placement, copy, tasks, run_remote, suffixed, crew, listen, len(work))
-                found, unwritten = _swept(placement, copy)
-                sessions = _run_remote_sessions(placement, output, asked, found, listen)
-                outcomes = (*placement.outcomes(), *sessions)
+                tasks = _once(work, destination, crew, listen)
+                _run_into(destination, copy, tasks, run_remote, suffixed, crew, listen, len(work))
+                found, unwritten = _swept(destination, copy)
+                sessions = _run_remote_sessions(destination, output, asked, found, listen)
+                outcomes = (*destination.outcomes(), *sessions)
                 found = found.with_sessions(one.flight_id for one in sessions if one.flight_id)
                 beside = write_beside(
                     copy, outcomes, with_pdf=asked.with_pdf, only_results=asked.only_results, found=found
@@ -340,7 +342,7 @@ def _run_remote(
 
 
 def _once(
-    work: Sequence[RemoteJob], placement: Placement, crew: Crew, listen: Listener
+    work: Sequence[RemoteJob], destination: Destination, crew: Crew, listen: Listener
 ) -> Iterator[tuple[int, RemoteJob]]:
     """The jobs by number, without those whose content another one before them has.
 
@@ -358,17 +360,17 @@ def _once(
         if kept == number:
             yield number, job
         else:
-            placement.put_twin(number, Outcome(job.log, "skipped", "", sha256=digests[number]), kept)
+            destination.put_twin(number, Outcome(job.log, "skipped", "", sha256=digests[number]), kept)
             listen(Event("end", job.name, "same content as another log"))
 
 
 def _run_remote_sessions(
-    placement: Placement, output: RemoteOutput, asked: Asked, among: Scan, listen: Listener
+    destination: Destination, output: RemoteOutput, asked: Asked, among: Scan, listen: Listener
 ) -> tuple[Outcome, ...]:
     """Run the sessions in the copy of an OUT elsewhere, in this process, where the MCAPs are fetched to."""
     before = session_folders(output.root)
     here = replace(asked, out=output.root, mcap_in=output.mcap_in, is_copy=True)
-    outcomes = _run_sessions(placement, here, among, partial(in_turn, listen=listen), listen)
+    outcomes = _run_sessions(destination, here, among, partial(in_turn, listen=listen), listen)
     sent = []
     for outcome in outcomes:
         if outcome.folder:
@@ -381,7 +383,7 @@ def _run_remote_sessions(
 
 
 def _run_into(
-    placement: Placement,
+    destination: Destination,
     out: Path,
     tasks: Iterable[tuple[int, AnyJob]],
     run: Callable[[AnyJob, Listener], Outcome],
@@ -398,14 +400,14 @@ def _run_into(
         with closing(crew(tasks, run)) as ended:  # closed at once when something is wrong here: its processes end
             for number, outcome in ended:
                 listen(Event("end", PurePath(outcome.source).name, outcome.text))
-                placement.put(number, replace(outcome, more=()))
+                destination.put(number, replace(outcome, more=()))
                 for place, other in enumerate(outcome.more, start=1):
-                    placement.put(number + place * logs, other)
-        clashing = placement.clashing()
+                    destination.put(number + place * logs, other)
+        clashing = destination.clashing()
         if clashing:
             with closing(crew(((number, suffixed(number)) for number in clashing), run)) as ended:
                 for number, outcome in ended:
-                    placement.put_again(number, outcome)
+                    destination.put_again(number, outcome)
     except BaseException:
-        write_index_of(out, placement.outcomes())
+        write_index_of(out, destination.outcomes())
         raise

@@ -83,7 +83,7 @@ class _Content(NamedTuple):
         return cls(one.sha256, one.power_up)
 
 
-class Placement:
+class Destination:
     """Puts finished flights into place at once.
 
     Two flights of one id get the digests of their logs into their names; as that is known only when the second one

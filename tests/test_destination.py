@@ -9,7 +9,7 @@ import pytest
 
 from groundstation.pipeline.many_flights.fleet.refresh import refresh
 from groundstation.pipeline.many_flights.fleet.scan import scan
-from groundstation.pipeline.many_flights.runs.destination import LocalOutput, Placement
+from groundstation.pipeline.many_flights.runs.destination import Destination, LocalOutput
 from groundstation.pipeline.one_flight.flight import PARTIAL_PREFIX, remove
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.files import load_manifest, save_manifest
@@ -33,16 +33,16 @@ def finished(out: Path, log: str, sha256: str, flight_id: str = FLIGHT, folder: 
 
 def run(out: Path, *outcomes: Outcome, again: bool = True) -> list[Outcome]:
     """Put outcomes in their order; those that clash are run again, with success or without."""
-    placement = Placement(LocalOutput(out), [one.source for one in outcomes])
+    destination = Destination(LocalOutput(out), [one.source for one in outcomes])
     for number, outcome in enumerate(outcomes):
-        placement.put(number, outcome)
-    for number in placement.clashing():
+        destination.put(number, outcome)
+    for number in destination.clashing():
         one = outcomes[number]
         flight_id = f"{FLIGHT}_{one.sha256[:8]}"
         anew = finished(out, one.source, one.sha256, flight_id) if again else Outcome(one.source, "failed", "no memory")
-        placement.put_again(number, anew)
-    placement.sweep(scan(out))
-    return list(placement.outcomes())
+        destination.put_again(number, anew)
+    destination.sweep(scan(out))
+    return list(destination.outcomes())
 
 
 def names(out: Path) -> list[str]:
@@ -63,11 +63,11 @@ def test_a_flight_that_fails_when_it_is_run_again_keeps_what_stood_there(tmp_pat
 
 def test_a_twin_of_a_clashing_flight_leaves_nothing_behind(tmp_path: Path) -> None:
     kept, twin, other = (finished(tmp_path, log, sha) for log, sha in (("a", ONE), ("b", ONE), ("c", OTHER)))
-    placement = Placement(LocalOutput(tmp_path), ["a", "b", "c"])
+    destination = Destination(LocalOutput(tmp_path), ["a", "b", "c"])
     for number, outcome in ((2, other), (1, twin), (0, kept)):  # the later twin is finished first
-        placement.put(number, outcome)
-    assert [one.state for one in placement.outcomes()] == ["done", "skipped", "done"]
-    assert placement.clashing() == (0, 2)
+        destination.put(number, outcome)
+    assert [one.state for one in destination.outcomes()] == ["done", "skipped", "done"]
+    assert destination.clashing() == (0, 2)
     assert names(tmp_path) == [Path(kept.folder).name, FLIGHT]
 
 
@@ -113,11 +113,11 @@ def test_a_flight_that_clashed_before_is_put_where_it_was(tmp_path: Path) -> Non
     anew = [
         finished(tmp_path, log, sha, name) for log, sha, name in (("a", ONE, SUFFIXED[0]), ("b", OTHER, SUFFIXED[1]))
     ]
-    placement = Placement(LocalOutput(tmp_path), ["a", "b"])
+    destination = Destination(LocalOutput(tmp_path), ["a", "b"])
     for number, outcome in enumerate(anew):
-        placement.put(number, outcome)
-    placement.sweep(scan(tmp_path))
-    assert placement.clashing() == () and names(tmp_path) == list(SUFFIXED)
+        destination.put(number, outcome)
+    destination.sweep(scan(tmp_path))
+    assert destination.clashing() == () and names(tmp_path) == list(SUFFIXED)
 
 
 def test_another_log_does_not_take_the_place_of_one_that_is_not_in_this_run(tmp_path: Path) -> None:
@@ -141,10 +141,10 @@ def test_a_flight_is_removed_for_what_its_manifest_says_not_for_what_is_remember
         manifest = json.loads((folder / "manifest.json").read_text())
         manifest["source"]["sha256"] = sha256
         (folder / "manifest.json").write_text(json.dumps(manifest))  # in place: the time of the folder stays
-    placement = Placement(LocalOutput(tmp_path), ["a"])
-    placement.put(0, finished(tmp_path, "a", remembered))
+    destination = Destination(LocalOutput(tmp_path), ["a"])
+    destination.put(0, finished(tmp_path, "a", remembered))
     assert list(scan(tmp_path).fresh) == [folder.name for folder in old]
-    assert placement.sweep(scan(tmp_path))
+    assert destination.sweep(scan(tmp_path))
     assert names(tmp_path) == sorted([".flights", FLIGHT, old[0].name, "flights.parquet", "samples.parquet"])
 
 
