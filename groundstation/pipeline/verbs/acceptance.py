@@ -1,4 +1,7 @@
-"""An acceptance from a folder of flights: read what they saved, judge it against a standard, write page and tables."""
+"""Acceptance of the INS from a folder of flights, judged against a standard.
+
+It is made from what the flights saved; page and tables are written.
+"""
 
 import hashlib
 import math
@@ -89,7 +92,9 @@ def accept(out: Path, standard: str) -> Acceptance:
 
 
 def accept_to(out: Path, standard: str, folder: Path | None = None) -> tuple[Acceptance, list[Path], str]:
-    """Write an acceptance: page, PDF, JSON and the table of flights; ``folder`` left out, beside the flights.
+    """Write an acceptance: page, PDF, JSON and the table of flights.
+
+    ``folder`` left out, they stand beside the flights.
 
     Returns
     -------
@@ -129,7 +134,10 @@ def flights_figure(found: Acceptance) -> FigureData:
 
 
 def _flight_of(folder: Path, standard: Standard) -> tuple[FlightError, InsErrors | None, Mapping[str, Any]]:
-    """The errors of one flight, or why it is left out; and the settings that its errors were found with."""
+    """Errors of one flight, or why it is left out.
+
+    With them come the settings that its errors were found with.
+    """
     try:
         saved = load(folder, ANSWER_TYPES)
         return _errors_of(saved, standard)
@@ -187,7 +195,7 @@ def _rows_of(saved: SavedFlight) -> tuple[InertialStates | None, InertialTrack |
 
 
 def _not_judged(saved: SavedFlight, inertial: InertialResult | None) -> str:
-    """Why a flight is no free inertial one that can be judged; empty where it is."""
+    """Reason why a flight is no free inertial one that can be judged; empty where it is."""
     if inertial is None:
         return "; ".join(saved.results.reasons("inertial")) or "no INS errors found"
     if inertial.kind != "unaided":
@@ -214,7 +222,7 @@ def _other_values(inertial: InertialResult, heading: HeadingResult | None) -> di
 
 
 def _reference95(inertial: InertialResult, heading: HeadingResult | None, hours: float) -> dict[str, float]:
-    """What the reference may err by in 95 % of cases, in the units of the figures that it judges.
+    """Error of the reference in 95 % of cases, in the units of the figures that it judges.
 
     Of GNSS what the estimator took it for: white and correlated noise of either axis.
     """
@@ -240,7 +248,7 @@ def _reference95(inertial: InertialResult, heading: HeadingResult | None, hours:
 
 
 def _sure_enough(flight: FlightError, standard: Standard) -> FlightError:
-    """The flight, left out where the reference is not as much surer than a limit as the standard asks for."""
+    """Flight, left out where the reference is not surer than a limit by the ratio asked for."""
     least = standard.accuracy_ratio_min
     ratios = [accuracy_ratio(flight, limit) for limit in standard.limits if limit.is_for(flight.hours)]
     known = [ratio for ratio in ratios if ratio is not None]
@@ -251,7 +259,10 @@ def _sure_enough(flight: FlightError, standard: Standard) -> FlightError:
 
 
 def _unit_of(saved: SavedFlight, topic: str) -> str:
-    """Name of the INS: its serial, else the aircraft and the topic; where neither is known it may be any."""
+    """Name of the INS: its serial, else the aircraft and the topic.
+
+    Where neither is known it may be any.
+    """
     serial = _said(saved, "ins_serial")
     if serial:
         return serial
@@ -260,7 +271,7 @@ def _unit_of(saved: SavedFlight, topic: str) -> str:
 
 
 def _said(saved: SavedFlight, key: str) -> str:
-    """What the aircraft file of the run says, else the head of the log."""
+    """Value that the aircraft file of the run says, else the head of the log."""
     set_by_user = mapping(saved.manifest.configuration, "aircraft").get(key)
     return str(set_by_user or saved.results.metadata.get(key, "")).strip()
 

@@ -1,4 +1,7 @@
-"""One batch of a watch, in a process of its own: a watch of weeks keeps no thread and no memory of what it ran."""
+"""Batch of a watch, in a process of its own.
+
+So a watch of weeks keeps no thread and no memory of what it ran.
+"""
 
 import math
 import multiprocessing
@@ -48,7 +51,9 @@ class Batch:
 
 
 def run_batch(batch: Batch, listen: Listener) -> tuple[Outcome, ...] | str:
-    """Run a batch in a process of its own; returns what became of its logs, or why nothing was run.
+    """Run a batch in a process of its own.
+
+    Returns what became of its logs, or why nothing was run.
 
     Where that process dies (killed, or out of memory) its logs are run one by one: the one with which it dies again
     has failed. Interrupted, the process writes the index of what is finished, and ends.
@@ -90,7 +95,10 @@ def _one_by_one(batch: Batch, listen: Listener) -> tuple[Outcome, ...] | str:
 
 
 def _run(sender: Connection, batch: Batch) -> None:
-    """What the process of a batch does: it ends with the watch, and cleanly when it is asked to."""
+    """Run a batch in the process made for it.
+
+    It ends with the watch, and cleanly when it is asked to.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the watch is interrupted, and ends this process in its way
     signal.signal(signal.SIGTERM, _interrupted)
     threading.Thread(target=_end_with_the_watch, name="parent", daemon=True).start()
@@ -150,14 +158,16 @@ def _outcomes(batch: Batch, listen: Listener) -> tuple[Outcome, ...]:
 
 
 def _has_flights(out: Path) -> bool:
-    """Whether any flight is in a folder of results."""
+    """Tell whether any flight is in a folder of results."""
     from groundstation.pipeline.many_flights.inputs import flight_folders
 
     return out.is_dir() and bool(flight_folders(out))
 
 
 def _unclaimed(path: Path, batch: Batch) -> Outcome | None:
-    """The outcome of a file that no reader claims, which in a folder is skipped; None for any other.
+    """Outcome of a file that no reader claims, which in a folder is skipped.
+
+    None for any other.
 
     Isolated, only its first bytes are looked at: nothing of it is decompressed or read in this process.
     """
@@ -179,7 +189,7 @@ def _unclaimed(path: Path, batch: Batch) -> Outcome | None:
 
 
 def _list_too(batch: Batch, before: "list[IndexRow]", strangers: list[Outcome]) -> None:
-    """List in the index the logs without a flight of earlier batches, and the files that no reader claims."""
+    """List the logs without a flight of earlier batches, and the files that no reader claims."""
     from groundstation.pipeline.many_flights.fleet.index import rows_without_flight, write_index_of
     from groundstation.pipeline.many_flights.runs.out_folder import alone_in
 

@@ -1,4 +1,4 @@
-"""A folder that is watched: what arrives is run once it has stopped growing, by the engine of ``run``.
+"""Watch a folder: what arrives is run by the engine of ``run``, once it stops growing.
 
 All that is known of finished logs stands in OUT, so the watch may be killed at any moment: at its next start it finds
 what is finished, and goes on. Folders are listed again and again, which works on network shares too.
@@ -25,7 +25,7 @@ Signature = tuple[tuple[str, int, int], ...]  # name, size and time of change of
 
 @dataclass
 class Watched:
-    """What a watch remembers between two looks at its folder.
+    """Memory of a watch between two looks at its folder.
 
     Parameters
     ----------
@@ -39,7 +39,9 @@ class Watched:
     done: dict[Path, Signature] = field(default_factory=dict)
 
     def ready(self, now: dict[Path, Signature]) -> list[Path]:
-        """Logs that have not changed since the last look, and were not run as they are; the look is remembered.
+        """Logs that have not changed since the last look, and were not run as they are.
+
+        The look is remembered.
 
         Examples
         --------
@@ -76,7 +78,9 @@ def watch(
     listen: Listener = silent,
     wait: Callable[[float], None] = time.sleep,
 ) -> Iterator[tuple[Outcome, ...]]:
-    """Run what arrives in a folder, as long as it is asked for; yields what became of each batch.
+    """Run what arrives in a folder, as long as it is asked for.
+
+    Yields what became of each batch.
 
     A log is run once two looks, ``every_s`` apart, find the same sizes and times; one that is written to later, or
     replaced, is run again, and its results replace the earlier ones. What no reader claims is told once.
@@ -133,7 +137,7 @@ def watch(
 
 @dataclass
 class _Trouble:
-    """What keeps a watch from its work, told once and not at every look."""
+    """Trouble that keeps a watch from its work, told once and not at every look."""
 
     say: Callable[[str], None]
     told: str = ""
@@ -160,7 +164,10 @@ def _look(folder: Path, out: Path, configuration: Configuration, trouble: _Troub
 
 
 def signature_of(path: Path) -> Signature:
-    """Names, sizes and times of the files of a log; empty where they cannot be read: then it is not looked at."""
+    """Names, sizes and times of the files of a log.
+
+    Empty where they cannot be read: then it is not looked at.
+    """
     files: Collection[Path] = (path,)
     try:
         if path.name == METADATA:

@@ -1,1 +1,1 @@
-"""What a folder of flights says together: the dataset of flights, index, statistics, installations."""
+"""Folder of flights as a fleet: the dataset of flights, index, statistics, installations."""

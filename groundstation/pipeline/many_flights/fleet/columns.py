@@ -1,4 +1,7 @@
-"""The columns of the tables of flights: what every flight has, and between it what each analysis gives."""
+"""Columns of the tables of flights, and the schema of the dataset that they are kept in.
+
+Every flight has some columns; between them stand those that each analysis gives.
+"""
 
 import json
 import math
@@ -75,7 +78,9 @@ DETAILS = {
 
 @dataclass(frozen=True)
 class Check:
-    """Something independent of the estimate beside it: residual, the sigma claimed for it, inside 95 % or not.
+    """Comparison of an estimate with something independent of it.
+
+    It has the residual, the sigma claimed for it, and whether it is inside 95 %.
 
     ``z`` is the residual over the sigma. ``verdict`` is that on the estimate; empty where it was not judged.
     """
@@ -90,7 +95,9 @@ class Check:
 
 @dataclass(frozen=True)
 class FlightShare:
-    """What one flight adds to the fleet, and what a run must know of it when it does not touch it.
+    """Share of one flight in the fleet.
+
+    It also has what a run must know of the flight when it does not touch it.
 
     Parameters
     ----------
@@ -129,7 +136,10 @@ class FlightShare:
 
 
 def dataset_schema() -> Any:
-    """Arrow schema of flights.parquet/: the columns of a flight and the details; metadata ``columns`` has meanings."""
+    """Arrow schema of flights.parquet/: the columns of a flight and the details.
+
+    Its metadata ``columns`` has their meanings.
+    """
     import pyarrow as pa
 
     kinds = {

@@ -1,4 +1,7 @@
-"""``run --store delta:PLACE``: the rows of a run's flights in a Delta table, into which several runs may write."""
+"""Rows of a run's flights in a Delta table: ``run --store delta:PLACE``.
+
+Several runs may write into one table.
+"""
 
 import hashlib
 from collections.abc import Sequence
@@ -36,7 +39,9 @@ def delta_place(store: str) -> str:
 
 
 def put_flights(store: str, found: Scan, outcomes: Sequence[Outcome]) -> tuple[Outcome, ...]:
-    """Merge the rows of a run's flights into a Delta table by flight id; returns what went wrong.
+    """Merge the rows of a run's flights into a Delta table by flight id.
+
+    Returns what went wrong.
 
     A row that is there already, equal in all columns, is not written; the table is made when it is missing.
 
@@ -62,7 +67,10 @@ def put_flights(store: str, found: Scan, outcomes: Sequence[Outcome]) -> tuple[O
 
 
 def _rows(found: Scan, flight_ids: set[str]) -> Any:
-    """The rows of some flights as Delta takes them: texts without dictionaries, times in microseconds."""
+    """Rows of some flights as Delta takes them.
+
+    Texts have no dictionaries, times are in microseconds.
+    """
     import pyarrow as pa
 
     some = found.with_only(flight_ids)

@@ -1,4 +1,7 @@
-"""index.json and index.csv of an OUT: every flight and session in it, and the logs that gave none."""
+"""Index of an OUT: every flight and session in it, and the logs that gave none.
+
+It is written as index.json and index.csv.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +20,9 @@ MOST_SKIPPED = 1000  # files that the index lists
 def write_index_of(
     out: Path, outcomes: Sequence[Outcome], kept_rows: Sequence[IndexRow] = (), found: Scan | None = None
 ) -> tuple[Outcome, ...]:
-    """Write index.json and index.csv: every flight and session in ``out``, and the logs of this run that gave none.
+    """Write index.json and index.csv of a folder of flights.
+
+    They list every flight and session in ``out``, and the logs of this run that gave none.
 
     Of more than 20 000 flights they say where the rows are. Returns what could not be listed: folders that cannot be
     read, an index that cannot be written.
@@ -50,7 +55,10 @@ def write_index_of(
 
 
 def _listed(without_flight: Sequence[Outcome]) -> list[Outcome]:
-    """Logs without a flight as the index lists them: of very many skipped files the rest is one row."""
+    """Logs without a flight as the index lists them.
+
+    Very many skipped files are cut: the rest is one row.
+    """
     skipped = [one for one in without_flight if one.state == "skipped"]
     rest = skipped[MOST_SKIPPED:]
     if not rest:
@@ -61,7 +69,10 @@ def _listed(without_flight: Sequence[Outcome]) -> list[Outcome]:
 
 
 def rows_without_flight(out: Path) -> list[IndexRow]:
-    """Rows of the logs that gave no flight, from the index as it stands: nothing else remembers them."""
+    """Rows of the logs that gave no flight, from the index as it stands.
+
+    Nothing else remembers them.
+    """
     import json
 
     from groundstation.base.serial import MismatchError, from_json

@@ -1,4 +1,7 @@
-"""installations.json: what the flights of an OUT teach of each INS's installation, from what they stored alone."""
+"""Installations that the flights of an OUT teach, from stored figures alone.
+
+They are kept in installations.json.
+"""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
@@ -32,7 +35,7 @@ from groundstation.results.installation import (
 
 
 def refresh_installations(out: Path, found: Scan, remade: Iterable[str]) -> list[str]:
-    """Bring installations.json, and what reports show of it, up to what the flights of an OUT say.
+    """Bring installations.json, and the reports that show it, up to date with the flights.
 
     The same flights give the same file, whatever was there before: an installation whose flights are as they were is
     taken over, of another the answers are made again. Without a flight that states a serial there is no file. It is
@@ -94,7 +97,10 @@ def _key(one: Series | Installation) -> tuple[str, str, tuple[Lesson, ...]]:
 
 
 def _lessons(out: Path, found: Scan) -> Iterator[Lesson]:
-    """Of the flights that the dataset has, and of those that it has not: some files of it could not be written."""
+    """Lessons of the flights in the dataset, then of those that it has not.
+
+    Some flights are missing there when a file of the dataset could not be written.
+    """
     for part in found.months_of(["lesson"]):
         yield from lessons_of(part)
     for name in found.stale:
@@ -120,7 +126,10 @@ def answers_in(found: Installations | None) -> dict[str, InstallationResult]:
 
 
 def show_answers(out: Path, answers: Mapping[str, InstallationResult], names: Iterable[str]) -> list[str]:
-    """Fill what was learned into the reports of some flights; returns those whose report changed."""
+    """Fill learned answers into the reports of some flights.
+
+    Returns the flights whose report changed.
+    """
     changed = []
     for name in names:
         page = out / name / REPORT

@@ -1,4 +1,7 @@
-"""What is known of every flight folder without reading it, as columns: no object but of one asked for."""
+"""Keys: facts of every flight folder that are known without reading it.
+
+They are kept as columns; an object is made only of the one that is asked for.
+"""
 
 import operator
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -18,7 +21,9 @@ NUMBERS = ("stamp", "start_ns", "end_ns")
 
 
 class Key(NamedTuple):
-    """What is known of a flight folder without reading it; ``stamp`` is of its files when it was read.
+    """Facts of a flight folder that are known without reading it.
+
+    ``stamp`` is of its files when it was read.
 
     ``parts`` are the digests of the consecutive logs of the flight but the first, one a line.
     """
@@ -102,7 +107,7 @@ class Keys(Mapping[str, Key]):
         return Key(*(self.table.column(field)[place].as_py() for field in Key._fields))
 
     def place(self, name: str) -> int | None:
-        """Where a flight stands; None where it does not."""
+        """Row of a flight; None when there is none."""
         return self._places.get(name)
 
     def column(self, name: str) -> list[Any]:
@@ -115,7 +120,7 @@ class Keys(Mapping[str, Key]):
         return self.column("stamp")
 
     def only(self, names: Collection[str]) -> "Keys":
-        """Those of some flights."""
+        """Keys of some flights."""
         import pyarrow as pa
         import pyarrow.compute as pc
 
@@ -124,13 +129,13 @@ class Keys(Mapping[str, Key]):
         return self if len(found) == len(self) else Keys(found)
 
     def without(self, values: Collection[str], field: str) -> "Keys":
-        """Those without some values of a field."""
+        """Keys without some values of a field."""
         if not values:
             return self
         return self.only([name for name, one in zip(self, self.column(field), strict=True) if one not in values])
 
     def at(self, places: NDArray[np.intp]) -> "Keys":
-        """Those at some places."""
+        """Keys in some rows."""
         return Keys(self.table.take(places))
 
     def by_month(self) -> dict[str, NDArray[np.intp]]:
@@ -170,7 +175,7 @@ def key_path(out: Path, month: str) -> Path:
 
 
 def read_keys(out: Path, month: str) -> Keys:
-    """What is known of the flights of a month; nothing where it cannot be read."""
+    """Read the keys of the flights of a month; none when they cannot be read."""
     import pyarrow.parquet as pq
 
     empty = Keys.of(())

@@ -1,4 +1,4 @@
-"""What stands beside the flight folders of an OUT: the index and what the flights say together."""
+"""Files beside the flight folders of an OUT: the index and what the flights say together."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -48,7 +48,9 @@ def write_beside(
     found: Scan | None = None,
     remade: Sequence[str] | None = None,
 ) -> tuple[Outcome, ...]:
-    """Write everything that stands beside the flight folders; returns what could not be written or read.
+    """Write everything that stands beside the flight folders.
+
+    Returns what could not be written or read.
 
     ``found`` is what :func:`~groundstation.pipeline.many_flights.fleet.refresh.refresh` gave, where it was called.
     With ``only_results`` the page and the recording of all flights are removed: they would tell of an earlier run.
@@ -92,7 +94,10 @@ def _write_beside(
     with_pdf: bool,
     only_results: bool,
 ) -> list[Outcome]:
-    """Write index, fleet, page and recording from the flights as they were found; returns what went wrong."""
+    """Write index, fleet, page and recording of the flights as they were found.
+
+    Returns what went wrong.
+    """
     problems = list(write_index_of(out, outcomes, kept_rows, found))
     fleet, unwritten = write_fleet(out, found)
     problems += unwritten
@@ -109,7 +114,7 @@ def _write_beside(
 
 
 class ReportedAgain(NamedTuple):
-    """What making reports again came to.
+    """Result of making reports again.
 
     Parameters
     ----------
@@ -126,7 +131,9 @@ class ReportedAgain(NamedTuple):
 
 
 def report_again(out: Path, *, with_pdf: bool = False) -> ReportedAgain:
-    """Make reports and index of an OUT (or the report of one flight folder) again from the saved results.
+    """Make reports and index of an OUT again from the saved results.
+
+    Of one flight folder, its report alone is made.
 
     Raises
     ------
@@ -172,5 +179,8 @@ def report_again(out: Path, *, with_pdf: bool = False) -> ReportedAgain:
 
 
 def _gone(pdfs: Sequence[Path], *, with_pdf: bool) -> list[Path]:
-    """Those that are not there any more; none where PDFs were asked for: then it was told why."""
+    """PDFs that are not there any more.
+
+    None where PDFs were asked for: then it was told why.
+    """
     return [] if with_pdf else [path for path in pdfs if not path.exists()]

@@ -1,4 +1,6 @@
-"""Bring the dataset of flights up to date: months with flights that are new, changed or gone are written again.
+"""Bring the dataset of flights up to date.
+
+Months with flights that are new, changed or gone are written again.
 
 The files of the dataset are a function of the flights alone. Beside them, hidden, stands for each month what tells
 whether a flight folder has changed since, and what a run must know of flights that it does not touch. Both are replaced
@@ -29,7 +31,7 @@ MOST_READ_HERE = 300  # flights, by the process that leads a run
 
 @dataclass(frozen=True)
 class MonthJob:
-    """A month of the dataset to be written: flights that are kept as they are, flights to read."""
+    """Month of the dataset to write: flights kept as they are, and flights to read."""
 
     out: Path
     month: str
@@ -38,7 +40,7 @@ class MonthJob:
 
     @property
     def log(self) -> str:
-        """What it is told by."""
+        """Path of its file, by which messages name it."""
         return str(month_path(self.out, self.month))
 
     @property
@@ -48,7 +50,7 @@ class MonthJob:
 
 
 def refresh(out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, ...]]:
-    """Bring the dataset of flights, and that of samples, up to what stands in the flight folders.
+    """Bring the datasets of flights and of samples up to date with the flight folders.
 
     Parameters
     ----------
@@ -93,7 +95,7 @@ def _after(before: Scan, fresh: Keys, jobs: Sequence[MonthJob]) -> Scan:
 
 
 def _jobs(before: Scan, fresh: Keys) -> Iterator[MonthJob]:
-    """The months that are to be written: with flights that changed, and with some that are gone."""
+    """Months to write: those with flights that changed or are gone."""
     lost = set(before.fresh).difference(fresh) if len(before.fresh) > len(fresh) else ()
     read: dict[str, list[str]] = {}
     for name in sorted({*before.stale, *lost}):
@@ -109,7 +111,10 @@ def _names_by_month(keys: Keys) -> dict[str, list[str]]:
 
 
 def restamp(out: Path, names: Iterable[str]) -> None:
-    """Take down how flight folders stand now: what was changed in them since they were read is not of the dataset."""
+    """Note how flight folders stand now.
+
+    Changes made since the folders were read do not concern the dataset.
+    """
     import pyarrow as pa
 
     by_month: dict[str, set[str]] = {}
@@ -132,7 +137,10 @@ def forget_month(out: Path, month: str) -> None:
 
 
 def write_month(job: MonthJob, listen: Listener = silent) -> Outcome:
-    """Write one month of the dataset, and the samples of the flights that changed; its outcome says what is wrong."""
+    """Write one month of the dataset, and the samples of the flights that changed.
+
+    The outcome says what is wrong.
+    """
     try:
         _write(job)
     except OSError as error:
@@ -161,7 +169,10 @@ def _write(job: MonthJob) -> None:
 
 
 def put_month(out: Path, month: str, table: Any, keys: Keys) -> None:
-    """Put a month of the dataset: the shares of the flights that have a key, in the order of their ids."""
+    """Put a month of the dataset.
+
+    It has the shares of the flights that have a key, in the order of their ids.
+    """
     if not len(keys):
         forget_month(out, month)
         return
@@ -185,7 +196,7 @@ def _read(path: Path) -> Any:
 
 
 def key_of(share: FlightShare, stamp: int) -> Key:
-    """What a run must know of a flight whose folder had a stamp when its share was read."""
+    """Key of a flight whose folder had this stamp when its share was read."""
     row, start_ns = share.row, share.row["start_utc"]
     duration_s = row["duration_s"]
     is_timed = start_ns is not None and duration_s == duration_s

@@ -1,4 +1,7 @@
-"""What one flight adds to the fleet: its row, its checks, its forecast skill, its samples; from what it saved."""
+"""Rows, checks, forecast skill and samples that one flight adds to the fleet.
+
+Each is made from what the flight saved.
+"""
 
 import math
 from collections.abc import Mapping
@@ -56,7 +59,10 @@ def to_number(value: Any) -> float:
 
 
 def flight_row(saved: SavedFlight, samples: FleetSamples | None) -> dict[str, Any]:
-    """Build the row of a flight: a value for every one of :data:`FLIGHT_COLUMNS`, of the type its kind has."""
+    """Build the row of a flight.
+
+    It has a value for every one of :data:`FLIGHT_COLUMNS`, of the type of its kind.
+    """
     results = saved.results
     start = results.start_utc_ns
     start = start if start is not None and abs(start) < LATEST_NS else None
@@ -209,7 +215,10 @@ def skill_of(saved: SavedFlight) -> tuple[str, list[SkillOfFlight]]:
 
 
 def _is_within(row: CalibrationRow) -> bool | None:
-    """Whether NEES is within its limits; None of one with too few starts, or damaged on the disk."""
+    """Tell whether NEES is within its limits.
+
+    None when there are too few starts, or the row is damaged on the disk.
+    """
     figures = [to_number(value) for value in (row.independent_starts, row.nees, row.nees_low, row.nees_high)]
     if not all(map(math.isfinite, figures)):
         return None
@@ -247,6 +256,6 @@ def share_of(folder: Path, store: SampleStore | None = None) -> FlightShare:
 
 
 def lesson_of(saved: SavedFlight) -> Lesson | None:
-    """What a flight teaches of its installation; None where the INS has no serial number."""
+    """Lesson of a flight on its installation; None where the INS has no serial number."""
     lesson = lesson_of_flight(saved.results, mapping(saved.manifest.configuration, "aircraft"), saved.folder.name)
     return lesson if lesson.ins_serial else None

@@ -1,4 +1,4 @@
-"""samples.parquet/: the heading samples of every flight as one dataset, partitioned by aircraft and month."""
+"""Dataset of the heading samples of every flight, by aircraft and month: samples.parquet/."""
 
 import hashlib
 import io
@@ -41,7 +41,9 @@ MEANINGS = {
 
 @dataclass(frozen=True)
 class FleetSamples:
-    """The heading samples of a flight, without the rows that only break lines; ``error_deg`` is NaN below walking pace.
+    """Heading samples of a flight, without the rows that only break lines.
+
+    ``error_deg`` is NaN below walking pace.
 
     ``moments`` and ``histogram`` are of the used ones, about the flight's estimate, so that none is cut at 180 deg.
     """
@@ -52,7 +54,9 @@ class FleetSamples:
 
 
 class SampleStore:
-    """The dataset in a folder of flights; only what changed is written, and what is gone is removed.
+    """Dataset of samples in a folder of flights.
+
+    Only what changed is written, and what is gone is removed.
 
     A file keeps the digest of what it was made from. Names of aircraft are percent-encoded as Hive writes them, which
     pandas, DuckDB and Polars undo; an aircraft or month that is not known is ``unknown``.
@@ -62,7 +66,9 @@ class SampleStore:
         self._root = out / SAMPLES
 
     def put(self, row: Mapping[str, Any], samples: FleetSamples) -> str:
-        """Keep the samples of a flight; returns its file in the dataset. ``row`` is that of the table of flights.
+        """Keep the samples of a flight; returns its file in the dataset.
+
+        ``row`` is that of the table of flights.
 
         Raises
         ------
@@ -77,7 +83,10 @@ class SampleStore:
         return name
 
     def files(self) -> dict[str, int]:
-        """Bytes of the files of the dataset, named as by :meth:`put`, and of what a killed run left."""
+        """Bytes of each file of the dataset, by the name that :meth:`put` gives it.
+
+        Files that a killed run left are among them.
+        """
         found: dict[str, int] = {}
         for aircraft in _folders_in(str(self._root)):
             for month in _folders_in(f"{self._root}/{aircraft}"):
@@ -113,7 +122,9 @@ def _sizes_in(folder: str) -> list[tuple[str, int]]:
 
 
 def partition(aircraft: str) -> str:
-    """Name of an aircraft's folder: letters, digits, _ and - stay, the rest is percent-encoded.
+    """Name of an aircraft's folder.
+
+    Letters, digits, _ and - stay, the rest is percent-encoded.
 
     Examples
     --------

@@ -1,4 +1,6 @@
-"""flights.parquet/ as it stands: a file a month of what the flights add to the fleet, and which changed since.
+"""Scan of a folder of flights: which ones the dataset has, and which changed since.
+
+The dataset, flights.parquet/, has a file a month with what each flight adds to the fleet.
 
 What has not changed is not read again.
 """
@@ -125,13 +127,19 @@ def _with_id(columns: Sequence[str]) -> list[str]:
 
 
 def _sorted(table: Any) -> Any:
-    """Rows in the order of flight ids, which that of the months is but for flights without a time."""
+    """Rows in the order of flight ids.
+
+    The months are in that order too, but for flights without a time.
+    """
     names = table.column("flight_id").to_pylist()
     return table if names == sorted(names) else table.take(np.argsort(np.array(names, dtype=object), kind="stable"))
 
 
 def scan(out: Path) -> Scan:
-    """Look at the flight folders of an OUT and at the dataset: of a known flight only times and sizes are asked for."""
+    """Look at the flight folders of an OUT and at the dataset.
+
+    Of a known flight only times and sizes are asked for.
+    """
     by_month = _keys_by_month(out)
     keys = Keys.joined(list(by_month.values()))
     stamps, root = dict(zip(keys.names, keys.stamps(), strict=True)), str(out)
@@ -150,7 +158,7 @@ def scan(out: Path) -> Scan:
 
 
 def remembered(out: Path) -> Keys:
-    """What is known of the flights of an OUT, also of those that have changed since or are gone."""
+    """Keys of the flights of an OUT, also of those that have changed since or are gone."""
     return Keys.joined(list(_keys_by_month(out).values()))
 
 
@@ -167,7 +175,9 @@ def names_in(out: Path) -> list[str]:
 
 
 def stamp_of(out: Path | str, name: str) -> int | None:
-    """Times and sizes that change with a flight, in one number; None where there is no summary.
+    """Stamp of a flight: times and sizes that change with it, in one number.
+
+    None where there is no summary.
 
     Asked for are the folder, whose time every file that is put there or replaced changes, the summary and the samples.
     """

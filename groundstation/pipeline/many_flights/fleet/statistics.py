@@ -1,4 +1,4 @@
-"""A folder of flights as a fleet: its statistics, from what each flight adds, and fleet.parquet."""
+"""Statistics of a folder of flights, from what each flight adds, and fleet.parquet."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -118,7 +118,7 @@ def write_fleet(out: Path, found: Scan) -> tuple[FleetResults, tuple[Outcome, ..
 
 
 def _unread_shares(found: Scan) -> tuple[Any, list[NotInFleet]]:
-    """Shares of the flights that the dataset has not, as far as they can be read, and those that cannot."""
+    """Shares of the flights that the dataset has not, and the flights that cannot be read."""
     shares, unread = [], []
     for name in found.stale:
         try:
@@ -143,7 +143,10 @@ def _joined(table: Any, shares: Any) -> Any:
 
 
 def _parts(found: Scan, shares: Any, columns: Sequence[str]) -> Iterator[Any]:
-    """Some columns of all flights in the order of their ids: a month at a time, where the months are in that order."""
+    """Columns of all flights in the order of their ids.
+
+    They come a month at a time, where the months are in that order.
+    """
     places = np.concatenate([np.zeros(0, np.intp), *found.fresh.by_month().values()])
     if len(shares) or not len(places) or np.any(np.diff(places) < 0):
         yield _joined(found.table(columns), shares)
@@ -214,7 +217,10 @@ def _details(found: Scan, flights: FigureData, shares: Any) -> tuple[SkillMerger
 def _table(
     name: str, types: Mapping[str, str], flights: FigureData, parts: Sequence[Mapping[str, NDArray[Any]]]
 ) -> FigureData:
-    """A table from parts that have some of its columns and, as ``row``, the flight that the others are of."""
+    """Table from parts that have some of its columns.
+
+    Their ``row`` says which flight the other columns are taken of.
+    """
     rows = np.concatenate([np.zeros(0, np.intp), *(part["row"] for part in parts)])
     arrays = {}
     for key, kind in types.items():
@@ -224,13 +230,16 @@ def _table(
 
 
 def _not_in_fleet(out: Path, unread: list[NotInFleet]) -> tuple[NotInFleet, ...]:
-    """Logs without a flight, as the index remembers them, and flight folders that could not be read just now."""
+    """Logs without a flight by the index, and flight folders that could not be read just now."""
     told = [*(one for one in _indexed(out) if not _is_folder_of(out, one.source)), *unread]
     return tuple(sorted(told, key=lambda one: (one.kind, one.source, one.reason)))
 
 
 def _is_folder_of(out: Path, source: str) -> bool:
-    """Whether a row of the index is of a folder that could not be read then: it is looked at anew."""
+    """Tell whether a row of the index is of a folder that could not be read then.
+
+    It is looked at anew.
+    """
     return Path(source).parent == out and (out / Path(source).name / SUMMARY).is_file()
 
 

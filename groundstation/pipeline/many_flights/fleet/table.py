@@ -1,4 +1,4 @@
-"""What one flight adds to the fleet, as the dataset of flights keeps it: its folder is read once, when it changes."""
+"""Arrow table of what the flights add to the fleet, and what is read back from it."""
 
 import json
 import math
@@ -53,12 +53,14 @@ def index_rows_of(table: Any) -> list[IndexRow]:
 
 
 def lessons_of(table: Any) -> Iterator[Lesson]:
-    """What the flights in a table of shares say of installations, those that state a serial."""
+    """Lessons in a table of shares, of the flights that state a serial."""
     yield from (from_json(Lesson, json.loads(text)) for text in table.column("lesson").to_pylist() if text)
 
 
 def skill_rows_of(table: Any) -> tuple[NDArray[np.intp], dict[str, NDArray[Any]]]:
-    """The skill of all flights in a table of shares: the row of the flight, and columns; ``is_within`` -1 is unknown.
+    """Skill of all flights in a table of shares: the row of the flight, and columns.
+
+    ``is_within`` -1 is unknown.
 
     ``is_shipped`` says whether the method is the shipped one of its flight.
     """
@@ -107,7 +109,9 @@ def histograms_of(table: Any) -> Iterator[SampleHistogram]:
 
 
 def fleet_parquet(table: Any) -> bytes:
-    """Encode the flights of a table of shares: times in UTC, dictionaries for categories, null for what is missing.
+    """Encode the flights of a table of shares.
+
+    Times are in UTC, categories have dictionaries, what is missing is null.
 
     The schema's metadata has ``columns``, JSON of every column's meaning.
     """

@@ -1,4 +1,7 @@
-"""Logs each in a process of its own, with limits: one that goes beyond them costs itself alone."""
+"""Jobs each in a process of its own, with limits.
+
+A log that goes beyond them costs itself alone.
+"""
 
 import json
 import math
@@ -28,7 +31,9 @@ Found = TypeVar("Found")
 
 
 def bounds_of(isolation: Isolation | None, timeout_s: float = math.inf) -> Bounds:
-    """What one log may take: by the settings where it is read apart (``isolation``), else by ``--timeout`` alone.
+    """Limits of one log.
+
+    The settings give them where it is read apart (``isolation``), else ``--timeout`` alone.
 
     Raises
     ------
@@ -57,7 +62,10 @@ def outcomes_apart(
     listen: Listener,
     bounds: Bounds,
 ) -> Generator[tuple[int, Outcome]]:
-    """Run jobs each in a process of its own, several side by side; yields number and outcome as each ends."""
+    """Run jobs each in a process of its own, several side by side.
+
+    Yields number and outcome as each ends.
+    """
 
     def failed(job: Work, reason: str) -> Outcome:
         return Outcome(job.log, "failed", f"{job.name}: {reason}")
@@ -115,7 +123,7 @@ def each_apart(
 
 
 def _heard(running: Iterable["_Running[Any]"]) -> list[Connection]:
-    """Those that have something to tell, or whose time is over."""
+    """Processes that have something to tell, or whose time is over."""
     by_receiver = {one.receiver: one for one in running}
     next_end = min(one.deadline for one in by_receiver.values()) - time.monotonic()
     ready = wait(list(by_receiver), None if math.isinf(next_end) else max(next_end, 0.0))
@@ -166,7 +174,7 @@ class _Running(Generic[AnyJob]):
         self.process.close()
 
     def answer(self, kind: type[Found], failed: Callable[[AnyJob, str], Found]) -> Found:
-        """What the process found, or that it found nothing."""
+        """Answer of the process, or that it found nothing."""
         if self.reason or self.found is None:
             return failed(self.job, self.reason or DIED)
         try:

@@ -1,4 +1,7 @@
-"""Jobs on a cluster of Dask, which schedules and repeats them; groundstation must be installed on its workers."""
+"""Jobs on a cluster of Dask, which schedules and repeats them.
+
+groundstation must be installed on its workers.
+"""
 
 import logging
 import math
@@ -81,7 +84,7 @@ def on_cluster(
 
 
 class _HangingError(Exception):
-    """What a worker raises when a job takes too long.
+    """Error that a worker raises when a job takes too long.
 
     It is no result: those are kept by their worker, and computed again by another one when that worker is started anew
     before its scheduler hears that they were fetched. The job would hang there, too.
@@ -114,7 +117,10 @@ def _keep(promise: Promise[Outcome], run: Callable[[AnyJob, Listener], Outcome],
 
 
 def _start_anew(client: "Client", worker: str) -> None:
-    """End a worker's process, which its nanny starts again; one without a nanny stays as it is."""
+    """End a worker's process, which its nanny starts again.
+
+    A worker without a nanny stays as it is.
+    """
     with suppress(Exception):  # whatever is wrong with that worker concerns no other
         client.restart_workers([worker], timeout=RESTART_S, raise_for_error=False)
 

@@ -30,7 +30,7 @@ _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
 
 @dataclass(frozen=True)
 class Bounds:
-    """What the process of one log may take.
+    """Limits of the process of one log.
 
     Parameters
     ----------
@@ -52,12 +52,15 @@ class Bounds:
 
     @property
     def late(self) -> str:
-        """What is said of a log that took too long."""
+        """Reason that is told of a log that took too long."""
         return f"not done within {self.time_s:g} s ({self.time_from}), ended"
 
 
 def begin(sender: Connection, payload: bytes, bounds: Bounds) -> None:
-    """Run what was handed over, in this process or in one below it; what comes of it goes to ``sender``."""
+    """Run a job that was handed over, in this process or in one below it.
+
+    What comes of it goes to ``sender``.
+    """
     if bounds.is_isolated:
         _keep(sender, payload, bounds)
     else:
@@ -91,7 +94,10 @@ def _work(sender: Connection, payload: bytes) -> None:
 
 
 def _keep(sender: Connection, payload: bytes, bounds: Bounds) -> None:
-    """Fork the process that does the work and watch it; tell why it ended where it did not end by itself."""
+    """Fork the process that does the work and watch it.
+
+    Where it does not end by itself, the reason is told.
+    """
     asked_to_end: list[int] = []
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run is interrupted, and ends this process in its way
     signal.signal(signal.SIGTERM, lambda number, _frame: asked_to_end.append(number))
@@ -125,7 +131,7 @@ def _be_the_worker(sender: Connection, payload: bytes, bounds: Bounds) -> NoRetu
 
 
 def _limit(bounds: Bounds) -> None:
-    """Have the system keep the limits, as far as it knows them."""
+    """Let the system keep the limits, as far as it knows them."""
     import resource  # not on Windows
 
     limits = {resource.RLIMIT_CORE: 0}
@@ -143,7 +149,10 @@ def _limit(bounds: Bounds) -> None:
 
 
 def _watch(worker: int, above: int, bounds: Bounds, asked_to_end: list[int]) -> str:
-    """Wait for the end of the worker; at its limits, or where the run is gone, why it has to end now."""
+    """Wait for the end of the worker; returns why it has to end now, if it has to.
+
+    It has to at its limits, or where the run is gone.
+    """
     deadline = time.monotonic() + bounds.time_s
     while True:
         ended, status = os.waitpid(worker, os.WNOHANG)
@@ -162,7 +171,7 @@ def _watch(worker: int, above: int, bounds: Bounds, asked_to_end: list[int]) -> 
 
 
 def _why(status: int, bounds: Bounds) -> str:
-    """Why a process ended; empty where it did what it was to do."""
+    """Reason why a process ended; empty where it did what it was to do."""
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
         if number == signal.SIGXCPU:
@@ -172,7 +181,10 @@ def _why(status: int, bounds: Bounds) -> str:
 
 
 def _end_all(worker: int) -> None:
-    """End a process and all that it has started, also what has left its group; none of them is left when it returns."""
+    """End a process and all that it has started, also what has left its group.
+
+    None of them is left when it returns.
+    """
     deadline = time.monotonic() + 10.0
     while time.monotonic() < deadline:
         with suppress(OSError):

@@ -1,4 +1,4 @@
-"""The crew of a run: a cluster, processes side by side, a process for each log, or this process alone."""
+"""Crew of a run: a cluster, processes side by side or each apart, or this process alone."""
 
 import math
 from functools import partial
@@ -17,7 +17,10 @@ def crew_for(
     timeout_s: float = math.inf,
     bounds: Bounds | None = None,
 ) -> Crew:
-    """Who does the work: a cluster, processes, or this process alone, where there is little and no limit of time."""
+    """Choose who does the work: a cluster, processes, or this process alone.
+
+    This process alone works where there is little to do and no limit of time.
+    """
     if bounds is not None:
         return partial(outcomes_apart, workers=workers, listen=listen, bounds=bounds)
     if scheduler:

@@ -1,4 +1,7 @@
-"""Worker processes that run jobs side by side; one that dies or hangs takes its own log with it and no other."""
+"""Worker processes that run jobs side by side.
+
+One that dies or hangs takes its own log with it and no other.
+"""
 
 import json
 import math
@@ -27,7 +30,7 @@ _END = b""
 
 
 class Work(Protocol):
-    """What can be run: where its log is as the user would type it, and the log's name."""
+    """Job of any kind: its log as the user would type it, and the log's name."""
 
     @property
     def log(self) -> str: ...
@@ -56,7 +59,10 @@ _tell_begin: Callable[[object], None] = print  # ... and of the number of a job 
 def in_turn(
     tasks: Iterable[tuple[int, AnyJob]], run: Callable[[AnyJob, Listener], Outcome], *, listen: Listener
 ) -> Generator[tuple[int, Outcome]]:
-    """Run jobs in this process, one after the other; yields the number and the outcome of each."""
+    """Run jobs in this process, one after the other.
+
+    Yields the number and the outcome of each.
+    """
     for number, job in tasks:
         yield number, run(job, listen)
 
@@ -92,7 +98,10 @@ def side_by_side(
 
 @dataclass
 class _Queue(Generic[AnyJob]):
-    """Jobs that wait: those to be run again, then the others; and when each of those that run began, by number."""
+    """Jobs that wait: those to be run again, then the others.
+
+    It also has when each of those that run began, by number.
+    """
 
     waiting: Iterator[tuple[int, AnyJob]]
     begun: dict[int, float] = field(default_factory=dict)
@@ -125,7 +134,9 @@ def _until_broken(
     broken: list[tuple[int, AnyJob]],
     timeout_s: float,
 ) -> Generator[tuple[int, Outcome]]:
-    """Run jobs until there are none, or until a process dies: then those that were in the pool are ``broken``.
+    """Run jobs until there are none, or until a process dies.
+
+    Then those that were in the pool are ``broken``.
 
     Where a job takes too long, those that were in the pool with it are in the queue again.
     """
@@ -169,7 +180,10 @@ def _until_broken(
 
 
 def _end(pool: ProcessPoolExecutor, *, at_once: bool) -> None:
-    """End the processes of a pool, ``at_once`` also those that do not listen; one that cannot end is not waited for."""
+    """End the processes of a pool, ``at_once`` also those that do not listen.
+
+    One that cannot end is not waited for.
+    """
     processes = list((getattr(pool, "_processes", None) or {}).values())
     pool.shutdown(wait=False, cancel_futures=True)
     for process in processes:
@@ -184,7 +198,10 @@ def _run(run: Callable[[AnyJob, Listener], Outcome], number: int, job: AnyJob) -
 
 
 def _begin(sender: Connection) -> None:
-    """Set up a worker process: its stages are told through the pipe, and it ends with the run, however that ends."""
+    """Set up a worker process.
+
+    Its stages are told through the pipe, and it ends with the run, however that ends.
+    """
     global _tell, _tell_begin
     _tell = _teller(sender)
     _tell_begin = partial(_send, sender)
@@ -217,7 +234,9 @@ def _send(sender: Connection, message: object) -> None:
 
 @contextmanager
 def _events(listen: Listener, queue: _Queue[Any]) -> Iterator[Connection]:
-    """A pipe for the events of all workers, which a thread passes on, and for the numbers of the jobs that they begin.
+    """Pipe for the events of all workers, and for the numbers of the jobs that they begin.
+
+    A thread passes the events on.
 
     Every event is one short write, which the system does not mix with another's: no lock that a killed process holds.
     """

@@ -1,4 +1,4 @@
-"""Places elsewhere, in a bucket or on a server: folders named by URL, reached through fsspec."""
+"""Folders in a bucket or on a server, named by URL and reached through fsspec."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -59,7 +59,10 @@ class RemoteFolder:
             return sorted({PurePosixPath(path).name for path in listed} - {PurePosixPath(self._path(name)).name, ""})
 
     def files(self) -> dict[str, int]:
-        """Bytes of all files below, by their path from here, sorted; "" where the URL names a file itself."""
+        """Bytes of all files below, by their path from here, sorted.
+
+        The path is "" where the URL names a file itself.
+        """
         with self._told(""):
             if self._fs.isfile(self._root):
                 return {"": int(self._fs.size(self._root))}
@@ -121,7 +124,10 @@ class RemoteFolder:
     def replace(
         self, source: str, target: str, is_old: Callable[[str], bool], *, last: str = FLIGHT_FOLDER_MARK
     ) -> None:
-        """Put the files of a folder in the place of old ones of another, one of them last; the source is gone then."""
+        """Put the files of a folder in the place of old ones of another, one of them last.
+
+        The source is gone then.
+        """
         with self._told(target):
             old = self._relative(target)
             if last in old:
@@ -185,7 +191,7 @@ def far_logs(url: str) -> list[FarLog]:
 
 
 def _is_left_out(path: PurePosixPath, ours: set[PurePosixPath]) -> bool:
-    """Whether a file is hidden, holds settings, or lies in a folder that groundstation made."""
+    """Tell whether a file is hidden, holds settings, or lies in a folder of groundstation's."""
     if path.suffix.lower() == NO_LOGS:
         return True
     return any(part.startswith(".") for part in path.parts) or not ours.isdisjoint(path.parents)

@@ -62,7 +62,10 @@ def run_remote(remote: RemoteJob, listen: Listener = silent) -> Outcome:
 
 
 def digest_remote(remote: RemoteJob, listen: Listener = silent) -> Outcome:
-    """Fetch a log for its digest alone, which the outcome holds; its run tells what is wrong with one that has none."""
+    """Fetch a log for its digest alone, which the outcome holds.
+
+    The run of a log without one tells what is wrong with it.
+    """
     listen(Event("stage", remote.name, "comparing its content"))
     try:
         with tempfile.TemporaryDirectory(prefix="groundstation-") as scratch:
@@ -95,7 +98,10 @@ def _run_in(scratch: Path, remote: RemoteJob, listen: Listener) -> Outcome:
 
 
 def _sent(job: Job, outcome: Outcome, out: RemoteFolder) -> Outcome:
-    """The outcome of a flight, its folder sent to staging, or what was made again of it to its place."""
+    """Outcome of a flight, its folder sent to staging.
+
+    What was made again of a finished one is sent to its place.
+    """
     if not outcome.flight_id:
         return outcome
     if job.step == "nothing":
@@ -112,7 +118,10 @@ def _sent(job: Job, outcome: Outcome, out: RemoteFolder) -> Outcome:
 
 
 def _planned(job: Job, out: RemoteFolder, scratch: Path) -> tuple[Job, ...]:
-    """The job with what has to be done of it, one for each power-up; what it needs of finished flights is fetched."""
+    """Job with what has to be done of it, one for each power-up.
+
+    What it needs of finished flights is fetched.
+    """
     asked = job.asked()
     if asked is None:
         return (job,)
@@ -138,7 +147,10 @@ def _planned(job: Job, out: RemoteFolder, scratch: Path) -> tuple[Job, ...]:
 
 
 def flights_of(out: RemoteFolder, sha256: str) -> dict[int, str]:
-    """Ids of the flights that a log gave, by the number of the power-up in it, 0 where it holds one."""
+    """Ids of the flights that a log gave, by the number of the power-up in it.
+
+    The number is 0 where the log holds one.
+    """
     lines = (out.read(f"{BY_LOG}/{sha256}") or b"").decode().split("\n")
     pairs = (line.rpartition(" ")[::2] for line in lines if line)
     return dict(sorted((int(number or 0), flight_id) for number, flight_id in pairs))
@@ -159,7 +171,7 @@ def array_files(out: RemoteFolder, flight_id: str) -> list[str]:
 
 
 def _fetched(out: RemoteFolder, flight_id: str, scratch: Path) -> Finished | None:
-    """What a flight elsewhere remembers, its two documents fetched; None when it is not whole."""
+    """Finished flight elsewhere, its two documents fetched; None when it is not whole."""
     folder, sizes = scratch / flight_id, out.sizes(flight_id)
     if not {MANIFEST, SUMMARY} <= sizes.keys():
         return None

@@ -1,4 +1,7 @@
-"""One run at a time in an OUT elsewhere: a lock of a bucket is a small file that says whose it is and when it ends."""
+"""Lock that keeps an OUT elsewhere to one run at a time.
+
+In a bucket it is a small file that says whose it is and when it ends.
+"""
 
 import json
 import os
@@ -21,7 +24,7 @@ LEASE_S, RENEW_S = 600.0, 60.0
 
 @dataclass(frozen=True)
 class _Held:
-    """What a lock says."""
+    """Lock as it was read."""
 
     name: str
     token: str
@@ -39,7 +42,10 @@ class Lease:
         self._thread.start()
 
     def require(self) -> None:
-        """Raise GroundstationError when another run has taken over, as it may once the lock has ended."""
+        """Raise GroundstationError when another run has taken over.
+
+        It may do so once the lock has ended.
+        """
         held = _held(self._folder)
         if held is None or held.token != self._token:
             owner = "the lock was removed" if held is None else held.owner
@@ -114,7 +120,7 @@ def _held(folder: RemoteFolder) -> _Held | None:
 
 
 def _read(folder: RemoteFolder, name: str) -> _Held:
-    """What a lock says; one that cannot be read has ended."""
+    """Read a lock; one that cannot be read has ended."""
     try:
         told = json.loads(folder.read(f"{LOCKS}/{name}") or b"")
         return _Held(name, str(told["token"]), str(told["owner"]), float(told["until_s"]))

@@ -1,4 +1,4 @@
-"""Where the flights of a run finally stand: a folder here, or one elsewhere with a small copy of it here."""
+"""OUT in a bucket or on a server, with a small copy of it here."""
 
 import shutil
 import uuid
@@ -26,7 +26,9 @@ FLEET_ARRAYS = (
 
 
 class RemoteOutput:
-    """An OUT elsewhere; its copy here holds documents and what the fleet is made from, and other files by name alone.
+    """OUT elsewhere.
+
+    Its copy here holds documents and what the fleet is made from, and other files by name alone.
 
     Parameters
     ----------
@@ -42,7 +44,10 @@ class RemoteOutput:
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Keep other runs out while this one writes; from when one took over nothing is written any more."""
+        """Keep other runs out while this one writes.
+
+        From when another one took over, nothing is written any more.
+        """
         with alone_elsewhere(self._out) as self._lease:
             yield
 
@@ -87,7 +92,7 @@ class RemoteOutput:
             self._out.fetch(f"{flight_id}/{name}", folder / name)
 
     def has_in_place(self, outcome: Outcome) -> bool:
-        """Whether the flight stands where it shall."""
+        """Tell whether the flight stands in its place."""
         return outcome.folder == outcome.flight_id
 
     def place(self, outcome: Outcome) -> str:
@@ -106,7 +111,10 @@ class RemoteOutput:
         return mcap
 
     def send_session(self, session_id: str) -> None:
-        """Send what was made of a session of the copy; files that stand there by name alone are there already."""
+        """Send the files made of a session of the copy.
+
+        Files that stand there by name alone are there already.
+        """
         self._require_alone()
         folder = self.root / session_id
         if (folder / TABLES).is_dir():  # made just now: of what is there already the copy has no tables
@@ -130,7 +138,9 @@ class RemoteOutput:
             shutil.rmtree(self.root / folder, ignore_errors=True)
 
     def publish(self, names: Sequence[str], *, is_whole: bool) -> None:
-        """Send files and folders of the copy that stand beside the flight folders; clear what is left of staging.
+        """Send files and folders of the copy that stand beside the flight folders.
+
+        What is left of staging is cleared.
 
         What a run that came to its end did not make is removed there too.
         """

@@ -1,4 +1,7 @@
-"""Several logs: each in its turn, several at once or on a cluster, one bad log never stopping the others."""
+"""Batch of logs: each in its turn, several at once or on a cluster.
+
+One bad log never stops the others.
+"""
 
 import math
 import tempfile
@@ -66,7 +69,9 @@ def run_many(
     unclaimed: Sequence[Path] = (),
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
-    """Run logs and folders of logs into ``out``, then the sessions among the flights; the index lists all of them.
+    """Run logs and folders of logs into ``out``, then the sessions among the flights.
+
+    The index lists all of them.
 
     What an earlier run finished, with the same logs and settings, is not done again unless ``redo`` is set. Interrupted
     or killed, it keeps what was finished.
@@ -154,7 +159,9 @@ def run_together(
     only_results: bool = False,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
-    """Run several logs of one flight as that flight; see :func:`groundstation.pipeline.one_flight.join.join_logs`.
+    """Run several logs of one flight as that flight.
+
+    See :func:`groundstation.pipeline.one_flight.join.join_logs`.
 
     The logs are read and joined each time; parameters as of :func:`run_many`.
 
@@ -257,7 +264,9 @@ def _run_joined(
     *,
     is_isolated: bool = False,
 ) -> tuple[Outcome, ...]:
-    """Run as one flight the consecutive logs among those in place; returns what could not be joined, and why.
+    """Run as one flight the consecutive logs among those in place.
+
+    Returns what could not be joined, and why.
 
     Isolated, files that cannot be read alone are not looked at: that would read them in this process.
     """
@@ -280,7 +289,10 @@ def _run_joined(
 
 
 def _swept(destination: Destination, out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, ...]]:
-    """Bring the dataset of flights up to date, flights that these logs have no longer being removed."""
+    """Bring the dataset of flights up to date.
+
+    Flights that these logs have no longer are removed.
+    """
     found, unwritten = refresh(out, crew)
     return refresh(out) if destination.sweep(found) else (found, unwritten)
 
@@ -288,7 +300,10 @@ def _swept(destination: Destination, out: Path, crew: Crew | None = None) -> tup
 def _run_sessions(
     destination: Destination, asked: Asked, among: Scan, crew: Crew, listen: Listener
 ) -> tuple[Outcome, ...]:
-    """Run the sessions among the flights that are in place; interrupted, the index at least is written."""
+    """Run the sessions among the flights that are in place.
+
+    Interrupted, the index at least is written.
+    """
     flights = destination.outcomes()
     outcomes: dict[int, Outcome] = {}
     try:
@@ -367,7 +382,10 @@ def _once(
 def _run_remote_sessions(
     destination: Destination, output: RemoteOutput, asked: Asked, among: Scan, listen: Listener
 ) -> tuple[Outcome, ...]:
-    """Run the sessions in the copy of an OUT elsewhere, in this process, where the MCAPs are fetched to."""
+    """Run the sessions in the copy of an OUT elsewhere.
+
+    They run in this process, where the MCAPs are fetched to.
+    """
     before = session_folders(output.root)
     here = replace(asked, out=output.root, mcap_in=output.mcap_in, is_copy=True)
     outcomes = _run_sessions(destination, here, among, partial(in_turn, listen=listen), listen)
@@ -392,7 +410,9 @@ def _run_into(
     listen: Listener,
     logs: int,
 ) -> None:
-    """Carry out jobs and put their flights into place; interrupted, the index at least is written.
+    """Carry out jobs and put their flights into place.
+
+    Interrupted, the index at least is written.
 
     ``logs`` is how many logs there are: the flights of a log have its number, and that and multiples of their count.
     """

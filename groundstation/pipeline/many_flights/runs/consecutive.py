@@ -1,4 +1,7 @@
-"""Consecutive logs among those of a run and the flights of its OUT: found by where each begins and ends."""
+"""Consecutive logs among those of a run and the flights of its OUT.
+
+They are found by where each begins and ends.
+"""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -50,7 +53,9 @@ class Stretch:
 def flights_of_parts(
     outcomes: Mapping[int, Outcome], known: KnownFlights, configuration: Configuration
 ) -> list[Stretch]:
-    """Flights that consist of several logs, of which this run has at least one, and which are not so in OUT yet.
+    """Flights that consist of several logs, and are not so in OUT yet.
+
+    This run has at least one log of each.
 
     Parameters
     ----------
@@ -89,7 +94,7 @@ class _Folders:
 
 
 def _followers(folder: Path) -> dict[str, str]:
-    """For each file of a folder, the one behind it among those of its family."""
+    """File behind each file of a folder, among those of its family."""
     families: dict[str, list[str]] = {}
     try:
         for one in folder.iterdir():
@@ -104,7 +109,10 @@ def _may_join(parts: Sequence[PartOfRun]) -> bool:
 
 
 def _others(own: Sequence[Stretch], strangers: Iterable[Path], known: KnownFlights) -> Iterator[Stretch]:
-    """Flights of OUT that are near those of the run; what the run has anew of their parts is left out of them."""
+    """Flights of OUT that are near those of the run.
+
+    What the run has anew of their parts is left out of them.
+    """
     of_logs = (found for one in own for part in one.parts for found in known.about(part))
     of_files = (found for path in strangers for found in known.beside(path))
     mine = {part.sha256 for one in own for part in one.parts}
@@ -122,7 +130,10 @@ def _others(own: Sequence[Stretch], strangers: Iterable[Path], known: KnownFligh
 def _with_strangers(
     stretch: Stretch, strangers: Mapping[Path, int], folders: _Folders, configuration: Configuration
 ) -> Stretch:
-    """A stretch with the files behind it that cannot be read alone: by name they follow, by content they go on."""
+    """Stretch with the files behind it that cannot be read alone.
+
+    By name they follow, by content they go on.
+    """
     first: Log | None = None
     while strangers and (path := folders.next_file(Path(stretch.last.path))) in strangers:
         assert path is not None
@@ -162,7 +173,10 @@ def _chained(stretches: Sequence[Stretch], folders: _Folders) -> list[Stretch]:
 
 
 def _nearest(stretches: Sequence[Stretch], others: Sequence[int], *, is_behind: bool) -> list[int]:
-    """Those of some stretches behind (or before) another one that are not behind (or before) one of themselves."""
+    """Stretches next behind (or before) another one, out of several.
+
+    They are not behind (or before) one of themselves.
+    """
 
     def comes_first(one: int, other: int) -> bool:
         first, second = (stretches[one], stretches[other]) if is_behind else (stretches[other], stretches[one])
@@ -177,7 +191,10 @@ def _first_ns(stretch: Stretch) -> int:
 
 
 def _only(stretches: Sequence[Stretch], one: int, others: Sequence[int]) -> int | None:
-    """The one of several that goes with a stretch: where there are more, that of the same family of names."""
+    """Stretch that goes with another one, out of several.
+
+    Where there are more, it is that of the same family of names.
+    """
     if len(others) == 1:
         return others[0]
     like = family(stretches[one].last.name)
@@ -202,5 +219,5 @@ def _pairs(stretches: Sequence[Stretch], folders: _Folders) -> Iterator[tuple[in
 
 
 def _moments(part: PartOfRun, at: int) -> list[tuple[str, int]]:
-    """When a log begins (0) or ends (1), by each clock that tells it."""
+    """Times at which a log begins (0) or ends (1), by each clock that tells it."""
     return [("device", part.device_ns[at]), *([("utc", part.utc_ns[at])] if part.utc_ns else [])]

@@ -1,4 +1,7 @@
-"""Where finished flights are put, one after the other, so that a run that is killed keeps what it had finished."""
+"""Destination of finished flights.
+
+They are put there one after the other, so that a run that is killed keeps what it had finished.
+"""
 
 import json
 import shutil
@@ -31,7 +34,7 @@ class Output(Protocol):
     root: Path
 
     def has_in_place(self, outcome: Outcome) -> bool:
-        """Whether the flight stands where it shall."""
+        """Tell whether the flight stands in its place."""
 
     def place(self, outcome: Outcome) -> str:
         """Move a finished flight to its place, which is told."""
@@ -47,7 +50,7 @@ class LocalOutput:
         self.root = root
 
     def has_in_place(self, outcome: Outcome) -> bool:
-        """Whether the flight stands where it shall."""
+        """Tell whether the flight stands in its place."""
         return Path(outcome.folder) == self.root / outcome.flight_id
 
     def place(self, outcome: Outcome) -> str:
@@ -65,7 +68,7 @@ class LocalOutput:
 
 
 class _Origin(NamedTuple):
-    """Which log a flight folder came from: where it was, the digest of its content, which power-up in it."""
+    """Origin of a flight folder: path of the log, digest of its content, power-up in it."""
 
     path: str
     sha256: str
@@ -73,7 +76,7 @@ class _Origin(NamedTuple):
 
 
 class _Content(NamedTuple):
-    """What a flight is of: the digest of its log, and which power-up in it."""
+    """Content of a flight: the digest of its log, and which power-up in it."""
 
     sha256: str
     power_up: int
@@ -160,7 +163,7 @@ class Destination:
         return Outcome(outcome.source, "failed", reason, sha256=outcome.sha256, times_s=outcome.times_s)
 
     def clashing(self) -> tuple[int, ...]:
-        """Numbers of the logs, once all are put, that must be run again with their digests in their names."""
+        """Numbers of the logs to run again with their digests in their names, once all are put."""
         return tuple(number for number, outcome in sorted(self._outcomes.items()) if outcome.flight_id in self._clashes)
 
     def put_again(self, number: int, outcome: Outcome) -> None:
@@ -179,7 +182,9 @@ class Destination:
         )
 
     def put_joined(self, numbers: Sequence[int], outcome: Outcome) -> Outcome | None:
-        """Put the flight of several logs into place, in that of the flights that they gave one by one.
+        """Put the flight of several logs into place.
+
+        It takes the place of the flights that they gave one by one.
 
         Parameters
         ----------
@@ -200,11 +205,13 @@ class Destination:
         return None
 
     def flights(self) -> dict[int, Outcome]:
-        """What became of the logs put so far, by their numbers."""
+        """Outcomes of the logs put so far, by their numbers."""
         return dict(self._outcomes)
 
     def sweep(self, found: Scan) -> bool:
-        """Remove flights of these logs that stand under another id, and those of older versions of the logs.
+        """Remove flights of these logs that stand under another id.
+
+        Those of older versions of the logs are removed, too.
 
         Returns whether there were any. ``found`` are the flights of the folder, with what is known of them.
         """
@@ -227,18 +234,18 @@ class Destination:
         return bool(old)
 
     def outcomes(self) -> tuple[Outcome, ...]:
-        """What became of the logs put so far, in the order of the inputs."""
+        """Outcomes of the logs put so far, in the order of the inputs."""
         count = max(1, len(self._names))
         return tuple(
             self._outcomes[number] for number in sorted(self._outcomes, key=lambda one: divmod(one, count)[::-1])
         )
 
     def power_up(self, number: int) -> int:
-        """Which of several power-ups in its log the flight of a number is; 0 where the log holds one."""
+        """Number of the power-up in its log that a flight is; 0 where the log holds one."""
         return self._outcomes[number].power_up
 
     def _is_of_another_log(self, flight_id: str, outcome: Outcome) -> bool:
-        """Whether a flight folder came from another log than an earlier version of this one."""
+        """Tell whether a flight folder came from another log than an earlier version of this one."""
         origin = _origin_of(self._output.root / flight_id)
         if origin is None or _Content.of(origin) == _Content.of(outcome):
             return False
@@ -253,12 +260,12 @@ def _came_from(flights: Keys, digests: Collection[str], paths: Collection[str]) 
 
 
 def _place_of(outcome: Outcome) -> str:
-    """Where the log is, as manifests tell it."""
+    """Path or URL of the log, as manifests tell it."""
     return outcome.source if is_remote(outcome.source) else str(Path(outcome.source).absolute())
 
 
 def _origin_of(folder: Path) -> _Origin | None:
-    """None for a folder that is not whole."""
+    """Origin of a flight folder; None when it is not whole."""
     try:
         manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
         source, power_up = manifest["source"], manifest.get("power_up") or {}

@@ -1,4 +1,4 @@
-"""What a run would do of each log, found without running any."""
+"""Plan of a run: what it would do of each log, found without running any."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -30,7 +30,9 @@ def plan_many(
     stations: Path | None = None,
     only_results: bool = False,
 ) -> tuple[Outcome, ...]:
-    """Say what ``run_many`` would do of each log, and of the sessions among finished flights; nothing is written.
+    """Say what ``run_many`` would do of each log, and of the sessions among finished flights.
+
+    Nothing is written.
 
     Raises
     ------
@@ -61,7 +63,7 @@ def plan_many(
 
 
 def _planned(job: Job) -> Outcome:
-    """What would become of a log."""
+    """Outcome that a log would have."""
     if job.finished is not None:
         is_there = job.step == "nothing"
         return Outcome(job.log, "done", TO_DO[job.step], flight_id=job.finished.flight_id, was_finished=is_there)
@@ -75,7 +77,10 @@ def _planned(job: Job) -> Outcome:
 
 
 def _planned_sessions(asked: Asked, among: Scan, planned: Sequence[Outcome]) -> list[Outcome]:
-    """Sessions among the finished flights; that those of unread logs are looked for, where stations are given."""
+    """Sessions among the finished flights.
+
+    Those of unread logs are looked for, where stations are given.
+    """
     flight_ids = {one.flight_id for one in planned if one.flight_id}
     found = find_sessions(asked, among, flight_ids) if flight_ids else FoundSessions()
     sessions = [*map(planned_session, found.jobs), *(one for one in found.told if one.state == "failed")]

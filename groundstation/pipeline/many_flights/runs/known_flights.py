@@ -1,4 +1,7 @@
-"""Flights that an OUT has already, by the log they came from; a folder is read when its log is asked for."""
+"""Flights that an OUT has already, by the log they came from.
+
+A folder is read when its log is asked for.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -53,7 +56,9 @@ class KnownFlights:
         return len(self._one_of)
 
     def of(self, sha256: str) -> tuple[Finished, ...]:
-        """The flights that a log gave, by its digest: one of each power-up in it; none unless all of them are whole.
+        """Flights that a log gave, by its digest: one of each power-up in it.
+
+        None unless all of them are whole.
 
         Of a log that is part of a flight, the flight.
         """
@@ -69,21 +74,24 @@ class KnownFlights:
 
     @cached_property
     def paths_of_parts(self) -> frozenset[str]:
-        """Where the logs behind the first one are of flights that came from several."""
+        """Paths of the logs behind the first one, of flights that came from several."""
         several = self.manifests_of(self._of_several)
         return frozenset(part.path for manifest in several for part in manifest.parts[1:])
 
     def about(self, part: PartOfRun) -> list[str]:
-        """Flights that another one may go on from, or that may go on from it: by their times, or names of files."""
+        """Flights that another one may go on from, or that may go on from it.
+
+        Their times tell, or names of files.
+        """
         is_sure = part.utc_ns is not None and part.aircraft
         return sorted({*self._near(part), *([] if is_sure else self.beside(Path(part.path)))})
 
     def beside(self, path: Path) -> list[str]:
-        """Flights of files in the folder of another one whose names differ from its in a number alone."""
+        """Flights of files beside another one whose names differ from its in a number alone."""
         return self._by_family.get((path.parent, family(path.name)), [])
 
     def manifests_of(self, names: Iterable[str]) -> Iterator[Manifest]:
-        """What is recorded of some flights, without those that are gone or not whole."""
+        """Manifests of some flights, without those that are gone or not whole."""
         for name in names:
             with suppress(GroundstationError):
                 yield self._manifests.get(name) or load_manifest((self._out or Path()) / name)
@@ -99,7 +107,7 @@ class KnownFlights:
 
     @cached_property
     def _by_family(self) -> dict[tuple[Path, str], list[str]]:
-        """Flights by the folder of their log and the family of its name, in the order of their names."""
+        """Flights by the folder of their log and the family of its name, sorted by name."""
         if self._out is None:
             return {}
         paths = (*self._keys.column("path"), *(one.source.path for one in self._manifests.values()))

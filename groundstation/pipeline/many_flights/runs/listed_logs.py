@@ -1,4 +1,4 @@
-"""The logs of a run: which there are, which are none, and what an earlier run has left to do of each."""
+"""Logs of a run, files that are none, and what an earlier run has left to do of each."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -22,7 +22,10 @@ from groundstation.results.manifest import PartOfRun
 def inputs_of(
     paths: Sequence[Path | str], out: Path | str, configuration: Configuration, unclaimed: Sequence[Path] = ()
 ) -> tuple[FarLog, ...]:
-    """Logs by path or URL, in a stable order, with the files ``unclaimed``, which no reader claims."""
+    """List logs by path or URL, in a stable order.
+
+    The files ``unclaimed``, which no reader claims, are among them.
+    """
     near = [Path(path) for path in paths if not is_remote(str(path))]
     found = {log.url: log for path in paths if is_remote(str(path)) for log in far_logs(str(path))}
     found.update({str(path): FarLog(str(path), is_named=False, size=path.stat().st_size) for path in unclaimed})
@@ -39,7 +42,9 @@ def inputs_of(
 def with_steps(
     jobs: Sequence[Job], known: KnownFlights, without: Collection[int] = ()
 ) -> Iterator[tuple[int, Job, int | None]]:
-    """Jobs by number, with what is to be done of each, and the number of an earlier one that gives its flight.
+    """Jobs by number, with what is to be done of each.
+
+    With them comes the number of an earlier job that gives the same flight.
 
     That is one with the same log, or with another part of the flight. A log whose flights of several power-ups are
     finished has a job for each of them. Those ``without`` are passed over.
@@ -72,7 +77,10 @@ def _with_step(
     found: Sequence[Finished],
     is_as_it_was: Callable[[PartOfRun], bool],
 ) -> tuple[Job, ...]:
-    """A job with what is left to do of it, one for each power-up of its log; ``found`` are its finished flights."""
+    """Job with what is left to do of it, one for each power-up of its log.
+
+    ``found`` are its finished flights.
+    """
     if found and len(found[0].parts) > 1:
         return (_of_parts(job, found[0], is_as_it_was),)
     if asked is None or not found:
@@ -84,7 +92,10 @@ def _with_step(
 
 
 def _of_parts(job: Job, flight: Finished, is_as_it_was: Callable[[PartOfRun], bool]) -> Job:
-    """The job of a flight of several logs; where one of them has changed, that of its own log alone."""
+    """Job of a flight of several logs.
+
+    Where one of them has changed, it is that of its own log alone.
+    """
     if not all(map(is_as_it_was, flight.parts)):
         return job
     joined = job.of_parts(flight.parts)
@@ -103,14 +114,16 @@ def skipped_files(inputs: Sequence[FarLog], strangers: Strangers) -> dict[int, O
 
 
 def without_parts(skipped: Mapping[int, Outcome], known: KnownFlights) -> dict[int, Outcome]:
-    """Those of the skipped files that are no parts of known flights."""
+    """Skipped files that are no parts of known flights."""
     return {
         number: one for number, one in skipped.items() if str(Path(one.source).absolute()) not in known.paths_of_parts
     }
 
 
 def run_known(job: Job, listen: Listener, *, redo: bool) -> Outcome:
-    """Run a log that this process has not looked at yet: what an earlier run finished of it is not done again.
+    """Run a log that this process has not looked at yet.
+
+    What an earlier run finished of it is not done again.
 
     With ``add_suffix`` it is one of several of the same id, and run anew; with parts it is several logs.
     """
@@ -124,6 +137,6 @@ def run_known(job: Job, listen: Listener, *, redo: bool) -> Outcome:
 
 
 def _is_as_it_was(part: PartOfRun) -> bool:
-    """Whether a part of a flight has not changed; one that is gone cannot tell."""
+    """Tell whether a part of a flight is unchanged; one that is gone cannot tell."""
     path = Path(part.path)
     return not path.exists() or digest_of(as_log(path)) == part.sha256

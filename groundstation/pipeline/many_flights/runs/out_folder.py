@@ -1,4 +1,7 @@
-"""The folder that results go into: whether it is ours, who else writes into it, what a killed run left in it."""
+"""Folder that results go into.
+
+It is ours or not, one run at a time writes into it, and what a killed run left is cleared.
+"""
 
 import os
 import shutil
@@ -29,7 +32,7 @@ def refuse_foreign(out: Path, force: bool) -> None:
 
 
 def _is_begun(out: Path) -> bool:
-    """Whether a folder is empty, or a run was killed in it before it was marked as ours."""
+    """Tell whether a folder is empty, or a run was killed in it before it was marked as ours."""
     names = {one.name for one in out.iterdir()}
     return not names or names == {LOCK} or (LOCK in names and names <= {LOCK, *BEGUN})
 
@@ -59,7 +62,10 @@ def prepare(out: Path) -> None:
 
 
 def clear_unfinished(out: Path) -> None:
-    """Clear away what nobody writes any more: this run is alone in here, and none of its jobs is running."""
+    """Clear away what nobody writes any more.
+
+    This run is alone in here, and none of its jobs is running.
+    """
     for name in os.listdir(out):  # noqa: PTH208 (a pattern is three times as slow, which 100 000 folders tell)
         if name.startswith(PARTIAL_PREFIX):
             shutil.rmtree(out / name, ignore_errors=True)

@@ -1,4 +1,7 @@
-"""References for many flights: files, or folders of files, of which each flight takes the one of its time."""
+"""References for many flights: files, or folders of files.
+
+Each flight takes the one of its time.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,6 @@
-"""Files in folders of logs that no reader claims: told before any process is started, and remembered.
+"""Files in folders of logs that no reader claims.
+
+They are told before any process is started, and remembered.
 
 What is remembered stands in OUT. A file that is as it was then, by its size and by the times of its content and of its
 last change, is not opened again.
@@ -35,7 +37,7 @@ class Strangers:
         self._told: set[str] = set()
 
     def reason(self, path: Path) -> str | None:
-        """Why a file is skipped, None where only its run can tell."""
+        """Reason why a file is skipped, None where only its run can tell."""
         place = str(path.absolute())
         try:
             stamp, known = _stamp(path), self._before.get(place)
@@ -53,7 +55,10 @@ class Strangers:
         return f"{path.name}{found}" if found.startswith(_BEHIND_NAME) else found
 
     def keep(self, outcomes: Iterable[Outcome]) -> None:
-        """Remember those that were found, and those that a run told of; a folder that cannot be written keeps none."""
+        """Remember the files that were found, and those that a run told of.
+
+        A folder that cannot be written keeps none.
+        """
         for one in outcomes:
             if one.state != "skipped" or one.sha256 or one.is_session or one.source in self._told:
                 continue
@@ -81,7 +86,7 @@ def _stamp(path: Path) -> Stamp:
 
 
 def _key() -> list[str]:
-    """What decides which files are logs: another version or another reader may claim one."""
+    """Key of the memory: another version or another reader may claim a file."""
     return [__version__, *(one.name for one in registry.formats()), *registry.plug_in_failures()]
 
 
@@ -93,7 +98,10 @@ def _encoded(found: Mapping[str, tuple[Stamp, str]]) -> bytes:
 
 
 def _read(path: Path) -> dict[str, tuple[Stamp, str]]:
-    """What was remembered; nothing where it cannot be read, or was by another version."""
+    """Read what was remembered.
+
+    Nothing where it cannot be read, or was by another version.
+    """
     try:
         told = json.loads(path.read_bytes())
         if told["key"] != _key():

@@ -1,4 +1,7 @@
-"""The sessions that a run finds among its flights: jobs on the MCAPs just made, with the stations beside the logs."""
+"""Sessions that a run finds among its flights.
+
+They are jobs on the MCAPs just made, with the stations beside the logs.
+"""
 
 from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
@@ -31,7 +34,7 @@ STATIONS_TOML = "stations.toml"  # beside the logs
 
 @dataclass(frozen=True)
 class Asked:
-    """How a run is to do its sessions; the fields are those of :class:`SessionJob`.
+    """Options of a run for its sessions; the fields are those of :class:`SessionJob`.
 
     ``stations`` is None where no file was named: then there may be one beside the logs. ``mcap_in`` gives the MCAP of a
     flight folder. ``store`` is the table that takes the rows of the flights; empty without one.
@@ -51,14 +54,17 @@ class Asked:
 
 @dataclass(frozen=True)
 class FoundSessions:
-    """Sessions to run, and what is told of flights that are in none and of logs that cannot be opened."""
+    """Sessions to run, and what is told of flights in none and of logs that cannot be opened."""
 
     jobs: tuple[SessionJob, ...] = ()
     told: tuple[Outcome, ...] = ()
 
 
 def find_sessions(asked: Asked, found: Scan, flight_ids: AbstractSet[str]) -> FoundSessions:
-    """Find the sessions in which one of these flights takes part, with whatever other flight of the folder."""
+    """Find the sessions in which one of these flights takes part.
+
+    Any other flight of the folder may be in them.
+    """
     if not any(one.hears for one in members_of(found, flight_ids)):
         return FoundSessions()
     members = ranging_with(found, flight_ids)
@@ -79,7 +85,10 @@ def find_sessions(asked: Asked, found: Scan, flight_ids: AbstractSet[str]) -> Fo
 
 
 def _heard(mcap_in: Callable[[Path], Path], folder: Path) -> Span | None:
-    """What :func:`heard_span_ns` says of a flight; None where its MCAP cannot be read, which its own row tells."""
+    """Span that a flight heard, by :func:`heard_span_ns`.
+
+    None where its MCAP cannot be read, which its own row tells.
+    """
     try:
         return heard_span_ns(mcap_in(folder))
     except (GroundstationError, OSError):
@@ -105,7 +114,10 @@ def _job(asked: Asked, group: Sequence[Member]) -> SessionJob:
 
 
 def _stations_beside(group: Sequence[Member]) -> tuple[Stations, tuple[Finding, ...]]:
-    """The ground stations of the file beside the logs; none where there is no file, or where several differ."""
+    """Ground stations of the file beside the logs.
+
+    None where there is no file, or where several differ.
+    """
     sources = [load_manifest(one.folder).source.path for one in group]
     folders = {Path(path).parent for path in sources if path and not is_remote(path)}
     found: list[Stations] = []

@@ -1,4 +1,4 @@
-"""A session to run, and what an earlier run left of it."""
+"""Job of a session, and what an earlier run left of it."""
 
 import hashlib
 import platform
@@ -63,7 +63,7 @@ class SessionJob:
 
     @property
     def log(self) -> str:
-        """Its logs as the user would type them."""
+        """Names of its logs as the user would type them."""
         return self.name
 
     @property
@@ -110,7 +110,10 @@ def sessions_of(out: Path) -> Iterator[tuple[Path, Manifest]]:
 
 
 class KeptSession(NamedTuple):
-    """A session of the same logs and settings that an earlier run left, and what of its report is to be made."""
+    """Session of the same logs and settings that an earlier run left.
+
+    It has what of its report is to be made.
+    """
 
     folder: Path
     resume: Resume
@@ -155,7 +158,7 @@ def _is_whole(file: Path, spoiled: Collection[str]) -> bool:
 
 
 def planned_session(job: SessionJob) -> Outcome:
-    """What :func:`run_one` would do of a session; nothing is written."""
+    """Say what :func:`run_one` would do of a session; nothing is written."""
     kept = kept_session(job)
     if kept is None:
         return Outcome(job.name, "done", "session to run", is_session=True)

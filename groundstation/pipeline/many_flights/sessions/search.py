@@ -1,4 +1,6 @@
-"""Sessions among the flights of a folder: flights that name each other over the link, and overlap.
+"""Search for sessions among the flights of a folder.
+
+They are flights that name each other over the link, and overlap.
 
 Two flights belong together when one has a topic ``link.<aircraft of the other>`` and both were in the air at a time; so
 do those that they belong with. Where UTC puts a flight beside nobody whom it heard, the times of transmission do: a
@@ -52,14 +54,20 @@ class Member:
 
 @dataclass(frozen=True)
 class Apart:
-    """A flight that names others over the link, and is in no session with them; why, in one line."""
+    """Flight that names others over the link, and is in no session with them.
+
+    The reason is one line.
+    """
 
     folder: Path
     reason: str
 
 
 def members_of(found: Scan, flight_ids: Set[str] | None = None) -> tuple[Member, ...]:
-    """The flights of a folder, or some of them, in the order of their names, those that cannot be read left out."""
+    """Flights of a folder, or some of them, in the order of their names.
+
+    Those that cannot be read are left out.
+    """
     known = found.fresh if flight_ids is None else found.fresh.only(flight_ids)
     columns = map(known.column, ("link_name", "hears", "start_ns", "end_ns"))
     members = [
@@ -79,7 +87,7 @@ def members_of(found: Scan, flight_ids: Set[str] | None = None) -> tuple[Member,
 
 
 def ranging_with(found: Scan, flight_ids: Set[str]) -> tuple[Member, ...]:
-    """The flights of a folder as :func:`members_of` gives them, without those that no chain of links joins to some.
+    """Flights of a folder that a chain of links joins to some, as :func:`members_of` has them.
 
     A chain goes from an aircraft to those whom one of its flights heard, or who heard it.
     """
@@ -156,7 +164,10 @@ def sessions_among(
 
 
 def heard_span_ns(mcap: Path) -> Span | None:
-    """First and last time of transmission in an MCAP, on the clock of the link; None where there is none."""
+    """First and last time of transmission in an MCAP, on the clock of the link.
+
+    None where there is none.
+    """
     from groundstation.store.reader import Part, read
 
     everything = np.iinfo(np.int64)
@@ -173,7 +184,9 @@ def heard_span_ns(mcap: Path) -> Span | None:
 
 @dataclass(frozen=True)
 class _Timed:
-    """Flights of one aircraft in the order in which they begin, to find those that overlap a span without asking all.
+    """Flights of one aircraft in the order in which they begin.
+
+    Those that overlap a span are found without asking all.
 
     Parameters
     ----------
@@ -189,7 +202,7 @@ class _Timed:
 
     @classmethod
     def of(cls, spans: Mapping[int, Span | None]) -> "_Timed":
-        """From the spans of members by their numbers; one without a span overlaps nothing."""
+        """Order members by their spans, given by number; one without a span overlaps nothing."""
         timed = sorted((span, number) for number, span in spans.items() if span is not None)
         ends_ns = accumulate((end_ns for (_, end_ns), _ in timed), max)
         return cls([number for _, number in timed], [start_ns for (start_ns, _), _ in timed], list(ends_ns))
@@ -204,7 +217,7 @@ def overlapping(
     span_of: Callable[[Member], Span | None],
     joined: Set[tuple[Path, str]] = frozenset(),
 ) -> list[tuple[Member, Member]]:
-    """Pairs of flights of different aircraft that overlap, of which one heard the other's name.
+    """Pairs of flights of different aircraft that overlap, of which one heard the other.
 
     Left out are those of which one has a partner of the other's aircraft already: ``joined`` has flights with the
     aircraft of their partners.
@@ -235,14 +248,20 @@ def overlapping(
 
 
 def overlap_ns(one: Span | None, other: Span | None) -> int:
-    """For how long two spans overlap; negative: the time between them, 0 without a span."""
+    """Time for which two spans overlap.
+
+    Negative: the time between them, 0 without a span.
+    """
     return 0 if one is None or other is None else min(one[1], other[1]) - max(one[0], other[0])
 
 
 def _best(
     overlapping: Sequence[tuple[Member, Member]], span_of: Callable[[Member], Span | None]
 ) -> list[tuple[Member, Member]]:
-    """Of several flights of one aircraft that overlap a flight the one that does so longest, and what overlaps that.
+    """Best pairs of flights that overlap.
+
+    Of several flights of one aircraft that overlap a flight, the one that does so longest stays, with those that
+    overlap it.
 
     A recorder that begins a new log in the air gives flights that follow each other: each goes with those of its time.
     Two recorders of one aircraft give flights that overlap: both stay.
@@ -274,7 +293,7 @@ def _groups(members: Sequence[Member], edges: Iterable[tuple[Member, Member]]) -
 
 
 def _reason(one: Member, named: Mapping[str, Sequence[Member]], grouped: set[Path]) -> str:
-    """Why a flight is in no session, though flights of aircraft that it heard are there."""
+    """Reason why a flight is in no session, though flights of aircraft it heard are there."""
     others = [other for name in one.hears - {one.aircraft} for other in named.get(name, ())]
     names = ", ".join(sorted({other.aircraft for other in others}))
     if any(overlap_ns(one.span_ns, other.span_ns) > 0 and other.folder in grouped for other in others):

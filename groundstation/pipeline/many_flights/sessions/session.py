@@ -1,4 +1,4 @@
-"""One session from beginning to end: MCAPs of its logs, answers, recording and report in a folder of its own."""
+"""Session from beginning to end: MCAPs, answers, recording and report in its own folder."""
 
 import shutil
 from collections.abc import Iterator, Sequence
@@ -54,7 +54,9 @@ MCAPS = "mcap"  # folder of those that the session converted itself
 
 
 def run_one(job: SessionJob, listen: Listener = silent) -> Outcome:
-    """Run a session into its place; of one that is finished only the reports that are missing are made.
+    """Run a session into its place.
+
+    Of one that is finished only the reports that are missing are made.
 
     What cannot be computed is an outcome with the reason, never an exception; a part that fails by a defect is left
     out, as in a flight.
@@ -89,7 +91,10 @@ def _outcome(
 
 
 def _finished(job: SessionJob, watch: Stopwatch) -> Outcome | None:
-    """The outcome of a session that is finished, its reports made again where they are missing; None without one."""
+    """Outcome of a session that is finished; None without one.
+
+    Its reports are made again where they are missing.
+    """
     kept = kept_session(job)
     if kept is None:
         return None
@@ -140,7 +145,10 @@ def _show(partial: Path, assembled: AssembledSession, results: FlightResults, jo
 
 
 def _flights(partial: Path, job: SessionJob) -> tuple[list[Flight], tuple[LogOfSession, ...], list[Finding]]:
-    """What a session reads of each log; a log that is no MCAP gets one beside the session's results."""
+    """Flights of a session as read from each log, the logs, and findings of lost data.
+
+    A log that is no MCAP gets one beside the session's results.
+    """
     from groundstation.store.reader import read_info
 
     flights, logs, damaged = [], [], []
@@ -167,7 +175,10 @@ def _flights(partial: Path, job: SessionJob) -> tuple[list[Flight], tuple[LogOfS
 
 
 def _seen_from_a_folder_in(out: Path, mcap: Path) -> str:
-    """Path of an MCAP: from a folder in OUT where it is in OUT, which may be moved as a whole; else from the root."""
+    """Path of an MCAP, from a folder in OUT where it is in OUT, else from the root.
+
+    OUT may be moved as a whole.
+    """
     if not mcap.resolve().is_relative_to(out.resolve()):
         return str(mcap.absolute())
     return str(Path("..") / mcap.resolve().relative_to(out.resolve()))
@@ -211,7 +222,7 @@ def _results(
 
 
 def _assumed(job: SessionJob) -> Iterator[Finding]:
-    """What the session takes for granted because nobody set it."""
+    """Findings of what the session takes for granted because nobody set it."""
     tables, settings = job.configuration.tables, job.configuration.settings.session
     shipped = {"session": f"sigma of a range, {settings.range_sigma_m:g} m", "cooperative": "sigmas of the INS"}
     told = [what for table, what in shipped.items() if not tables.get(table)]
@@ -224,7 +235,10 @@ def _assumed(job: SessionJob) -> Iterator[Finding]:
 
 
 def _free(job: SessionJob, identity: str) -> str:
-    """The id, with the digest where other logs gave a folder of that name; a run replaces what a run found."""
+    """Id of the session, with the digest where other logs gave a folder of that name.
+
+    A run replaces what a run found.
+    """
     target = job.out / identity
     if not (target / MANIFEST).is_file():
         return identity
@@ -237,7 +251,9 @@ def _free(job: SessionJob, identity: str) -> str:
 
 
 def joined_names(names: Sequence[str]) -> str:
-    """Names of the aircraft of a session as a part of its id; of very many the first, and how many more.
+    """Names of the aircraft of a session as a part of its id.
+
+    Of very many it has the first, and how many more.
 
     Examples
     --------
@@ -261,7 +277,10 @@ def _manifest(job: SessionJob, results: FlightResults, logs: tuple[LogOfSession,
 
 
 def _session_figures(assembled: AssembledSession) -> tuple[FigureData, ...]:
-    """``session_clocks``, a row a log, and ``session_points`` where the session has ground points."""
+    """Arrays of a session that no analysis owns.
+
+    They are ``session_clocks``, a row a log, and ``session_points`` where the session has ground points.
+    """
     clocks, points = assembled.clocks, assembled.session.points
     offsets = [float("nan") if row.offset_s is None else row.offset_s for row in clocks]
     found: list[FigureData] = [
