@@ -357,7 +357,10 @@ def csv_text(figure: FigureData, line_end: str = "\n") -> str:
 
 
 def parquet_bytes(table: Any) -> bytes:
-    """Encode a table: the same rows in the same order give the same bytes, whatever they were put together from."""
+    """Encode a table as Parquet.
+
+    The same rows in the same order give the same bytes, whatever they were put together from.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -339,7 +339,7 @@ def read_installations(path: Path) -> Installations:
 
 
 def installations_in(out: Path) -> Installations | None:
-    """What installations.json of an OUT holds; None where there is none that can be read."""
+    """Read installations.json of an OUT; None where there is none that can be read."""
     try:
         return read_installations(out / INSTALLATIONS)
     except SettingsError:
