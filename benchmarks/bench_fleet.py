@@ -21,7 +21,7 @@ from unittest import mock
 import psutil
 from distributed import LocalCluster
 
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.verbs.synthesis import simulate_to
 

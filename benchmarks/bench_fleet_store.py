@@ -21,24 +21,18 @@ import numpy as np
 import pyarrow as pa
 
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.many_flights.fleet import write_fleet
-from groundstation.pipeline.many_flights.fleet_samples import SAMPLES
-from groundstation.pipeline.many_flights.fleet_share import share_of, to_arrow
-from groundstation.pipeline.many_flights.fleet_store import (
-    Scan,
-    put_month,
-    refresh,
-    remembered,
-    scan,
-    stamp_of,
-)
-from groundstation.pipeline.many_flights.flight_keys import Key, Keys, month_of
-from groundstation.pipeline.many_flights.known_flights import KnownFlights
-from groundstation.pipeline.many_flights.out_folder import clear_unfinished, prepare, refuse_foreign
-from groundstation.pipeline.many_flights.output import LocalOutput
-from groundstation.pipeline.many_flights.placement import Placement
-from groundstation.pipeline.many_flights.publishing import write_index_of
-from groundstation.pipeline.many_flights.session_search import members_of
+from groundstation.pipeline.many_flights.fleet.index import write_index_of
+from groundstation.pipeline.many_flights.fleet.keys import Key, Keys, month_of
+from groundstation.pipeline.many_flights.fleet.refresh import put_month, refresh
+from groundstation.pipeline.many_flights.fleet.rows import share_of
+from groundstation.pipeline.many_flights.fleet.samples import SAMPLES
+from groundstation.pipeline.many_flights.fleet.scan import Scan, remembered, scan, stamp_of
+from groundstation.pipeline.many_flights.fleet.statistics import write_fleet
+from groundstation.pipeline.many_flights.fleet.table import to_arrow
+from groundstation.pipeline.many_flights.runs.destination import Destination, LocalOutput
+from groundstation.pipeline.many_flights.runs.known_flights import KnownFlights
+from groundstation.pipeline.many_flights.runs.out_folder import clear_unfinished, prepare, refuse_foreign
+from groundstation.pipeline.many_flights.sessions.search import members_of
 from groundstation.reports.fleet_report import write_fleet_report
 from groundstation.results.file_names import ARRAYS, MANIFEST, SUMMARY
 from groundstation.viewer.fleet import write_fleet_recording
@@ -132,7 +126,7 @@ def one_more(out: Path, identity: str) -> None:
     KnownFlights(out)
     clear_unfinished(out)
     found, problems = refresh(out)
-    Placement(LocalOutput(out), []).sweep(found)
+    Destination(LocalOutput(out), []).sweep(found)
     members_of(found, {identity})
     assert not problems and not found.stale
     write_index_of(out, (), (), found)

@@ -17,7 +17,7 @@ from filelock import FileLock
 from rerun.experimental import ViewerClient
 
 from groundstation.base import compile as compiling
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from tests.browser import Browser, BrowserError, browser

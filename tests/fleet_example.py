@@ -10,7 +10,7 @@ import numpy as np
 
 from groundstation.base.timescales import utc_ns_to_stamp
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
+from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
 from groundstation.results.figures import FigureData
 from groundstation.results.files import save
 from groundstation.results.forecast import ForecastResult, SkillRow

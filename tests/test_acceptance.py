@@ -22,7 +22,7 @@ from groundstation.methods.fleet.confidence import (
     share_low,
 )
 from groundstation.methods.fleet.ins_errors import growth_of, ins_errors
-from groundstation.pipeline.many_flights.acceptance import STANDARDS, accept, accept_to, read_standard
+from groundstation.pipeline.verbs.acceptance import STANDARDS, accept, accept_to, read_standard
 from groundstation.results.acceptance import ENSEMBLE, UNKNOWN_INS, Bound, FlightError, Limit, Standard
 from tests.acceptance_example import save_fleet, save_flight
 

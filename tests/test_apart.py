@@ -13,21 +13,23 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import GroundstationError, SettingsError, UsageError
-from groundstation.pipeline.many_flights import apart, watched_batch
-from groundstation.pipeline.many_flights import batch as batch_of_logs
-from groundstation.pipeline.many_flights.apart import DIED, bounds_of, outcomes_apart
-from groundstation.pipeline.many_flights.batch import _crew, run_many
-from groundstation.pipeline.many_flights.confined import Bounds
-from groundstation.pipeline.many_flights.watched_batch import Batch
+from groundstation.pipeline.many_flights.processes import apart
+from groundstation.pipeline.many_flights.processes.apart import DIED, bounds_of, outcomes_apart
+from groundstation.pipeline.many_flights.processes.confined import Bounds
+from groundstation.pipeline.many_flights.processes.crews import crew_for
+from groundstation.pipeline.many_flights.runs import batch as batch_of_logs
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.pipeline.one_flight.isolation import Isolation
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import keys_of
+from groundstation.pipeline.verbs import watched_batch
 from groundstation.pipeline.verbs.check import check_many
 from groundstation.pipeline.verbs.check_apart import check_apart, describe_apart
 from groundstation.pipeline.verbs.conversions import convert_many
 from groundstation.pipeline.verbs.describe import describe
+from groundstation.pipeline.verbs.watched_batch import Batch
 from groundstation.readers import registry
 from groundstation.results.flight import Source
 from tests.apart_deeds import Deed, act
@@ -205,7 +207,7 @@ def test_a_system_without_limits_says_so(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_one_log_is_read_apart_too() -> None:
-    assert _crew("", 1, 1, silent, bounds=ISOLATED).func is outcomes_apart
+    assert crew_for("", 1, 1, silent, bounds=ISOLATED).func is outcomes_apart
 
 
 def test_a_watch_that_isolates_reads_no_log_in_its_own_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -46,6 +46,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 }
 PARTS_OF_THE_PIPELINE = ("one_flight", "many_flights", "verbs", "")  # each imports those before it; "": the Python API
 SYSTEM_OF = {"installation": "heading", "two_clocks": "together"}  # folders of one system; else each is one
+FLOORS_OF_MANY_FLIGHTS = 5
 ONLY_ROOM_OF = {"mcap": "store", "google": "store", "foxglove_schemas_protobuf": "store", "rerun": "viewer"}
 NOT_PUBLIC = re.compile(r"/?(rerun_|rerun-[a-z]+-|re_viewer|RERUN_|rerun\.(.*\.)?_)")
 OF_TUPLES = ("_replace", "_fields", "_asdict", "_make")  # public methods of named tuples, which cannot have others
@@ -93,7 +94,8 @@ def test_room_imports_only_what_it_may(room: str) -> None:
 def test_part_of_the_pipeline_imports_only_those_before_it() -> None:
     forbidden, place = [], PARTS_OF_THE_PIPELINE.index
     for path in (PACKAGE / "pipeline").rglob("*.py"):
-        part = path.parent.name if path.parent.name != "pipeline" else ""
+        below = path.relative_to(PACKAGE / "pipeline").parts
+        part = below[0] if len(below) > 1 else ""
         for name, line in imports_of(path):
             if name.startswith("groundstation.pipeline."):
                 parts = name.split(".")
@@ -168,6 +170,26 @@ def test_no_file_imports_itself_through_others() -> None:
         for name in removable:
             del left[name]
     assert not left, f"in or behind an import circle: {', '.join(sorted(left))}"
+
+
+def test_many_flights_has_at_most_five_floors_and_no_arrow_back() -> None:
+    """A file stands one floor above the highest of those in the folder that it imports; so do its parts."""
+    files = {_name(path): path for path in modules() if "many_flights" in path.parts}
+    graph = {name: _imported(path, files) - {name} for name, path in files.items()}
+
+    @cache
+    def floor(name: str) -> int:
+        return 1 + max(map(floor, graph[name]), default=0)
+
+    highest = max(graph, key=floor)
+    assert floor(highest) <= FLOORS_OF_MANY_FLIGHTS, f"{highest} stands on floor {floor(highest)}"
+    part = {name: path.parent.name for name, path in files.items()}
+    arrows = {(part[name], part[other]) for name in graph for other in graph[name]}
+    left = {one: {other for start, other in arrows if start == one != other} for one in part.values()}
+    while removable := [one for one, others in left.items() if not others & left.keys()]:
+        for one in removable:
+            del left[one]
+    assert not left, f"parts that import one another: {', '.join(sorted(left))}"
 
 
 def _name(path: Path) -> str:

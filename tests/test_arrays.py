@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import groundstation
 from groundstation.base.failures import failures, gathered_failures
 from groundstation.cli.main import app
-from groundstation.pipeline.many_flights.fleet_rows import heading_samples
+from groundstation.pipeline.many_flights.fleet.rows import heading_samples
 from groundstation.results.arrays.heading import HeadingSamples, StandstillVelocity
 from groundstation.results.arrays.inertial import DifferencesOfChannel, InertialDifferences
 from groundstation.results.arrays.magnetic import GroundRunCurve

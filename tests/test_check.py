@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from groundstation.cli.main import app
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.verbs.conversions import convert_many

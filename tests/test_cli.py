@@ -20,7 +20,7 @@ HEAVY = (
     "cattrs",
     *("numpy", "pandas", "pyarrow", "numba", "scipy", "rerun", "matplotlib", "mcap", "google.protobuf"),
     *("jinja2", "typst"),
-    *("groundstation.pipeline.many_flights.batch", "groundstation.readers", "groundstation.viewer"),
+    *("groundstation.pipeline.many_flights.runs.batch", "groundstation.readers", "groundstation.viewer"),
 )
 
 
@@ -146,7 +146,7 @@ def test_an_interrupted_run_says_how_to_go_on(tmp_path: Path, monkeypatch: pytes
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("groundstation.pipeline.many_flights.batch.run_many", interrupted)
+    monkeypatch.setattr("groundstation.pipeline.many_flights.runs.batch.run_many", interrupted)
     code, out, err = groundstation("run", str(tmp_path), "-o", "out")
     assert (code, out) == (130, "")
     assert err == "interrupted: out keeps what is finished; the same command continues with the rest\n"

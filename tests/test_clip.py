@@ -13,7 +13,7 @@ from groundstation.base.errors import UsageError
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.base.units import NS_PER_S
 from groundstation.cli.main import app
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log

@@ -22,7 +22,7 @@ from groundstation.exports.gpx import write_gpx
 from groundstation.exports.kml import write_kml
 from groundstation.exports.tracks import Track
 from groundstation.methods.fleet.ins_errors import ins_errors
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.flight import FlightResults
 from groundstation.simulation.approach import TrueRunway, simulate_approach

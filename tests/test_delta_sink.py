@@ -9,9 +9,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.many_flights.delta_sink import DIGEST, delta_place, put_flights
-from groundstation.pipeline.many_flights.fleet_share import fleet_parquet
-from groundstation.pipeline.many_flights.fleet_store import Scan, refresh
+from groundstation.pipeline.many_flights.fleet.delta_sink import DIGEST, delta_place, put_flights
+from groundstation.pipeline.many_flights.fleet.refresh import refresh
+from groundstation.pipeline.many_flights.fleet.scan import Scan
+from groundstation.pipeline.many_flights.fleet.table import fleet_parquet
 from groundstation.pipeline.one_flight.outcome import Outcome
 from tests.fleet_example import save_flight
 from tests.test_remote import bucket

@@ -20,8 +20,8 @@ from groundstation.chapters.plots.acceptance import JUDGED
 from groundstation.chapters.plots.comparison import COMPARED
 from groundstation.chapters.plots.fleet import FLEET_PLOTS
 from groundstation.cli.main import main
-from groundstation.pipeline.many_flights import publishing
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.fleet import publishing
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight import analyse as analysing
 from groundstation.pipeline.one_flight import flight as running
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -268,7 +268,7 @@ def test_a_chapter_on_a_fleet_that_fails_leaves_the_others(
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    from groundstation.pipeline.many_flights.fleet import gather
+    from groundstation.pipeline.many_flights.fleet.statistics import gather
     from tests.fleet_example import save_flight
 
     out: Path = tmp_path_factory.mktemp("fleet")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.progress import Event
 from tests.test_resume import SAMPLES, SHORT, assert_equal_runs

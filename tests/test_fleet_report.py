@@ -26,8 +26,8 @@ from groundstation.methods.fleet.density import densities_of, histogram_of
 from groundstation.methods.fleet.deviation import deviations
 from groundstation.methods.fleet.moments import moments_of
 from groundstation.methods.fleet.skill import SkillMerger, SkillOfFlight
-from groundstation.pipeline.many_flights.fleet import gather
-from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
+from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
+from groundstation.pipeline.many_flights.fleet.statistics import gather
 from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_fleet_report
 from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights
 from groundstation.results.figures import FigureData

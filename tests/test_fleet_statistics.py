@@ -15,7 +15,7 @@ from groundstation.methods.fleet.moments import Moments, merged, moments_of
 from groundstation.methods.fleet.outliers import find_outliers
 from groundstation.methods.fleet.skill import SkillMerger, SkillOfFlight
 from groundstation.methods.intervals import share_interval
-from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
+from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
 from groundstation.results.figures import FigureData
 from tests.fleet_example import flights_table
 

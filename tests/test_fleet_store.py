@@ -20,14 +20,14 @@ import pytest
 
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.methods.fleet.moments import merged, moments_of
-from groundstation.pipeline.many_flights import fleet_share
-from groundstation.pipeline.many_flights.batch import run_many
-from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET, gather, write_fleet
-from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS
-from groundstation.pipeline.many_flights.fleet_samples import MEANINGS, SAMPLES, SampleStore, partition
-from groundstation.pipeline.many_flights.fleet_share import FlightShare
-from groundstation.pipeline.many_flights.fleet_store import FLIGHTS, refresh
-from groundstation.pipeline.many_flights.publishing import write_beside
+from groundstation.pipeline.many_flights.fleet import rows as fleet_rows
+from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS, FlightShare
+from groundstation.pipeline.many_flights.fleet.publishing import write_beside
+from groundstation.pipeline.many_flights.fleet.refresh import refresh
+from groundstation.pipeline.many_flights.fleet.samples import MEANINGS, SAMPLES, SampleStore, partition
+from groundstation.pipeline.many_flights.fleet.scan import FLIGHTS
+from groundstation.pipeline.many_flights.fleet.statistics import FLEET_PARQUET, gather, write_fleet
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.fleet import FleetResults
@@ -144,7 +144,7 @@ def test_a_known_flight_is_not_read_again_by_another_process(tmp_path: Path) -> 
     write(tmp_path)
     program = (
         "import sys; from pathlib import Path;"
-        "from groundstation.pipeline.many_flights.fleet_store import scan;"
+        "from groundstation.pipeline.many_flights.fleet.scan import scan;"
         "found = scan(Path(sys.argv[1])); print(len(found.fresh), len(found.stale), len(found.months))"
     )
     told = subprocess.run([sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True, check=True)
@@ -159,9 +159,9 @@ def test_a_month_is_written_again_by_what_changed_in_it_alone(tmp_path: Path, mo
 
     def share_of(folder: Path, store: SampleStore | None = None) -> FlightShare:
         read.append(folder.name)
-        return fleet_share.share_of(folder, store)
+        return fleet_rows.share_of(folder, store)
 
-    monkeypatch.setattr("groundstation.pipeline.many_flights.fleet_store.share_of", share_of)
+    monkeypatch.setattr("groundstation.pipeline.many_flights.fleet.refresh.share_of", share_of)
     write(tmp_path)
     assert read == []
     save_flight(tmp_path, 10, error_deg=4.0)
@@ -208,8 +208,8 @@ def test_a_large_fleet_says_where_its_rows_are(tmp_path: Path, monkeypatch: pyte
         save_flight(tmp_path, number)
     write_beside(tmp_path, (), with_pdf=False)
     assert len(json.loads((tmp_path / "index.json").read_text())["rows"]) == 4
-    for module in ("fleet", "publishing"):
-        monkeypatch.setattr(f"groundstation.pipeline.many_flights.{module}.MOST_LISTED", 3)
+    for module in ("statistics", "index"):
+        monkeypatch.setattr(f"groundstation.pipeline.many_flights.fleet.{module}.MOST_LISTED", 3)
     write_beside(tmp_path, (Outcome("broken.csv", "failed", "no header"),), with_pdf=False)
     index = json.loads((tmp_path / "index.json").read_text())
     assert index["elsewhere"] == "4 flights: flights.parquet/"

@@ -15,7 +15,7 @@ from groundstation.base.clock import Clock
 from groundstation.base.errors import GroundstationError
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import Damage, RecordBatch
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log

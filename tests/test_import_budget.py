@@ -18,7 +18,7 @@ SAMPLE = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv"
 NOT_NEEDED = (  # to look at a log, check or convert it
     *("numba", "scipy", "pandas", "matplotlib", "jinja2", "typst", "rerun", "h5py", "distributed"),
     *("groundstation.estimators", "groundstation.tables.phases", "groundstation.reports", "groundstation.viewer"),
-    *("groundstation.simulation", "groundstation.chapters.by_answer", "groundstation.pipeline.many_flights.batch"),
+    *("groundstation.simulation", "groundstation.chapters.by_answer", "groundstation.pipeline.many_flights.runs.batch"),
 )
 BY_VERB = """
 import os, sys

@@ -15,22 +15,24 @@ from groundstation.base.serial import to_json
 from groundstation.estimators.installation.lesson import Stored, lesson_of
 from groundstation.estimators.installation.series import answer_from
 from groundstation.estimators.installation.settings import InstallationSettings
-from groundstation.pipeline.many_flights.batch import run_many
-from groundstation.pipeline.many_flights.fleet_store import refresh, scan
-from groundstation.pipeline.many_flights.installations import (
-    INSTALLATIONS,
-    installations_in,
-    refresh_installations,
-    show_installation,
-)
-from groundstation.pipeline.many_flights.publishing import write_beside
+from groundstation.pipeline.many_flights.fleet.installations import refresh_installations, show_installation
+from groundstation.pipeline.many_flights.fleet.publishing import write_beside
+from groundstation.pipeline.many_flights.fleet.refresh import refresh
+from groundstation.pipeline.many_flights.fleet.scan import scan
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration, installed_as
 from groundstation.pipeline.verbs.rules import RulesTest, rules_test
 from groundstation.reports.flight_report import REPORT, write_flight_report
 from groundstation.results.files import load
 from groundstation.results.gates import judged_gate
 from groundstation.results.inertial import InertialResult
-from groundstation.results.installation import InstallationResult, Installations, read_installations
+from groundstation.results.installation import (
+    INSTALLATIONS,
+    InstallationResult,
+    Installations,
+    installations_in,
+    read_installations,
+)
 from groundstation.results.schema import installations_schema
 from groundstation.systems import systems
 from tests.installation_example import heading_of, inertial_of, save_installed

@@ -12,7 +12,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.integrity import LedgerCounts, ledger_findings, survey
 from groundstation.integrity.limits import thresholds_from
 from groundstation.integrity.stretches import Sampler
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.log import open_log
 from tests.saved import load

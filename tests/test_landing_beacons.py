@@ -20,7 +20,7 @@ from groundstation.estimators.landing_beacons.geometry import (
     solve_bearings,
 )
 from groundstation.estimators.landing_beacons.settings import LandingBeaconsSettings
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import load_configuration
 from groundstation.pipeline.verbs.synthesis import simulate_to
 from groundstation.results.answer import by_analysis

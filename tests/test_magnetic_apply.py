@@ -26,11 +26,11 @@ from groundstation.base.records import Column
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.cli.main import app
 from groundstation.estimators.magnetic.corrected import CorrectedHeading, correct_heading
-from groundstation.pipeline.many_flights.batch import run_many
-from groundstation.pipeline.many_flights.dry_run import plan_many
+from groundstation.pipeline.many_flights.fleet.publishing import report_again
 from groundstation.pipeline.many_flights.inputs import file_in
-from groundstation.pipeline.many_flights.publishing import report_again
-from groundstation.pipeline.many_flights.remote import RemoteFolder
+from groundstation.pipeline.many_flights.remote.folder import RemoteFolder
+from groundstation.pipeline.many_flights.runs.batch import run_many
+from groundstation.pipeline.many_flights.runs.dry_run import plan_many
 from groundstation.pipeline.one_flight.apply_deviation import APPLIED, NOT_APPLIED, Applied, apply_deviation
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.deviation_to_apply import Apply, asked_for

@@ -18,7 +18,7 @@ from groundstation.estimators.inertial.analysis import INERTIAL
 from groundstation.estimators.magnetic.analysis import MAGNETIC
 from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.methods import harmonics
-from groundstation.pipeline.many_flights.fleet_columns import answer_values
+from groundstation.pipeline.many_flights.fleet.columns import answer_values
 from groundstation.pipeline.one_flight import analyse as pipeline
 from groundstation.pipeline.one_flight.analyse import Given, analyse, known_of, run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration

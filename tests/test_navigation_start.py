@@ -14,7 +14,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.chapters import inertial as chapter
 from groundstation.cli.main import app
 from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
-from groundstation.pipeline.many_flights.acceptance import accept
+from groundstation.pipeline.verbs.acceptance import accept
 from groundstation.results.inertial import InertialResult
 from groundstation.systems.known import AircraftData
 from groundstation.tables.table import Flight

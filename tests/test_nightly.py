@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from distributed import LocalCluster
 
-from groundstation.pipeline.many_flights.batch import run_many
-from groundstation.pipeline.many_flights.remote import RemoteFolder
+from groundstation.pipeline.many_flights.remote.folder import RemoteFolder
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome, worst_code
 from tests.test_remote import bucket

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from groundstation.pipeline.many_flights.acceptance import accept
+from groundstation.pipeline.verbs.acceptance import accept
 from groundstation.pipeline.verbs.compare import compare
 from groundstation.reports.acceptance import write_acceptance_report
 from groundstation.reports.comparison import comparison_html

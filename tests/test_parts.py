@@ -16,9 +16,8 @@ from hypothesis import strategies as st
 
 from groundstation.base.timescales import iso_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
-from groundstation.pipeline.many_flights.batch import run_many, run_together
-from groundstation.pipeline.many_flights.dry_run import plan_many
-from groundstation.pipeline.many_flights.watched_batch import Batch, run_batch
+from groundstation.pipeline.many_flights.runs.batch import run_many, run_together
+from groundstation.pipeline.many_flights.runs.dry_run import plan_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
@@ -26,6 +25,7 @@ from groundstation.pipeline.one_flight.log import open_parts
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.parts import goes_on
 from groundstation.pipeline.one_flight.progress import silent
+from groundstation.pipeline.verbs.watched_batch import Batch, run_batch
 from groundstation.readers.joined import JoinedSource
 from groundstation.readers.source import Source
 from groundstation.results.files import load_document, load_manifest

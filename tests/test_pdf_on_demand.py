@@ -13,13 +13,13 @@ from typer.testing import CliRunner
 
 import groundstation
 from groundstation.cli.main import app
-from groundstation.pipeline.many_flights.batch import run_many
-from groundstation.pipeline.many_flights.dry_run import plan_many
-from groundstation.pipeline.many_flights.publishing import report_again
-from groundstation.pipeline.many_flights.watching import watch
+from groundstation.pipeline.many_flights.fleet.publishing import report_again
+from groundstation.pipeline.many_flights.runs.batch import run_many
+from groundstation.pipeline.many_flights.runs.dry_run import plan_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.verbs.plan import run_plan
+from groundstation.pipeline.verbs.watching import watch
 from groundstation.reports import sections
 from groundstation.results.files import load_manifest
 from tests.test_plan import scenario

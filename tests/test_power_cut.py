@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from groundstation.base import to_disk
-from groundstation.pipeline.many_flights.batch import run_many
-from groundstation.pipeline.many_flights.dry_run import plan_many
-from groundstation.pipeline.many_flights.flight_keys import KEYS
+from groundstation.pipeline.many_flights.fleet.keys import KEYS
+from groundstation.pipeline.many_flights.runs.batch import run_many
+from groundstation.pipeline.many_flights.runs.dry_run import plan_many
 from groundstation.pipeline.one_flight import flight
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.identity import sha256_of
@@ -144,7 +144,7 @@ def test_a_manifest_without_sizes_is_that_of_an_earlier_version(finished: Path, 
 
 
 def test_what_is_reported_again_is_taken_down_and_nothing_else(finished: Path, tmp_path: Path) -> None:
-    from groundstation.pipeline.many_flights.publishing import report_again
+    from groundstation.pipeline.many_flights.fleet.publishing import report_again
 
     out = copied(finished, tmp_path / "out")
     folder = flight_in(out)
@@ -188,7 +188,7 @@ PROGRAM = """
 import os, signal, sys
 from pathlib import Path
 from groundstation.base import to_disk
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from tests.test_power_cut import SHORT
 

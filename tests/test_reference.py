@@ -17,7 +17,7 @@ from groundstation.estimators.reference.paths import path_rows
 from groundstation.estimators.reference.placing import fit_place
 from groundstation.estimators.reference.settings import ReferenceSettings
 from groundstation.estimators.reference.statistics import share_of, spread_of
-from groundstation.pipeline.many_flights.fleet_rows import checks_of
+from groundstation.pipeline.many_flights.fleet.rows import checks_of
 from groundstation.pipeline.one_flight.analyse import Answered, answers_of
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.files import save

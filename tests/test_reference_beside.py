@@ -13,7 +13,7 @@ from groundstation.base.records import Column
 from groundstation.base.timescales import GPS_EPOCH_NS, leap_seconds_at
 from groundstation.base.units import NS_PER_S
 from groundstation.cli.main import app
-from groundstation.pipeline.many_flights.references import judged_by
+from groundstation.pipeline.many_flights.runs.references import judged_by
 from groundstation.pipeline.one_flight import reference as beside
 from groundstation.pipeline.one_flight.analyse import analyse
 from groundstation.pipeline.one_flight.configuration import NO_REFERENCES, Configuration, References

@@ -15,7 +15,7 @@ from groundstation.base import reading
 from groundstation.base.errors import GroundstationError, lack_of_memory, told_in_a_line
 from groundstation.base.reading import open_to_read
 from groundstation.cli.main import app
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight import outcome
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log

@@ -18,11 +18,11 @@ import pytest
 from distributed import Client
 
 from groundstation.base.errors import GroundstationError, UsageError
-from groundstation.pipeline.many_flights.batch import run_many
-from groundstation.pipeline.many_flights.cluster import on_cluster
-from groundstation.pipeline.many_flights.dry_run import plan_many
-from groundstation.pipeline.many_flights.lease import alone_elsewhere
-from groundstation.pipeline.many_flights.remote import RemoteFolder, far_logs
+from groundstation.pipeline.many_flights.processes.cluster import on_cluster
+from groundstation.pipeline.many_flights.remote.folder import RemoteFolder, far_logs
+from groundstation.pipeline.many_flights.remote.lease import alone_elsewhere
+from groundstation.pipeline.many_flights.runs.batch import run_many
+from groundstation.pipeline.many_flights.runs.dry_run import plan_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job
 from groundstation.pipeline.one_flight.outcome import Outcome
@@ -193,7 +193,7 @@ def test_one_run_at_a_time_writes_into_a_place_elsewhere(memory: str, monkeypatc
     assert out.names(".lock") == ["0"]
     out.remove(".lock/0")
     out.write(".lock/8", b"not a lock")
-    monkeypatch.setattr("groundstation.pipeline.many_flights.lease.RENEW_S", 0.05)
+    monkeypatch.setattr("groundstation.pipeline.many_flights.remote.lease.RENEW_S", 0.05)
     with alone_elsewhere(out):
         first = json.loads(out.read(".lock/9") or b"")["until_s"]
         deadline = time.monotonic() + 10.0
@@ -344,6 +344,6 @@ def test_a_scheduler_that_goes_away_is_told_in_one_line(tmp_path: Path, caplog: 
 
 
 def test_a_scheduler_that_does_not_answer_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("groundstation.pipeline.many_flights.cluster.CONNECT_S", 1.0)
+    monkeypatch.setattr("groundstation.pipeline.many_flights.processes.cluster.CONNECT_S", 1.0)
     with pytest.raises(UsageError, match="no scheduler answers"):
         run_many([SHORT], tmp_path / "out", Configuration(), scheduler="tcp://127.0.0.1:1")

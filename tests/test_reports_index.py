@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from groundstation.pipeline.many_flights.fleet_columns import FLIGHT_COLUMNS, INDEXED, answer_values
+from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS, INDEXED, answer_values
 from groundstation.reports.index import IndexRow, columns_of, failed_row, index_row, write_index
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults

@@ -13,8 +13,8 @@ import pytest
 from pypdf import PdfReader
 
 from groundstation.chapters.parts import Cell, Document, Facts, Front, Grid, Head, Mark, Note, Section
-from groundstation.pipeline.many_flights.batch import run_many
-from groundstation.pipeline.many_flights.publishing import report_again
+from groundstation.pipeline.many_flights.fleet.publishing import report_again
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.reports import pdf
 from groundstation.reports.drawing import Drawing

@@ -9,7 +9,7 @@ import jsonschema
 import pytest
 
 from groundstation.base.findings import Finding
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results import forecast as outlook
 from groundstation.results import heading as answers

@@ -19,12 +19,13 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import UsageError
 from groundstation.cli.main import app
-from groundstation.pipeline.many_flights import workers
-from groundstation.pipeline.many_flights.batch import _crew, run_many
-from groundstation.pipeline.many_flights.dry_run import plan_many
-from groundstation.pipeline.many_flights.flight_keys import KEYS
-from groundstation.pipeline.many_flights.out_folder import LOCK
-from groundstation.pipeline.many_flights.workers import TASKS_PER_PROCESS, _teller, in_turn, side_by_side
+from groundstation.pipeline.many_flights.fleet.keys import KEYS
+from groundstation.pipeline.many_flights.processes import workers
+from groundstation.pipeline.many_flights.processes.crews import crew_for
+from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS, _teller, in_turn, side_by_side
+from groundstation.pipeline.many_flights.runs.batch import run_many
+from groundstation.pipeline.many_flights.runs.dry_run import plan_many
+from groundstation.pipeline.many_flights.runs.out_folder import LOCK
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job
 from groundstation.pipeline.one_flight.outcome import Outcome
@@ -238,7 +239,7 @@ def test_workers_end_with_a_run_that_is_killed(tmp_path: Path) -> None:
         "from groundstation.pipeline.one_flight.configuration import Configuration;"
         "from groundstation.pipeline.one_flight.flight import Job;"
         "from groundstation.pipeline.one_flight.progress import silent;"
-        "from groundstation.pipeline.many_flights.workers import side_by_side;"
+        "from groundstation.pipeline.many_flights.processes.workers import side_by_side;"
         "job = Job(Path('x'), Path(sys.argv[1]), Configuration());"
         "list(side_by_side([(0, job)], tell_and_sleep, workers=1, listen=silent))"
     )
@@ -264,7 +265,7 @@ def is_alive(process: int) -> bool:
 
 
 def test_many_logs_are_never_run_in_the_process_that_leads() -> None:
-    few, many = (_crew("", 1, logs, silent) for logs in (TASKS_PER_PROCESS, TASKS_PER_PROCESS + 1))
+    few, many = (crew_for("", 1, logs, silent) for logs in (TASKS_PER_PROCESS, TASKS_PER_PROCESS + 1))
     assert (few.func, many.func) == (in_turn, side_by_side)  # recordings leave threads behind
 
 
@@ -352,7 +353,7 @@ def ended_children() -> bool:
 
 
 def test_a_time_limit_leaves_no_part_of_a_flight(tmp_path: Path) -> None:
-    limited = _crew("", 1, 1, silent, 1.0)
+    limited = crew_for("", 1, 1, silent, 1.0)
     assert limited.func is side_by_side  # one log, too, is run in a process that can be ended
 
     def stop(event: Event) -> None:

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from groundstation.pipeline.many_flights.batch import run_many
+from groundstation.pipeline.many_flights.fleet.publishing import report_again
 from groundstation.pipeline.many_flights.inputs import flight_folders
-from groundstation.pipeline.many_flights.publishing import report_again
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration, Interval
 from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.outcome import Outcome, worst_code

@@ -17,8 +17,8 @@ from groundstation.cli.main import main
 from groundstation.estimators.cooperative.analysis import COOPERATIVE, NIS_MAX, SessionKnown, innovations_of
 from groundstation.estimators.cooperative.estimate import estimate_session
 from groundstation.estimators.cooperative.settings import ALGORITHMS, CooperativeSettings, InsBelief
+from groundstation.pipeline.many_flights.fleet.publishing import report_again
 from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
-from groundstation.pipeline.many_flights.publishing import report_again
 from groundstation.pipeline.one_flight.analyse import run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.pipeline.verbs.cooperative import run_session

@@ -11,11 +11,11 @@ import fsspec
 import pytest
 
 from groundstation.cli.main import main
-from groundstation.pipeline.many_flights import session_search
-from groundstation.pipeline.many_flights.batch import run_many
 from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
-from groundstation.pipeline.many_flights.remote import RemoteFolder
-from groundstation.pipeline.many_flights.session_search import Member, Span, sessions_among
+from groundstation.pipeline.many_flights.remote.folder import RemoteFolder
+from groundstation.pipeline.many_flights.runs.batch import run_many
+from groundstation.pipeline.many_flights.sessions import search as session_search
+from groundstation.pipeline.many_flights.sessions.search import Member, Span, sessions_among
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.cooperative import CooperativeResult
@@ -452,7 +452,7 @@ def test_a_warning_of_the_session_reaches_the_exit_code(logs: Path, tmp_path: Pa
 
 
 def test_the_fleet_lists_the_session_with_its_report(out: Path) -> None:
-    from groundstation.pipeline.many_flights.fleet import gather
+    from groundstation.pipeline.many_flights.fleet.statistics import gather
     from groundstation.viewer.fleet_recorder import FleetRecorder
     from groundstation.viewer.fleet_text import flights_text
     from groundstation.viewer.recording import open_stream

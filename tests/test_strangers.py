@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.pipeline.many_flights import batch, strangers
-from groundstation.pipeline.many_flights.batch import run_many
-from groundstation.pipeline.many_flights.dry_run import plan_many
-from groundstation.pipeline.many_flights.publishing import MOST_SKIPPED
-from groundstation.pipeline.many_flights.strangers import MEMORY, Strangers
+from groundstation.pipeline.many_flights.fleet.index import MOST_SKIPPED
+from groundstation.pipeline.many_flights.runs import batch, strangers
+from groundstation.pipeline.many_flights.runs.batch import run_many
+from groundstation.pipeline.many_flights.runs.dry_run import plan_many
+from groundstation.pipeline.many_flights.runs.strangers import MEMORY, Strangers
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.readers import registry
@@ -55,7 +55,7 @@ def test_files_that_are_no_logs_are_told_as_before_and_no_job_is_made_of_them(
         patch.setattr(batch, "skipped_files", lambda *_: {})
         before = run(folder, tmp_path / "one")
     assert {one.state for one in before} == {"skipped"} and len(before) == len(CONTENTS)
-    monkeypatch.setattr("groundstation.pipeline.many_flights.batch.run_flight", None)
+    monkeypatch.setattr("groundstation.pipeline.many_flights.runs.batch.run_flight", None)
     assert run(folder, tmp_path / "two") == before
     assert (tmp_path / "one/index.json").read_bytes() == (tmp_path / "two/index.json").read_bytes()
     assert (tmp_path / "one" / MEMORY).read_bytes() == (tmp_path / "two" / MEMORY).read_bytes()

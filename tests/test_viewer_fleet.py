@@ -14,7 +14,7 @@ from groundstation.chapters.fleet import aircraft, flights, rest, sessions, tren
 from groundstation.chapters.fleet import skill as forecast
 from groundstation.chapters.markdown import escaped
 from groundstation.chapters.parts import Grid
-from groundstation.pipeline.many_flights.fleet import gather
+from groundstation.pipeline.many_flights.fleet.statistics import gather
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import Densities, FleetResults, NotInFleet
 from groundstation.viewer.fleet import write_fleet_recording

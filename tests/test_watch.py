@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.many_flights import watching
-from groundstation.pipeline.many_flights.watched_batch import Batch, run_batch
-from groundstation.pipeline.many_flights.watching import signature_of, watch
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import silent
+from groundstation.pipeline.verbs import watching
+from groundstation.pipeline.verbs.watched_batch import Batch, run_batch
+from groundstation.pipeline.verbs.watching import signature_of, watch
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 LONG_S = 120.0  # for a process on a busy machine

@@ -18,7 +18,7 @@ from groundstation.cli.text import say as say
 from groundstation.cli.text import tell as tell
 
 if TYPE_CHECKING:
-    from groundstation.pipeline.many_flights.confined import Bounds
+    from groundstation.pipeline.many_flights.processes.confined import Bounds
     from groundstation.pipeline.one_flight.isolation import Isolation
 
 DONE, FAILED, USAGE, DATA_LOST, LIMIT_REACHED = 0, 1, 2, 3, 4
@@ -279,7 +279,7 @@ def time_bound(timeout: float | None, isolation: "Isolation | None" = None) -> "
     timeout_s = time_limit_s(timeout)
     if timeout is None and isolation is None:
         return None
-    from groundstation.pipeline.many_flights.apart import bounds_of
+    from groundstation.pipeline.many_flights.processes.apart import bounds_of
 
     return bounds_of(isolation, timeout_s)
 

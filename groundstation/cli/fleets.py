@@ -50,7 +50,7 @@ def acceptance(out: Path, standard: str, output: Path | None, fail_on: FailOnMod
     from groundstation.chapters.acceptance_front import front
     from groundstation.chapters.wording import NARROW_SPACE
     from groundstation.cli.text import as_json, printable
-    from groundstation.pipeline.many_flights.acceptance import accept_to
+    from groundstation.pipeline.verbs.acceptance import accept_to
 
     with gathered_failures():
         found, paths, problem = accept_to(out, standard, output)

@@ -138,9 +138,9 @@ def run(
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.many_flights.batch import run_many, run_together
-    from groundstation.pipeline.many_flights.dry_run import plan_many
-    from groundstation.pipeline.many_flights.references import judged_by
+    from groundstation.pipeline.many_flights.runs.batch import run_many, run_together
+    from groundstation.pipeline.many_flights.runs.dry_run import plan_many
+    from groundstation.pipeline.many_flights.runs.references import judged_by
     from groundstation.pipeline.one_flight.configuration import applying, installed_as, load_configuration
 
     refuse_pdf_of_results(only, pdf=pdf)
@@ -229,7 +229,7 @@ def report(
         return fleets.acceptance(out, standard, output, fail_on, quiet=quiet, json=json)
     if output is not None or fail_on != "none":
         raise UsageError("report", "-o or --fail-on without --standard", "--standard NAME too")
-    from groundstation.pipeline.many_flights.publishing import report_again
+    from groundstation.pipeline.many_flights.fleet.publishing import report_again
 
     done = report_again(out, with_pdf=pdf)
     tell_written(done.written, as_json_text=json, quiet=quiet)

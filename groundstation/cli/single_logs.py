@@ -164,7 +164,7 @@ def convert(
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.many_flights.references import judged_by
+    from groundstation.pipeline.many_flights.runs.references import judged_by
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.conversions import convert_many, convert_together
 

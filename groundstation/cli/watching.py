@@ -86,10 +86,10 @@ def watch(
     """
     from groundstation.cli import printing
     from groundstation.cli.progress import listener
-    from groundstation.pipeline.many_flights.references import judged_by
-    from groundstation.pipeline.many_flights.watching import fresh
-    from groundstation.pipeline.many_flights.watching import watch as looked_at
+    from groundstation.pipeline.many_flights.runs.references import judged_by
     from groundstation.pipeline.one_flight.configuration import load_configuration
+    from groundstation.pipeline.verbs.watching import fresh
+    from groundstation.pipeline.verbs.watching import watch as looked_at
 
     refuse_pdf_of_results(only, pdf=pdf)
     timeout_s = time_limit_s(timeout)

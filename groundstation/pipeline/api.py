@@ -93,7 +93,7 @@ def open_fleet(out: AnyPath) -> "pd.DataFrame":
     """
     import pandas as pd
 
-    from groundstation.pipeline.many_flights.fleet import FLEET_PARQUET
+    from groundstation.pipeline.many_flights.fleet.statistics import FLEET_PARQUET
 
     table = Path(out) / FLEET_PARQUET
     if not table.is_file():
@@ -202,7 +202,7 @@ class OpenLog(OpenFlight):
         GroundstationError
             When ``out`` is something else's, or the log cannot be run.
         """
-        from groundstation.pipeline.many_flights.batch import run_many
+        from groundstation.pipeline.many_flights.runs.batch import run_many
 
         with told_in_a_line(str(out)):
             log = self._conversion.log.path

@@ -11,6 +11,7 @@ from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.heading import IntervalPart
 
+INSTALLATIONS = "installations.json"
 FORMAT_VERSION = 1
 METHOD_VERSION = 1  # version of the model: with another one every learned answer is made again
 NAMED_PROBABILITY = 0.5  # of a change, or an odd flight, above which it is named
@@ -345,3 +346,11 @@ def read_installations(path: Path) -> Installations:
         return from_json(Installations, document)
     except MismatchError as error:
         raise SettingsError(f"{path}, {error.place}", error.found, error.expected or expected) from error
+
+
+def installations_in(out: Path) -> Installations | None:
+    """Read installations.json of an OUT; None where there is none that can be read."""
+    try:
+        return read_installations(out / INSTALLATIONS)
+    except SettingsError:
+        return None

@@ -4,10 +4,10 @@ from dataclasses import dataclass, field, replace
 
 from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
-from groundstation.systems.known import AircraftData, Known, SiteData
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.heading import HeadingResult
 from groundstation.results.latency import Latencies
+from groundstation.systems.known import AircraftData, Known, SiteData
 from groundstation.tables.phases import ground_mask
 from groundstation.tables.table import Flight
 

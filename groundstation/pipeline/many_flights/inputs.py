@@ -1,4 +1,7 @@
-"""Which files a run takes: named files, and logs found in folders; nothing that groundstation itself made."""
+"""Files that a run takes: named files, and logs found in folders.
+
+Nothing that groundstation itself made is among them.
+"""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -20,14 +23,19 @@ NO_LOGS = ".toml"  # settings, stations, aircraft, profiles: they stand beside l
 
 @dataclass(frozen=True)
 class Input:
-    """A file to process. ``is_named``: the user named it, so that failing to recognise it is an error."""
+    """File to process.
+
+    ``is_named``: the user named it, so that failing to recognise it is an error.
+    """
 
     path: Path
     is_named: bool
 
 
 def collect(paths: Sequence[Path], out: Path | None = None) -> tuple[Input, ...]:
-    """List the files that ``paths`` (files or folders, recursive) stand for, in a stable order, each once.
+    """List the files that ``paths`` (files or folders, recursive) stand for, each once.
+
+    Their order is stable.
 
     OUT and folders that groundstation made (they hold its manifest or index) are never inputs of a folder walk; nor
     are hidden files and settings (TOML). A folder that is a bag of ROS 2 is one log, named by its metadata.
@@ -51,7 +59,7 @@ def collect(paths: Sequence[Path], out: Path | None = None) -> tuple[Input, ...]
 
 
 def is_ours(folder: Path) -> bool:
-    """Whether groundstation made the folder: a flight folder or an OUT."""
+    """Tell whether groundstation made the folder: a flight folder or an OUT."""
     names = {FLIGHT_FOLDER_MARK, SUMMARY}, {OUT_FOLDER_MARK, INDEX_CSV}, {STUDY_MARK}, set(COMPARISON_MARKS)
     try:
         return any(all((folder / name).is_file() for name in marks) for marks in names)
@@ -60,19 +68,21 @@ def is_ours(folder: Path) -> bool:
 
 
 def is_session(folder: Path) -> bool:
-    """Whether a folder is that of a session of several aircraft."""
+    """Tell whether a folder is that of a session of several aircraft."""
     return any((folder / mark).is_file() for mark in SESSION_MARKS)
 
 
 def no_log(folder: Path) -> UsageError:
-    """Why a folder is not the log that a verb takes."""
+    """Error for a folder that is not the log that a verb takes."""
     if is_session(folder):
         return UsageError(str(folder), "a session of several aircraft", "a log", "manifest.json in it names its logs")
     return UsageError(str(folder), "a folder", "a log", "`run` takes folders")
 
 
 def file_in(folder: Path, ending: str, *others: str) -> Path:
-    """The file with an ending in a folder that ``run`` made: that of its name, of ``others``, or the only one.
+    """Find the file with an ending in a folder that ``run`` made.
+
+    It is that of the folder's name, of ``others``, or the only one.
 
     Raises
     ------
@@ -114,7 +124,7 @@ def saved_flights(out: Path) -> list[Path]:
 
 
 def is_flight(folder: Path) -> bool:
-    """Whether a folder that holds a summary is that of a flight: neither a session nor a plan."""
+    """Tell whether a folder with a summary is that of a flight, not of a session or a plan."""
     return not any((folder / mark).is_file() for mark in (*SESSION_MARKS, PLAN_MARK))
 
 
@@ -154,3 +164,14 @@ def _walk(folder: Path, out: Path | None) -> Iterator[tuple[Path, Input]]:
                 folders.append((path, place / entry.name))
             elif entry.is_file():
                 yield path.resolve() if entry.is_symlink() else place / entry.name, Input(path, is_named=False)
+
+
+def is_remote(place: str) -> bool:
+    """Tell whether a place is named by URL.
+
+    Examples
+    --------
+    >>> is_remote("s3://flights/2026"), is_remote("flights/2026")
+    (True, False)
+    """
+    return "://" in place

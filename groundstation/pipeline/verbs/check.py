@@ -176,12 +176,9 @@ def _for_purpose(
 def _for_session(
     found: Sequence[Checked], purpose: str, flights: Mapping[int, "Flight"], configuration: Configuration, fail_on: str
 ) -> list[Checked]:
-    """Return the checks with what their logs can be used for together.
-
-    The stations are those beside the first log.
-    """
-    from groundstation.pipeline.many_flights.found_sessions import STATIONS_TOML
-    from groundstation.pipeline.many_flights.session import load_stations
+    """The checks with what their logs can be used for together, with the stations beside the first of them."""
+    from groundstation.pipeline.many_flights.sessions.found import STATIONS_TOML
+    from groundstation.pipeline.many_flights.sessions.job import load_stations
     from groundstation.pipeline.verbs.usable import usability_of_session
 
     file = Path(found[min(flights)].outcome.source).with_name(STATIONS_TOML)

@@ -12,8 +12,8 @@ from groundstation.base.clock import Clock
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
-from groundstation.pipeline.many_flights.apart import each_apart
-from groundstation.pipeline.many_flights.confined import Bounds
+from groundstation.pipeline.many_flights.processes.apart import each_apart
+from groundstation.pipeline.many_flights.processes.confined import Bounds
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent

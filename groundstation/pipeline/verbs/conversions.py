@@ -9,10 +9,10 @@ from tempfile import TemporaryDirectory
 from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.signals import is_canonical
 from groundstation.integrity.limits import Thresholds
-from groundstation.pipeline.many_flights.apart import outcomes_apart
-from groundstation.pipeline.many_flights.confined import Bounds
 from groundstation.pipeline.many_flights.inputs import no_log
-from groundstation.pipeline.many_flights.workers import Crew, in_turn
+from groundstation.pipeline.many_flights.processes.apart import outcomes_apart
+from groundstation.pipeline.many_flights.processes.confined import Bounds
+from groundstation.pipeline.many_flights.processes.workers import Crew, in_turn
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
 from groundstation.pipeline.one_flight.log import Log, as_log, log_name, open_log

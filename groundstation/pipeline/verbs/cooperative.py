@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from groundstation.base.errors import UsageError
+from groundstation.pipeline.many_flights.fleet.index import rows_without_flight, write_index_of
 from groundstation.pipeline.many_flights.inputs import file_in, is_session
-from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
-from groundstation.pipeline.many_flights.publishing import rows_without_flight, write_index_of
-from groundstation.pipeline.many_flights.session import SessionJob, load_stations, run_one
+from groundstation.pipeline.many_flights.runs.out_folder import alone_in, prepare, refuse_foreign
+from groundstation.pipeline.many_flights.sessions.job import SessionJob, load_stations
+from groundstation.pipeline.many_flights.sessions.session import run_one
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.log import Log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of

@@ -11,7 +11,7 @@ from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.failures import attempt, failures, gathered_failures, is_incomplete, with_failures
 from groundstation.base.findings import worst
 from groundstation.pipeline.many_flights.inputs import FLIGHT_FOLDER_MARK, PLAN_MARK
-from groundstation.pipeline.many_flights.out_folder import alone_in, prepare, refuse_foreign
+from groundstation.pipeline.many_flights.runs.out_folder import alone_in, prepare, refuse_foreign
 from groundstation.pipeline.one_flight.flight import (
     OF_THE_WORLD,
     Stopwatch,

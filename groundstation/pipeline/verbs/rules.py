@@ -18,12 +18,11 @@ from groundstation.base.serial import to_json
 from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.estimators.installation.answer import verdict_of
 from groundstation.pipeline.many_flights.inputs import saved_flights
-from groundstation.pipeline.many_flights.installations import installations_in
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, csv_text, load, mapping, write_text
 from groundstation.results.gates import Gate, judged_gate
-from groundstation.results.installation import InstalledFlight
+from groundstation.results.installation import InstalledFlight, installations_in
 from groundstation.results.rules import Rejudged
 from groundstation.systems import systems
 

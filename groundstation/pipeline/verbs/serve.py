@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError
+from groundstation.pipeline.many_flights.fleet.publishing import FLEET_RECORDING
 from groundstation.pipeline.many_flights.inputs import file_in, flight_folders, session_folders
-from groundstation.pipeline.many_flights.publishing import FLEET_RECORDING
 
 PATIENCE_S = 1.0  # between two looks at whether it shall end
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
+from groundstation.pipeline.many_flights.fleet.publishing import FLEET_RECORDING
 from groundstation.pipeline.many_flights.inputs import COMPARISON_RECORDING, file_in
-from groundstation.pipeline.many_flights.publishing import FLEET_RECORDING
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.results.files import load_manifest

@@ -1,0 +1,32 @@
+"""Crew of a run: a cluster, processes side by side or each apart, or this process alone."""
+
+import math
+from functools import partial
+
+from groundstation.pipeline.many_flights.processes.apart import outcomes_apart
+from groundstation.pipeline.many_flights.processes.confined import Bounds
+from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS, Crew, in_turn, side_by_side
+from groundstation.pipeline.one_flight.progress import Listener
+
+
+def crew_for(
+    scheduler: str,
+    workers: int,
+    logs: int,
+    listen: Listener,
+    timeout_s: float = math.inf,
+    bounds: Bounds | None = None,
+) -> Crew:
+    """Choose who does the work: a cluster, processes, or this process alone.
+
+    This process alone works where there is little to do and no limit of time.
+    """
+    if bounds is not None:
+        return partial(outcomes_apart, workers=workers, listen=listen, bounds=bounds)
+    if scheduler:
+        from groundstation.pipeline.many_flights.processes.cluster import on_cluster
+
+        return partial(on_cluster, scheduler=scheduler, timeout_s=timeout_s)
+    if min(workers, logs) <= 1 and logs <= TASKS_PER_PROCESS and math.isinf(timeout_s):
+        return partial(in_turn, listen=listen)
+    return partial(side_by_side, workers=min(workers, logs), listen=listen, timeout_s=timeout_s)

@@ -1,0 +1,1 @@
+"""Logs and results elsewhere, in a bucket or on a server."""

@@ -1,0 +1,1 @@
+"""Runs of many logs: listed, run, put into OUT, continued."""

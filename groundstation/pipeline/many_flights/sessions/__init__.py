@@ -1,0 +1,1 @@
+"""Sessions of several aircraft: found among flights, run, continued."""
