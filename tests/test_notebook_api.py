@@ -20,6 +20,7 @@ from groundstation.base.errors import GroundstationError, NotAssessableError, Un
 from groundstation.chapters.parts import Figure
 from groundstation.chapters.plots import PLOTS
 from groundstation.estimators.analyses import ANSWER_TYPES
+from groundstation.pipeline import notebook
 from groundstation.pipeline.api import OpenLog, SavedRun
 from groundstation.pipeline.verbs.clip import Wanted, clip
 from groundstation.reports.notebook.plots import name_of
@@ -419,6 +420,12 @@ def test_without_the_extra_show_says_what_to_install(flight: OpenLog, monkeypatc
     monkeypatch.setattr(inline.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(GroundstationError, match=re.escape("groundstation[notebook]")):
         flight.show(inline=True)
+
+
+def test_without_the_extra_a_figure_says_what_to_install(flight: OpenLog, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(notebook, "find_spec", lambda name: None)
+    with pytest.raises(UsageError, match=re.escape("no package matplotlib: pip install 'groundstation[notebook]'")):
+        flight.figure("density")
 
 
 def test_a_fleet_is_a_frame(tmp_path: Path) -> None:
