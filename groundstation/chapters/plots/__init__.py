@@ -25,7 +25,7 @@ from groundstation.chapters.plots import (
 from groundstation.plots.plot import Plot
 from groundstation.results.flight import FlightResults
 
-# By the name that a chapter gives; a figure that is one of several alike gets which.
+# By the name that a chapter gives, or a tab alone; a figure that is one of several alike gets which.
 PLOTS: dict[str, Callable[[FlightResults], Plot | None] | Callable[[FlightResults, str], Plot | None]] = {
     GENERIC_SERIES: generic.series,
     "heading.difference": heading.difference,
@@ -60,6 +60,7 @@ PLOTS: dict[str, Callable[[FlightResults], Plot | None] | Callable[[FlightResult
     "magnetic.ground_runs": magnetic.ground_runs,
     "landing.deviations": landing.deviations,
     "landing.final": landing.final,
+    "landing.motion": landing.motion,
     "landing.protection": landing.protection,
     "overview.track": flight.track_map,
     "overview.profile": flight.profile,
