@@ -10,7 +10,7 @@ DEV     := $(VENV)/.dev
 PIP     := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check types style slow fuzz schemas bench lock newest sbom clean help
+.PHONY: demo test check types style slow fuzz golden schemas bench lock newest sbom clean help
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -57,6 +57,9 @@ slow: $(DEV) ## the long Monte Carlo tests
 
 fuzz: $(DEV) ## mutated logs through every reader for three minutes; FUZZ=10000: so many of each format
 	$(BIN)/python -m tests.fuzz
+
+golden: $(DEV) ## write anew what every plot shows, tests/references/plots.json: its diff is to be reviewed
+	$(BIN)/python -m tests.plot_contents
 
 schemas: $(DEV) ## make the package's descriptor set from schemas/*.proto, schemas/*.schema.json from the results
 	$(BIN)/python -m grpc_tools.protoc -Ischemas --include_imports \

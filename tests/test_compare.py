@@ -15,6 +15,8 @@ from rerun.experimental import ViewerClient
 from typer.testing import CliRunner
 
 from groundstation.base.errors import UnreadableLogError, UsageError
+from groundstation.base.normal import NORMAL_95
+from groundstation.chapters.plots.comparison import COMPARED, sides_of
 from groundstation.cli.main import app
 from groundstation.pipeline.many_flights.inputs import collect
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -24,6 +26,7 @@ from groundstation.pipeline.verbs.clip import Wanted, clip
 from groundstation.pipeline.verbs.compare import compare, compare_to, deltas_of
 from groundstation.reports.comparison import comparison_html
 from groundstation.results.answer import by_analysis
+from groundstation.results.arrays.inertial import InertialStates
 from groundstation.results.comparison import Comparison, Delta
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, save
@@ -32,7 +35,7 @@ from groundstation.results.manifest import Manifest
 from groundstation.results.summary import summary_of
 from groundstation.simulation.samples import write_scenario
 from groundstation.systems import systems
-from groundstation.viewer.comparison import write_comparison
+from groundstation.viewer.comparison import COOPERATIVE, FORECAST, HEADING, INERTIAL, OVER_TIME, write_comparison
 from tests.inertial_example import inertial_result
 from tests.recording_contents import Contents
 from tests.saved import load
@@ -44,6 +47,7 @@ SCENARIOS = Path(__file__).parents[1] / "groundstation" / "simulation" / "scenar
 GRID_S = 0.2  # step of the grid on which phases are told apart
 LATER_S = 23.7
 LEAST_PIXELS = 40
+SPEEDS = [f"/comparison/overview-ground_speed_mps/ground_speed/b0{place}_lines" for place in range(2)]  # of A, of B
 
 
 def groundstation(*arguments: str) -> tuple[int, str, str]:
@@ -263,14 +267,14 @@ def test_the_recording_holds_both_on_the_clock_of_a(folders: dict[str, Path], tm
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"compare.html", "compare.csv", "compare.rrd"}
     contents = Contents(tmp_path / "out" / "compare.rrd")
     assert contents.timelines == {"flight_time"}, "the clock of B is moved: it is no UTC"
-    for letter, name, offset_s in (("A", "good", 0.0), ("B", "later", comparison.alignment.offset_s)):
+    for entity, name, offset_s in zip(SPEEDS, ("good", "later"), (0.0, comparison.alignment.offset_s), strict=True):
         figure = load(folders[name]).figures["overview"]
-        time_ns, values = contents.scalars(f"/{letter}/overview/ground_speed_mps")
+        time_ns, values = contents.scalars(entity)
         known = np.isfinite(values[:, 0])
         expected = np.isfinite(figure["ground_speed_mps"])
         assert np.array_equal(values[known, 0], figure["ground_speed_mps"][expected])
         assert np.abs(time_ns[known] / 1e9 - figure["time_s"][expected] - offset_s).max() < 1e-6
-    speeds = [contents.scalars(f"/{letter}/overview/ground_speed_mps") for letter in "AB"]
+    speeds = [contents.scalars(entity) for entity in SPEEDS]
     grid_ns = np.arange(70, 240) * 10**9
     a, b = (np.interp(grid_ns, time_ns, values[:, 0]) for time_ns, values in speeds)
     assert np.sqrt(np.mean((a - b) ** 2)) < 0.5, "the same taxi does not lie over itself"
@@ -280,7 +284,7 @@ def test_runs_of_one_log_keep_utc(folders: dict[str, Path], tmp_path: Path) -> N
     compare_to(folders["good"], folders["part"], tmp_path / "out")
     contents = Contents(tmp_path / "out" / "compare.rrd")
     assert contents.timelines == {"flight_time", "utc"}
-    batch = contents.batches["/B/overview/ground_speed_mps"][0]
+    batch = contents.batches[SPEEDS[1]][0]
     flight_ns, utc_ns = (np.asarray(batch.column(name).cast(pa.int64())) for name in ("flight_time", "utc"))
     assert flight_ns[0] == 30 * 10**9
     assert (utc_ns - flight_ns == 1_777_874_400_000_000_000).all()  # 2026-05-04T06:00:00Z
@@ -290,16 +294,38 @@ def test_runs_of_one_log_keep_utc(folders: dict[str, Path], tmp_path: Path) -> N
 def test_every_figure_of_every_analysis_is_laid_over(tmp_path: Path) -> None:
     a, b = saved_example(tmp_path / "a"), saved_example(tmp_path / "b")
     comparison = compare_to(tmp_path / "a", tmp_path / "b", tmp_path / "out", "start")
-    entities = set(Contents(tmp_path / "out" / "compare.rrd").batches)
-    for letter in "AB":
-        for path in (
-            *("overview/altitude_m", "overview/ground_speed_mps", "overview/heading_deg", "phase", "plan/now"),
-            *("heading_running/mean_deg", "inertial_states/north_position_m", "inertial_track/ins_error_m"),
-        ):
-            assert f"/{letter}/{path}" in entities
+    contents = Contents(tmp_path / "out" / "compare.rrd")
+    both = [
+        *(f"/comparison/phases/{letter}" for letter in "AB"),
+        *(f"/comparison/tracks/north/02_told/{n}" for n in "01"),
+    ]
+    assert set(both) <= set(contents.batches)
+    drawn = {entity.split("/")[2] for entity in {*contents.batches, *contents.fixed} if entity.count("/") > 2}
+    assert drawn >= {name for name, tell in COMPARED.items() if tell(sides_of(comparison, a, b)) is not None}
+    assert len(drawn) > 10
     html = comparison_html(comparison, a, b)
     for title in ("Tracks", "Altitude", "Heading error, running mean", "North position error", "Forecast"):
         assert f"<h3>{title}</h3>" in html
+
+
+def test_every_figure_of_the_page_has_its_place_in_the_recording() -> None:
+    rows = (*OVER_TIME, *HEADING, *INERTIAL, *COOPERATIVE, *FORECAST)
+    assert {"tracks", *(name for row in rows for name in row)} == set(COMPARED)
+
+
+def test_each_line_of_the_recording_has_its_band_and_its_values(tmp_path: Path) -> None:
+    saved_example(tmp_path / "a"), saved_example(tmp_path / "b")
+    compare_to(tmp_path / "a", tmp_path / "b", tmp_path / "out", "start")
+    contents = Contents(tmp_path / "out" / "compare.rrd")
+    states = load(tmp_path / "a").rows_of(InertialStates)
+    assert states is not None
+    for place in range(2):
+        _, middle, half = contents.band(
+            f"/comparison/inertial_states-east_velocity_mps/east_velocity_error/c0{place}_band"
+        )
+        known = np.isfinite(middle)
+        assert np.array_equal(middle[known], states.east.velocity_mps)
+        assert half[known] == pytest.approx(NORMAL_95 * states.east.velocity_sigma_mps)
 
 
 def test_the_page_is_whole_and_says_what_differs(folders: dict[str, Path], tmp_path: Path) -> None:

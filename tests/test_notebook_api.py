@@ -18,6 +18,7 @@ import pytest
 import groundstation
 from groundstation.base.errors import GroundstationError, NotAssessableError, UnreadableLogError, UsageError
 from groundstation.chapters.parts import Figure
+from groundstation.pipeline import notebook
 from groundstation.pipeline.api import OpenLog, SavedRun
 from groundstation.pipeline.verbs.clip import Wanted, clip
 from groundstation.reports.notebook.plots import name_of
@@ -40,9 +41,9 @@ NAMES = (
     "inertial inertial-tilt inertial-radial inertial-innovations inertial-observability inertial-differences "
     "inertial-own-innovations landing-beacons landing-space landing-accuracy landing-trials latency-search together "
     "magnetic-deviation magnetic-held-out magnetic-track magnetic-branches magnetic-modulus magnetic-ground "
-    "landing-deviations landing-final landing-protection map profile attitude states gaps reference reference-track "
-    "reference-claims cooperative-map cooperative-errors cooperative-geometry cooperative-links control-paths "
-    "control-measures control-law placement-map placement-accuracy"
+    "landing-deviations landing-final landing-motion landing-protection map profile attitude states gaps reference "
+    "reference-track reference-claims cooperative-map cooperative-errors cooperative-geometry cooperative-links "
+    "control-paths control-measures control-law placement-map placement-accuracy"
 )
 
 
@@ -419,6 +420,12 @@ def test_without_the_extra_show_says_what_to_install(flight: OpenLog, monkeypatc
     monkeypatch.setattr(inline.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(GroundstationError, match=re.escape("groundstation[notebook]")):
         flight.show(inline=True)
+
+
+def test_without_the_extra_a_figure_says_what_to_install(flight: OpenLog, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(notebook, "find_spec", lambda name: None)
+    with pytest.raises(UsageError, match=re.escape("no package matplotlib: pip install 'groundstation[notebook]'")):
+        flight.figure("density")
 
 
 def test_a_fleet_is_a_frame(tmp_path: Path) -> None:

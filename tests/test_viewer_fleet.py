@@ -94,49 +94,69 @@ def test_identity_and_embedded_layout(contents: Contents) -> None:
 def test_errors_and_intervals_are_those_of_the_flights(contents: Contents, fleet: FleetResults, name: str) -> None:
     flights = fleet.flights
     mine = flights["aircraft"] == name
-    places, values = contents.scalars(f"/aircraft/{name}/heading_error/flights")
-    assert (places == np.flatnonzero(mine) + 1).all() and (values[:, 0] == flights["error_deg"][mine]).all()
-    stretches = [entity for entity in contents.batches if f"/{name}/heading_error/interval95/" in entity]
+    outside = fleet.trend.flight_id[fleet.trend.is_outside & (fleet.trend.aircraft == name)]
+    dots = [contents.scalars(one) for one in drawn(contents, name, "dots") if one != new_level(contents, name)]
+    places, values = (np.concatenate([one[part] for one in dots]) for part in (0, 1))
+    order = np.argsort(places)
+    assert (places[order] == np.flatnonzero(mine) + 1).all() and len(dots) == (2 if len(outside) else 1)
+    assert (values[order, 0] == flights["error_deg"][mine]).all()
+    stretches = drawn(contents, name, "band")
     assert len(stretches) == (2 if name == STEPPING else 1), "a band ends where the level changes"
-    bands = [contents.band(entity) for entity in sorted(stretches)]
+    bands = [contents.band(entity) for entity in stretches]
     middle, half = (np.concatenate([band[part] for band in bands]) for part in (1, 2))
     assert middle - half == pytest.approx(flights["confidence95_low_deg"][mine])
     assert middle + half == pytest.approx(flights["confidence95_high_deg"][mine])
 
 
+def drawn(contents: Contents, name: str, kind: str, what: str = "heading_error") -> list[str]:
+    """Entities of one kind of mark of an aircraft, in their order."""
+    start = f"/aircraft/{name}/{what}/"
+    return sorted(one for one in contents.batches if one.startswith(start) and one.endswith(f"_{kind}"))
+
+
+def new_level(contents: Contents, name: str) -> str | None:
+    """The entity of the first flights of new levels."""
+    style = {
+        one: contents.fixed[one][0].column("SeriesPoints:names")[0].as_py() for one in drawn(contents, name, "dots")
+    }
+    return next((one for one, names in style.items() if names == ["new level, °"]), None)
+
+
 def test_lines_are_interrupted_where_the_level_changes(contents: Contents, fleet: FleetResults) -> None:
     change = next(one for one in fleet.change_points if one.aircraft == STEPPING)
     first = fleet.flights["flight_id"].tolist().index(change.flight_id) + 1
-    places, values = contents.scalars(f"/aircraft/{STEPPING}/heading_error/limits")
-    before = places < first
-    assert values.shape[1] == 6 and before.any() and not before.all()
-    assert np.isnan(values[before][:, 3:]).all() and np.isnan(values[~before][:, :3]).all()
-    assert np.allclose(values[before][:, 0], change.level_before)
-    assert np.allclose(values[~before][:, 3], change.level_after)
-    place, level = contents.scalars(f"/aircraft/{STEPPING}/heading_error/change")
+    before, after = (contents.scalars(one) for one in drawn(contents, STEPPING, "lines"))
+    assert (before[0] < first).all() and (after[0] >= first).all()
+    for (_, values), level in ((before, change.level_before), (after, change.level_after)):
+        low, high, own = values.T
+        assert np.allclose(own, level) and (low < own).all() and (own < high).all()
+    entity = new_level(contents, STEPPING)
+    assert entity is not None
+    place, level = contents.scalars(entity)
     assert place.tolist() == [first] and level[0, 0] == pytest.approx(change.level_after)
 
 
 def test_an_aircraft_without_changes_has_none(contents: Contents) -> None:
-    assert f"/aircraft/{STEADY}/heading_error/change" not in contents.batches
-    assert contents.scalars(f"/aircraft/{STEADY}/heading_error/limits")[1].shape[1] == 3
+    assert new_level(contents, STEADY) is None
+    ((_, values),) = (contents.scalars(one) for one in drawn(contents, STEADY, "lines"))
+    assert values.shape == (2, 3)
 
 
 def test_the_growing_density_is_that_of_all_flights_so_far(contents: Contents, fleet: FleetResults) -> None:
     densities = fleet.densities
-    drawn = {
+    so_far_of = {
         place: np.asarray(tensor[0]["buffer"])
         for batch in contents.batches[f"/{PATH}/fleet_so_far"]
         for place, tensor in zip(
             batch.column("flight_number").to_pylist(), batch.column("BarChart:values").to_pylist(), strict=True
         )
     }
-    assert sorted(drawn) == list(range(1, FLIGHTS + 1))
+    assert sorted(so_far_of) == list(range(1, FLIGHTS + 1))
     for upto, (place, so_far) in enumerate(steps_of(densities), start=1):
         expected = np.average(densities.density_per_deg[:upto], axis=0, weights=densities.samples[:upto])
         assert place == upto - 1 and np.allclose(so_far, expected, rtol=1e-6)
-        assert (drawn[upto] == so_far).all() or not drawn[upto].any(), "left out only when far too high"
-    assert np.allclose(drawn[FLIGHTS], densities.pooled_per_deg, rtol=1e-6, atol=1e-9)
+        assert (so_far_of[upto] == so_far).all() or not so_far_of[upto].any(), "left out only when far too high"
+    assert np.allclose(so_far_of[FLIGHTS], densities.pooled_per_deg, rtol=1e-6, atol=1e-9)
 
 
 def steps_of(densities: Densities) -> list[tuple[int, np.ndarray]]:
@@ -157,11 +177,11 @@ def test_many_flights_are_drawn_in_some_200_steps(fleet: FleetResults) -> None:
 
 
 def test_skill_of_every_flight_by_horizon(contents: Contents, fleet: FleetResults) -> None:
-    places, values = contents.scalars("/forecast/rms_by_flight")
     rms, horizons = fleet.skill_flights["rms_m"], fleet.skill_flights["horizon_min"]
-    assert (places == np.arange(1, FLIGHTS + 1)).all()
-    for column, horizon in enumerate(np.unique(horizons).tolist()):
-        assert (values[:, column] == rms[horizons == horizon]).all()
+    for number, horizon in enumerate(np.unique(horizons).tolist()):
+        places, values = contents.scalars(f"/forecast/rms_by_flight/d0{number}_dots")
+        assert (places == np.arange(1, FLIGHTS + 1)).all() and (values[:, 0] == rms[horizons == horizon]).all()
+    assert {f"/fleet/growth/RMS_radial_error/{mark}" for mark in ("00_dots/0", "01_curve")} <= set(contents.fixed)
     assert "900" not in contents.text("/forecast/skill") and "last estimate" in contents.text("/forecast/skill")
 
 
@@ -217,7 +237,7 @@ def test_flights_without_a_time_have_a_number_alone(fleet: FleetResults, tmp_pat
             places = np.asarray(batch.column("flight_number"))
             behind = bool(first) & (places > FLIGHTS)  # where every lane ends, on both timelines
             assert (((places <= first) | behind) == ("utc" in batch.schema.names)).all()
-    places, _ = found.scalars(f"/aircraft/{STEADY}/heading_error/flights")
+    places = np.concatenate([found.scalars(one)[0] for one in drawn(found, STEADY, "dots")])
     assert len(places) == FLIGHTS // 3, "all of them have a place on flight_number"
     assert f"{FLIGHTS - first} flights have no absolute time" in found.text("/flights")
 
@@ -229,8 +249,10 @@ def test_one_flight_and_none(tmp_path: Path) -> None:
     save_flight(tmp_path / "one", 0)
     write_fleet_recording(tmp_path / "one.rrd", gather(tmp_path / "one"))
     found = Contents(tmp_path / "one.rrd")
-    assert found.scalars("/aircraft/A12/heading_error/flights")[1].tolist() == [[1.0]]
-    assert found.scalars("/aircraft/A12/heading_error/interval95")[1].shape == (1, 2)
+    (dots,) = drawn(found, "A12", "dots")
+    assert found.scalars(dots)[1].tolist() == [[1.0]]
+    ends = [found.scalars(f"/aircraft/A12/heading_error/c00_band/{end}")[1][0, 0] for end in ("low", "high")]
+    assert ends[0] < ends[1], "a band of one flight is not seen"
 
 
 def test_flights_without_any_heading_leave_the_charts_out(fleet: FleetResults, tmp_path: Path) -> None:
@@ -274,13 +296,13 @@ def test_views_of_every_tab_draw_and_complain_of_nothing(
     client = headless_viewer(path)
     client.set_time("flight_number", sequence=FLIGHTS // 2)
     seen = []
-    drawn = set()
+    seen_views = set()
     for name, views in pages(client):
         seen.append(name)
         for view in chosen(views, is_every):
-            if view.view_id in drawn:  # stands on several pages
+            if view.view_id in seen_views:  # stands on several pages
                 continue
-            drawn.add(view.view_id)
+            seen_views.add(view.view_id)
             kind = view.view_class
             pixels = picture(client.take_screenshot(view.view_id))  # the page has come to rest
             assert kind not in DRAWN_IN_COLOUR or colourful(pixels) > LEAST_PIXELS, (name, kind)

@@ -1,6 +1,7 @@
 """A plot is told once: what a tab logs by hand is listed here with its reason, and each mark of a plot is drawn."""
 
 import ast
+import re
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from tests.every_mark import DRAWN
 from tests.recording_contents import Contents
 
 TABS = Path(groundstation.viewer.tabs.__file__).parent
+ROOM = TABS.parent
 LOGGING = {"lines", "thinned", "band", "dots", "lane", "spans"}  # of a Recorder
 # What is not told once. A tab that is not here shows plots of its chapter alone.
 BY_HAND = {
@@ -31,6 +33,18 @@ BY_RERUN = {  # spaces, maps, tensors, and what grows with time
     *("control", "placement", "landing", "landing_ranges", "flight_space", "session_space", "track"),
     *("magnetic_field", "distribution", "forecast"),
 }
+# The same of the room itself: fleet, comparison, plan, session, and what all painters log with.
+ROOM_BY_HAND = {
+    "fleet_charts": {"lane"},  # the verdict of every flight: the page has it in the table of flights
+    "plot_views": {"lines", "band", "dots", "spans"},  # the painter
+}
+ROOM_BY_RERUN = {
+    "fleet_density",  # grows flight by flight
+    *("chart", "recorder"),  # the painters
+}
+DRAWN_BY_RERUN = re.compile(
+    r"rr\.(Boxes|Points|LineStrips|BarChart|SeriesLines|SeriesPoints|Measurements|Tensor|Image)"
+)
 
 
 def calls_of(path: Path) -> set[str]:
@@ -51,6 +65,12 @@ def test_tabs_that_log_by_hand_are_listed() -> None:
     paths = sorted(TABS.glob("*.py"))
     assert {path.stem: calls for path in paths if (calls := calls_of(path))} == BY_HAND
     assert {path.stem for path in paths if draws_by_rerun(path)} == BY_RERUN
+
+
+def test_the_room_logs_by_hand_where_it_is_listed() -> None:
+    paths = sorted(ROOM.glob("*.py"))
+    assert {path.stem: calls for path in paths if (calls := calls_of(path))} == ROOM_BY_HAND
+    assert {path.stem for path in paths if DRAWN_BY_RERUN.search(path.read_text("utf-8"))} == ROOM_BY_RERUN
 
 
 def logged(folder: Path, plot: Plot, *, is_run: bool = False) -> Contents:
@@ -133,7 +153,7 @@ def test_the_place_at_a_time_moves(tmp_path: Path) -> None:
     contents = logged(
         tmp_path, Plot("a.plot", "A", "", "", one_panel(Panel(marks, Axis("x"), Axis("y"), is_map=True), 40.0))
     )
-    assert (contents.times("/a/plot/y/01_told") == (1e10 * x).astype(np.int64)).all()
+    assert (contents.times("/a/plot/y/01_told/0") == (1e10 * x).astype(np.int64)).all()
 
 
 def test_why_a_panel_is_empty_is_a_text(tmp_path: Path) -> None:

@@ -3,13 +3,20 @@
 from abc import ABC, abstractmethod
 from functools import cached_property
 from html import escape
+from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from groundstation.base.clock import Clock
-from groundstation.base.errors import GroundstationError, NotAssessableError, UnknownNameError, told_in_a_line
+from groundstation.base.errors import (
+    GroundstationError,
+    NotAssessableError,
+    UnknownNameError,
+    UsageError,
+    told_in_a_line,
+)
 from groundstation.base.ledger import Ledger
 from groundstation.results.answer import A
 from groundstation.results.flight import FlightResults, Source
@@ -168,12 +175,14 @@ class OpenFlight(ABC):
         Raises
         ------
         UsageError
-            When this flight has no such figure.
+            When this flight has no such figure, or matplotlib is not installed.
         """
         showing = (plot for plot in self._plots.values() if name in plot.numbers)
         plot = self._plots.get(name) or next(showing, None)
         if plot is None:
             raise UnknownNameError("figures", name, self._plots)
+        if find_spec("matplotlib") is None:
+            raise UsageError(f"figure {name}", "no package matplotlib", "", "pip install 'groundstation[notebook]'")
         from groundstation.reports.notebook.figure import figure_of
 
         return figure_of(plot)

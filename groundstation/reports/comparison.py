@@ -5,13 +5,12 @@ from collections.abc import Callable, Sequence
 from groundstation.base.failures import attempt
 from groundstation.chapters.comparison import answers, findings, opening, settings
 from groundstation.chapters.parts import Section, kept
-from groundstation.chapters.plots.comparison import COMPARED, Side
+from groundstation.chapters.plots.comparison import COMPARED, Side, sides_of
 from groundstation.plots.plot import Plot
 from groundstation.reports.drawing import Drawing, drawing_of
 from groundstation.reports.page import TEMPLATES, render
 from groundstation.results.comparison import Comparison
 from groundstation.results.files import SavedFlight
-from groundstation.results.forecast import ForecastResult
 
 
 def comparison_html(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> str:
@@ -33,18 +32,14 @@ def comparison_html(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> s
 
 def _figures(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> Section | None:
     """Return figures of both flights over each other, without those that fail."""
-    sides = (
-        Side("A", a, _default_method(a)),
-        Side("B", b, _default_method(b), comparison.alignment.offset_s),
-    )
+    sides = sides_of(comparison, a, b)
     parts = kept(attempt("figure", name, _drawn, tell, sides) for name, tell in COMPARED.items())
-    return Section("figures", "Figures", "A blue, B orange; thin lines are 95 % bands.", parts) if parts else None
+    return (
+        Section("figures", "Figures", "A blue, B orange; the shade about a line is its 95 % band.", parts)
+        if parts
+        else None
+    )
 
 
 def _drawn(tell: Callable[[Sequence[Side]], Plot | None], sides: Sequence[Side]) -> Drawing | None:
     return drawing_of(tell(sides))
-
-
-def _default_method(saved: SavedFlight) -> str:
-    forecast = saved.results.answer(ForecastResult)
-    return "" if forecast is None else forecast.default_method

@@ -119,7 +119,7 @@ ROLES: Final[dict[Role, Colour]] = {
 }
 # Widths of lines and sizes of dots, in points.
 LINE: Final[dict[Emphasis, float]] = {"faint": 0.6, "thin": 1.0, "usual": 1.5, "bold": 2.5}
-DOT: Final[dict[Emphasis, float]] = {"faint": 1.0, "thin": 1.3, "usual": 1.6, "bold": 2.5}
+DOT: Final[dict[Emphasis, float]] = {"faint": 1.0, "thin": 1.3, "usual": 1.6, "bold": 3.5}
 
 
 def faint(colour: Colour) -> Colour:

@@ -10,26 +10,26 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.base.failures import attempt
+from groundstation.chapters.plots.fleet.skill import growth
+from groundstation.chapters.plots.fleet.trend import HEADING
 from groundstation.results.fleet import FleetResults
 from groundstation.viewer.fleet_charts import (
-    HEADING,
     MOST_AIRCRAFT,
-    PATHS,
     Aircraft,
     aircraft_of,
+    by_aircraft,
     log_aircraft,
-    over_time,
-    skill_by_horizon,
     skill_over_flights,
     verdicts,
 )
 from groundstation.viewer.fleet_density import heading_error_density
 from groundstation.viewer.fleet_recorder import FLIGHT_NUMBER, FleetRecorder
 from groundstation.viewer.fleet_text import aircraft_text, failed_text, flights_text, forecast_text
+from groundstation.viewer.plot_views import panels_of
 from groundstation.viewer.recording import save_stream, send_layout
 from groundstation.viewer.views import document
 
-Logged = tuple[Aircraft, list[str]]  # an aircraft and the quantities it has
+Logged = tuple[Aircraft, dict[str, rrb.View]]  # an aircraft and the views of the quantities it has
 FLEET = "fleet"
 FLIGHTS_TEXT = "flights"  # entity of the table of flights
 
@@ -72,7 +72,8 @@ def _logged(recorder: FleetRecorder, fleet: FleetResults, one: Aircraft) -> Logg
 def _fleet(recorder: FleetRecorder, fleet: FleetResults, found: list[Logged]) -> rrb.Container:
     aircraft = [one for one, _ in found]
     recorder.document("by_aircraft", aircraft_text(fleet, {one.name: one.entity for one in aircraft}))
-    plots = [*over_time(found, HEADING), *([verdicts(aircraft)] if aircraft else [])]
+    errors = by_aircraft([one for one, views in found if HEADING in views], HEADING)
+    plots = [*errors, *([verdicts(aircraft)] if aircraft else [])]
     answer = [document("By aircraft", "by_aircraft"), *heading_error_density(recorder, fleet)]
     columns = [rrb.Vertical(contents=answer)]
     if plots:
@@ -82,20 +83,17 @@ def _fleet(recorder: FleetRecorder, fleet: FleetResults, found: list[Logged]) ->
 
 def _aircraft(_recorder: FleetRecorder, _fleet: FleetResults, found: list[Logged]) -> rrb.Container | None:
     own = [
-        rrb.Vertical(
-            contents=[*(view for quantity in PATHS for view in over_time([(one, names)], quantity)), verdicts([one])],
-            name=one.label,
-        )
-        for one, names in found[:MOST_AIRCRAFT]
+        rrb.Vertical(contents=[*views.values(), verdicts([one])], name=one.label)
+        for one, views in found[:MOST_AIRCRAFT]
     ]
     return rrb.Tabs(contents=own, name="Aircraft") if own else None
 
 
 def _forecast(recorder: FleetRecorder, fleet: FleetResults, _found: list[Logged]) -> rrb.Container | None:
-    forecast = [*skill_over_flights(recorder, fleet), *skill_by_horizon(recorder, fleet)]
     skill = forecast_text(fleet)
     if not skill:
         return None
+    forecast = [*skill_over_flights(recorder, fleet), *panels_of(recorder, growth(fleet))]
     recorder.document("forecast/skill", skill)
     views = [*forecast, document("Skill of the forecast", "forecast/skill")]
     return rrb.Grid(contents=views, grid_columns=2, name="Forecast")

@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from groundstation.base.records import Int64Array
 from groundstation.results.fleet import FleetResults
 from groundstation.viewer.colours import Colour, for_states
 from groundstation.viewer.names import clean_text
-from groundstation.viewer.recorder import UTC, Line, Recorder
+from groundstation.viewer.recorder import UTC, Recorder
 from groundstation.viewer.series import FloatArray
 
 FLIGHT_NUMBER = "flight_number"
@@ -36,9 +36,17 @@ class FleetRecorder(Recorder):
         self._number = {name: place + 1 for place, name in enumerate(ids[self.order].tolist())}
         super().__init__(stream, 0, self.timed > 0)
 
+    def time_ns(self, flight_seconds: ArrayLike) -> Int64Array:
+        """Numbers of flights as they stand on the axes of plots."""
+        return np.rint(np.asarray(flight_seconds, dtype=np.float64)).astype(np.int64)
+
     def numbers(self, flight_ids: NDArray[np.str_]) -> Int64Array:
         """Return numbers of flights."""
         return np.array([self._number[name] for name in flight_ids.tolist()], dtype=np.int64)
+
+    def places(self, flight_ids: NDArray[np.str_]) -> FloatArray:
+        """Numbers of flights as places on an axis of a plot."""
+        return self.numbers(flight_ids).astype(np.float64)
 
     def set_flight(self, number: int) -> None:
         """Put everything logged next at a flight, until ``stream.reset_time``."""
@@ -53,17 +61,6 @@ class FleetRecorder(Recorder):
         if len(time_ns) and time_ns[0] <= self.timed:
             columns.append(rr.TimeColumn(UTC, timestamp=self.starts[time_ns - 1]))
         return columns
-
-    def points(self, path: str, numbers: Int64Array, values: FloatArray, lines: Sequence[Line]) -> None:
-        """Log series that share their rows as points without lines, values of shape (n, k)."""
-        style = rr.SeriesPoints(
-            names=[line.name for line in lines],
-            colors=[line.colour for line in lines],
-            marker_sizes=[line.width for line in lines],
-            markers=["circle"] * len(lines),
-        )
-        self.static(path, style)
-        self._scalars(path, numbers, values)
 
     def lane(self, path: str, time_ns: Int64Array, states: Sequence[str], colours: Mapping[str, Colour]) -> None:
         """Log one lane of states, a flight each.

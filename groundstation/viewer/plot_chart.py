@@ -220,10 +220,10 @@ def _cells(chart: Chart, name: str, several: list[marks.Cells], _: float) -> Non
 
 
 def _told(chart: Chart, name: str, several: list[marks.Told], _: float) -> None:
-    """Log a mark at the aircraft's place at the cursor, where flight time is described."""
-    for mark in several:
+    """Log a mark that is where the aircraft is at the cursor, where the description tells flight time."""
+    for place, mark in enumerate(several):
         if mark.is_time:
-            chart.moving(name, mark.value, mark.x, mark.y, Line("", colours.PAPER, HERE))
+            chart.moving(f"{name}/{place}", mark.value, mark.x, mark.y, _line(replace(mark, name=""), HERE))
 
 
 def _label(chart: Chart, name: str, labels: list[tuple[FloatArray, str, Colour]]) -> None:

@@ -6,7 +6,8 @@ outage is a lane of its own.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 import rerun.blueprint as rrb
@@ -45,23 +46,36 @@ def panels_of(
         is a chart.
     """
     views: list[rrb.View] = []
-    for path, title, panel in _named(told, of):
-        if panel.nothing:
-            recorder.document(path, markdown_text(panel.nothing))
-            views.append(document(title, path))
-        elif panel.x.scale != "time" or (panel.y.scale == "log" and not apart):
-            views.append(chart_view(recorder, path, panel, title, height))
-        elif any(isinstance(mark, Lanes) for mark in panel.marks):
-            views.append(_lanes(recorder, path, panel, title))
-        elif panel.y.scale == "log":
-            curves = [mark for mark in panel.marks if isinstance(mark, Curve)]
-            parts = path_parts(mark.name for mark in curves)
-            for mark, part in zip(curves, parts, strict=True):
-                alone = Panel([mark], panel.x, legend="")
-                views.append(over_time(recorder, f"{path}/{part}", alone, f"{title}: {clean_text(mark.name)}"))
+    for has_lanes, group in groupby(_named(told, of), key=lambda one: _has_lanes(one[2])):
+        panels = list(group)
+        if has_lanes:
+            views.append(_lanes(recorder, panels))
         else:
-            views.append(over_time(recorder, path, panel, title))
+            views += (view for one in panels for view in _views(recorder, *one, height, apart=apart))
     return views
+
+
+def _has_lanes(panel: Panel) -> bool:
+    return panel.x.scale == "time" and any(isinstance(mark, Lanes) for mark in panel.marks)
+
+
+def _views(
+    recorder: Recorder, path: str, title: str, panel: Panel, height: float, *, apart: bool
+) -> Iterator[rrb.View]:
+    """Log a panel without lanes: the one view of it, or one of each curve."""
+    if panel.nothing:
+        recorder.document(path, markdown_text(panel.nothing))
+        yield document(title, path)
+    elif panel.x.scale != "time" or (panel.y.scale == "log" and not apart):
+        yield chart_view(recorder, path, panel, title, height)
+    elif panel.y.scale == "log":
+        curves = [mark for mark in panel.marks if isinstance(mark, Curve)]
+        parts = path_parts(mark.name for mark in curves)
+        for mark, part in zip(curves, parts, strict=True):
+            alone = Panel([mark], panel.x, legend="")
+            yield over_time(recorder, f"{path}/{part}", alone, f"{title}: {clean_text(mark.name)}")
+    else:
+        yield over_time(recorder, path, panel, title)
 
 
 def runs_of(recorder: Recorder, told: Plot | None, path: str, *, height: float = 70.0) -> list[list[rrb.View]]:
@@ -100,7 +114,8 @@ def _named(told: Plot | None, of: str) -> Iterator[tuple[str, str, Panel]]:
         first = row.panels[0].y.title
         for panel in row.panels:
             axis = panel.y.title or (first if panel.marks else "")
-            found.append((panel, ": ".join(filter(None, (of, panel.title, axis))) or told.title))
+            own = "" if _has_lanes(panel) else panel.title
+            found.append((panel, ": ".join(filter(None, (of, own, axis))) or told.title))
     parts = path_parts(_part(panel, title) for panel, title in found)
     for (panel, title), part in zip(found, parts, strict=True):
         yield f"{base}/{part}", clean_text(title[:1].upper() + title[1:]), panel
@@ -112,7 +127,7 @@ def _part(panel: Panel, title: str) -> str:
     "lanes" for lanes, the axis or the title for all others.
     """
     if any(isinstance(mark, Lanes) for mark in panel.marks):
-        return "lanes"
+        return panel.title or "lanes"
     axis = panel.y.title or title
     return axis.rpartition(", ")[0] or axis
 
@@ -147,7 +162,7 @@ def over_time(recorder: Recorder, path: str, panel: Panel, title: str) -> rrb.Vi
     limits: list[Limit] = []
     named: list[Line] = []
     for place, mark in enumerate(panel.marks):
-        line = _line(mark, unit, _name_of_alike(panel, mark) or title)
+        line = _line(replace(mark, name=mark.name or _name_of_alike(panel, mark)), unit, title)
         if isinstance(mark, Band):
             _band(recorder, f"{path}/c{place:02d}_band", mark, of_band.get(id(mark)), line, unit, title)
         elif isinstance(mark, Dots) and not _is_joined(mark, curves):
@@ -211,6 +226,10 @@ def _is_middle(curve: Curve, band: Band) -> bool:
 def _band(recorder: Recorder, path: str, band: Band, about: Curve | None, line: Line, unit: str, title: str) -> None:
     rows = np.flatnonzero(np.isfinite(band.x))
     time_ns = recorder.time_ns(band.x[rows])
+    if len(rows) == 1:  # of one moment nothing would be seen but its ends
+        for end, values in (("low", band.low), ("high", band.high)):
+            recorder.dots(f"{path}/{end}", time_ns, values[rows], replace(line, width=colours.DOT["bold"]))
+        return
     with np.errstate(over="ignore", invalid="ignore"):
         middle = _middle(band)[rows] if about is None else about.y[rows]
         half = band.high[rows] - middle
@@ -278,18 +297,19 @@ def _title(title: str, named: Sequence[Line]) -> str:
     return told if len(told) <= MOST_TOLD else ""
 
 
-def _lanes(recorder: Recorder, path: str, panel: Panel, title: str) -> rrb.View:
-    """Log states over time, each mark as one lane that names every state.
+def _lanes(recorder: Recorder, panels: Sequence[tuple[str, str, Panel]]) -> rrb.View:
+    """Log states over time in one view of the panels, which follow each other; it has the title of the first.
 
-    States that the page leaves out are included.
+    Each mark is a lane that says every state, those that the page leaves out too.
     """
     paths = []
-    several = [mark for mark in panel.marks if isinstance(mark, Lanes)]
-    for place, mark in enumerate(several):
-        if len(mark.start):
-            order = np.argsort(mark.start, kind="stable")
-            own = {state: colours.ROLES[role] for state, role in mark.roles.items()}
-            palette = {**own, **colours.STATES_OF_LANES}
-            paths.append(f"{path}/{place:02d}" if len(several) > 1 else path)
-            recorder.spans(paths[-1], mark.start[order], mark.end[order], mark.state[order], palette)
-    return lanes(title, paths)
+    for path, _, panel in panels:
+        several = [mark for mark in panel.marks if isinstance(mark, Lanes)]
+        for place, mark in enumerate(several):
+            if len(mark.start):
+                order = np.argsort(mark.start, kind="stable")
+                own = {state: colours.ROLES[role] for state, role in mark.roles.items()}
+                palette = {**own, **colours.STATES_OF_LANES}
+                paths.append(f"{path}/{place:02d}" if len(several) > 1 else path)
+                recorder.spans(paths[-1], mark.start[order], mark.end[order], mark.state[order], palette)
+    return lanes(panels[0][1], paths)

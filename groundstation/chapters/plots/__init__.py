@@ -6,7 +6,7 @@ from groundstation.chapters.generic import SERIES as GENERIC_SERIES
 from groundstation.chapters.plots import flight, generic, quality
 from groundstation.plots.plot import Describe
 
-# Of every flight, by the name that a chapter gives; a figure that is one of several alike gets which.
+# Of every flight, by the name that a chapter gives, or a tab alone; a figure that is one of several alike gets which.
 PLOTS: Mapping[str, Describe] = {
     GENERIC_SERIES: generic.series,
     "overview.track": flight.track_map,

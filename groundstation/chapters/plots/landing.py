@@ -214,5 +214,6 @@ def protection(results: FlightResults, of: str) -> Plot | None:
 PLOTS: Mapping[str, Describe] = {
     "landing.deviations": deviations,
     "landing.final": final,
+    "landing.motion": motion,
     "landing.protection": protection,
 }

@@ -9,7 +9,6 @@ import rerun.blueprint as rrb
 
 from groundstation.chapters.landing import landing as chapter
 from groundstation.chapters.markdown import markdown
-from groundstation.chapters.plots.landing import motion
 from groundstation.results.arrays.landing import LandingPath
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing import Approach, LandingResult
@@ -46,7 +45,8 @@ def landing(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
 def _approach(recorder: Recorder, results: FlightResults, one: Approach, data: LandingPath) -> rrb.Container:
     flown, path = data.where(data.approach == one.number), f"landing/{one.number}"
     left = _space(recorder, f"{path}/space", flown)
-    left += [view for run in runs_of(recorder, motion(results, str(one.number)), f"{path}/motion") for view in run]
+    motion = plot_of(recorder, "landing.motion", results, str(one.number))
+    left += [view for run in runs_of(recorder, motion, f"{path}/motion") for view in run]
     told = plot_of(recorder, "landing.protection", results, str(one.number))
     left += panels_of(recorder, told, of="Protection levels", height=70.0)
     right = panels_of(recorder, plot_of(recorder, "landing.deviations", results, str(one.number)), height=110.0)

@@ -1,6 +1,6 @@
 """Parts that the plots of the fleet report share: roles, rows of names, axes of dates."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,8 @@ from groundstation.chapters.wording import number
 from groundstation.plots.marks import SERIES, Floats, Role
 from groundstation.plots.plot import Axis
 from groundstation.results.fleet import FleetResults
+
+Places = Callable[[NDArray[np.str_]], Floats]  # of flights by their ids along an axis, NaN where one has none
 
 MOST_ROWS = 40  # aircraft in a plot with a row for each: more and the page is full
 ROW_MM = 4.8

@@ -4,9 +4,9 @@ import numpy as np
 
 from groundstation.chapters.fleet.skill import HEADLINE_MIN, drawn, method_title, shipped_method
 from groundstation.chapters.plots.common import label, line_with_dots
-from groundstation.chapters.plots.fleet.common import date_axis, roles_of, seconds_of
+from groundstation.chapters.plots.fleet.common import Places, date_axis, roles_of, seconds_of
 from groundstation.chapters.plots.forecast import HORIZON, OTHERS
-from groundstation.plots.marks import AnyMark, Curve, Dots, Emphasis, Limit, Role
+from groundstation.plots.marks import AnyMark, Curve, Dots, Emphasis, Limit, Role, series
 from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
 from groundstation.results.fleet import FleetResults
 
@@ -51,6 +51,19 @@ def flights(fleet: FleetResults) -> Plot:
         "Forecast error of every flight over time, and coverage of the forecast's band by horizon.",
         (Row((_flights(fleet, horizon), _coverage(fleet)), 42.0),),
     )
+
+
+def by_horizon(fleet: FleetResults, x: Axis, places: Places) -> Panel | None:
+    """The shipped method on every flight, a series for each horizon; None where there is no number."""
+    table = fleet.skill_flights
+    known, at = np.isfinite(table.rms_m), places(table.flight_id)
+    marks = []
+    for number, horizon in enumerate(np.unique(table.horizon_min[known]).tolist()):
+        mine = np.flatnonzero(known & (table.horizon_min == horizon))
+        mine = mine[np.argsort(at[mine], kind="stable")]
+        name = f"after {horizon:g} min"
+        marks.append(Dots(x=at[mine], y=table.rms_m[mine], role=series(number), name=name, emphasis="bold"))
+    return Panel(marks, x, Axis("RMS of the shipped method by flight, m")) if marks else None
 
 
 def _flights(fleet: FleetResults, horizon: float) -> Panel:

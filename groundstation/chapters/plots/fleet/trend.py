@@ -1,6 +1,10 @@
-"""Plot: trend of each aircraft over time, as a control chart with its changes of level."""
+"""Plot: trend of each aircraft over time, as a control chart with its changes of level.
+
+The page draws one over dates, the recording over the numbers of flights: there flights without a time have a place.
+"""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,15 +12,17 @@ from numpy.typing import NDArray
 from groundstation.chapters.fleet.common import plural, title_of
 from groundstation.chapters.fleet.trend import QUANTITIES, changes_of, charted, flights_of
 from groundstation.chapters.plots.common import label
-from groundstation.chapters.plots.fleet.common import date_axis, log_limits, seconds_of
-from groundstation.plots.marks import AnyMark, Curve, Dots, Floats, Limit
+from groundstation.chapters.plots.fleet.common import Places, date_axis, log_limits, seconds_of
+from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit, Role
 from groundstation.plots.plot import Axis, Panel, Plot, Row
 from groundstation.plots.ranges import finite, padded
+from groundstation.results.figures import numbers
 from groundstation.results.fleet import FleetResults
 
+SHADED = "Shaded: the 95 % intervals of the flights. "
 MOST_PANELS = 8
 PANEL_MM = 24.0
-POSITIVE = "radial_error_rate_fit_nmiph"
+HEADING, POSITIVE = "error_deg", "radial_error_rate_fit_nmiph"
 
 
 def charts(fleet: FleetResults, quantity: str) -> Plot | None:
@@ -30,46 +36,113 @@ def charts(fleet: FleetResults, quantity: str) -> Plot | None:
     first = sorted(names, key=lambda name: (-changed[name], -outside[name], -len(rows[name]), name))
     shown = sorted(first[:MOST_PANELS])
     dates = date_axis(fleet.trend.start_utc[fleet.trend.quantity == quantity])
-    panels = [_chart(fleet, quantity, name, rows[name], dates, legend=name == shown[0]) for name in shown]
+    panels = [
+        replace(
+            told,
+            title=f"{label(name, 24)}, {plural(len(rows[name]), 'flight')}",
+            legend="above" if name == shown[0] else "",
+        )
+        for name in shown
+        if (told := chart(fleet, quantity, name, dates, _dates_of(fleet))) is not None
+    ]
     more = ""
     if len(shown) < len(names):
         more = f" {len(shown)} of {len(names)} aircraft: those with changes first, then with flights outside."
     return Plot(
         f"fleet.trend.{quantity}",
         f"Control chart of the {title_of(quantity)}",
-        "Line: level, the median between changes; dashed: control limits of single flights; orange: outside them. "
-        f"Numbered: the first flight of a new level.{more}",
+        "Line: level, the median between changes; dashed: control limits of single flights; red: outside them. "
+        f"{SHADED if quantity == HEADING else ''}Numbered: the first flight of a new level.{more}",
         f"Control charts of the {title_of(quantity)} by aircraft over time.",
         tuple(Row((panel,), PANEL_MM, shares_x=panel is not panels[-1]) for panel in panels),
     )
 
 
-def _chart(
-    fleet: FleetResults, quantity: str, name: str, rows: NDArray[np.intp], dates: Axis, *, legend: bool
-) -> Panel:
-    own = fleet.trend.where(rows)
-    time, outside = seconds_of(own.start_utc), own.is_outside
+def chart(
+    fleet: FleetResults, quantity: str, name: str, x: Axis, places: Places, title: str = "flight", role: Role = "ins"
+) -> Panel | None:
+    """Flights of an aircraft by a quantity, with their intervals, level and limits; None without a number.
+
+    Parameters
+    ----------
+    fleet : FleetResults
+    quantity, name : str
+        Name is that of the aircraft.
+    x : Axis
+    places : callable
+        Places of flights along it, by their ids.
+    title : str
+        Of a flight in the legend.
+    role : Role
+        Of a flight.
+    """
+    flights = fleet.flights
+    rows = np.flatnonzero((flights["aircraft"] == name) & np.isfinite(numbers(flights, quantity)))
+    time, rows = _in_order(places(flights["flight_id"][rows]), rows)
+    value = numbers(flights, quantity)[rows]
+    if not len(rows):
+        return None
+    own = fleet.trend.where(flights_of(fleet, quantity, name))
+    is_outside = np.isin(flights["flight_id"][rows], own.flight_id[own.is_outside])
+    changes = changes_of(fleet, quantity, name)
+    at, changed = places(np.array([one.flight_id for _, one in changes], dtype=np.str_)), [one for _, one in changes]
     marks: list[AnyMark] = []
-    for number, change in changes_of(fleet, quantity, name):
-        at = float(seconds_of(np.array([change.start_utc_ns], dtype="datetime64[ns]"))[0])
+    for (number, _), place in zip(changes, at.tolist(), strict=True):
         shown = f" {number}"
-        marks.append(Limit(value=at, is_upright=True, role="ink", dash="dotted", emphasis="thin", label=shown))
-    for place, run in enumerate(_runs(own.level, own.low, own.high)):
+        marks.append(Limit(value=place, is_upright=True, role="ink", dash="dotted", emphasis="thin", label=shown))
+    if quantity == HEADING:
+        ends = numbers(flights, "confidence95_low_deg")[rows], numbers(flights, "confidence95_high_deg")[rows]
+        marks += _intervals(time, ends, np.sort(at), f"{title}, 95 %", role)
+    marks += _levels(places(own.flight_id), own.level, own.low, own.high)
+    if len(at):
+        after = np.array([one.level_after for one in changed])
+        marks.append(Dots(x=at, y=after, role="ink", name="new level", emphasis="bold"))
+    marks.append(Dots(x=time[~is_outside], y=value[~is_outside], role=role, name=title, emphasis="bold"))
+    if is_outside.any():
+        text = "outside the limits"
+        marks.append(Dots(x=time[is_outside], y=value[is_outside], role="bad", name=text, emphasis="bold"))
+    known = finite(value, own.low, own.high)
+    is_log = quantity == POSITIVE and bool((known > 0.0).any())
+    low, high = log_limits(known[known > 0.0]) if is_log else padded(float(known.min()), float(known.max()), 0.08, 0.05)
+    return Panel(marks, x, Axis(QUANTITIES[quantity], "log" if is_log else "linear", low, high))
+
+
+def _in_order(places: Floats, rows: NDArray[np.intp]) -> tuple[Floats, NDArray[np.intp]]:
+    """Places in their order, and the rows that have one."""
+    order = np.argsort(places, kind="stable")
+    order = order[np.isfinite(places[order])]
+    return places[order], rows[order]
+
+
+def _dates_of(fleet: FleetResults) -> Places:
+    """Places of flights on an axis of dates."""
+    known = dict(zip(fleet.flights["flight_id"].tolist(), seconds_of(fleet.flights["start_utc"]).tolist(), strict=True))
+    return lambda ids: np.array([known[one] for one in ids.tolist()], dtype=np.float64)
+
+
+def _intervals(time: Floats, ends: tuple[Floats, Floats], firsts: Floats, title: str, role: Role) -> list[AnyMark]:
+    """Bands of the intervals of flights; one ends where the level changes, at the places ``firsts``."""
+    low, high = ends
+    known = np.isfinite(low) & np.isfinite(high)
+    stretch = np.searchsorted(firsts, time, side="right")
+    bands: list[AnyMark] = []
+    for one in range(len(firsts) + 1):
+        mine = known & (stretch == one)
+        if mine.any():
+            bands.append(Band(x=time[mine], low=low[mine], high=high[mine], role=role, name=title, emphasis="faint"))
+    return bands
+
+
+def _levels(time: Floats, level: Floats, low: Floats, high: Floats) -> list[AnyMark]:
+    """Level and limits of each run between changes, from its first to its last flight."""
+    marks: list[AnyMark] = []
+    for place, run in enumerate(_runs(level, low, high) if len(level) else ()):
         span = np.array([time[run[0]], time[run[-1]]])
-        for limit, title in ((own.low, ""), (own.high, "" if place else "limits")):
-            marks.append(Curve(x=span, y=np.full(2, limit[run[0]]), role="limit", name=title, dash="dashed"))
-        title = "" if place else "level"
-        marks.append(Curve(x=span, y=np.full(2, own.level[run[0]]), role="ink", name=title))
-    marks.append(Dots(x=time[~outside], y=own.value[~outside], role="ins", name="flight", emphasis="bold"))
-    if outside.any():
-        title = "outside the limits"
-        marks.append(Dots(x=time[outside], y=own.value[outside], role="gnss", name=title, emphasis="bold"))
-    known = finite(own.value, own.low, own.high)
-    is_log = quantity == POSITIVE
-    ends = log_limits(known[known > 0.0]) if is_log else padded(float(known.min()), float(known.max()), 0.08, 0.05)
-    y = Axis(QUANTITIES[quantity], "log" if is_log else "linear", *ends)
-    title = f"{label(name, 24)}, {plural(len(rows), 'flight')}"
-    return Panel(marks, dates, y, title=title, legend="above" if legend else "")
+        for limit, title in ((low, ""), (high, "" if place else "limits")):
+            y = np.full(2, limit[run[0]])
+            marks.append(Curve(x=span, y=y, role="limit", name=title, dash="dashed", emphasis="thin"))
+        marks.append(Curve(x=span, y=np.full(2, level[run[0]]), role="ink", name="" if place else "level"))
+    return marks
 
 
 def _runs(*columns: Floats) -> Sequence[NDArray[np.intp]]:
