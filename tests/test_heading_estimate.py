@@ -26,6 +26,8 @@ NOISELESS_DEG = 1e-6  # rounding of headings and positions
 SAME_DEG = 1e-6  # the same numbers in another order of rounding
 UNSTATED = AircraftData(antenna_arm_m=4.0)
 AIRCRAFT = replace(UNSTATED, sideslip_sigma_deg=0.1, mounting_sigma_deg=0.05)
+SETTINGS = HeadingSettings()
+DRAWS = 1000  # a quarter: nothing told here hangs on how finely the interval is averaged
 CASE = TaxiCase(
     segments_s=(45.0, 45.0),
     turns_deg=(-95.0,),
@@ -40,8 +42,9 @@ def run_of(case: TaxiCase = CASE, seed: int = 1) -> TaxiRun:
     return simulate_taxi(case, np.random.default_rng(seed))
 
 
-def estimate(flight: Flight, **options: object) -> HeadingResult:
-    return estimate_heading_error(flight, **({"aircraft": AIRCRAFT} | options))  # type: ignore[arg-type]
+def estimate(flight: Flight, settings: HeadingSettings = SETTINGS, **options: object) -> HeadingResult:
+    few = replace(settings, posterior_draws=DRAWS)
+    return estimate_heading_error(flight, settings=few, **({"aircraft": AIRCRAFT} | options))  # type: ignore[arg-type]
 
 
 def with_table(flight: Flight, topic: str, change: Callable[[Table], Table]) -> Flight:

@@ -13,6 +13,7 @@ from typer.main import get_command_name
 from typer.models import CommandInfo
 
 from groundstation.base.errors import UsageError
+from groundstation.base.garbage import importing
 from groundstation.base.version import __version__
 from groundstation.base.without_pandas import spare_pandas
 from groundstation.cli import fleets, flights, plans, rules, simulated, single_logs, watching
@@ -136,12 +137,13 @@ def run(
 
     An OUT of an earlier run is continued: what it finished with the same logs and settings is not repeated.
     """
-    from groundstation.cli import printing
-    from groundstation.cli.progress import listener
-    from groundstation.pipeline.many_flights.runs.batch import run_many, run_together
-    from groundstation.pipeline.many_flights.runs.dry_run import plan_many
-    from groundstation.pipeline.many_flights.runs.references import judged_by
-    from groundstation.pipeline.one_flight.configuration import applying, installed_as, load_configuration
+    with importing():
+        from groundstation.cli import printing
+        from groundstation.cli.progress import listener
+        from groundstation.pipeline.many_flights.runs.batch import run_many, run_together
+        from groundstation.pipeline.many_flights.runs.dry_run import plan_many
+        from groundstation.pipeline.many_flights.runs.references import judged_by
+        from groundstation.pipeline.one_flight.configuration import applying, installed_as, load_configuration
 
     refuse_pdf_of_results(only, pdf=pdf)
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd, weather)
@@ -350,7 +352,8 @@ def main(arguments: Any = None) -> None:
             stream.reconfigure(errors="backslashreplace")  # a code page that lacks a sign loses no answer
     is_own_process = arguments is None and {"--scheduler", "--help", "-h"}.isdisjoint(sys.argv)
     if is_own_process and sys.argv[1:2] and sys.argv[1] in DRAWING:
-        spare_pandas()  # what Dask imports is Dask's affair
+        with importing():
+            spare_pandas()  # what Dask imports is Dask's affair
     _application_for(sys.argv[1:] if arguments is None else arguments)(arguments)
 
 

@@ -213,7 +213,9 @@ class Chart:
         strips = np.stack([np.column_stack([WIDTH * places, end]) for end in ends], axis=1)
         filled = strips[np.isfinite(strips).all(axis=(1, 2))]
         radius = 0.75 * WIDTH / (BAND_COLUMNS - 1)  # more than half of the distance: no seams
-        drawn = rr.LineStrips2D(list(filled), colors=[faint(colour)] * len(filled), radii=radius, draw_order=order)
+        drawn = rr.LineStrips2D(
+            filled.astype(np.float32), colors=[faint(colour)] * len(filled), radii=radius, draw_order=order
+        )
         self._log(name, drawn, at_s)
 
     def boxes(
@@ -239,7 +241,7 @@ class Chart:
         middle = np.minimum(left, right)[each] + radii * (2.0 * place + 1.0)
         strips = np.stack([np.column_stack([middle, ends[each]]) for ends in (low, high)], axis=1)
         colours_of = [shades[row] for row in each.tolist()]
-        drawn = rr.LineStrips2D(list(strips), colors=colours_of, radii=1.02 * radii, draw_order=order)
+        drawn = rr.LineStrips2D(strips.astype(np.float32), colors=colours_of, radii=1.02 * radii, draw_order=order)
         self.recorder.static(f"{self.path}/{name}", drawn)
 
     def note(self, name: str, text: str, at_s: float | None = None) -> None:

@@ -132,6 +132,7 @@ class _Target:
             if data.segment is not None
             else np.zeros(len(data.time_s), dtype=bool),
         )
+        self.width = len(columns)
         self.free = np.arange(len(PRIOR_MEAN) if data.segment is not None else noise.SEGMENT)
         gap_s = -1.0 if still.gap_s is None else float(still.gap_s)
         self.still = (
@@ -151,15 +152,19 @@ class _Target:
 
     def evaluate(self, thetas: FloatArray, checkpoints: NDArray[np.int64]) -> _Found:
         """Return the results for draws of the noise parameters, shape (k, 11)."""
-        count, width = len(thetas), self.taxi[1].shape[1] - 1
-        log_likelihood, estimate = np.empty(count), np.empty((count, width))
-        variance, alone = np.empty((count, len(checkpoints), width)), np.empty((count, 2))
         bounded = np.clip(thetas, PRIOR_MEAN - 6.0 * PRIOR_SIGMA, PRIOR_MEAN + 6.0 * PRIOR_SIGMA)
-        room = noise.room_for(width + 1, len(checkpoints))
-        out = (log_likelihood, estimate, variance, self.prior_of_alone, alone)
-        noise.evaluate(bounded, self.still, self.taxi, self.prior, checkpoints, *out, room)
+        found = self.likelihood(bounded, checkpoints, noise.room_for(self.width, len(checkpoints)))
         scaled = ((thetas - PRIOR_MEAN) / PRIOR_SIGMA)[:, self.free]
-        return _Found(log_likelihood - 0.5 * np.sum(scaled**2, axis=1), estimate, variance, alone)
+        return found._replace(density=found.density - 0.5 * np.sum(scaled**2, axis=1))
+
+    def likelihood(self, thetas: FloatArray, checkpoints: NDArray[np.int64], room: noise.Room) -> _Found:
+        """The same with the log likelihood alone as density; ``room`` then holds what the loops came to."""
+        count, rest = len(thetas), self.width - 1
+        log_likelihood, estimate = np.empty(count), np.empty((count, rest))
+        variance, alone = np.empty((count, len(checkpoints), rest)), np.empty((count, 2))
+        out = (log_likelihood, estimate, variance, self.prior_of_alone, alone)
+        noise.evaluate(thetas, self.still, self.taxi, self.prior, checkpoints, *out, room)
+        return _Found(log_likelihood, estimate, variance, alone)
 
     def whole(self, thetas: FloatArray) -> FloatArray:
         """Return all parameters, shape (k, 11), from the sampled ones."""
@@ -317,14 +322,11 @@ def misfit(differences: Differences, parameters: FloatArray) -> float:
     It is 1 where the differences are as noisy as the parameters say.
     """
     target = _Target(NO_STANDSTILL, differences)
-    width = int(target.taxi[1].shape[1])
-    room = noise.room_for(width)
-    noise.taxi_filter(*target.taxi, -1.0, parameters, room.start, target.last, room.information, room.history, room)
-    information, mean = room.information, room.mean
-    noise.solve_normal_equations(information[0], target.prior[0], target.prior[1], mean, room.inverse, room)
-    full = np.concatenate([[1.0], -mean])
-    squares = float(np.sum(np.outer(full, full) * information[0]))
-    return squares / max(len(differences.time_s) - width + 1, 1)
+    room = noise.room_for(target.width, lanes=1)
+    target.likelihood(parameters[None, :], target.last, room)
+    full = np.concatenate([[1.0], -room.mean])
+    squares = float(np.sum(np.outer(full, full) * room.information[0, 0]))
+    return squares / max(len(differences.time_s) - target.width + 1, 1)
 
 
 def sample_weights(differences: Differences, parameters: FloatArray) -> FloatArray:
@@ -333,11 +335,9 @@ def sample_weights(differences: Differences, parameters: FloatArray) -> FloatArr
     The noise parameters are given.
     """
     target = _Target(NO_STANDSTILL, differences)
-    time_s, columns, from_north, from_east, is_start = target.taxi
-    history = np.zeros((len(time_s), 1 + noise.STATES))
-    room, weights = noise.room_for(columns.shape[1]), np.zeros(len(time_s))
-    noise.taxi_filter(*target.taxi, -1.0, parameters, room.start, target.last, room.information, history, room)
-    noise.generalised_weights(
-        time_s, from_north, from_east, is_start, parameters, history, room, np.zeros(len(time_s)), weights
-    )
+    time_s, _columns, from_north, from_east, is_start = target.taxi
+    room = noise.room_for(target.width, lanes=1, history=len(time_s))
+    target.likelihood(parameters[None, :], target.last, room)
+    innovation, weights = np.zeros((2, len(time_s)))
+    noise.generalised_weights(time_s, from_north, from_east, is_start, parameters, room, innovation, weights)
     return weights

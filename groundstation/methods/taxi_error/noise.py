@@ -47,6 +47,7 @@ PARAMETER_NAMES = (
     "wander_s",
 )
 STATES = 6  # GNSS north and east (m/s), sway (deg), sway rate (deg/s), own error of the segment, wander (deg)
+LANES = 40  # draws that go through a filter side by side: the processor takes several of them in one step
 DAMPING_MAX = 0.99
 _LOG_2PI = math.log(2.0 * math.pi)
 
@@ -54,47 +55,57 @@ _LOG_2PI = math.log(2.0 * math.pi)
 class Room(NamedTuple):
     """Working arrays of the loops, made once for many calls.
 
-    So the loops make no array, and are found again without numba. The arrays of ``taxi_filter`` are q, P, x, K, H, the
-    sums of products, innovations, decays and F; those of ``solve_normal_equations`` are the matrix beside its inverse
-    and the right side; the others are what ``evaluate`` hands from one to the other.
+    Of the filters, a lane for each draw: q, P, x, K, H, S and its inverse, the three noise parameters as they enter,
+    sums of products, innovations, decays, F, and what they leave; of ``solve_normal_equations``: the matrix beside its
+    inverse and the right side; the others are what ``evaluate`` hands from one to the other.
     """
 
-    q: FloatArray  # (STATES,)
-    P: FloatArray  # (STATES, STATES)
-    x: FloatArray  # (c, STATES)
-    K: FloatArray  # (STATES,)
-    H: FloatArray  # (STATES,)
-    total: FloatArray  # (c, c)
-    innovation: FloatArray  # (c,)
-    keep: FloatArray  # (STATES,)
-    F: FloatArray  # (2, 2)
+    q: FloatArray  # (STATES, lanes)
+    P: FloatArray  # (STATES, STATES, lanes), its lower half and what is told in taxi_filter
+    x: FloatArray  # (c, STATES, lanes)
+    K: FloatArray  # (STATES, lanes)
+    H: FloatArray  # (2, lanes)
+    S: FloatArray  # (2, lanes)
+    noise: FloatArray  # (3, lanes)
+    total: FloatArray  # (c, c, lanes)
+    innovation: FloatArray  # (c, lanes)
+    keep: FloatArray  # (STATES, lanes)
+    F: FloatArray  # (2, 2, lanes)
+    turned: FloatArray  # (lanes,)
+    start: FloatArray  # (3, lanes)
+    history: FloatArray  # (n, 1 + STATES) or (0, 1 + STATES)
+    log_likelihood: FloatArray  # (lanes,)
+    log_determinant: FloatArray  # (lanes,)
+    information: FloatArray  # (lanes, checkpoints, c, c)
     matrix: FloatArray  # (c - 1, 2 (c - 1))
     right: FloatArray  # (c - 1,)
-    start: FloatArray  # (3,)
-    information: FloatArray  # (checkpoints, c, c)
-    history: FloatArray  # (0, 1 + STATES)
     mean: FloatArray  # (c - 1,)
     inverse: FloatArray  # (c - 1, c - 1)
 
 
-def room_for(width: int, checkpoints: int = 1) -> Room:
-    """Make working arrays for ``width`` columns, data and regressors."""
+def room_for(width: int, checkpoints: int = 1, *, lanes: int = LANES, history: int = 0) -> Room:
+    """Room for ``width`` columns, data and regressors; with ``history``, for that of so many samples."""
     rest = width - 1
     return Room(
-        q=np.zeros(STATES),
-        P=np.zeros((STATES, STATES)),
-        x=np.zeros((width, STATES)),
-        K=np.zeros(STATES),
-        H=np.zeros(STATES),
-        total=np.zeros((width, width)),
-        innovation=np.zeros(width),
-        keep=np.zeros(STATES),
-        F=np.zeros((2, 2)),
+        q=np.zeros((STATES, lanes)),
+        P=np.zeros((STATES, STATES, lanes)),
+        x=np.zeros((width, STATES, lanes)),
+        K=np.zeros((STATES, lanes)),
+        H=np.zeros((2, lanes)),
+        S=np.zeros((2, lanes)),
+        noise=np.zeros((3, lanes)),
+        total=np.zeros((width, width, lanes)),
+        innovation=np.zeros((width, lanes)),
+        keep=np.zeros((STATES, lanes)),
+        F=np.zeros((2, 2, lanes)),
+        turned=np.zeros(lanes),
+        start=np.zeros((3, lanes)),
+        history=np.zeros((history, 1 + STATES)),
+        log_likelihood=np.zeros(lanes),
+        log_determinant=np.zeros(lanes),
+        information=np.zeros((lanes, checkpoints, width, width)),
         matrix=np.zeros((rest, 2 * rest)),
         right=np.zeros(rest),
-        start=np.zeros(3),
-        information=np.zeros((checkpoints, width, width)),
-        history=np.zeros((0, 1 + STATES)),
         mean=np.zeros(rest),
         inverse=np.zeros((rest, rest)),
     )
@@ -102,53 +113,68 @@ def room_for(width: int, checkpoints: int = 1) -> Room:
 
 @in_place
 def standstill_filter(
-    time_s: FloatArray,
-    north: FloatArray,
-    east: FloatArray,
-    restart: int,
-    white_variance: float,
-    variance: float,
-    tau: float,
-    out: FloatArray,
-) -> float:
-    """Return the log likelihood of standstill velocities.
+    time_s: FloatArray, north: FloatArray, east: FloatArray, restart: int, thetas: FloatArray, room: Room
+) -> None:
+    """Find the log likelihood of standstill velocities, and the last state: mean north, mean east, variance.
 
-    Mean north, mean east and variance of the last state are left in ``out``. ``restart`` is the index at which the
+    ``thetas``, shape (k, 11), are as many draws as the room has lanes, or fewer; ``restart`` is the index at which the
     filter starts afresh (a second, unconnected stretch).
     """
-    log_likelihood = 0.0
-    p, g_north, g_east = variance, 0.0, 0.0
-    last_step, keep = -1.0, 0.0
+    lanes = len(thetas)
+    variance, white, keep, total, misfit = room.q[0], room.noise[0], room.keep[0], room.S[0], room.S[1]
+    g_north, g_east, p, log_likelihood = room.start[0], room.start[1], room.start[2], room.log_likelihood
+    for k in range(lanes):
+        white[k], variance[k] = math.exp(2.0 * thetas[k, WHITE]), math.exp(2.0 * thetas[k, CORRELATED])
+        g_north[k], g_east[k], p[k], log_likelihood[k] = 0.0, 0.0, variance[k], 0.0
+    last_step = -1.0
     for i in range(len(time_s)):
-        if i == 0 or i == restart:
-            p, g_north, g_east = variance, 0.0, 0.0
-        else:
+        if i == restart:
+            for k in range(lanes):
+                g_north[k], g_east[k], p[k] = 0.0, 0.0, variance[k]
+        elif i > 0:
             step = time_s[i] - time_s[i - 1]
             if abs(step - last_step) > 1e-6:
-                keep, last_step = math.exp(-step / tau), step
-            g_north *= keep
-            g_east *= keep
-            p = keep * keep * (p - variance) + variance
-        total = p + white_variance
-        gain = p / total
-        v_north, v_east = north[i] - g_north, east[i] - g_east
-        g_north += gain * v_north
-        g_east += gain * v_east
-        p *= 1.0 - gain
-        log_likelihood -= math.log(total) + 0.5 * (v_north * v_north + v_east * v_east) / total
-    out[0], out[1], out[2] = g_north, g_east, p
-    return log_likelihood - len(time_s) * _LOG_2PI
+                last_step = step
+                for k in range(lanes):
+                    keep[k] = math.exp(-step / math.exp(thetas[k, TAU]))
+            for k in range(lanes):
+                g_north[k] *= keep[k]
+                g_east[k] *= keep[k]
+                p[k] = keep[k] * keep[k] * (p[k] - variance[k]) + variance[k]
+        for k in range(lanes):
+            total[k] = p[k] + white[k]
+            gain = p[k] / total[k]
+            v_north, v_east = north[i] - g_north[k], east[i] - g_east[k]
+            g_north[k] += gain * v_north
+            g_east[k] += gain * v_east
+            p[k] *= 1.0 - gain
+            misfit[k] = 0.5 * (v_north * v_north + v_east * v_east) / total[k]
+        for k in range(lanes):
+            log_likelihood[k] -= math.log(total[k]) + misfit[k]
+    for k in range(lanes):
+        log_likelihood[k] -= len(time_s) * _LOG_2PI
 
 
 @inlined
-def _oscillator(theta: FloatArray, step_s: float, f: FloatArray) -> None:
-    """Fill ``f``, shape (2, 2), with the exact transition of sway and sway rate over a step."""
+def _oscillator(theta: FloatArray, step_s: float, F: FloatArray, lane: int) -> None:
+    """Transition of sway and sway rate over a step, exact, into a lane of F of shape (2, 2, lanes)."""
     natural = 2.0 * math.pi * math.exp(theta[FREQUENCY])
     zeta = min(math.exp(theta[DAMPING]), DAMPING_MAX)
     decay, damped = zeta * natural, natural * math.sqrt(1.0 - zeta * zeta)
     shrink, sine, cosine = math.exp(-decay * step_s), math.sin(damped * step_s), math.cos(damped * step_s)
-    f[0, 0], f[0, 1] = shrink * (cosine + decay / damped * sine), shrink * sine / damped
-    f[1, 0], f[1, 1] = -natural * natural * f[0, 1], shrink * (cosine - decay / damped * sine)
+    F[0, 0, lane], F[0, 1, lane] = shrink * (cosine + decay / damped * sine), shrink * sine / damped
+    F[1, 0, lane], F[1, 1, lane] = -natural * natural * F[0, 1, lane], shrink * (cosine - decay / damped * sine)
+
+
+@in_place
+def _turn(F: FloatArray, sway: FloatArray, rate: FloatArray, turned: FloatArray, lanes: int) -> None:
+    """Sway and sway rate, each of shape (lanes,), a step later; ``turned`` is room for one of them."""
+    for k in range(lanes):
+        turned[k] = F[0, 0, k] * sway[k] + F[0, 1, k] * rate[k]
+    for k in range(lanes):
+        rate[k] = F[1, 0, k] * sway[k] + F[1, 1, k] * rate[k]
+    for k in range(lanes):
+        sway[k] = turned[k]
 
 
 @in_place
@@ -159,14 +185,14 @@ def taxi_filter(
     from_east: FloatArray,
     is_start: NDArray[np.bool_],
     start_gap_s: float,
-    theta: FloatArray,
-    start: FloatArray,
+    thetas: FloatArray,
     checkpoints: NDArray[np.int64],
-    information: FloatArray,
-    history: FloatArray,
     room: Room,
-) -> float:
-    """Filter the differences and the regressors; returns the sum of log innovation variances.
+) -> None:
+    """Filter the differences and the regressors; leaves the sum of log innovation variances and the information.
+
+    The information, in a lane's part of shape (m, c, c), is the sums of products of whitened columns after so many
+    samples as ``checkpoints`` say.
 
     Parameters
     ----------
@@ -176,101 +202,124 @@ def taxi_filter(
         Change of the difference, degrees, by one m/s of GNSS velocity error.
     is_start : ndarray of bool, shape (n,)
         First sample of a segment: its own error is drawn afresh there.
-    start_gap_s, start
-        Time since the standstill state ``start`` (mean north, mean east, variance); negative: no standstill.
-    checkpoints : ndarray of int64, shape (k,)
-        Numbers of samples, increasing, after which the information is written out.
-    information : ndarray, shape (k, c, c)
-        Out: sums of products of whitened columns.
-    history : ndarray, shape (n, 7) or (0, 7)
-        Out, where there is room: S and K of every sample.
+    start_gap_s
+        Time since the standstill state ``room.start`` (mean north, mean east, variance); negative: no standstill.
+    thetas : ndarray, shape (k, 11)
+        As many draws as the room has lanes, or fewer.
+    checkpoints : ndarray of int64, shape (m,)
+        Numbers of samples, increasing.
+    room : Room
+        Where it has room for the history, S and K of every sample, of the first draw, are written.
 
     Letters: P covariance and x states in the order of ``STATES``; q stationary variances; S innovation variance
-    (deg^2), K gain, H measurement, F the transition of the oscillator, the other states decaying by ``keep``.
+    (deg^2), K gain, H measurement, F the transition of the oscillator, the other states decaying by ``keep``. P is
+    symmetric, so its lower half is carried; of sway and sway rate also [2, 3], which is [3, 2] but for rounding.
     """
-    count, width = columns.shape
-    white2, heading2 = math.exp(2.0 * theta[WHITE]), math.exp(2.0 * theta[HEADING_WHITE])
-    motion = math.exp(theta[MOTION])
-    q, P, x, K, H = room.q, room.P, room.x, room.K, room.H
-    total, innovation, keep, F = room.total, room.innovation, room.keep, room.F
-    q[0] = q[1] = math.exp(2.0 * theta[CORRELATED])
-    q[2] = math.exp(2.0 * theta[SWAY])
-    q[3] = q[2] * (2.0 * math.pi * math.exp(theta[FREQUENCY])) ** 2
-    q[4], q[5] = math.exp(2.0 * theta[SEGMENT]), math.exp(2.0 * theta[WANDER])
-    for a in range(STATES):
-        for b in range(STATES):
-            P[a, b] = 0.0
-        P[a, a] = q[a]
-        keep[a], H[a] = 1.0, 0.0
-    for j in range(width):
-        for a in range(STATES):
-            x[j, a] = 0.0
-        for m in range(width):
-            total[j, m] = 0.0
-    if start_gap_s >= 0.0:
-        kept = math.exp(-start_gap_s / math.exp(theta[TAU]))
-        P[0, 0] = P[1, 1] = kept * kept * (start[2] - q[0]) + q[0]
-        x[0, 0], x[0, 1] = kept * start[0], kept * start[1]
-    log_determinant, last_step, written = 0.0, -1.0, 0
-    for i in range(count):
-        step = time_s[i] - time_s[i - 1] if i > 0 else 0.0
+    lanes, width, states = len(thetas), columns.shape[1], len(room.keep)
+    q, P, x, K, H, S, inverse = room.q, room.P, room.x, room.K, room.H, room.S[0], room.S[1]
+    white2, heading2, motion = room.noise[0], room.noise[1], room.noise[2]
+    total, innovation, keep, F, log_determinant = room.total, room.innovation, room.keep, room.F, room.log_determinant
+    history = room.history
+    for k in range(lanes):
+        theta = thetas[k]
+        white2[k], heading2[k] = math.exp(2.0 * theta[WHITE]), math.exp(2.0 * theta[HEADING_WHITE])
+        motion[k] = math.exp(theta[MOTION])
+        q[0, k] = q[1, k] = math.exp(2.0 * theta[CORRELATED])
+        q[2, k] = math.exp(2.0 * theta[SWAY])
+        q[3, k] = q[2, k] * (2.0 * math.pi * math.exp(theta[FREQUENCY])) ** 2
+        q[4, k], q[5, k] = math.exp(2.0 * theta[SEGMENT]), math.exp(2.0 * theta[WANDER])
+        log_determinant[k] = 0.0
+        for a in range(states):
+            for b in range(states):
+                P[a, b, k] = 0.0
+            P[a, a, k], keep[a, k] = q[a, k], 1.0
+        for j in range(width):
+            for a in range(states):
+                x[j, a, k] = 0.0
+            for m in range(width):
+                total[j, m, k] = 0.0
+        if start_gap_s >= 0.0:
+            kept = math.exp(-start_gap_s / math.exp(theta[TAU]))
+            P[0, 0, k] = P[1, 1, k] = kept * kept * (room.start[2, k] - q[0, k]) + q[0, k]
+            x[0, 0, k], x[0, 1, k] = kept * room.start[0, k], kept * room.start[1, k]
+    last_step, written = -1.0, 0
+    for i in range(len(time_s)):
         if i > 0:
+            step = time_s[i] - time_s[i - 1]
             if abs(step - last_step) > 1e-6:
                 last_step = step
-                keep[0] = keep[1] = math.exp(-step / math.exp(theta[TAU]))
-                keep[5] = math.exp(-step / math.exp(theta[WANDER_TAU]))
-                _oscillator(theta, step, F)
-            # Stationary covariance is diagonal, so only the deviation from it is moved: no process-noise matrix.
-            for a in range(STATES):
-                P[a, a] -= q[a]
-            for a in range(STATES):
-                low, high = P[2, a], P[3, a]
-                P[2, a], P[3, a] = F[0, 0] * low + F[0, 1] * high, F[1, 0] * low + F[1, 1] * high
-            for a in range(STATES):
-                low, high = P[a, 2], P[a, 3]
-                P[a, 2], P[a, 3] = F[0, 0] * low + F[0, 1] * high, F[1, 0] * low + F[1, 1] * high
+                for k in range(lanes):
+                    theta = thetas[k]
+                    keep[0, k] = keep[1, k] = math.exp(-step / math.exp(theta[TAU]))
+                    keep[5, k] = math.exp(-step / math.exp(theta[WANDER_TAU]))
+                    _oscillator(theta, step, F, k)
             fresh = 0.0 if is_start[i] else 1.0
-            keep[4] = fresh
-            for a in range(STATES):
-                for b in range(STATES):
-                    P[a, b] *= keep[a] * keep[b]
-            for a in range(STATES):
-                P[a, a] += q[a]
+            for k in range(lanes):
+                keep[4, k] = fresh
+            # Stationary covariance is diagonal, so only the deviation from it is moved: no process-noise matrix.
+            for a in range(states):
+                for k in range(lanes):
+                    P[a, a, k] -= q[a, k]
+            for b in range(4):
+                _turn(F, P[2, b], P[3, b], room.turned, lanes)
+            for a in range(2, states):
+                _turn(F, P[a, 2], P[a, 3], room.turned, lanes)
+            for a in range(states):
+                for b in range(a + 1):
+                    for k in range(lanes):
+                        P[a, b, k] *= keep[a, k] * keep[b, k]
+            for a in range(states):
+                for k in range(lanes):
+                    P[a, a, k] += q[a, k]
             for j in range(width):
-                low, high = x[j, 2], x[j, 3]
-                x[j, 2], x[j, 3] = F[0, 0] * low + F[0, 1] * high, F[1, 0] * low + F[1, 1] * high
-                for a in range(STATES):
-                    x[j, a] *= keep[a]
-        H[0], H[1], H[2], H[4], H[5] = motion * from_north[i], motion * from_east[i], 1.0, 1.0, 1.0
-        s = white2 * (from_north[i] * from_north[i] + from_east[i] * from_east[i]) + heading2
-        for a in range(STATES):
-            K[a] = P[a, 0] * H[0] + P[a, 1] * H[1] + P[a, 2] + P[a, 4] + P[a, 5]
-            s += H[a] * K[a]
-        log_determinant += math.log(s)
-        inverse = 1.0 / s
-        for a in range(STATES):
-            for b in range(STATES):
-                P[a, b] -= K[a] * K[b] * inverse
-        for a in range(STATES):
-            K[a] *= inverse
+                _turn(F, x[j, 2], x[j, 3], room.turned, lanes)
+                for a in range(states):
+                    for k in range(lanes):
+                        x[j, a, k] *= keep[a, k]
+        for k in range(lanes):
+            H[0, k], H[1, k] = motion[k] * from_north[i], motion[k] * from_east[i]
+            S[k] = white2[k] * (from_north[i] * from_north[i] + from_east[i] * from_east[i]) + heading2[k]
+        for a in range(states):
+            north, east, sway = P[a, 0], P[max(a, 1), min(a, 1)], P[max(a, 2), min(a, 2)]
+            segment, wander = P[max(a, 4), min(a, 4)], P[5, a]
+            for k in range(lanes):
+                K[a, k] = north[k] * H[0, k] + east[k] * H[1, k] + sway[k] + segment[k] + wander[k]
+        for k in range(lanes):
+            S[k] = S[k] + H[0, k] * K[0, k] + H[1, k] * K[1, k] + K[2, k] + K[4, k] + K[5, k]
+            inverse[k] = 1.0 / S[k]
+        for k in range(lanes):
+            log_determinant[k] += math.log(S[k])
+        for k in range(lanes):
+            P[2, 3, k] -= K[2, k] * K[3, k] * inverse[k]
+        for a in range(states):
+            for b in range(a + 1):
+                for k in range(lanes):
+                    P[a, b, k] -= K[a, k] * K[b, k] * inverse[k]
+        for a in range(states):
+            for k in range(lanes):
+                K[a, k] *= inverse[k]
         if len(history) > 0:
-            history[i, 0] = s
-            for a in range(STATES):  # a slice would take as long to compile as all the rest
-                history[i, 1 + a] = K[a]
+            history[i, 0] = S[0]
+            for a in range(states):  # a slice would take as long to compile as all the rest
+                history[i, 1 + a] = K[a, 0]
         for j in range(width):
-            v = columns[i, j] - H[0] * x[j, 0] - H[1] * x[j, 1] - x[j, 2] - x[j, 4] - x[j, 5]
-            for a in range(STATES):
-                x[j, a] += K[a] * v
-            innovation[j] = v
+            for k in range(lanes):
+                innovation[j, k] = (
+                    columns[i, j] - H[0, k] * x[j, 0, k] - H[1, k] * x[j, 1, k] - x[j, 2, k] - x[j, 4, k] - x[j, 5, k]
+                )
+            for a in range(states):
+                for k in range(lanes):
+                    x[j, a, k] += K[a, k] * innovation[j, k]
             for m in range(j + 1):
-                total[j, m] += v * innovation[m] * inverse
+                for k in range(lanes):
+                    total[j, m, k] += innovation[j, k] * innovation[m, k] * inverse[k]
         if written < len(checkpoints) and i + 1 == checkpoints[written]:
-            for j in range(width):
-                for m in range(j + 1):
-                    information[written, j, m] = total[j, m]
-                    information[written, m, j] = total[j, m]
+            for k in range(lanes):
+                for j in range(width):
+                    for m in range(j + 1):
+                        room.information[k, written, j, m] = total[j, m, k]
+                        room.information[k, written, m, j] = total[j, m, k]
             written += 1
-    return log_determinant
 
 
 @in_place
@@ -280,47 +329,46 @@ def generalised_weights(
     from_east: FloatArray,
     is_start: NDArray[np.bool_],
     theta: FloatArray,
-    history: FloatArray,
     room: Room,
     innovation: FloatArray,
     weights: FloatArray,
 ) -> None:
     """Fill ``weights``, shape (n,), sum 1, with each sample's weight in the estimated mean.
 
-    The mean is that by generalised least squares. The weights are the row sums of the inverse covariance: the gradient
-    of half the quadratic form of a constant, taken backwards through the filter whose ``history`` (S and K) is given.
-    Letters as in ``taxi_filter``; r is the gradient with respect to the state. ``innovation`` of shape (n,) is room to
-    work in.
+    The weights are the row sums of the inverse covariance: the gradient of half the quadratic form of a constant,
+    taken backwards through the filter whose history (S and K) is in the room. Letters as in ``taxi_filter``; r is the
+    gradient with respect to the state. ``innovation`` of shape (n,) is room to work in, as are the room's first lanes.
     """
     count, motion = len(time_s), math.exp(theta[MOTION])
-    H, x, r, keep, F = room.H, room.x[0], room.K, room.keep, room.F
+    H, x, r, keep, F, history = room.q, room.x[0], room.K, room.keep, room.F, room.history
     for a in range(STATES):
-        H[a], x[a], r[a], keep[a] = 0.0, 0.0, 0.0, 1.0
-    H[2] = H[4] = H[5] = 1.0
+        H[a, 0], x[a, 0], r[a, 0], keep[a, 0] = 0.0, 0.0, 0.0, 1.0
+    H[2, 0] = H[4, 0] = H[5, 0] = 1.0
     for turn in range(2 * count):
         is_forward = turn < count
         i = turn if is_forward else 2 * count - 1 - turn
         step = time_s[i] - time_s[i - 1] if i > 0 else 0.0
-        keep[0] = keep[1] = math.exp(-step / math.exp(theta[TAU]))
-        keep[5] = math.exp(-step / math.exp(theta[WANDER_TAU]))
-        keep[4] = 0.0 if is_start[i] else 1.0
-        _oscillator(theta, step, F)
-        H[0], H[1] = motion * from_north[i], motion * from_east[i]
+        keep[0, 0] = keep[1, 0] = math.exp(-step / math.exp(theta[TAU]))
+        keep[5, 0] = math.exp(-step / math.exp(theta[WANDER_TAU]))
+        keep[4, 0] = 0.0 if is_start[i] else 1.0
+        _oscillator(theta, step, F, 0)
+        H[0, 0], H[1, 0] = motion * from_north[i], motion * from_east[i]
         if is_forward:
-            x[2], x[3] = F[0, 0] * x[2] + F[0, 1] * x[3], F[1, 0] * x[2] + F[1, 1] * x[3]
+            _turn(F, x[2], x[3], room.turned, 1)
             innovation[i] = 1.0
             for a in range(STATES):
-                x[a] *= keep[a]
-                innovation[i] -= H[a] * x[a]
+                x[a, 0] *= keep[a, 0]
+                innovation[i] -= H[a, 0] * x[a, 0]
             for a in range(STATES):
-                x[a] += history[i, 1 + a] * innovation[i]
+                x[a, 0] += history[i, 1 + a] * innovation[i]
         else:
             weights[i] = innovation[i] / history[i, 0]
             for a in range(STATES):
-                weights[i] += history[i, 1 + a] * r[a]
+                weights[i] += history[i, 1 + a] * r[a, 0]
             for a in range(STATES):
-                r[a] = (r[a] - H[a] * weights[i]) * keep[a]
-            r[2], r[3] = F[0, 0] * r[2] + F[1, 0] * r[3], F[0, 1] * r[2] + F[1, 1] * r[3]
+                r[a, 0] = (r[a, 0] - H[a, 0] * weights[i]) * keep[a, 0]
+            sway, rate = r[2, 0], r[3, 0]
+            r[2, 0], r[3, 0] = F[0, 0, 0] * sway + F[1, 0, 0] * rate, F[0, 1, 0] * sway + F[1, 1, 0] * rate
     total = 0.0
     for i in range(count):
         total += weights[i]
@@ -412,33 +460,24 @@ def evaluate(
     alone : ndarray, shape (k, 2)
         Out: the first coefficient and its variance, were the coefficients after the first ``a`` known to be zero.
     """
-    width = taxi[1].shape[1]
-    information, start, mean, inverse, history = room.information, room.start, room.mean, room.inverse, room.history
-    for k in range(len(thetas)):
-        theta = thetas[k]
-        total = standstill_filter(
-            standstill[0],
-            standstill[1],
-            standstill[2],
-            standstill[3],
-            math.exp(2.0 * theta[0]),
-            math.exp(2.0 * theta[1]),
-            math.exp(theta[2]),
-            start,
-        )
-        gap_s = standstill[4]
-        log_determinant = taxi_filter(
-            taxi[0], taxi[1], taxi[2], taxi[3], taxi[4], gap_s, theta, start, checkpoints, information, history, room
-        )
-        rest = 0.0
-        for m in range(len(checkpoints)):
-            rest = solve_normal_equations(information[m], prior[0], prior[1], mean, inverse, room)
+    width, last = taxi[1].shape[1], len(checkpoints) - 1
+    information, mean, inverse = room.information, room.mean, room.inverse
+    first, lanes = 0, len(room.S[0])
+    while first < len(thetas):
+        some = thetas[first : first + lanes]
+        standstill_filter(standstill[0], standstill[1], standstill[2], standstill[3], some, room)
+        taxi_filter(taxi[0], taxi[1], taxi[2], taxi[3], taxi[4], standstill[4], some, checkpoints, room)
+        for lane in range(len(some)):
+            k, rest = first + lane, 0.0
+            for m in range(len(checkpoints)):
+                rest = solve_normal_equations(information[lane, m], prior[0], prior[1], mean, inverse, room)
+                for j in range(width - 1):
+                    variance[k, m, j] = inverse[j, j]
             for j in range(width - 1):
-                variance[k, m, j] = inverse[j, j]
-        for j in range(width - 1):
-            estimate[k, j] = mean[j]
-        log_likelihood[k] = total - 0.5 * (log_determinant + rest)
-        if len(prior_of_alone[0]) < width - 1:
-            last = len(checkpoints) - 1
-            rest = solve_normal_equations(information[last], prior_of_alone[0], prior_of_alone[1], mean, inverse, room)
-        alone[k, 0], alone[k, 1] = mean[0], inverse[0, 0]
+                estimate[k, j] = mean[j]
+            log_likelihood[k] = room.log_likelihood[lane] - 0.5 * (room.log_determinant[lane] + rest)
+            if len(prior_of_alone[0]) < width - 1:
+                means, precisions = prior_of_alone
+                solve_normal_equations(information[lane, last], means, precisions, mean, inverse, room)
+            alone[k, 0], alone[k, 1] = mean[0], inverse[0, 0]
+        first += lanes

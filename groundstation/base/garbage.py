@@ -1,0 +1,32 @@
+"""What a process imports is no garbage: it need not be searched for any, neither meanwhile, nor later, nor at the end.
+
+A run imports some 1800 modules, and Python's search for garbage went through them again and again as they came, then at
+the end of the process: a seventh of the processor time of `run` on a short log.
+"""
+
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def importing() -> Iterator[None]:
+    """Search for no garbage meanwhile; what there is then is left out of every later search (``gc.freeze``).
+
+    For processes of the command line alone: in a notebook, garbage of others would stay with it.
+
+    Examples
+    --------
+    >>> with importing():
+    ...     import json
+    >>> gc.isenabled()
+    True
+    """
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        if was_enabled:
+            gc.enable()
