@@ -25,11 +25,11 @@ from filterpy.kalman import ExtendedKalmanFilter  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 from scipy.linalg import block_diag  # noqa: E402
 
-from groundstation.estimators.cooperative.algorithms import run_algorithm  # noqa: E402
-from groundstation.estimators.cooperative.events import Prepared, prepare  # noqa: E402
-from groundstation.estimators.cooperative.settings import CooperativeSettings  # noqa: E402
 from groundstation.simulation.session import simulate_session  # noqa: E402
 from groundstation.simulation.session_scenario import LinkSettings, SessionAircraft, SessionScenario  # noqa: E402
+from groundstation.systems.cooperative.algorithms import run_algorithm  # noqa: E402
+from groundstation.systems.cooperative.events import Prepared, prepare  # noqa: E402
+from groundstation.systems.cooperative.settings import CooperativeSettings  # noqa: E402
 
 compiled = partial(run_algorithm, is_repeated=True)
 

@@ -17,19 +17,19 @@ import numpy as np  # noqa: E402
 from filterpy.kalman import KalmanFilter  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
-from groundstation.estimators.inertial.filter import (  # noqa: E402
+from groundstation.systems.inertial.filter import (  # noqa: E402
     FilterRun,
     Smoothed,
     measurement_variances,
     run_filter,
     smooth,
 )
-from groundstation.estimators.inertial.hindcast import hindcast  # noqa: E402
-from groundstation.estimators.inertial.leads import leads_of, start_epochs  # noqa: E402
-from groundstation.estimators.inertial.settings import InertialSettings  # noqa: E402
-from groundstation.results.forecast import METHODS  # noqa: E402
-from groundstation.studies.forecast import study_forecast  # noqa: E402
-from groundstation.studies.forecast_consistency import matched_run  # noqa: E402
+from groundstation.systems.inertial.forecast_answer import METHODS  # noqa: E402
+from groundstation.systems.inertial.hindcast import hindcast  # noqa: E402
+from groundstation.systems.inertial.leads import leads_of, start_epochs  # noqa: E402
+from groundstation.systems.inertial.settings import InertialSettings  # noqa: E402
+from groundstation.systems.inertial.study.consistency import matched_run  # noqa: E402
+from groundstation.systems.inertial.study.forecast import study_forecast  # noqa: E402
 
 EPOCHS = 16_000
 RATIO_GOAL, MAP_GOAL_S, STUDY_GOAL_S = 100.0, 1.0, 120.0

@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 from recorded import LOGS, are_here
 
-from groundstation.estimators.magnetic.earth import earth_field
-from groundstation.estimators.magnetic.iron import Iron
-from groundstation.estimators.magnetic.modulus import fit_modulus
-from groundstation.estimators.magnetic.poisson import EarthField, fit_iron
-from groundstation.estimators.magnetic.readings import choose_topics, gather
-from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.integrity.ordering import corrected
 from groundstation.integrity.survey import survey
 from groundstation.readers.dataflash import read
 from groundstation.readers.source import Source
+from groundstation.systems.magnetic.earth import earth_field
+from groundstation.systems.magnetic.iron import Iron
+from groundstation.systems.magnetic.modulus import fit_modulus
+from groundstation.systems.magnetic.poisson import EarthField, fit_iron
+from groundstation.systems.magnetic.readings import choose_topics, gather
+from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.phases import flight_phases
 

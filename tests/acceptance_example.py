@@ -11,7 +11,7 @@ from groundstation.base.timescales import utc_ns_to_stamp
 from groundstation.base.units import M_PER_NAUTICAL_MILE
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
-from groundstation.results.heading import HeadingResult
+from groundstation.systems.heading.answer import HeadingResult
 from tests.figure_arrays import filled
 from tests.fleet_example import DAY_NS, START_NS
 from tests.inertial_example import inertial_result

@@ -4,7 +4,6 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from groundstation.estimators.cooperative.settings import CooperativeSettings, InsBelief
 from groundstation.simulation.session import SimulatedSession, VehicleTruth
 from groundstation.simulation.session_scenario import (
     SessionAircraft,
@@ -13,6 +12,7 @@ from groundstation.simulation.session_scenario import (
     SessionScenario,
     Turn,
 )
+from groundstation.systems.cooperative.settings import CooperativeSettings, InsBelief
 
 TRIANGLE = (
     SessionAircraft("A", 0.0, 0.0, rank=1),

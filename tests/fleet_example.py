@@ -13,8 +13,8 @@ from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
 from groundstation.results.figures import FigureData
 from groundstation.results.files import save
-from groundstation.results.forecast import ForecastResult, SkillRow
-from groundstation.results.heading import HeadingResult
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.inertial.forecast_answer import ForecastResult, SkillRow
 from tests.report_example import MANIFEST, example, figure, heading_result
 
 START_NS = 1_777_874_400_000_000_000  # 2026-05-04T06:00:00Z

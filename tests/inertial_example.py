@@ -7,7 +7,17 @@ import numpy as np
 
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.results.figures import FigureData
-from groundstation.results.forecast import (
+from groundstation.systems.inertial.answer import (
+    AzimuthEstimate,
+    ChannelResult,
+    Difference,
+    InertialResult,
+    NavigationStart,
+    OwnInnovation,
+    RealOutage,
+    StateEstimate,
+)
+from groundstation.systems.inertial.forecast_answer import (
     HORIZONS_MIN,
     METHODS,
     CalibrationRow,
@@ -17,16 +27,6 @@ from groundstation.results.forecast import (
     GapRow,
     PhaseRow,
     SkillRow,
-)
-from groundstation.results.inertial import (
-    AzimuthEstimate,
-    ChannelResult,
-    Difference,
-    InertialResult,
-    NavigationStart,
-    OwnInnovation,
-    RealOutage,
-    StateEstimate,
 )
 from tests.figure_arrays import figure
 

@@ -12,9 +12,9 @@ from groundstation.base.declination import declination_along
 from groundstation.base.records import Column
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import MPS2_PER_G, NS_PER_S
-from groundstation.estimators.magnetic.attitude import field_in_body, levelled_heading_deg
 from groundstation.methods.harmonics import fit
-from groundstation.results.heading import HeadingResult
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.magnetic.attitude import field_in_body, levelled_heading_deg
 from groundstation.tables.phases import Interval, Phases
 from groundstation.tables.table import Flight, Table
 

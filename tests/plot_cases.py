@@ -12,10 +12,6 @@ import numpy as np
 from groundstation.base.clock import Clock
 from groundstation.base.ledger import Ledger
 from groundstation.chapters.generic import SERIES, columns_by_unit
-from groundstation.estimators.control.plan import plan_session
-from groundstation.estimators.control.scenario import KeepOut
-from groundstation.estimators.cooperative.analysis import COOPERATIVE, SessionKnown
-from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
 from groundstation.pipeline.one_flight.analyse import Given, analyse, run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
@@ -24,14 +20,18 @@ from groundstation.pipeline.one_flight.join import join_logs
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.results.answer import Answer, by_analysis
 from groundstation.results.arrays.flight import GnssLanes, Overview, StateLanes
-from groundstation.results.arrays.landing import LandingPath, LandingProtection
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.landing import LandingResult
-from groundstation.results.reference import ReferenceResult
-from groundstation.results.together import Together
 from groundstation.simulation.session import simulate_session
+from groundstation.systems.cooperative.analysis import COOPERATIVE, SessionKnown
+from groundstation.systems.landing.answer import LandingResult
+from groundstation.systems.landing.arrays import LandingPath, LandingProtection
 from groundstation.systems.plan import Planned
+from groundstation.systems.planning.landing.plan import LANDING_PLAN
+from groundstation.systems.planning.session.plan import plan_session
+from groundstation.systems.planning.session.scenario import KeepOut
+from groundstation.systems.reference.answer import ReferenceResult
+from groundstation.systems.several_logs.answer import Together
 from groundstation.tables.table import Flight
 from tests import report_example, viewer_example
 from tests.inertial_example import aided_figures, forecast_result, inertial_result

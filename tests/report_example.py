@@ -13,15 +13,15 @@ from groundstation.results.answer import Answer, by_analysis
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.gates import Gate
-from groundstation.results.heading import (
+from groundstation.results.manifest import Host, Manifest
+from groundstation.simulation.processes import damped_oscillation, gauss_markov
+from groundstation.systems.heading.answer import (
     HeadingResult,
     OnboardComparison,
     RunwayCheck,
     Standstill,
     TaxiSegment,
 )
-from groundstation.results.manifest import Host, Manifest
-from groundstation.simulation.processes import damped_oscillation, gauss_markov
 from tests.figure_arrays import figure
 
 ERROR_DEG = 1.04

@@ -7,12 +7,8 @@ import numpy as np
 import pytest
 
 from groundstation.chapters.agreement import agreement_note
-from groundstation.chapters.heading import heading as heading_chapter
-from groundstation.chapters.latency import latency as latency_chapter
-from groundstation.chapters.magnetic import magnetic as magnetic_chapter
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Note, Section
-from groundstation.estimators.magnetic.estimate import estimate_deviation
 from groundstation.results.agreement import (
     Agreement,
     OneFinding,
@@ -22,11 +18,15 @@ from groundstation.results.agreement import (
 )
 from groundstation.results.answer import Answer, by_analysis
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.heading import HeadingResult
-from groundstation.results.inertial import AzimuthEstimate, InertialResult
-from groundstation.results.latency import Latencies, Latency
-from groundstation.results.magnetic import DeclinationUsed, MagneticResult
-from groundstation.results.magnetic_ground import GroundDeviation, GroundRun
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.heading.chapter import heading as heading_chapter
+from groundstation.systems.inertial.answer import AzimuthEstimate, InertialResult
+from groundstation.systems.latency.answer import Latencies, Latency
+from groundstation.systems.latency.chapter import latency as latency_chapter
+from groundstation.systems.magnetic.answer import DeclinationUsed, MagneticResult
+from groundstation.systems.magnetic.chapter import magnetic as magnetic_chapter
+from groundstation.systems.magnetic.estimate import estimate_deviation
+from groundstation.systems.magnetic.ground_answer import GroundDeviation, GroundRun
 from tests.inertial_example import inertial_result
 from tests.magnetic_example import make, taxi_heading
 

@@ -11,11 +11,7 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.approaches.analysis import LANDING
-from groundstation.estimators.approaches.path import step_of
-from groundstation.estimators.approaches.settings import LandingSettings
 from groundstation.pipeline.api import open_flight
-from groundstation.results.landing import Approach, LandingResult
 from groundstation.simulation.approach import (
     ApproachScenario,
     Flown,
@@ -27,6 +23,10 @@ from groundstation.simulation.approach import (
 )
 from groundstation.systems.analysis import Found
 from groundstation.systems.known import Known, Runway, SiteData
+from groundstation.systems.landing.analysis import LANDING
+from groundstation.systems.landing.answer import Approach, LandingResult
+from groundstation.systems.landing.path import step_of
+from groundstation.systems.landing.settings import LandingSettings
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
 from tests.real_logs import real_log

@@ -12,7 +12,6 @@ from groundstation.base.findings import Finding
 from groundstation.base.ledger import DamageEntry, Ledger, RemarkEntry
 from groundstation.chapters.findings import findings
 from groundstation.chapters.gates import gate_grid, limit_text
-from groundstation.chapters.heading import heading
 from groundstation.chapters.next_steps import next_steps
 from groundstation.chapters.overview import overview
 from groundstation.chapters.parts import Facts, Figure, Grid, Mark, Note, Part, Section
@@ -23,8 +22,9 @@ from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.gates import Gate
-from groundstation.results.heading import HeadingResult
-from groundstation.results.latency import Latencies, Latency
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.heading.chapter import heading
+from groundstation.systems.latency.answer import Latencies, Latency
 from tests.figure_arrays import filled
 from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import example, heading_result

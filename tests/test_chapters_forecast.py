@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from groundstation.chapters.forecast import forecast
 from groundstation.chapters.parts import Section
 from groundstation.results.flight import NotAssessable
-from groundstation.results.forecast import SkillRow
+from groundstation.systems.inertial.forecast_answer import SkillRow
+from groundstation.systems.inertial.forecast_chapter import forecast
 from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import example
 from tests.section_contents import every_text, grid, notes, row, rows, titles, tones

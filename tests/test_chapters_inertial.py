@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
-from groundstation.chapters.inertial import inertial
 from groundstation.chapters.parts import Section
 from groundstation.results.flight import NotAssessable
-from groundstation.results.inertial import AzimuthEstimate, ChannelResult, RealOutage
+from groundstation.systems.inertial.answer import AzimuthEstimate, ChannelResult, RealOutage
+from groundstation.systems.inertial.chapter import inertial
 from tests.inertial_example import AIDED, inertial_result
 from tests.report_example import example
 from tests.section_contents import every_text, facts, grid, notes, row, rows, titles, tones

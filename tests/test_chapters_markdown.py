@@ -2,10 +2,10 @@
 
 import pytest
 
-from groundstation.chapters.heading import heading
 from groundstation.chapters.markdown import escaped, front_markdown, markdown, part_markdown
 from groundstation.chapters.parts import Cell, Facts, Figure, Front, Grid, Head, Mark, Note, Section
 from groundstation.results.flight import NotAssessable
+from groundstation.systems.heading.chapter import heading
 from tests.markup import MARKDOWN, foreign_markup
 from tests.report_example import example, heading_result
 from tests.told import front

@@ -1,8 +1,8 @@
 """Sections as plain text for a terminal."""
 
-from groundstation.chapters.heading import heading
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Mark, Note, Section
 from groundstation.chapters.terminal import grid_text, part_text, terminal
+from groundstation.systems.heading.chapter import heading
 from tests.report_example import example, heading_result
 
 

@@ -26,15 +26,15 @@ from groundstation.pipeline.verbs.clip import Wanted, clip
 from groundstation.pipeline.verbs.compare import compare, compare_to, deltas_of
 from groundstation.reports.comparison import comparison_html
 from groundstation.results.answer import by_analysis
-from groundstation.results.arrays.inertial import InertialStates
 from groundstation.results.comparison import Comparison, Delta
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, save
-from groundstation.results.inertial import InertialResult, RealOutage
 from groundstation.results.manifest import Manifest
 from groundstation.results.summary import summary_of
 from groundstation.simulation.samples import write_scenario
 from groundstation.systems import systems
+from groundstation.systems.inertial.answer import InertialResult, RealOutage
+from groundstation.systems.inertial.arrays import InertialStates
 from groundstation.viewer.comparison import COOPERATIVE, FORECAST, HEADING, INERTIAL, OVER_TIME, write_comparison
 from tests.inertial_example import inertial_result
 from tests.recording_contents import Contents

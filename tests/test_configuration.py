@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from groundstation.base.errors import SettingsError
-from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.integrity.limits import shipped
 from groundstation.pipeline.one_flight.configuration import Configuration, Interval, load_configuration
+from groundstation.systems.heading.settings import HeadingSettings
 
 
 def written(folder: Path, name: str, text: str) -> Path:

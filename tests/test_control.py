@@ -9,12 +9,15 @@ from scipy.linalg import expm
 from scipy.optimize import LinearConstraint, minimize
 
 from groundstation.base.errors import GroundstationError
-from groundstation.estimators.control.accuracy import AccuracyModel
-from groundstation.estimators.control.descent import nearest_law
-from groundstation.estimators.control.laws import Law, Session, StepMeasure, integral_law, local_law
-from groundstation.estimators.control.measures import geometry_of
-from groundstation.estimators.control.plan import plan_session
-from groundstation.estimators.control.scenario import (
+from groundstation.systems.cooperative.aircraft import aircraft_of
+from groundstation.systems.cooperative.settings import CooperativeSettings, InsBelief
+from groundstation.systems.planning.session.accuracy import AccuracyModel
+from groundstation.systems.planning.session.answer import UNCONTROLLED, ControlPlan
+from groundstation.systems.planning.session.descent import nearest_law
+from groundstation.systems.planning.session.laws import Law, Session, StepMeasure, integral_law, local_law
+from groundstation.systems.planning.session.measures import geometry_of
+from groundstation.systems.planning.session.plan import plan_session
+from groundstation.systems.planning.session.scenario import (
     LOCAL_CRITERIA,
     Axis,
     Control,
@@ -25,9 +28,6 @@ from groundstation.estimators.control.scenario import (
     Ranging,
     SessionPlan,
 )
-from groundstation.estimators.cooperative.aircraft import aircraft_of
-from groundstation.estimators.cooperative.settings import CooperativeSettings, InsBelief
-from groundstation.results.control import UNCONTROLLED, ControlPlan
 from groundstation.tables.session import DeadReckoning
 
 FloatArray = NDArray[np.float64]

@@ -9,30 +9,30 @@ from scipy.linalg import expm
 from scipy.stats import chi2
 
 from groundstation.base.compile import Loop
-from groundstation.estimators.cooperative import plain
-from groundstation.estimators.cooperative.aircraft import Aircraft, aircraft_of, fleet_of
-from groundstation.estimators.cooperative.algorithms import run_algorithm
-from groundstation.estimators.cooperative.arrays import KINDS, PEER, Events, rows_for
-from groundstation.estimators.cooperative.centralised import is_about_reckoning
-from groundstation.estimators.cooperative.estimate import estimate_session
-from groundstation.estimators.cooperative.events import Prepared, prepare
-from groundstation.estimators.cooperative.messages import Broadcast, decode, pairwise_bytes, report_bytes
-from groundstation.estimators.cooperative.motion import place
-from groundstation.estimators.cooperative.observation import observe
-from groundstation.estimators.cooperative.plain.decentralised import Decentralised
-from groundstation.estimators.cooperative.plain.observation import rows_of
-from groundstation.estimators.cooperative.plain.steps import Event
-from groundstation.estimators.cooperative.settings import (
+from groundstation.simulation.session import simulate_session
+from groundstation.simulation.session_scenario import SessionScenario, load_session
+from groundstation.systems.cooperative import plain
+from groundstation.systems.cooperative.aircraft import Aircraft, aircraft_of, fleet_of
+from groundstation.systems.cooperative.algorithms import run_algorithm
+from groundstation.systems.cooperative.arrays import KINDS, PEER, Events, rows_for
+from groundstation.systems.cooperative.centralised import is_about_reckoning
+from groundstation.systems.cooperative.estimate import estimate_session
+from groundstation.systems.cooperative.events import Prepared, prepare
+from groundstation.systems.cooperative.messages import Broadcast, decode, pairwise_bytes, report_bytes
+from groundstation.systems.cooperative.motion import place
+from groundstation.systems.cooperative.observation import observe
+from groundstation.systems.cooperative.plain.decentralised import Decentralised
+from groundstation.systems.cooperative.plain.observation import rows_of
+from groundstation.systems.cooperative.plain.steps import Event
+from groundstation.systems.cooperative.settings import (
     ALGORITHMS,
     CameraBelief,
     CooperativeSettings,
     InsBelief,
     OdometryBelief,
 )
-from groundstation.estimators.cooperative.tracks import AlgorithmRun
-from groundstation.estimators.cooperative.wheeled_vehicle import WheeledVehicle
-from groundstation.simulation.session import simulate_session
-from groundstation.simulation.session_scenario import SessionScenario, load_session
+from groundstation.systems.cooperative.tracks import AlgorithmRun
+from groundstation.systems.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.tables.session import NO_SLOT, DeadReckoning, GroundPoint, Heights, Odometry, Ranges, Session
 from tests.cooperative_example import GLOBAL, LOCAL, believed, full_nees, truth_of
 

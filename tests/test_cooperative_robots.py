@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from groundstation.estimators.cooperative.algorithms import run_algorithm
-from groundstation.estimators.cooperative.arrays import PEER
-from groundstation.estimators.cooperative.consistency import judge
-from groundstation.estimators.cooperative.events import prepare
-from groundstation.estimators.cooperative.plain.sighting import sighting_of
-from groundstation.estimators.cooperative.plain.split_covariance import fuse
-from groundstation.estimators.cooperative.plain.steps import Event
-from groundstation.estimators.cooperative.settings import CameraBelief, CooperativeSettings, OdometryBelief
-from groundstation.estimators.cooperative.wheeled_vehicle import WheeledVehicle
+from groundstation.systems.cooperative.algorithms import run_algorithm
+from groundstation.systems.cooperative.arrays import PEER
+from groundstation.systems.cooperative.consistency import judge
+from groundstation.systems.cooperative.events import prepare
+from groundstation.systems.cooperative.plain.sighting import sighting_of
+from groundstation.systems.cooperative.plain.split_covariance import fuse
+from groundstation.systems.cooperative.plain.steps import Event
+from groundstation.systems.cooperative.settings import CameraBelief, CooperativeSettings, OdometryBelief
+from groundstation.systems.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.tables.session import NO_SLOT, GroundPoint, Odometry, Ranges, Session
 
 SEEDS = range(500, 505)  # written down before the first run

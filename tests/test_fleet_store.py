@@ -31,7 +31,7 @@ from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.fleet import FleetResults
-from groundstation.results.heading import OnboardComparison, RunwayCheck
+from groundstation.systems.heading.answer import OnboardComparison, RunwayCheck
 from tests.fleet_example import START_NS, save_flight, skill
 
 REPOSITORY = Path(__file__).parents[1]

@@ -15,19 +15,19 @@ import pytest
 from groundstation.base.angles import wrap_180
 from groundstation.base.timescales import GPS_EPOCH_NS, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.heading.analysis import HEADING
 from groundstation.pipeline.one_flight.analyse import known_of, run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.readers.sbet import RECORD
-from groundstation.results.heading import HeadingResult
 from groundstation.simulation.chapter10_buses import WORD_TIME_NS
 from groundstation.simulation.chapter10_writer import write_chapter10
 from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
+from groundstation.systems.heading.analysis import HEADING
+from groundstation.systems.heading.answer import HeadingResult
 from groundstation.tables.table import Flight
 from tests.bag_writer import Messages, enu_quaternion_xyzw, write_ros2
 from tests.dataflash_writer import DataFlash

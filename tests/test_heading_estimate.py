@@ -9,15 +9,15 @@ import pytest
 from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
-from groundstation.estimators.heading.estimate import estimate_heading_error
-from groundstation.estimators.heading.figures import IN_PAUSE
-from groundstation.estimators.heading.references import reference_findings
-from groundstation.estimators.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
-from groundstation.results.heading import HeadingResult
 from groundstation.simulation.taxi import TaxiCase, TaxiRun, noiseless, simulate_taxi, table_of, taxi_flight
 from groundstation.simulation.taxi_disturbance import Disturbance
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.heading.estimate import estimate_heading_error
+from groundstation.systems.heading.figures import IN_PAUSE
+from groundstation.systems.heading.references import reference_findings
+from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.systems.known import AircraftData, SiteData, Stand
 from groundstation.tables.phases import flight_phases, ground_mask
 from groundstation.tables.table import Flight, Table
@@ -623,7 +623,7 @@ def test_wind_from_the_left_turns_the_nose_left_of_the_path() -> None:
 )
 def test_a_class_has_its_sideslip(flight: Flight, kind: str, sideslip_deg: float) -> None:
     """10 m/s from the left and half of the mean as its sigma; what no class is stated for is wider."""
-    from groundstation.estimators.heading.steady import FACTORS, steady_prior
+    from groundstation.systems.heading.steady import FACTORS, steady_prior
 
     aircraft = AircraftData(aircraft_class=kind)  # type: ignore[arg-type]
     prior = steady_prior(windy(flight, 0.0, 10.0), (0.0, 100.0), aircraft, HeadingSettings())
@@ -715,7 +715,7 @@ def test_sideslip_on_the_way_back_takes_the_other_sign() -> None:
 
 
 def test_weather_that_is_not_of_the_taxi_is_told(flight: Flight) -> None:
-    from groundstation.estimators.heading.analysis import HEADING
+    from groundstation.systems.heading.analysis import HEADING
     from groundstation.systems.known import Known
 
     known = Known(flight_phases(flight), aircraft=AIRCRAFT, weather=("METAR UUEE 040930Z 09010MPS CAVOK=",))

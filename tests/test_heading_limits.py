@@ -3,8 +3,8 @@
 import pytest
 
 from groundstation.base.units import ARCMIN_PER_DEG
-from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.heading.verdict import gate_bounds
+from groundstation.systems.heading.settings import HeadingSettings
+from groundstation.systems.heading.verdict import gate_bounds
 
 PAPER = "Markelov, Kostishin, Shukalov, Heading correction of an INS before take-off by satellite navigation, 2015"
 ENOUGH = 1000  # samples

@@ -12,23 +12,6 @@ from groundstation.base.angles import wrap_360
 from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.records import Column
 from groundstation.base.toml_settings import settings_from
-from groundstation.estimators.heading.arms import know_arm
-from groundstation.estimators.heading.checks import about_running_line
-from groundstation.estimators.heading.estimate import estimate_heading_error
-from groundstation.estimators.heading.normality import kurtosis_z, normality, skewness_z
-from groundstation.estimators.heading.recursion import run_recursion
-from groundstation.estimators.heading.references import (
-    logged_reference,
-    onboard_comparison,
-    parking_reference,
-    reference_conflict,
-    runway_checks,
-    shrunk_drift,
-)
-from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.heading.standstill import find_standstill, speed_bound_mps
-from groundstation.estimators.heading.steps import heading_steps
-from groundstation.estimators.heading.verdict import decide, explain
 from groundstation.methods.intervals import effective_samples
 from groundstation.methods.taxi.gating import gate_samples, intervals_without_epoch
 from groundstation.methods.taxi.intervals import Interval
@@ -37,6 +20,23 @@ from groundstation.methods.taxi.settings import GroundLimits
 from groundstation.results.gates import Gate
 from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.taxi import TaxiCase, noiseless, simulate_taxi, table_of, taxi_flight
+from groundstation.systems.heading.arms import know_arm
+from groundstation.systems.heading.checks import about_running_line
+from groundstation.systems.heading.estimate import estimate_heading_error
+from groundstation.systems.heading.normality import kurtosis_z, normality, skewness_z
+from groundstation.systems.heading.recursion import run_recursion
+from groundstation.systems.heading.references import (
+    logged_reference,
+    onboard_comparison,
+    parking_reference,
+    reference_conflict,
+    runway_checks,
+    shrunk_drift,
+)
+from groundstation.systems.heading.settings import HeadingSettings
+from groundstation.systems.heading.standstill import find_standstill, speed_bound_mps
+from groundstation.systems.heading.steps import heading_steps
+from groundstation.systems.heading.verdict import decide, explain
 from groundstation.systems.known import AircraftData, Runway, SiteData, Stand
 from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.table import Flight, Table

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from groundstation.base.angles import wrap_360
-from groundstation.estimators.heading.estimate import estimate_heading_error
-from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.heading.solution import MOST_STEPS, STEP_SIGMA_DEG, _before
 from groundstation.methods.taxi_error import interval
-from groundstation.results.heading import HeadingStep
 from groundstation.simulation.taxi import TaxiCase, simulate_taxi, table_of, taxi_flight
+from groundstation.systems.heading.answer import HeadingStep
+from groundstation.systems.heading.estimate import estimate_heading_error
+from groundstation.systems.heading.settings import HeadingSettings
+from groundstation.systems.heading.solution import MOST_STEPS, STEP_SIGMA_DEG, _before
 from groundstation.tables.table import Flight
 
 TWO_TURNS = TaxiCase(segments_s=(60.0, 60.0, 60.0), turns_deg=(90.0, -100.0), antenna_arm_m=4.0)

@@ -51,7 +51,7 @@ def test_a_purpose_is_answered_without_estimating() -> None:
     CliRunner().invoke(app, asked)  # compiles, where that was not done before
     used = ("groundstation.estimators", "groundstation.tables.phases", "scipy")  # a quantile at standstill
     not_needed = tuple(name for name in NOT_NEEDED if name not in used)
-    assert loaded(BY_VERB, *asked, names=(*not_needed, "groundstation.estimators.heading.solution")) == []
+    assert loaded(BY_VERB, *asked, names=(*not_needed, "groundstation.systems.heading.solution")) == []
 
 
 def test_a_log_is_opened_without_what_it_does_not_need() -> None:

@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from groundstation.estimators.inertial import azimuth, velocity_changes
-from groundstation.estimators.inertial.azimuth import estimate_azimuth
-from groundstation.estimators.inertial.differences import Differences, drag_per_s
-from groundstation.estimators.inertial.filter import Epochs, FilterRun, run_filter
-from groundstation.estimators.inertial.model import ChannelModel, FloatArray
-from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.methods.ins_noise import InsNoise
-from groundstation.results.inertial import AzimuthEstimate
 from groundstation.simulation.inertial_family import FamilySettings, GnssNoise, simulate_family
 from groundstation.simulation.ins_class import load_ins_class
 from groundstation.simulation.ins_errors import SensorErrors, TrueMotion, propagate
+from groundstation.systems.inertial import azimuth, velocity_changes
+from groundstation.systems.inertial.answer import AzimuthEstimate
+from groundstation.systems.inertial.azimuth import estimate_azimuth
+from groundstation.systems.inertial.differences import Differences, drag_per_s
+from groundstation.systems.inertial.filter import Epochs, FilterRun, run_filter
+from groundstation.systems.inertial.model import ChannelModel, FloatArray
+from groundstation.systems.inertial.settings import InertialSettings
 
 SETTINGS = InertialSettings()
 LIMITS = velocity_changes.AzimuthLimits()

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import NotAssessableError
-from groundstation.estimators.inertial.analysis import FORECAST, INERTIAL
-from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
-from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.methods.fleet.ins_errors import ins_errors
 from groundstation.pipeline.one_flight.analyse import Answered, run_analyses
-from groundstation.results.inertial import InertialResult
+from groundstation.systems.inertial.analysis import FORECAST, INERTIAL
+from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.inertial.estimate import Estimation, estimate_ins_errors
+from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.known import AircraftData, Known
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight

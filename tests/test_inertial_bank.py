@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import SettingsError
-from groundstation.estimators.inertial.bank import NoiseBank, run_bank
-from groundstation.estimators.inertial.coarse import COARSE_S, Coarse
-from groundstation.estimators.inertial.estimate import estimate_ins_errors
-from groundstation.estimators.inertial.filter import Epochs, FilterRun, initial_of, run_filter
-from groundstation.estimators.inertial.hindcast import hindcast
-from groundstation.estimators.inertial.leads import leads_of, past_mean, start_epochs
-from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.estimators.inertial.skill import claimed_sigma
 from groundstation.methods.ins_noise import BankFactors, Calibration, GnssNoise, load_class
+from groundstation.systems.inertial.bank import NoiseBank, run_bank
+from groundstation.systems.inertial.coarse import COARSE_S, Coarse
+from groundstation.systems.inertial.estimate import estimate_ins_errors
+from groundstation.systems.inertial.filter import Epochs, FilterRun, initial_of, run_filter
+from groundstation.systems.inertial.hindcast import hindcast
+from groundstation.systems.inertial.leads import leads_of, past_mean, start_epochs
+from groundstation.systems.inertial.settings import InertialSettings
+from groundstation.systems.inertial.skill import claimed_sigma
 from tests.inertial_flights import batch_of, flight_of
 
 SETTINGS = InertialSettings()

@@ -8,8 +8,11 @@ from scipy.linalg import expm
 
 from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
 from groundstation.base.records import Int64Array
-from groundstation.estimators.inertial import coupled, coupled_forecast
-from groundstation.estimators.inertial.coupled import (
+from groundstation.methods.ins_noise import GnssNoise, InsNoise
+from groundstation.simulation.inertial_family import ErrorBatch, FamilySettings, simulate_family
+from groundstation.simulation.ins_errors import SensorErrors, TrueMotion, propagate
+from groundstation.systems.inertial import coupled, coupled_forecast
+from groundstation.systems.inertial.coupled import (
     AZIMUTH,
     AZIMUTH_DRIFT,
     CHANNELS,
@@ -17,12 +20,12 @@ from groundstation.estimators.inertial.coupled import (
     NORTH,
     CoupledRun,
 )
-from groundstation.estimators.inertial.craft_motion import CraftMotion
-from groundstation.estimators.inertial.differences import Differences, drag_per_s
-from groundstation.estimators.inertial.filter import Epochs, run_filter
-from groundstation.estimators.inertial.hindcast import hindcast
-from groundstation.estimators.inertial.leads import built_up, start_epochs
-from groundstation.estimators.inertial.model import (
+from groundstation.systems.inertial.craft_motion import CraftMotion
+from groundstation.systems.inertial.differences import Differences, drag_per_s
+from groundstation.systems.inertial.filter import Epochs, run_filter
+from groundstation.systems.inertial.hindcast import hindcast
+from groundstation.systems.inertial.leads import built_up, start_epochs
+from groundstation.systems.inertial.model import (
     DRIFT,
     POSITION,
     RANDOM_DRIFT,
@@ -32,11 +35,8 @@ from groundstation.estimators.inertial.model import (
     FloatArray,
     normal_gravity_mps2,
 )
-from groundstation.estimators.inertial.seams import PATIENCE_S
-from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.methods.ins_noise import GnssNoise, InsNoise
-from groundstation.simulation.inertial_family import ErrorBatch, FamilySettings, simulate_family
-from groundstation.simulation.ins_errors import SensorErrors, TrueMotion, propagate
+from groundstation.systems.inertial.seams import PATIENCE_S
+from groundstation.systems.inertial.settings import InertialSettings
 
 TYPICAL = (100.0, 0.1, 1e-5, 5e-8, 1e-12, 5e-8)  # sizes of the six states, SI units
 SETTINGS = InertialSettings()

@@ -10,29 +10,29 @@ from scipy.stats import chi2
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.units import MPS2_PER_G
-from groundstation.estimators.inertial.channel_group import RESET_POSITION_M, RESET_VELOCITY_MPS
-from groundstation.estimators.inertial.filter import (
+from groundstation.methods.ins_noise import GnssNoise, InsNoise
+from groundstation.methods.kalman import smoother
+from groundstation.simulation.channel_truth import RADIUS_M
+from groundstation.systems.inertial.channel_group import RESET_POSITION_M, RESET_VELOCITY_MPS
+from groundstation.systems.inertial.filter import (
     Epochs,
     FilterRun,
     measurement_variances,
     run_filter,
     smooth,
 )
-from groundstation.estimators.inertial.leads import start_epochs
-from groundstation.estimators.inertial.model import (
+from groundstation.systems.inertial.leads import start_epochs
+from groundstation.systems.inertial.model import (
     POSITION,
     SIZE,
     TILT,
     VELOCITY,
     ChannelModel,
 )
-from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.estimators.inertial.start_covariance import WITH_COVARIANCE, start_covariance
-from groundstation.estimators.inertial.starts import start_states
-from groundstation.methods.ins_noise import GnssNoise, InsNoise
-from groundstation.methods.kalman import smoother
-from groundstation.simulation.channel_truth import RADIUS_M
-from groundstation.studies.forecast_consistency import consistency_table, matched_run
+from groundstation.systems.inertial.settings import InertialSettings
+from groundstation.systems.inertial.start_covariance import WITH_COVARIANCE, start_covariance
+from groundstation.systems.inertial.starts import start_states
+from groundstation.systems.inertial.study.consistency import consistency_table, matched_run
 
 MODEL = ChannelModel(MPS2_PER_G, RADIUS_M, 1.0 / 3600.0)
 TYPICAL = np.array([100.0, 0.1, 1e-5, 5e-8, 1e-12, 5e-8])  # sizes of the six states, SI units

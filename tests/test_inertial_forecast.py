@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
-from groundstation.estimators.inertial.filter import Epochs, FilterRun, initial_of, run_filter
-from groundstation.estimators.inertial.forecast import assess_forecast
-from groundstation.estimators.inertial.hindcast import hindcast
-from groundstation.estimators.inertial.leads import leads_of, start_epochs
-from groundstation.estimators.inertial.settings import InertialSettings
-from groundstation.estimators.inertial.skill import claimed_sigma
-from groundstation.estimators.inertial.starts import start_states
-from groundstation.results.forecast import METHODS, ForecastResult
+from groundstation.systems.inertial.estimate import Estimation, estimate_ins_errors
+from groundstation.systems.inertial.filter import Epochs, FilterRun, initial_of, run_filter
+from groundstation.systems.inertial.forecast import assess_forecast
+from groundstation.systems.inertial.forecast_answer import METHODS, ForecastResult
+from groundstation.systems.inertial.hindcast import hindcast
+from groundstation.systems.inertial.leads import leads_of, start_epochs
+from groundstation.systems.inertial.settings import InertialSettings
+from groundstation.systems.inertial.skill import claimed_sigma
+from groundstation.systems.inertial.starts import start_states
 from tests.inertial_flights import batch_of, flight_of, without_rows
 from tests.real_logs import real_log
 

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from groundstation.estimators.inertial import coupled
-from groundstation.estimators.inertial.channel_group import ChannelGroup
-from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
-from groundstation.estimators.inertial.filter import Epochs, FilterRun, Initial, run_filter, smooth
-from groundstation.estimators.inertial.model import POSITION, FloatArray
-from groundstation.estimators.inertial.seams import FACTOR_MAX, PATIENCE_S, factor_of, fixes_since, returns_of
-from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.methods.ins_noise import InsNoise
 from groundstation.simulation.inertial_family import ErrorBatch, simulate_family
-from groundstation.studies.forecast_cases import NO_GATE, differences_of, epochs_of, full_case, model_of
+from groundstation.systems.inertial import coupled
+from groundstation.systems.inertial.channel_group import ChannelGroup
+from groundstation.systems.inertial.estimate import Estimation, estimate_ins_errors
+from groundstation.systems.inertial.filter import Epochs, FilterRun, Initial, run_filter, smooth
+from groundstation.systems.inertial.model import POSITION, FloatArray
+from groundstation.systems.inertial.seams import FACTOR_MAX, PATIENCE_S, factor_of, fixes_since, returns_of
+from groundstation.systems.inertial.settings import InertialSettings
+from groundstation.systems.inertial.study.cases import NO_GATE, differences_of, epochs_of, full_case, model_of
 from groundstation.tables.table import Flight
 from tests.inertial_flights import changed, flight_of, without_rows
 

@@ -6,14 +6,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from groundstation.estimators.installation.answer import verdict_of
-from groundstation.estimators.installation.model import doubts, factor_nodes, first_belief, installed, learn, predict
-from groundstation.estimators.installation.series import FIRST, SAME_TIME, answer_from, answers_of, pooled_of, series_of
-from groundstation.estimators.installation.settings import InstallationSettings
-from groundstation.results.installation import InstallationResult, Lesson, Measured
-from groundstation.studies.installation import judge_family
-from groundstation.studies.installation_family import FAMILIES, draw_fleet
-from groundstation.studies.installation_pool import TaxiOfPool, draw_taxi
+from groundstation.systems.heading.installation.answer import InstallationResult, Lesson, Measured
+from groundstation.systems.heading.installation.model import (
+    doubts,
+    factor_nodes,
+    first_belief,
+    installed,
+    learn,
+    predict,
+)
+from groundstation.systems.heading.installation.outcome import verdict_of
+from groundstation.systems.heading.installation.series import (
+    FIRST,
+    SAME_TIME,
+    answer_from,
+    answers_of,
+    pooled_of,
+    series_of,
+)
+from groundstation.systems.heading.installation.settings import InstallationSettings
+from groundstation.systems.heading.study.installation import judge_family
+from groundstation.systems.heading.study.installation_family import FAMILIES, draw_fleet
+from groundstation.systems.heading.study.installation_pool import TaxiOfPool, draw_taxi
 
 SETTINGS = InstallationSettings()
 TRUSTING = InstallationSettings(hazard=0.0, odd_rates=(0.0,), odd_weights=(1.0,), gross_share=0.0)

@@ -12,9 +12,6 @@ import pytest
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.serial import to_json
-from groundstation.estimators.installation.lesson import Stored, lesson_of
-from groundstation.estimators.installation.series import answer_from
-from groundstation.estimators.installation.settings import InstallationSettings
 from groundstation.pipeline.many_flights.fleet.installations import refresh_installations, show_installation
 from groundstation.pipeline.many_flights.fleet.publishing import write_beside
 from groundstation.pipeline.many_flights.fleet.refresh import refresh
@@ -25,16 +22,19 @@ from groundstation.pipeline.verbs.rules import RulesTest, rules_test
 from groundstation.reports.flight_report import REPORT, write_flight_report
 from groundstation.results.files import load
 from groundstation.results.gates import judged_gate
-from groundstation.results.inertial import InertialResult
-from groundstation.results.installation import (
+from groundstation.results.schema import installations_schema
+from groundstation.systems import systems
+from groundstation.systems.heading.installation.answer import (
     INSTALLATIONS,
     InstallationResult,
     Installations,
     installations_in,
     read_installations,
 )
-from groundstation.results.schema import installations_schema
-from groundstation.systems import systems
+from groundstation.systems.heading.installation.lesson import Stored, lesson_of
+from groundstation.systems.heading.installation.series import answer_from
+from groundstation.systems.heading.installation.settings import InstallationSettings
+from groundstation.systems.inertial.answer import InertialResult
 from tests.installation_example import heading_of, inertial_of, save_installed
 
 SCHEMA_FILE = Path(__file__).parents[1] / "schemas" / "installations.schema.json"

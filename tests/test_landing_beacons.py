@@ -8,9 +8,18 @@ import pytest
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.errors import NotAssessableError, SettingsError
-from groundstation.estimators.landing_beacons.analysis import LANDING_BEACONS
-from groundstation.estimators.landing_beacons.approach import Deviations, over_known_ground
-from groundstation.estimators.landing_beacons.geometry import (
+from groundstation.pipeline.many_flights.runs.batch import run_many
+from groundstation.pipeline.one_flight.configuration import load_configuration
+from groundstation.pipeline.verbs.synthesis import simulate_to
+from groundstation.results.answer import by_analysis
+from groundstation.results.flight import FlightResults, Source
+from groundstation.simulation.scenario import Scenario
+from groundstation.systems.analysis import Found
+from groundstation.systems.known import Beacon, Ground, Runway, SiteData
+from groundstation.systems.landing.beacons.analysis import LANDING_BEACONS
+from groundstation.systems.landing.beacons.answer import BeaconLanding
+from groundstation.systems.landing.beacons.approach import Deviations, over_known_ground
+from groundstation.systems.landing.beacons.geometry import (
     BearingFix,
     distance_from_bearing_m,
     distance_sigma_m,
@@ -19,16 +28,7 @@ from groundstation.estimators.landing_beacons.geometry import (
     side_sigma_m,
     solve_bearings,
 )
-from groundstation.estimators.landing_beacons.settings import LandingBeaconsSettings
-from groundstation.pipeline.many_flights.runs.batch import run_many
-from groundstation.pipeline.one_flight.configuration import load_configuration
-from groundstation.pipeline.verbs.synthesis import simulate_to
-from groundstation.results.answer import by_analysis
-from groundstation.results.flight import FlightResults, Source
-from groundstation.results.landing_beacons import BeaconLanding
-from groundstation.simulation.scenario import Scenario
-from groundstation.systems.analysis import Found
-from groundstation.systems.known import Beacon, Ground, Runway, SiteData
+from groundstation.systems.landing.beacons.settings import LandingBeaconsSettings
 from tests.landing_example import BEACONS, approach_scenario, flown, known_of
 from tests.recording_contents import Contents
 from tests.saved import load

@@ -7,17 +7,18 @@ import pytest
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.errors import SettingsError
-from groundstation.estimators.landing_ranges.answer import category_spans, range_landing
-from groundstation.estimators.landing_ranges.filter import (
+from groundstation.systems.planning.landing.answer import HONEST, TOUCHDOWN, WHITE
+from groundstation.systems.planning.landing.filter import (
     covariance_along,
     filter_ranges,
     nominal_readings,
     with_errors,
 )
-from groundstation.estimators.landing_ranges.model import CLOCK, PLACE, error_model
-from groundstation.estimators.landing_ranges.moving_point import fly_moving_point, measure
-from groundstation.estimators.landing_ranges.plan import _of_places
-from groundstation.estimators.landing_ranges.scenario import (
+from groundstation.systems.planning.landing.model import CLOCK, PLACE, error_model
+from groundstation.systems.planning.landing.moving_point import fly_moving_point, measure
+from groundstation.systems.planning.landing.outcome import category_spans, range_landing
+from groundstation.systems.planning.landing.plan import _of_places
+from groundstation.systems.planning.landing.scenario import (
     GroundPoint,
     MovingPoint,
     OwnErrors,
@@ -25,8 +26,7 @@ from groundstation.estimators.landing_ranges.scenario import (
     RangeNoise,
     StraightPath,
 )
-from groundstation.estimators.landing_ranges.trials import draw_errors, fly_trials
-from groundstation.results.landing_ranges import HONEST, TOUCHDOWN, WHITE
+from groundstation.systems.planning.landing.trials import draw_errors, fly_trials
 
 PAIR = (GroundPoint("left", 0.0, -1000.0), GroundPoint("right", 0.0, 1000.0))
 THIRD = (*PAIR, GroundPoint("third", 100.0, 0.0))

@@ -12,11 +12,6 @@ import pytest
 from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
-from groundstation.chapters.latency import latency
-from groundstation.estimators.heading.estimate import estimate_heading_error
-from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.latency.analysis import LATENCY
-from groundstation.estimators.latency.estimate import estimate_latencies
 from groundstation.methods.lag.settings import LatencySettings
 from groundstation.methods.lag.windows import Series
 from groundstation.pipeline.one_flight.analyse import Answered, known_of, run_analyses
@@ -24,12 +19,17 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.log import open_log
-from groundstation.results import latency as answers
 from groundstation.results.files import save
 from groundstation.results.manifest import Manifest
 from groundstation.simulation.flight import simulate
 from groundstation.simulation.scenario import load_scenario
+from groundstation.systems.heading.estimate import estimate_heading_error
+from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.known import AircraftData
+from groundstation.systems.latency import answer as answers
+from groundstation.systems.latency.analysis import LATENCY
+from groundstation.systems.latency.chapter import latency
+from groundstation.systems.latency.estimate import estimate_latencies
 from groundstation.tables.table import Flight, Table
 from tests.real_logs import real_log
 from tests.report_example import example

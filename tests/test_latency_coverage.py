@@ -8,13 +8,13 @@ import pytest
 
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.latency.estimate import estimate_latencies
-from groundstation.results.latency import Latency
 from groundstation.simulation.flight import simulate
 from groundstation.simulation.readings import Readings
 from groundstation.simulation.scenario import GnssSettings, InsSettings
 from groundstation.simulation.sensors import gnss_readings, ins_readings
 from groundstation.simulation.trajectory import Trajectory
+from groundstation.systems.latency.answer import Latency
+from groundstation.systems.latency.estimate import estimate_latencies
 from groundstation.tables.table import Flight, Table
 from tests.simulated_flights import FLIGHT_LEGS, TAXI_LEGS, scenario
 

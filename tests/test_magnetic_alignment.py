@@ -15,20 +15,6 @@ from groundstation.base.ledger import Ledger
 from groundstation.base.records import Column
 from groundstation.base.toml_settings import settings_from
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.heading.estimate import estimate_heading_error
-from groundstation.estimators.heading.on_ground import Estimator
-from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.magnetic.alignment import NOT_IN_INTERVAL, against_heading, align, refused
-from groundstation.estimators.magnetic.attitude import field_in_body
-from groundstation.estimators.magnetic.before_lift_off import (
-    GroundRuns,
-    find_ground_runs,
-    least_speed_mps,
-)
-from groundstation.estimators.magnetic.entered import corrections_entered
-from groundstation.estimators.magnetic.estimate import estimate_deviation
-from groundstation.estimators.magnetic.gyros import EARTH_DEG_PER_H, GyroDrift, gyro_drift
-from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.pipeline.one_flight import configuration as configured
 from groundstation.pipeline.one_flight.analyse import Given, analyse
@@ -37,14 +23,28 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.answer import Answer, by_analysis
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.gates import Gate
-from groundstation.results.heading import HeadingResult
-from groundstation.results.inertial import AzimuthEstimate, InertialResult
-from groundstation.results.magnetic import Alignment, MagneticResult
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.flight_errors import heading_error_deg
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, simulate_magnetic_family
 from groundstation.simulation.scenario import load_scenario
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.heading.estimate import estimate_heading_error
+from groundstation.systems.heading.on_ground import Estimator
+from groundstation.systems.heading.settings import HeadingSettings
+from groundstation.systems.inertial.answer import AzimuthEstimate, InertialResult
 from groundstation.systems.known import AircraftData
+from groundstation.systems.magnetic.alignment import NOT_IN_INTERVAL, against_heading, align, refused
+from groundstation.systems.magnetic.answer import Alignment, MagneticResult
+from groundstation.systems.magnetic.attitude import field_in_body
+from groundstation.systems.magnetic.before_lift_off import (
+    GroundRuns,
+    find_ground_runs,
+    least_speed_mps,
+)
+from groundstation.systems.magnetic.entered import corrections_entered
+from groundstation.systems.magnetic.estimate import estimate_deviation
+from groundstation.systems.magnetic.gyros import EARTH_DEG_PER_H, GyroDrift, gyro_drift
+from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.tables.phases import Interval, Phases, flight_phases
 from groundstation.tables.table import Flight
 from tests.inertial_example import inertial_result

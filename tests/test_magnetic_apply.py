@@ -25,7 +25,6 @@ from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.base.records import Column
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.cli.main import app
-from groundstation.estimators.magnetic.corrected import CorrectedHeading, correct_heading
 from groundstation.pipeline.many_flights.fleet.publishing import report_again
 from groundstation.pipeline.many_flights.inputs import file_in
 from groundstation.pipeline.many_flights.remote.folder import RemoteFolder
@@ -38,7 +37,18 @@ from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.verbs.check import check_many
 from groundstation.reports.pdf import write_pdf
 from groundstation.reports.steer_card import MOST_ROWS, TEMPLATE, steer_card, write_exports
-from groundstation.results.deviation import (
+from groundstation.results.file_names import SUMMARY
+from groundstation.results.files import save
+from groundstation.results.flight import FlightResults
+from groundstation.results.manifest import Manifest
+from groundstation.simulation.flat_csv_writer import write_flat_csv
+from groundstation.simulation.flight import Simulated, simulate
+from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
+from groundstation.store.reader import read, read_info
+from groundstation.systems.latency.answer import Latencies
+from groundstation.systems.magnetic.answer import ADVISORY, CardRow, MagneticResult
+from groundstation.systems.magnetic.corrected import CorrectedHeading, correct_heading
+from groundstation.systems.magnetic.deviation_answer import (
     DEVIATION_CSV,
     STEER_CARD,
     Deviation,
@@ -46,16 +56,6 @@ from groundstation.results.deviation import (
     deviation_from_csv,
     deviation_of,
 )
-from groundstation.results.file_names import SUMMARY
-from groundstation.results.files import save
-from groundstation.results.flight import FlightResults
-from groundstation.results.latency import Latencies
-from groundstation.results.magnetic import ADVISORY, CardRow, MagneticResult
-from groundstation.results.manifest import Manifest
-from groundstation.simulation.flat_csv_writer import write_flat_csv
-from groundstation.simulation.flight import Simulated, simulate
-from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
-from groundstation.store.reader import read, read_info
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.table import Flight, Table
 from tests import magnetic_example

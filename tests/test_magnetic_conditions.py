@@ -8,18 +8,18 @@ import pytest
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.records import Column
-from groundstation.chapters.magnetic import magnetic as chapter
 from groundstation.chapters.parts import Grid
-from groundstation.estimators.heading.estimate import estimate_heading_error
-from groundstation.estimators.magnetic.estimate import estimate_deviation
 from groundstation.results.answer import by_analysis
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.magnetic import MagneticResult, OtherCondition
 from groundstation.simulation.deviation import deviation_truth
 from groundstation.simulation.flight import Simulated
 from groundstation.simulation.magnetometer import world_field_nt
-from groundstation.studies.magnetic_cases import seed_of
-from groundstation.studies.magnetic_taxis import simulate_taxi_flight, taxi_cells
+from groundstation.systems.heading.estimate import estimate_heading_error
+from groundstation.systems.magnetic.answer import MagneticResult, OtherCondition
+from groundstation.systems.magnetic.chapter import magnetic as chapter
+from groundstation.systems.magnetic.estimate import estimate_deviation
+from groundstation.systems.magnetic.study.cases import seed_of
+from groundstation.systems.magnetic.study.taxis import simulate_taxi_flight, taxi_cells
 from groundstation.tables.table import Flight
 
 SEED, RUNS = 1, (3, 4, 5)

@@ -19,14 +19,9 @@ from groundstation.base.ledger import Ledger
 from groundstation.base.records import Column
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
-from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.markdown import escaped
 from groundstation.chapters.parts import Grid, Note
 from groundstation.chapters.wording import number
-from groundstation.estimators.magnetic.analysis import MAGNETIC_GROUND
-from groundstation.estimators.magnetic.ground_fit import fit_curve
-from groundstation.estimators.magnetic.ground_runs import estimate_ground_deviation
-from groundstation.estimators.magnetic.ground_settings import MagneticGroundSettings
 from groundstation.methods import harmonics
 from groundstation.pipeline.one_flight.analyse import Answered, Given, analyse, known_of, run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
@@ -34,12 +29,17 @@ from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight, sentence
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.reports.drawing import Drawing, drawn_by
-from groundstation.results import magnetic_ground as answers
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.magnetic import LETTERS
-from groundstation.results.magnetic_ground import GroundDeviation
 from groundstation.results.manifest import Manifest
+from groundstation.systems.magnetic import ground_answer as answers
+from groundstation.systems.magnetic.analysis import MAGNETIC_GROUND
+from groundstation.systems.magnetic.answer import LETTERS
+from groundstation.systems.magnetic.chapter import magnetic
+from groundstation.systems.magnetic.ground_answer import GroundDeviation
+from groundstation.systems.magnetic.ground_fit import fit_curve
+from groundstation.systems.magnetic.ground_runs import estimate_ground_deviation
+from groundstation.systems.magnetic.ground_settings import MagneticGroundSettings
 from groundstation.tables.table import Flight, Table
 from tests.real_logs import real_log
 from tests.recording_contents import Contents

@@ -7,20 +7,20 @@ import pytest
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.errors import SettingsError
-from groundstation.estimators.magnetic.alignment import align
-from groundstation.estimators.magnetic.apply import corrected_by_coefficients, corrected_by_iron, corrected_by_table
-from groundstation.estimators.magnetic.attitude import field_in_body, levelled_heading_deg
-from groundstation.estimators.magnetic.compass_table import CENTRES_DEG, build_table
-from groundstation.estimators.magnetic.held_out import Unseen, advantage
-from groundstation.estimators.magnetic.iron import Iron, bank_bias, heading_errors, parameters_of
-from groundstation.estimators.magnetic.manoeuvre import covered_bins, widest_gap_deg
-from groundstation.estimators.magnetic.methods import recommend
-from groundstation.estimators.magnetic.modulus import fit_modulus
-from groundstation.estimators.magnetic.poisson import EarthField
-from groundstation.estimators.magnetic.readings import Readings
-from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.methods import harmonics
-from groundstation.results.magnetic import Method, MethodName
+from groundstation.systems.magnetic.alignment import align
+from groundstation.systems.magnetic.answer import Method, MethodName
+from groundstation.systems.magnetic.apply import corrected_by_coefficients, corrected_by_iron, corrected_by_table
+from groundstation.systems.magnetic.attitude import field_in_body, levelled_heading_deg
+from groundstation.systems.magnetic.compass_table import CENTRES_DEG, build_table
+from groundstation.systems.magnetic.held_out import Unseen, advantage
+from groundstation.systems.magnetic.iron import Iron, bank_bias, heading_errors, parameters_of
+from groundstation.systems.magnetic.manoeuvre import covered_bins, widest_gap_deg
+from groundstation.systems.magnetic.methods import recommend
+from groundstation.systems.magnetic.modulus import fit_modulus
+from groundstation.systems.magnetic.poisson import EarthField
+from groundstation.systems.magnetic.readings import Readings
+from groundstation.systems.magnetic.settings import MagneticSettings
 from tests.magnetic_example import correlated, taxi_heading
 
 EARTH = EarthField(11.0, 17_000.0, 50_000.0)

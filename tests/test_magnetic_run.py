@@ -14,9 +14,6 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.clock import Clock
 from groundstation.base.errors import SettingsError
 from groundstation.base.ledger import Ledger
-from groundstation.estimators.inertial.analysis import INERTIAL
-from groundstation.estimators.magnetic.analysis import MAGNETIC
-from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.methods import harmonics
 from groundstation.pipeline.many_flights.fleet.columns import answer_values
 from groundstation.pipeline.one_flight import analyse as pipeline
@@ -25,15 +22,18 @@ from groundstation.pipeline.one_flight.configuration import Configuration, load_
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight, sentence
 from groundstation.pipeline.one_flight.log import open_log
-from groundstation.results import magnetic as answers
 from groundstation.results.files import SavedFlight, save
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.magnetic import LETTERS, MagneticResult
 from groundstation.results.manifest import Manifest
 from groundstation.simulation.deviation import BIN_MIDDLES_DEG, scenario_deviation
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario
 from groundstation.systems import systems
+from groundstation.systems.inertial.analysis import INERTIAL
+from groundstation.systems.magnetic import answer as answers
+from groundstation.systems.magnetic.analysis import MAGNETIC
+from groundstation.systems.magnetic.answer import LETTERS, MagneticResult
+from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.tables.table import Flight
 from tests.real_logs import real_log
 from tests.saved import load

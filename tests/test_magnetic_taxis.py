@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from groundstation.estimators.heading.estimate import estimate_heading_error
-from groundstation.estimators.magnetic.alignment import NOT_IN_INTERVAL
-from groundstation.studies.magnetic_cases import seed_of
-from groundstation.studies.magnetic_taxis import (
+from groundstation.systems.heading.estimate import estimate_heading_error
+from groundstation.systems.magnetic.alignment import NOT_IN_INTERVAL
+from groundstation.systems.magnetic.study.cases import seed_of
+from groundstation.systems.magnetic.study.taxis import (
     TaxiOutcome,
     fly_taxis,
     simulate_taxi_flight,

@@ -11,11 +11,11 @@ from typer.testing import CliRunner
 from groundstation.base.errors import SettingsError
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
-from groundstation.chapters import inertial as chapter
 from groundstation.cli.main import app
-from groundstation.estimators.inertial.estimate import Estimation, estimate_ins_errors
 from groundstation.pipeline.verbs.acceptance import accept
-from groundstation.results.inertial import InertialResult
+from groundstation.systems.inertial import chapter
+from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.inertial.estimate import Estimation, estimate_ins_errors
 from groundstation.systems.known import AircraftData
 from groundstation.tables.table import Flight
 from tests.acceptance_example import save_fleet, save_flight
@@ -172,7 +172,7 @@ def test_the_chapter_says_why_there_is_no_rate() -> None:
 
 
 def test_flights_without_a_start_stand_outside_the_acceptance(tmp_path: Path) -> None:
-    from groundstation.results.inertial import NavigationStart
+    from groundstation.systems.inertial.answer import NavigationStart
 
     save_fleet(tmp_path, [0.5] * 3)
     save_flight(tmp_path, 10, 9.0, navigation_start=NavigationStart(None, "unknown", "the aircraft moves"))

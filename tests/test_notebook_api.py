@@ -75,7 +75,7 @@ def test_opening_and_the_ledger_need_neither_rerun_nor_matplotlib() -> None:
         "import sys, groundstation\n"
         f"flight = groundstation.open({str(GOOD)!r})\n"
         "assert flight.info and flight.ledger and flight.clock and len(flight.tables['ins'])\n"
-        "heavy = ('rerun', 'matplotlib', 'typst', 'IPython', 'groundstation.estimators.inertial.filter')\n"
+        "heavy = ('rerun', 'matplotlib', 'typst', 'IPython', 'groundstation.systems.inertial.filter')\n"
         "print([name for name in heavy if name in sys.modules], 'results' in vars(flight))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

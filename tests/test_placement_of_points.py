@@ -7,10 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError, SettingsError
-from groundstation.estimators.control.placement import plan_placement
-from groundstation.estimators.control.placing import PlaceLoss, Site
-from groundstation.estimators.control.region import Region
-from groundstation.estimators.control.scenario import (
+from groundstation.systems.planning.session.placement import plan_placement
+from groundstation.systems.planning.session.placement_answer import GIVEN, PlacementPlan
+from groundstation.systems.planning.session.placing import PlaceLoss, Site
+from groundstation.systems.planning.session.region import Region
+from groundstation.systems.planning.session.scenario import (
     Criterion,
     KeepOut,
     Over,
@@ -21,7 +22,6 @@ from groundstation.estimators.control.scenario import (
     Ranging,
     SessionPlan,
 )
-from groundstation.results.placement import GIVEN, PlacementPlan
 
 FloatArray = NDArray[np.float64]
 SPEED_MPS, SLOPE = 70.0, float(np.tan(np.deg2rad(3.0)))

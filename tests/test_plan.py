@@ -10,14 +10,14 @@ import pytest
 from typer.testing import CliRunner
 
 from groundstation.cli.main import app
-from groundstation.estimators.control.scenario import SessionPlan
-from groundstation.estimators.landing_ranges.scenario import RangeApproach
 from groundstation.pipeline.many_flights.fleet.publishing import report_again
 from groundstation.pipeline.many_flights.inputs import flight_folders, plan_folders
 from groundstation.pipeline.verbs.plan import run_plan, shipped_scenarios
 from groundstation.results.files import load, load_manifest
 from groundstation.systems import systems
 from groundstation.systems.plan import Plan
+from groundstation.systems.planning.landing.scenario import RangeApproach
+from groundstation.systems.planning.session.scenario import SessionPlan
 from groundstation.systems.shipped_plans import load_plan, plan_names
 from tests.recording_contents import Contents
 

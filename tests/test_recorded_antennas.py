@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError, UsageError
-from groundstation.estimators.cooperative.algorithms import run_algorithm
-from groundstation.estimators.cooperative.consistency import judge
-from groundstation.estimators.cooperative.events import prepare
 from groundstation.pipeline.verbs import recorded
 from groundstation.pipeline.verbs.recorded import recorded_sets
 from groundstation.readers import miluv, registry
 from groundstation.readers.source import Source
 from groundstation.simulation.reckoning import ReckoningErrors, drifting_reckoning
-from groundstation.studies.recorded import SETTINGS, study_recorded
+from groundstation.systems.cooperative.algorithms import run_algorithm
+from groundstation.systems.cooperative.consistency import judge
+from groundstation.systems.cooperative.events import prepare
+from groundstation.systems.cooperative.study.recorded import SETTINGS, study_recorded
 from groundstation.tables.session_antennas import Poses
 from tests.real_logs import real_log
 from tests.test_readers_contract import check

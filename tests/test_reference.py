@@ -10,23 +10,23 @@ from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
 from groundstation.chapters.markdown import markdown
-from groundstation.estimators.reference.analysis import REFERENCE
-from groundstation.estimators.reference.columns import REFERENCE_COLUMNS
-from groundstation.estimators.reference.errors import Errors, errors_of, turned_arm
-from groundstation.estimators.reference.paths import path_rows
-from groundstation.estimators.reference.placing import fit_place
-from groundstation.estimators.reference.settings import ReferenceSettings
-from groundstation.estimators.reference.statistics import share_of, spread_of
 from groundstation.pipeline.many_flights.fleet.rows import checks_of
 from groundstation.pipeline.one_flight.analyse import Answered, answers_of
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.manifest import Manifest
-from groundstation.results.reference import ReferenceResult
 from groundstation.simulation.flight import simulate
 from groundstation.simulation.processes import gauss_markov
 from groundstation.systems.known import Known
+from groundstation.systems.reference.analysis import REFERENCE
+from groundstation.systems.reference.answer import ReferenceResult
+from groundstation.systems.reference.columns import REFERENCE_COLUMNS
+from groundstation.systems.reference.errors import Errors, errors_of, turned_arm
+from groundstation.systems.reference.paths import path_rows
+from groundstation.systems.reference.placing import fit_place
+from groundstation.systems.reference.settings import ReferenceSettings
+from groundstation.systems.reference.statistics import share_of, spread_of
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
 from tests.saved import load

@@ -24,10 +24,10 @@ from groundstation.pipeline.one_flight.resume import keys_of
 from groundstation.pipeline.verbs.conversions import convert_many
 from groundstation.readers.sbet import RECORD
 from groundstation.results.flight import FlightResults
-from groundstation.results.reference import ReferenceResult
 from groundstation.results.summary import summary_of
 from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import simulate
+from groundstation.systems.reference.answer import ReferenceResult
 from groundstation.tables.table import Flight
 from tests.bag_writer import small_flight, write_ros2
 from tests.real_logs import real_log

@@ -18,18 +18,22 @@ import groundstation
 PACKAGE = Path(groundstation.__file__).parent
 # What makes the answers, and some of what reads them: a whole package would take mypy a minute.
 CHECKED = (
-    *("results/heading.py", "results/inertial.py", "base/ledger.py", "integrity/ledger.py"),
-    *("estimators/heading/answer.py", "estimators/inertial/estimate.py"),
-    *("chapters/heading.py", "chapters/inertial.py", "cli/check_table.py"),
-    *("results/arrays/heading.py", "estimators/heading/figures.py"),
-    *("chapters/plots/heading.py", "viewer/tabs/heading.py", "chapters/plots/comparison.py"),
+    *("systems/heading/answer.py", "systems/inertial/answer.py", "base/ledger.py", "integrity/ledger.py"),
+    *("systems/heading/outcome.py", "systems/inertial/estimate.py"),
+    *("systems/heading/chapter.py", "systems/inertial/chapter.py", "cli/check_table.py"),
+    *("systems/heading/arrays.py", "systems/heading/figures.py"),
+    *("systems/heading/plots.py", "systems/heading/tab.py", "chapters/plots/comparison.py"),
 )
-ARRAYS = ("results/arrays/heading.py", "estimators/heading/figures.py")
+ARRAYS = ("systems/heading/arrays.py", "systems/heading/figures.py")
 # Field, and the files that define and make it; those that read it keep the old name.
 RENAMED = (
-    ("estimate_sd_deg", ("results/heading.py", "estimators/heading/answer.py"), "chapters/heading.py"),
-    ("radial_error_rate_50_nmiph", ("results/inertial.py", "estimators/inertial/estimate.py"), "chapters/inertial.py"),
-    ("honest_half_width_deg", ARRAYS, "chapters/plots/heading.py"),
+    ("estimate_sd_deg", ("systems/heading/answer.py", "systems/heading/outcome.py"), "systems/heading/chapter.py"),
+    (
+        "radial_error_rate_50_nmiph",
+        ("systems/inertial/answer.py", "systems/inertial/estimate.py"),
+        "systems/inertial/chapter.py",
+    ),
+    ("honest_half_width_deg", ARRAYS, "systems/heading/plots.py"),
     ("honest_half_width_deg", ARRAYS, "chapters/plots/comparison.py"),
     ("longest_s", ("base/ledger.py", "integrity/ledger.py"), "cli/check_table.py"),
 )

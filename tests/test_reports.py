@@ -24,7 +24,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.gates import Gate
-from groundstation.results.heading import HeadingResult
+from groundstation.systems.heading.answer import HeadingResult
 from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import MANIFEST, example, figure, heading_result
 from tests.saved import load, write_flight_report

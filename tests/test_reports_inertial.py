@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 from groundstation.base.failures import failures, gathered_failures
-from groundstation.chapters.forecast import forecast
-from groundstation.chapters.inertial import inertial
 from groundstation.chapters.parts import Front
 from groundstation.chapters.plots.flight import track_map
 from groundstation.reports.drawing import Drawing, drawn_by
@@ -19,8 +17,10 @@ from groundstation.results.corrected_position import corrected_position
 from groundstation.results.figures import FigureData
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
-from groundstation.results.forecast import ForecastResult
-from groundstation.results.inertial import InertialResult
+from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.inertial.chapter import inertial
+from groundstation.systems.inertial.forecast_answer import ForecastResult
+from groundstation.systems.inertial.forecast_chapter import forecast
 from tests.inertial_example import AIDED, aided_figures, forecast_result, inertial_result
 from tests.report_example import MANIFEST, example
 from tests.saved import load

@@ -6,18 +6,18 @@ from typing import Any
 
 import pytest
 
-from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Figure, Grid, Note, Section
 from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.results.answer import by_analysis
-from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.figures import FigureData
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, NotAssessable
 from groundstation.results.gates import Gate
-from groundstation.results.magnetic import ADVISORY, MagneticResult
 from groundstation.results.manifest import Manifest
+from groundstation.systems.magnetic.answer import ADVISORY, MagneticResult
+from groundstation.systems.magnetic.chapter import magnetic
+from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD
 from tests.report_example import example
 from tests.saved import load
 from tests.test_magnetic_run import figure_eight

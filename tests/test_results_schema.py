@@ -11,14 +11,14 @@ import pytest
 from groundstation.base.findings import Finding
 from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.results import forecast as outlook
-from groundstation.results import heading as answers
-from groundstation.results import inertial as errors
 from groundstation.results.files import json_text
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.schema import schema_text
 from groundstation.results.summary import SCHEMA_VERSION, summary_of
 from groundstation.systems import systems
+from groundstation.systems.heading import answer as answers
+from groundstation.systems.inertial import answer as errors
+from groundstation.systems.inertial import forecast_answer as outlook
 from tests.inertial_example import forecast_result, inertial_result
 from tests.real_logs import real_log
 from tests.report_example import example, heading_result

@@ -14,9 +14,9 @@ from groundstation.cli.rules import rules_text
 from groundstation.pipeline.api import open_flight, simulate
 from groundstation.pipeline.verbs.rules import RulesTest, rules_test
 from groundstation.results.files import save
-from groundstation.results.heading import HeadingResult
 from groundstation.results.manifest import Manifest
 from groundstation.systems import systems
+from groundstation.systems.heading.answer import HeadingResult
 from tests.saved import load
 
 SAMPLES = sorted((Path(__file__).parents[1] / "sample_logs").glob("*.csv"))

@@ -11,22 +11,22 @@ import jsonschema
 import numpy as np
 import pytest
 
-from groundstation.chapters.cooperative import TITLES, cooperative, session_front, trusted, worst_first
 from groundstation.chapters.parts import Facts, Figure, Grid, Mark, Note, Section
 from groundstation.cli.main import main
-from groundstation.estimators.cooperative.analysis import COOPERATIVE, NIS_MAX, SessionKnown, innovations_of
-from groundstation.estimators.cooperative.estimate import estimate_session
-from groundstation.estimators.cooperative.settings import ALGORITHMS, CooperativeSettings, InsBelief
 from groundstation.pipeline.many_flights.fleet.publishing import report_again
 from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
 from groundstation.pipeline.one_flight.analyse import run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.pipeline.verbs.cooperative import run_session
-from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.files import load_manifest
 from groundstation.results.flight import FlightResults
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_log import write_session
+from groundstation.systems.cooperative.analysis import COOPERATIVE, NIS_MAX, SessionKnown, innovations_of
+from groundstation.systems.cooperative.answer import CooperativeResult
+from groundstation.systems.cooperative.chapter import TITLES, cooperative, session_front, trusted, worst_first
+from groundstation.systems.cooperative.estimate import estimate_session
+from groundstation.systems.cooperative.settings import ALGORITHMS, CooperativeSettings, InsBelief
 from tests.cooperative_example import believed, truth_of
 from tests.recording_contents import Contents
 from tests.saved import load

@@ -9,12 +9,12 @@ import pytest
 from groundstation.base.errors import UsageError
 from groundstation.base.toml_settings import settings_from
 from groundstation.cli.main import main
-from groundstation.estimators.cooperative.settings import CooperativeSettings
 from groundstation.pipeline.verbs.catalogue import catalogue
 from groundstation.pipeline.verbs.synthesis import is_session, simulate_to
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_log import write_session
 from groundstation.simulation.session_scenario import SessionScenario, load_session, session_names
+from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.tables.session import DeadReckoning
 from groundstation.tables.session_assemble import session_from_flights
 from groundstation.tables.session_settings import SessionSettings, Stations

@@ -18,11 +18,11 @@ from groundstation.pipeline.many_flights.sessions import search as session_searc
 from groundstation.pipeline.many_flights.sessions.search import Member, Span, sessions_among
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
-from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.files import load, load_document, load_manifest
 from groundstation.results.flight import FlightResults
 from groundstation.simulation.session_log import write_session
 from groundstation.systems import systems
+from groundstation.systems.cooperative.answer import CooperativeResult
 from tests.session_example import SEED, SHORT
 
 IDENTITY = "20180305T120000Z_session_A-B-C"

@@ -10,7 +10,6 @@ from groundstation.base.angles import FloatArray, unwrap, wrap_180
 from groundstation.base.declination import declination_along
 from groundstation.base.errors import SettingsError
 from groundstation.base.geodesy import SEMI_MAJOR_M
-from groundstation.estimators.heading.estimate import estimate_heading_error
 from groundstation.simulation.deviation import (
     BIN_MIDDLES_DEG,
     deviation_truth,
@@ -26,6 +25,7 @@ from groundstation.simulation.magnetic_family import (
 )
 from groundstation.simulation.magnetometer import world_field_nt
 from groundstation.simulation.scenario import Anomaly, MagnetometerSettings, load_scenario
+from groundstation.systems.heading.estimate import estimate_heading_error
 from groundstation.tables.table import Flight
 from tests.simulated_flights import FLIGHT_LEGS, TAXI_LEGS, quiet, scenario
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from groundstation.pipeline.verbs.synthesis import simulate_to
-from groundstation.studies.approach import FAMILIES, drawn, study_approach
+from groundstation.systems.landing.study import FAMILIES, drawn, study_approach
 
 COVERAGE_TOLERANCE = 0.05  # two and a half standard deviations of the share at 100 runs
 COVERED = 0.95

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from groundstation.chapters.markdown import escaped
-from groundstation.estimators.control.laws import Session, integral_law
 from groundstation.results.figures import FigureData
-from groundstation.studies import control
-from groundstation.studies.control import laws_table, page, placement_table, published_table
-from groundstation.studies.control_cases import CASES, SPEED, placements, scenario, with_fixed_point
-from groundstation.studies.control_flown import fly
+from groundstation.systems.planning.session.laws import Session, integral_law
+from groundstation.systems.planning.session.study import control
+from groundstation.systems.planning.session.study.cases import CASES, SPEED, placements, scenario, with_fixed_point
+from groundstation.systems.planning.session.study.control import laws_table, page, placement_table, published_table
+from groundstation.systems.planning.session.study.flown import fly
 from groundstation.systems.study import StudyResult
 
 RUNS = 60

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from groundstation.estimators.cooperative.geometry import dilution
 from groundstation.simulation.session_scenario import load_session, session_names
-from groundstation.studies.cooperative import study_cooperative
-from groundstation.studies.cooperative_cases import CASES, FIRST_SEED, settings_of
-from groundstation.studies.cooperative_page import is_near, measured
-from groundstation.studies.cooperative_runs import Outcome, diverges
+from groundstation.systems.cooperative.geometry import dilution
+from groundstation.systems.cooperative.study.cases import CASES, FIRST_SEED, settings_of
+from groundstation.systems.cooperative.study.cooperative import study_cooperative
+from groundstation.systems.cooperative.study.page import is_near, measured
+from groundstation.systems.cooperative.study.runs import Outcome, diverges
 
 
 def outcome(error_m: tuple[float, float], late_ratio: float = 1.0) -> Outcome:

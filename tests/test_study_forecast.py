@@ -8,19 +8,21 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import UsageError
-from groundstation.estimators.inertial.hindcast import Hindcast
-from groundstation.estimators.inertial.settings import InertialSettings
 from groundstation.pipeline.verbs.catalogue import catalogue
 from groundstation.pipeline.verbs.synthesis import study_to
 from groundstation.results.figures import FigureData
-from groundstation.results.forecast import METHODS
 from groundstation.simulation.inertial_family import simulate_family
-from groundstation.studies import forecast, forecast_tables
-from groundstation.studies.forecast import study_forecast
-from groundstation.studies.forecast_cases import FIRST_SEED, NEW_ROUTES, Case, epochs_of, study_cases
-from groundstation.studies.forecast_coupled_bank import LEAD_STEP_S, LEADS, SetForecasts, fly_bank
-from groundstation.studies.forecast_outages import fly_with_outages, outages_of
-from groundstation.studies.forecast_runs import (
+from groundstation.systems import systems
+from groundstation.systems.inertial.forecast_answer import METHODS
+from groundstation.systems.inertial.hindcast import Hindcast
+from groundstation.systems.inertial.settings import InertialSettings
+from groundstation.systems.inertial.study import forecast
+from groundstation.systems.inertial.study import tables as forecast_tables
+from groundstation.systems.inertial.study.cases import FIRST_SEED, NEW_ROUTES, Case, epochs_of, study_cases
+from groundstation.systems.inertial.study.coupled_bank import LEAD_STEP_S, LEADS, SetForecasts, fly_bank
+from groundstation.systems.inertial.study.forecast import study_forecast
+from groundstation.systems.inertial.study.outages import fly_with_outages, outages_of
+from groundstation.systems.inertial.study.runs import (
     COUPLED,
     METHOD_NAMES,
     STUDY_HORIZONS_MIN,
@@ -28,8 +30,7 @@ from groundstation.studies.forecast_runs import (
     replay_flight,
     run_cases,
 )
-from groundstation.studies.forecast_tables import BETTER, UNDECIDED, WORSE, Resampled, finding
-from groundstation.systems import systems
+from groundstation.systems.inertial.study.tables import BETTER, UNDECIDED, WORSE, Resampled, finding
 from groundstation.systems.study import StudyResult
 
 SEED, FLIGHTS = 5, 12

@@ -8,9 +8,9 @@ import pytest
 from groundstation.base.errors import UsageError
 from groundstation.pipeline.verbs.kept_runs import KeptRuns
 from groundstation.simulation.taxi import Family
-from groundstation.studies.heading import StudyResult, study_heading
-from groundstation.studies.heading_family import RunOutcome, run_families
-from groundstation.studies.heading_paper import arm_table, precision_table, quality_table, standstill_tables
+from groundstation.systems.heading.study.family import RunOutcome, run_families
+from groundstation.systems.heading.study.heading import StudyResult, study_heading
+from groundstation.systems.heading.study.paper import arm_table, precision_table, quality_table, standstill_tables
 
 FEW_SEED = 5
 FEW_RUNS = [8, pytest.param(24, marks=pytest.mark.slow)]
@@ -132,7 +132,7 @@ def test_both_intervals_hold_the_truth_and_are_not_wider_than_they_were(family: 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["held velocity", "skidding", "spoofed"])
 def test_what_is_no_straight_taxi_is_refused(kind: str) -> None:
-    from groundstation.studies.heading_crew import KINDS, run_crew
+    from groundstation.systems.heading.study.crew import KINDS, run_crew
 
     place = next(number for number, name in enumerate(KINDS) if name == kind)
     outcomes = [run_crew(4001, place + 10 * number) for number in range(2)]
@@ -160,7 +160,7 @@ def test_the_wide_family_has_its_winds_and_half_of_the_runs_state_them() -> None
 
 
 def test_crew_runs_are_the_same_again_and_make_a_table() -> None:
-    from groundstation.studies.heading_crew import crew_table, run_crew
+    from groundstation.systems.heading.study.crew import crew_table, run_crew
 
     found = run_crew(4001, 0)
     assert found == run_crew(4001, 0)
@@ -170,7 +170,7 @@ def test_crew_runs_are_the_same_again_and_make_a_table() -> None:
 
 def test_one_engine_is_held_where_it_is_stated_alone() -> None:
     """Run 7: the sideslip of one engine is the same there and back, and the interval does not hold it."""
-    from groundstation.studies.heading_crew import run_crew
+    from groundstation.systems.heading.study.crew import run_crew
 
     found, stated = run_crew(4001, 7), run_crew(4001, 7, "one engine, stated")
     assert found.error_arcmin == pytest.approx(stated.error_arcmin, abs=0.1), "the same taxi"
@@ -182,7 +182,7 @@ def test_one_engine_is_held_where_it_is_stated_alone() -> None:
 def test_the_study_of_verdicts_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
     """Runs of its eleven kinds by turns; the time is over before the second turn, and none is made again."""
     from groundstation.pipeline.verbs.kept_runs import KeptRuns
-    from groundstation.studies.heading_crew import ALL_KINDS, CrewOutcome, study_crew
+    from groundstation.systems.heading.study.crew import ALL_KINDS, CrewOutcome, study_crew
 
     told: list[str] = []
     for _ in range(2):

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import pytest
 
-from groundstation.estimators.landing_ranges.answer import range_landing
-from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
-from groundstation.results.landing_ranges import TOUCHDOWN, RangeLanding
-from groundstation.studies import landing_cases
-from groundstation.studies.landing_bearings import bearing_spans, bearing_table
-from groundstation.studies.landing_cases import CLAIMS, FLOWN, PUBLISHED, SIGMAS, approach, variations
-from groundstation.studies.landing_runs import run_approaches
-from groundstation.studies.landing_tables import (
+from groundstation.systems.planning.landing.answer import TOUCHDOWN, RangeLanding
+from groundstation.systems.planning.landing.outcome import range_landing
+from groundstation.systems.planning.landing.plan import LANDING_PLAN
+from groundstation.systems.planning.landing.study import cases as landing_cases
+from groundstation.systems.planning.landing.study.bearings import bearing_spans, bearing_table
+from groundstation.systems.planning.landing.study.cases import CLAIMS, FLOWN, PUBLISHED, SIGMAS, approach, variations
+from groundstation.systems.planning.landing.study.runs import run_approaches
+from groundstation.systems.planning.landing.study.tables import (
     category_table,
     holds,
     order_table,

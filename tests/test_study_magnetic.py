@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from groundstation.estimators.magnetic.estimate import estimate_deviation
 from groundstation.results.figures import FigureData
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
 from groundstation.simulation.scenario import MagnetometerSettings
-from groundstation.studies import magnetic_runs, magnetic_tables
-from groundstation.studies.magnetic import study_magnetic
-from groundstation.studies.magnetic_bias import formula_biases, power_law_above_floor
-from groundstation.studies.magnetic_cases import (
+from groundstation.systems.magnetic.estimate import estimate_deviation
+from groundstation.systems.magnetic.study import runs as magnetic_runs
+from groundstation.systems.magnetic.study import tables as magnetic_tables
+from groundstation.systems.magnetic.study.bias import formula_biases, power_law_above_floor
+from groundstation.systems.magnetic.study.cases import (
     BANK,
     BANK_DEG,
     CLAIM,
@@ -25,12 +25,26 @@ from groundstation.studies.magnetic_cases import (
     Setup,
     seed_of,
 )
-from groundstation.studies.magnetic_coverage import coverage_table
-from groundstation.studies.magnetic_flights import Hangar, judged_outcome
-from groundstation.studies.magnetic_judge import METHODS, NOT_ASSESSABLE, Judged, Outcome, errors_deg, level_circle
-from groundstation.studies.magnetic_page import claim_text, coefficient_claim, limit_text, refusal_text, residual_claim
-from groundstation.studies.magnetic_runs import Job, RunOutcome, fly_job, run_jobs
-from groundstation.studies.magnetic_tables import (
+from groundstation.systems.magnetic.study.coverage import coverage_table
+from groundstation.systems.magnetic.study.flights import Hangar, judged_outcome
+from groundstation.systems.magnetic.study.judge import (
+    METHODS,
+    NOT_ASSESSABLE,
+    Judged,
+    Outcome,
+    errors_deg,
+    level_circle,
+)
+from groundstation.systems.magnetic.study.magnetic import study_magnetic
+from groundstation.systems.magnetic.study.page import (
+    claim_text,
+    coefficient_claim,
+    limit_text,
+    refusal_text,
+    residual_claim,
+)
+from groundstation.systems.magnetic.study.runs import Job, RunOutcome, fly_job, run_jobs
+from groundstation.systems.magnetic.study.tables import (
     BETTER,
     HELD_OUT,
     IRON,

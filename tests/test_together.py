@@ -10,9 +10,6 @@ import pytest
 from groundstation.base.errors import UsageError
 from groundstation.base.records import Column, RecordBatch
 from groundstation.base.units import NS_PER_S
-from groundstation.chapters.together import together as chapter
-from groundstation.estimators.latency.signals import pairs_of
-from groundstation.estimators.two_clocks.relation import NotOneFlightError
 from groundstation.methods.overview import overview
 from groundstation.methods.taxi.pair import HEADING_AND_VELOCITY
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -22,10 +19,13 @@ from groundstation.pipeline.one_flight.join import join_files, join_logs
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.results.figures import numbers
 from groundstation.results.files import load
-from groundstation.results.together import Together
 from groundstation.store.reader import read
 from groundstation.store.writer import StoreWriter
 from groundstation.systems import systems
+from groundstation.systems.latency.signals import pairs_of
+from groundstation.systems.several_logs.answer import Together
+from groundstation.systems.several_logs.chapter import together as chapter
+from groundstation.systems.several_logs.relation import NotOneFlightError
 from groundstation.tables.motion import motion_of
 from groundstation.tables.sources import TOGETHER, choose_pair, ranked, said_of, sources_of_kind, why_first
 from groundstation.tables.table import Flight, Table

@@ -10,8 +10,6 @@ from typer.testing import CliRunner
 
 from groundstation.cli.main import app
 from groundstation.cli.single_logs import PURPOSES
-from groundstation.estimators.heading.examine import OF_DATA
-from groundstation.estimators.heading.wording import told
 from groundstation.integrity.limits import shipped
 from groundstation.pipeline.one_flight.analyse import known_of, run_analyses, seen_by_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -24,7 +22,9 @@ from groundstation.pipeline.verbs.usable import (
     usability_of_flight,
     usability_of_session,
 )
-from groundstation.results.heading import HeadingResult
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.heading.examine import OF_DATA
+from groundstation.systems.heading.wording import told
 from groundstation.tables.session_settings import Stations
 from groundstation.tables.table import Flight
 from tests.inertial_flights import batch_of, flight_of, without_rows

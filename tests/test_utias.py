@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError, UsageError
-from groundstation.estimators.cooperative.consistency import judge
-from groundstation.estimators.cooperative.tracks import Track
-from groundstation.estimators.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.pipeline.verbs.recorded import recorded_sets
 from groundstation.readers import registry, utias
 from groundstation.readers.source import Source
-from groundstation.studies.recorded import SETTINGS, study_recorded
+from groundstation.systems.cooperative.consistency import judge
+from groundstation.systems.cooperative.study.recorded import SETTINGS, study_recorded
+from groundstation.systems.cooperative.tracks import Track
+from groundstation.systems.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.tables.session import Odometry
 from tests.real_logs import real_log
 from tests.test_readers_contract import check

@@ -13,8 +13,8 @@ from groundstation.results.answer import by_analysis
 from groundstation.results.corrected_position import corrected_position
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable
-from groundstation.results.forecast import ForecastResult
-from groundstation.results.inertial import InertialResult
+from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.tables.table import Flight
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder

@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.chapters.landing import landing
 from groundstation.chapters.markdown import markdown
 from groundstation.reports.drawing import Drawing, drawn_by
 from groundstation.results.answer import by_analysis
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.landing import LandingResult
 from groundstation.simulation.approach import load_approach, simulate_approach
+from groundstation.systems.landing.answer import LandingResult
+from groundstation.systems.landing.chapter import landing
 from tests.recording_contents import Contents
 from tests.test_approaches import found, site
 from tests.told import PLOTS, write_recording

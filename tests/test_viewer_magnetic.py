@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.chapters.magnetic import magnetic
 from groundstation.chapters.markdown import escaped, markdown
 from groundstation.chapters.wording import number
 from groundstation.results.answer import by_analysis
-from groundstation.results.deviation import STEER_CARD
 from groundstation.results.flight import NotAssessable
-from groundstation.results.magnetic import ADVISORY, MagneticResult
+from groundstation.systems.magnetic.answer import ADVISORY, MagneticResult
+from groundstation.systems.magnetic.chapter import magnetic
+from groundstation.systems.magnetic.deviation_answer import STEER_CARD
 from tests.recording_contents import Contents
 from tests.test_magnetic_run import figure_eight, simulated
 from tests.told import write_recording

@@ -20,7 +20,7 @@ from groundstation.base.records import Column
 from groundstation.plots.ranges import windows
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.heading import HeadingResult
+from groundstation.systems.heading.answer import HeadingResult
 from groundstation.tables.table import Flight
 from groundstation.viewer import recording
 from groundstation.viewer.recorder import Recorder

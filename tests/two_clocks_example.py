@@ -7,8 +7,8 @@ import numpy as np
 from groundstation.base.records import Int64Array
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.two_clocks.gnss_time import GnssStretch, GnssTime
-from groundstation.estimators.two_clocks.relation import LogRelation, TimedLog
+from groundstation.systems.several_logs.gnss_time import GnssStretch, GnssTime
+from groundstation.systems.several_logs.relation import LogRelation, TimedLog
 from groundstation.tables.table import Flight
 from tests.test_latency_coverage import motion, recorded
 

@@ -12,7 +12,7 @@ from groundstation.results.answer import by_analysis
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.gates import Gate
-from groundstation.results.heading import HeadingResult, OnboardComparison, Standstill, TaxiSegment
+from groundstation.systems.heading.answer import HeadingResult, OnboardComparison, Standstill, TaxiSegment
 from groundstation.tables.table import Flight, Table
 from tests.figure_arrays import figure
 from tests.inertial_example import forecast_result, inertial_result

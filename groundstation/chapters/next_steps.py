@@ -6,13 +6,13 @@ It covers every answer that this flight could not give or not decide.
 from collections.abc import Iterator
 
 from groundstation.chapters.assessed import SUBJECTS
-from groundstation.chapters.inertial_claim import is_start_unknown
 from groundstation.chapters.parts import Facts, Section
 from groundstation.chapters.wording import number, significant
 from groundstation.results.flight import FlightResults
 from groundstation.results.gates import Gate
-from groundstation.results.heading import HeadingResult
-from groundstation.results.inertial import InertialResult
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.inertial.claim_chapter import is_start_unknown
 
 TITLE = "What to do next"
 LEAD = ""

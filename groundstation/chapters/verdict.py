@@ -7,7 +7,7 @@ from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.chapters.gates import failed_to_inform
 from groundstation.chapters.parts import Claim, Mark, Rank
 from groundstation.chapters.wording import ABSENT, interval, is_number, number, step_places, typeset
-from groundstation.results.heading import HeadingResult
+from groundstation.systems.heading.answer import HeadingResult
 
 PUBLISHED_LIMIT_ARCMIN = 20.0
 PARTS: Mapping[str, str] = {"taxi": "this taxi", "wind": "wind", "installation": "installation"}

@@ -11,8 +11,8 @@ from groundstation.base.ellipse import ELLIPSE_95, principal_axes
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
-from groundstation.results.arrays.inertial import InertialStates, InertialTrack
 from groundstation.results.flight import FlightResults
+from groundstation.systems.inertial.arrays import InertialStates, InertialTrack
 from groundstation.tables.motion import horizontal_speed_mps
 from groundstation.tables.table import Flight, Table
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from groundstation.results.heading import HeadingResult
+from groundstation.systems.heading.answer import HeadingResult
 from groundstation.tables.table import Flight
 
 

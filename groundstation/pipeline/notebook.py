@@ -20,12 +20,12 @@ from groundstation.base.errors import (
 from groundstation.base.ledger import Ledger
 from groundstation.results.answer import A
 from groundstation.results.flight import FlightResults, Source
-from groundstation.results.forecast import ForecastResult
-from groundstation.results.heading import HeadingResult
-from groundstation.results.inertial import InertialResult
-from groundstation.results.latency import Latencies
-from groundstation.results.magnetic import MagneticResult
-from groundstation.results.magnetic_ground import GroundDeviation
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.inertial.forecast_answer import ForecastResult
+from groundstation.systems.latency.answer import Latencies
+from groundstation.systems.magnetic.answer import MagneticResult
+from groundstation.systems.magnetic.ground_answer import GroundDeviation
 from groundstation.tables.table import Flight, Tables
 
 if TYPE_CHECKING:

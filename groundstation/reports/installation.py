@@ -7,9 +7,9 @@ between them changes.
 
 import re
 
-from groundstation.chapters.installation import parts, sentence
 from groundstation.reports.page import render
-from groundstation.results.installation import InstallationResult
+from groundstation.systems.heading.installation.answer import InstallationResult
+from groundstation.systems.heading.installation.chapter import parts, sentence
 
 TOP, CHAPTER = "installation-top", "installation"
 

@@ -9,10 +9,10 @@ from groundstation.chapters.parts import Mark
 from groundstation.chapters.wording import ABSENT, is_number, number, typeset
 from groundstation.reports.page import TEMPLATES
 from groundstation.reports.pdf import PdfError, write_pdf
-from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD, deviation_csv
 from groundstation.results.files import SavedFlight, write_text
 from groundstation.results.flight import FlightResults
-from groundstation.results.magnetic import ADVISORY, METHOD_TITLES, CardRow, MagneticResult
+from groundstation.systems.magnetic.answer import ADVISORY, METHOD_TITLES, CardRow, MagneticResult
+from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD, deviation_csv
 
 TEMPLATE = TEMPLATES / "steer_card.typ"
 MOST_ROWS = 36  # of a page of A6: every 10 deg

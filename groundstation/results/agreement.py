@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 from groundstation.base.normal import NORMAL_95
 from groundstation.results.answer import Answers, answer_of
-from groundstation.results.heading import HeadingResult
-from groundstation.results.inertial import InertialResult
-from groundstation.results.latency import Latencies
-from groundstation.results.magnetic import LETTERS, MagneticResult
-from groundstation.results.magnetic_ground import GroundDeviation, GroundRun
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.latency.answer import Latencies
+from groundstation.systems.magnetic.answer import LETTERS, MagneticResult
+from groundstation.systems.magnetic.ground_answer import GroundDeviation, GroundRun
 
 DRIFT_SIGMA_DEG_PER_H = 0.1  # drift of the azimuth of an INS between two looks at it
 AGREE_SIGMAS, CONTRADICT_SIGMAS = 2.0, 3.0

@@ -35,7 +35,7 @@ def answer_of(answers: Answers, kind: type[A]) -> A | None:
 
     Examples
     --------
-    >>> from groundstation.results.latency import Latencies
+    >>> from groundstation.systems.latency.answer import Latencies
     >>> answer_of({}, Latencies) is None, answer_of({"latency": Latencies(rows=())}, Latencies)
     (True, Latencies(rows=(), settings={}, figures=()))
     """

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.ellipse import ELLIPSE_95, magnified
-from groundstation.results.arrays.inertial import InertialStates, InertialTrack
 from groundstation.results.flight import FlightResults
+from groundstation.systems.inertial.arrays import InertialStates, InertialTrack
 
 FloatArray = NDArray[np.float64]
 SHOWN_ALONG = 8  # ellipses of a track

@@ -15,8 +15,8 @@ from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.results.arrays.fleet import FleetChecks, FleetInstallationFlights, FleetSkillFlights, FleetTrend
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import row_fields, rows_frame
-from groundstation.results.installation import InstallationRow
-from groundstation.results.magnetic import LETTERS
+from groundstation.systems.heading.installation.answer import InstallationRow
+from groundstation.systems.magnetic.answer import LETTERS
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -36,7 +36,7 @@ class Tabular:
 
         Examples
         --------
-        >>> from groundstation.results.forecast import ForecastResult, SkillRow
+        >>> from groundstation.systems.inertial.forecast_answer import ForecastResult, SkillRow
         >>> rows = (SkillRow("raw_ins", 10.0, 3, 843.0, 700.0, 1500.0, None),)
         >>> forecast = ForecastResult("smoothed_start", 0.0, 300.0, True, "", rows)
         >>> forecast.to_frame()[["method", "horizon_min", "rms_m"]].values.tolist()

@@ -14,7 +14,7 @@ from typing import Any
 
 from groundstation.base.serial import is_kept_apart
 from groundstation.results.document import SCHEMA_VERSION, SummaryDocument
-from groundstation.results.installation import FORMAT_VERSION, Installations
+from groundstation.systems.heading.installation.answer import FORMAT_VERSION, Installations
 
 TITLE = "summary.json of one flight"
 ABOUT = (
@@ -98,7 +98,7 @@ def definition_name(cls: type) -> str:
     Examples
     --------
     >>> from groundstation.results.gates import Gate
-    >>> from groundstation.results.heading import HeadingResult
+    >>> from groundstation.systems.heading.answer import HeadingResult
     >>> definition_name(Gate), definition_name(HeadingResult)
     ('gate', 'heading')
     """

@@ -13,11 +13,11 @@ import rerun.blueprint as rrb
 
 from groundstation.base.records import Int64Array
 from groundstation.results.fleet import Densities, FittedNormal, FleetResults
+from groundstation.systems.heading.distribution_tab import NO_WIDTH, UNSEEN
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour
 from groundstation.viewer.fleet_recorder import FleetRecorder
 from groundstation.viewer.series import FloatArray
-from groundstation.viewer.tabs.distribution import NO_WIDTH, UNSEEN
 
 PATH = "fleet/heading_error_density"
 MOST_STEPS = 200  # a bar chart is logged alone, about 1 ms each

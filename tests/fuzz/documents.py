@@ -161,8 +161,8 @@ def _icd(path: Path) -> None:
 
 def _plan(name: str) -> Callable[[Path], Any]:
     def load(path: Path) -> Any:
-        from groundstation.estimators.control.analysis import SESSION_PLAN
-        from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
+        from groundstation.systems.planning.landing.plan import LANDING_PLAN
+        from groundstation.systems.planning.session.analysis import SESSION_PLAN
         from groundstation.systems.shipped_plans import load_plan
 
         return load_plan(SESSION_PLAN if name == "session" else LANDING_PLAN, path)

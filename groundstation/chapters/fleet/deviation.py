@@ -1,11 +1,11 @@
 """Chapter on the magnetic deviation found in flights, by aircraft."""
 
 from groundstation.chapters.fleet.common import aircraft_name, bounded
-from groundstation.chapters.magnetic import TONES
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Part, Section
 from groundstation.chapters.wording import ABSENT, number
 from groundstation.results.fleet import DeviationRow, FleetResults
-from groundstation.results.magnetic import ADVISORY, LETTERS, METHOD_TITLES
+from groundstation.systems.magnetic.answer import ADVISORY, LETTERS, METHOD_TITLES
+from groundstation.systems.magnetic.chapter import TONES
 
 TITLE = "Magnetic deviation by aircraft"
 LEAD = "What each flight found with its figure-eight: does the deviation of an aircraft stay the same?"

@@ -5,11 +5,11 @@ Their reports are pages of their own.
 
 import numpy as np
 
-from groundstation.chapters.cooperative import state_of, title_of
 from groundstation.chapters.fleet.common import aircraft_name, minute
 from groundstation.chapters.parts import Cell, Grid, Head, Note, Section
 from groundstation.chapters.wording import ABSENT, clock, number
 from groundstation.results.fleet import FleetResults, SessionRow
+from groundstation.systems.cooperative.chapter import state_of, title_of
 
 LEAD = "Flights of several aircraft that ranged to one another over a data link, analysed together."
 HEADS = (

@@ -6,7 +6,7 @@ from groundstation.chapters.fleet.common import bounded, plural
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Note, Part, Section
 from groundstation.chapters.wording import clean, is_number, number, percent
 from groundstation.results.fleet import FleetResults, FleetSkill
-from groundstation.results.forecast import HORIZONS_MIN, METHODS
+from groundstation.systems.inertial.forecast_answer import HORIZONS_MIN, METHODS
 
 HEADLINE_MIN = 60.0
 LEAD = (

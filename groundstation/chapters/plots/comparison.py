@@ -9,7 +9,6 @@ import numpy as np
 
 from groundstation.base.geodesy import north_east_m, on_earth, plan_north_east_m
 from groundstation.base.normal import NORMAL_95
-from groundstation.chapters.forecast import short
 from groundstation.chapters.plots.common import M_PER_KM, has_values, label, positive
 from groundstation.plots.axes import time_axis
 from groundstation.plots.marks import AnyMark, Band, Curve, Dash, Emphasis, Floats, Lanes, Role, Told
@@ -17,13 +16,14 @@ from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import broken_at_gaps, broken_at_wrap, finite, padded
 from groundstation.results.arrays.cooperative import SessionErrors
 from groundstation.results.arrays.flight import Overview, PhaseSpans
-from groundstation.results.arrays.forecast import ForecastGrowth
-from groundstation.results.arrays.heading import HeadingRunning, HeadingSamples
-from groundstation.results.arrays.inertial import InertialStates, InertialTrack
 from groundstation.results.arrays.typed import T
 from groundstation.results.comparison import Comparison
 from groundstation.results.files import SavedFlight
-from groundstation.results.forecast import ForecastResult
+from groundstation.systems.heading.arrays import HeadingRunning, HeadingSamples
+from groundstation.systems.inertial.arrays import InertialStates, InertialTrack
+from groundstation.systems.inertial.forecast_answer import ForecastResult
+from groundstation.systems.inertial.forecast_arrays import ForecastGrowth
+from groundstation.systems.inertial.forecast_chapter import short
 
 NEAR_M = 200_000.0  # flights that begin no further apart share one map
 LANE_MM = 4.0

@@ -16,7 +16,7 @@ from groundstation.results.arrays.flight import GnssLanes, Overview, PhaseSpans,
 from groundstation.results.arrays.typed import Flags
 from groundstation.results.corrected_position import CorrectedPosition, corrected_position
 from groundstation.results.flight import FlightResults
-from groundstation.results.heading import HeadingResult, TaxiSegment
+from groundstation.systems.heading.answer import HeadingResult, TaxiSegment
 
 SMALLEST_TAXI_M = 10.0  # less is no taxi worth enlarging: a receiver at rest, or a start by hand
 SMALLEST_MAP_M = 2.0  # side of the map of an aircraft that did not move

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.results.fleet import FleetSkill
-from groundstation.results.forecast import METHODS
+from groundstation.systems.inertial.forecast_answer import METHODS
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from groundstation.methods.intervals import BOUND95
-from groundstation.results.latency import Latencies
+from groundstation.systems.latency.answer import Latencies
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,6 @@ from groundstation.base.findings import Finding, Severity
 from groundstation.base.gaps import Gaps
 from groundstation.base.ledger import Ledger
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.heading.settings import HeadingSettings
 from groundstation.integrity.ledger import gaps_of
 from groundstation.methods import overview
 from groundstation.methods.taxi.intervals import Interval
@@ -30,9 +29,10 @@ from groundstation.results.answer import Answers, answer_of
 from groundstation.results.chosen import chosen_intervals
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
-from groundstation.results.heading import HeadingResult
 from groundstation.systems import systems
 from groundstation.systems.analysis import Analysis, Found, in_order_of_need
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.known import Known
 from groundstation.tables.phases import ALWAYS_ON_GROUND, flight_phases
 from groundstation.tables.table import Flight

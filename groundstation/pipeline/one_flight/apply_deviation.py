@@ -13,27 +13,27 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import MAX_BATCH_ROWS, Column, RecordBatch
-from groundstation.estimators.magnetic.settings import MagneticSettings
 from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.one_flight.convert import census_of, recounted
 from groundstation.pipeline.one_flight.deviation_to_apply import Apply
-from groundstation.results.arrays.magnetic import CorrectedHeadingRows
-from groundstation.results.deviation import (
+from groundstation.results.file_names import CORRECTED
+from groundstation.results.flight import FlightResults
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.latency.answer import Latencies
+from groundstation.systems.magnetic.answer import MagneticResult
+from groundstation.systems.magnetic.arrays import CorrectedHeadingRows
+from groundstation.systems.magnetic.deviation_answer import (
     Deviation,
     deviation_of,
 )
-from groundstation.results.file_names import CORRECTED
-from groundstation.results.flight import FlightResults
-from groundstation.results.heading import HeadingResult
-from groundstation.results.inertial import InertialResult
-from groundstation.results.latency import Latencies
-from groundstation.results.magnetic import MagneticResult
+from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:
-    from groundstation.estimators.magnetic.corrected import CorrectedHeading
     from groundstation.pipeline.one_flight.configuration import UserSettings
     from groundstation.store.info import StoreInfo
+    from groundstation.systems.magnetic.corrected import CorrectedHeading
 
 TOPIC = "corrected_heading"
 APPLIED, NOT_APPLIED = "magnetic.applied", "magnetic.not_applied"
@@ -73,7 +73,7 @@ def apply_deviation(flight: Flight, results: FlightResults, asked: Apply | None,
     Applied
         ``results`` with the findings and, where it was applied, the figure ``corrected_heading``.
     """
-    from groundstation.estimators.magnetic.corrected import correct_heading
+    from groundstation.systems.magnetic.corrected import correct_heading
 
     if asked is None:
         return Applied(results)
@@ -138,7 +138,7 @@ def _judged(
 
     It is compared with the heading before the deviation was added.
     """
-    from groundstation.estimators.magnetic.corrected import judge
+    from groundstation.systems.magnetic.corrected import judge
     from groundstation.tables.phases import flight_phases
 
     inertial = results.answer(InertialResult)
@@ -168,7 +168,7 @@ def ins_error_deg(results: FlightResults, ins_topic: str) -> float:
 
     It is known at the figure, from taxi, or from turns in flight.
     """
-    from groundstation.estimators.magnetic.alignment import refused
+    from groundstation.systems.magnetic.alignment import refused
 
     magnetic, heading = results.answer(MagneticResult), results.answer(HeadingResult)
     if magnetic is not None and magnetic.ins_topic == ins_topic:
@@ -182,7 +182,7 @@ def ins_error_deg(results: FlightResults, ins_topic: str) -> float:
 
 
 def _figure(flight: Flight, corrected: "CorrectedHeading") -> CorrectedHeadingRows:
-    from groundstation.estimators.magnetic.corrected import thinned
+    from groundstation.systems.magnetic.corrected import thinned
 
     drawn = thinned(corrected, MOST_DRAWN)
     return CorrectedHeadingRows(

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.base.errors import UsageError
-from groundstation.results.deviation import (
+from groundstation.results.file_names import SUMMARY
+from groundstation.systems.magnetic.deviation_answer import (
     DEVIATION_CSV,
     Deviation,
     deviation_from_csv,
     deviation_from_summary,
 )
-from groundstation.results.file_names import SUMMARY
 
 OWN = "own"
 MOST_BYTES = 64 << 20  # a summary of a long log with many damaged spans has some

@@ -29,11 +29,11 @@ from groundstation.pipeline.one_flight.resume import Finished, keys_of
 from groundstation.pipeline.one_flight.sealing import note, seal
 from groundstation.reports.flight_report import PDF, REPORT, add_pdf, write_flight_report
 from groundstation.reports.steer_card import write_exports
-from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import PartOfRun, PowerUpOfRun, Resume
 from groundstation.systems import systems
+from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD
 from groundstation.tables.table import Flight
 
 PARTIAL_PREFIX = ".partial-"

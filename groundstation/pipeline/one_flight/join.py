@@ -20,10 +20,6 @@ from groundstation.base.records import HEADING_IS_TRACK, Damage, Int64Array, Rec
 from groundstation.base.serial import to_json_exactly
 from groundstation.base.source_units import PREFIX as UNITS
 from groundstation.base.units import NS_PER_S
-from groundstation.estimators.two_clocks.gnss_time import gnss_time_of
-from groundstation.estimators.two_clocks.relate import relate
-from groundstation.estimators.two_clocks.relation import LogRelation, NotOneFlightError, TimedLog
-from groundstation.estimators.two_clocks.settings import TwoClocksSettings
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.ledger import damage_entry
 from groundstation.integrity.limits import Thresholds, shipped
@@ -33,8 +29,12 @@ from groundstation.pipeline.one_flight.convert import Converted, census_of, conv
 from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.log import Log, as_log, open_log
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
-from groundstation.results.together import LABELS, JoinedLog, JoinedStretch, Joining
 from groundstation.store.info import StoreInfo
+from groundstation.systems.several_logs.answer import LABELS, JoinedLog, JoinedStretch, Joining
+from groundstation.systems.several_logs.gnss_time import gnss_time_of
+from groundstation.systems.several_logs.relate import relate
+from groundstation.systems.several_logs.relation import LogRelation, NotOneFlightError, TimedLog
+from groundstation.systems.several_logs.settings import TwoClocksSettings
 from groundstation.tables.sources import TOGETHER
 
 OF_FIELDS = ("derived.", f"{HEADING_IS_TRACK}.")  # keys about a field, <topic>.<field> behind them

@@ -12,8 +12,8 @@ from typing import Any
 from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.resume import versions
 from groundstation.results.flight import FlightResults
-from groundstation.results.heading import HeadingResult
 from groundstation.results.manifest import Host, Manifest, PartOfRun, PowerUpOfRun, Resume, SourceOfRun
+from groundstation.systems.heading.answer import HeadingResult
 
 
 def manifest_of(

@@ -28,13 +28,13 @@ from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.log import as_log, digest_of
 from groundstation.pipeline.one_flight.sealing import spoiled_files
 from groundstation.reports.flight_report import PDF, REPORT
-from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.document import SummaryDocument
 from groundstation.results.file_names import ARRAYS, SUMMARY, TABLES
 from groundstation.results.files import load_document, load_manifest
 from groundstation.results.flight import Source
 from groundstation.results.manifest import Keys as Keys
 from groundstation.results.manifest import Manifest, PartOfRun, PowerUpOfRun
+from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD
 
 Step = Literal["everything", "analysis", "reports", "pdf", "nothing"]  # what has to be done for a log
 TO_DO: Mapping[Step, str] = {

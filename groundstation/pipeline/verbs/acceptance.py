@@ -32,13 +32,13 @@ from groundstation.pipeline.many_flights.inputs import saved_flights
 from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.reports.acceptance import write_acceptance_report
 from groundstation.results.acceptance import QUANTITIES, UNKNOWN_INS, Acceptance, FlightError, Standard
-from groundstation.results.arrays.inertial import InertialStates, InertialTrack
 from groundstation.results.arrays.typed import MissingColumnError
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, csv_text, json_text, load, mapping, write_text
-from groundstation.results.heading import HeadingResult
-from groundstation.results.inertial import InertialResult
 from groundstation.systems import systems
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.inertial.arrays import InertialStates, InertialTrack
 
 STANDARDS = ShippedToml("groundstation.methods.fleet", "standards", "standard")
 STATES, TRACK = "inertial_states", "inertial_track"

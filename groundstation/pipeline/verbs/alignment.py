@@ -10,7 +10,7 @@ from groundstation.pipeline.verbs.clip import zero_s
 from groundstation.results.arrays.flight import GnssLanes, PhaseSpans
 from groundstation.results.comparison import Alignment, Event
 from groundstation.results.files import SavedFlight
-from groundstation.results.inertial import InertialResult
+from groundstation.systems.inertial.answer import InertialResult
 
 EVENTS: tuple[Event, ...] = get_args(Event)
 AT_REST, UNKNOWN, AIRBORNE = "standstill", "unknown", "airborne"

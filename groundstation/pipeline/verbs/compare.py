@@ -21,12 +21,12 @@ from groundstation.pipeline.verbs.alignment import align
 from groundstation.pipeline.verbs.clip import CUT_SHA256
 from groundstation.results.arrays.cooperative import CooperativeTracks, SessionErrors
 from groundstation.results.comparison import Comparison, Delta, Event, SettingPair, Side, Value
-from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.file_names import MANIFEST
 from groundstation.results.files import SavedFlight, csv_text, load, mapping, write_text
 from groundstation.results.flight import NotAssessable
 from groundstation.results.grouped_findings import grouped
 from groundstation.systems import systems
+from groundstation.systems.cooperative.answer import CooperativeResult
 
 (PAGE, TABLE), RECORDING = COMPARISON_MARKS, COMPARISON_RECORDING
 IDENTITY = (  # what tells the rows of a table in the results apart

@@ -17,7 +17,7 @@ from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import as_log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.results.answer import answer_of
-from groundstation.results.inertial import InertialResult
+from groundstation.systems.inertial.answer import InertialResult
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:

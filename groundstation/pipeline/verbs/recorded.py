@@ -16,7 +16,7 @@ from groundstation.readers import miluv, utias
 from groundstation.readers.source import Source
 from groundstation.simulation.reckoning import drifting_reckoning
 from groundstation.store.reader import read
-from groundstation.studies.recorded import RecordedSet
+from groundstation.systems.cooperative.study.recorded import RecordedSet
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.session import GroundPoint, Session
 from groundstation.tables.session_antennas import Antenna, AntennaLog, antenna_ranges, poses_of, start_ns

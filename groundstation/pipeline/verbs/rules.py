@@ -15,16 +15,16 @@ import numpy as np
 from groundstation.base.digits import digits_of
 from groundstation.base.errors import GroundstationError
 from groundstation.base.serial import to_json
-from groundstation.estimators.heading.settings import HeadingSettings
-from groundstation.estimators.installation.answer import verdict_of
 from groundstation.pipeline.many_flights.inputs import saved_flights
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, csv_text, load, mapping, write_text
 from groundstation.results.gates import Gate, judged_gate
-from groundstation.results.installation import InstalledFlight, installations_in
 from groundstation.results.rules import Rejudged
 from groundstation.systems import systems
+from groundstation.systems.heading.installation.answer import InstalledFlight, installations_in
+from groundstation.systems.heading.installation.outcome import verdict_of
+from groundstation.systems.heading.settings import HeadingSettings
 
 LEARNED_GATE = "whole_half_width_learned"
 LEARNED_TITLE = "half width of the 95 % interval, the installation learned"

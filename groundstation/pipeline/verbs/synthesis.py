@@ -174,7 +174,7 @@ def _study_of(name: str, recorded: Path) -> "Callable[..., StudyResult]":
     if name != "cooperative":
         raise UsageError("study", f"--recorded with {name}", "cooperative")
     from groundstation.pipeline.verbs.recorded import recorded_sets
-    from groundstation.studies.recorded import study_recorded
+    from groundstation.systems.cooperative.study.recorded import study_recorded
 
     def run(runs: int, seed: int, progress: Callable[[str], None]) -> "StudyResult":
         return study_recorded(recorded_sets(recorded), progress)

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, Literal
 from groundstation.base.errors import NotAssessableError, SettingsError, UsageError
 from groundstation.base.findings import Finding
 from groundstation.base.signals import topics_of_kind
-from groundstation.estimators.cooperative.analysis import SessionKnown
 from groundstation.pipeline.one_flight.analyse import known_of, seen_by_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.systems import systems
 from groundstation.systems.analysis import Analysis, Shortfall
+from groundstation.systems.cooperative.analysis import SessionKnown
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from groundstation.estimators.cooperative.analysis import COOPERATIVE
+from groundstation.systems.cooperative.analysis import COOPERATIVE
 from groundstation.systems.system import Study, System, Tab
 
 if TYPE_CHECKING:
@@ -14,26 +14,26 @@ if TYPE_CHECKING:
 
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
-    from groundstation.chapters.cooperative import cooperative, session_front
-    from groundstation.results.cooperative import CooperativeResult
+    from groundstation.systems.cooperative.answer import CooperativeResult
+    from groundstation.systems.cooperative.chapter import cooperative, session_front
 
     return (Chapter((CooperativeResult,), cooperative, session_front),)
 
 
 def _plots() -> "Mapping[str, Describe]":
-    from groundstation.chapters.plots import cooperative
+    from groundstation.systems.cooperative import plots as cooperative
 
     return cooperative.PLOTS
 
 
 def _tabs() -> tuple[Tab, ...]:
-    from groundstation.viewer.tabs.cooperative import cooperative
+    from groundstation.systems.cooperative.tab import cooperative
 
     return (Tab(("cooperative",), cooperative),)
 
 
 def _study_cooperative() -> "Callable[..., StudyResult]":
-    from groundstation.studies.cooperative import study_cooperative
+    from groundstation.systems.cooperative.study.cooperative import study_cooperative
 
     return study_cooperative
 

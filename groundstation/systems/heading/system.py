@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from groundstation.estimators.heading.analysis import HEADING
-from groundstation.estimators.installation.analysis import INSTALLATION
+from groundstation.systems.heading.analysis import HEADING
+from groundstation.systems.heading.installation.analysis import INSTALLATION
 from groundstation.systems.system import Study, System, Tab
 
 if TYPE_CHECKING:
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
-    from groundstation.chapters.heading import heading
-    from groundstation.chapters.installation import installation
-    from groundstation.results.heading import HeadingResult
-    from groundstation.results.installation import InstallationResult
+    from groundstation.systems.heading.answer import HeadingResult
+    from groundstation.systems.heading.chapter import heading
+    from groundstation.systems.heading.installation.answer import InstallationResult
+    from groundstation.systems.heading.installation.chapter import installation
 
     return (
         Chapter((InstallationResult,), installation),
@@ -27,14 +27,15 @@ def _chapters() -> "tuple[Chapter, ...]":
 
 
 def _plots() -> "Mapping[str, Describe]":
-    from groundstation.chapters.plots import heading, standstill
+    from groundstation.systems.heading import plots as heading
+    from groundstation.systems.heading import standstill_plots as standstill
 
     return {**heading.PLOTS, **standstill.PLOTS}
 
 
 def _tabs() -> tuple[Tab, ...]:
-    from groundstation.viewer.tabs.heading import heading
-    from groundstation.viewer.tabs.installation import installation
+    from groundstation.systems.heading.installation.tab import installation
+    from groundstation.systems.heading.tab import heading
 
     return (
         Tab(("heading",), heading),
@@ -43,37 +44,37 @@ def _tabs() -> tuple[Tab, ...]:
 
 
 def _study_heading() -> "Callable[..., StudyResult]":
-    from groundstation.studies.heading import study_heading
+    from groundstation.systems.heading.study.heading import study_heading
 
     return study_heading
 
 
 def _outcome_heading() -> type:
-    from groundstation.studies.heading_family import RunOutcome
+    from groundstation.systems.heading.study.family import RunOutcome
 
     return RunOutcome
 
 
 def _study_crew() -> "Callable[..., StudyResult]":
-    from groundstation.studies.heading_crew import study_crew
+    from groundstation.systems.heading.study.crew import study_crew
 
     return study_crew
 
 
 def _outcome_crew() -> type:
-    from groundstation.studies.heading_crew import CrewOutcome
+    from groundstation.systems.heading.study.crew import CrewOutcome
 
     return CrewOutcome
 
 
 def _study_installation() -> "Callable[..., StudyResult]":
-    from groundstation.studies.installation import study_installation
+    from groundstation.systems.heading.study.installation import study_installation
 
     return study_installation
 
 
 def _outcome_installation() -> type:
-    from groundstation.studies.installation_pool import TaxiOfPool
+    from groundstation.systems.heading.study.installation_pool import TaxiOfPool
 
     return TaxiOfPool
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from groundstation.estimators.inertial.analysis import FORECAST, INERTIAL
+from groundstation.systems.inertial.analysis import FORECAST, INERTIAL
 from groundstation.systems.system import Study, System, Tab
 
 if TYPE_CHECKING:
@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
-    from groundstation.chapters.forecast import forecast
-    from groundstation.chapters.inertial import inertial
-    from groundstation.results.forecast import ForecastResult
-    from groundstation.results.inertial import InertialResult
+    from groundstation.systems.inertial.answer import InertialResult
+    from groundstation.systems.inertial.chapter import inertial
+    from groundstation.systems.inertial.forecast_answer import ForecastResult
+    from groundstation.systems.inertial.forecast_chapter import forecast
 
     return (
         Chapter((InertialResult,), inertial),
@@ -26,14 +26,15 @@ def _chapters() -> "tuple[Chapter, ...]":
 
 
 def _plots() -> "Mapping[str, Describe]":
-    from groundstation.chapters.plots import forecast, inertial
+    from groundstation.systems.inertial import forecast_plots as forecast
+    from groundstation.systems.inertial import plots as inertial
 
     return {**forecast.PLOTS, **inertial.PLOTS}
 
 
 def _tabs() -> tuple[Tab, ...]:
-    from groundstation.viewer.tabs.forecast import forecast
-    from groundstation.viewer.tabs.inertial import inertial
+    from groundstation.systems.inertial.forecast_tab import forecast
+    from groundstation.systems.inertial.tab import inertial
 
     return (
         Tab(("inertial",), inertial),
@@ -42,7 +43,7 @@ def _tabs() -> tuple[Tab, ...]:
 
 
 def _study_forecast() -> "Callable[..., StudyResult]":
-    from groundstation.studies.forecast import study_forecast
+    from groundstation.systems.inertial.study.forecast import study_forecast
 
     return study_forecast
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from groundstation.estimators.approaches.analysis import LANDING
-from groundstation.estimators.landing_beacons.analysis import LANDING_BEACONS
+from groundstation.systems.landing.analysis import LANDING
+from groundstation.systems.landing.beacons.analysis import LANDING_BEACONS
 from groundstation.systems.system import Study, System, Tab
 
 if TYPE_CHECKING:
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
-    from groundstation.chapters.landing import landing
-    from groundstation.chapters.landing_beacons import landing_beacons
-    from groundstation.results.landing import LandingResult
-    from groundstation.results.landing_beacons import BeaconLanding
+    from groundstation.systems.landing.answer import LandingResult
+    from groundstation.systems.landing.beacons.answer import BeaconLanding
+    from groundstation.systems.landing.beacons.chapter import landing_beacons
+    from groundstation.systems.landing.chapter import landing
 
     return (
         Chapter((LandingResult,), landing),
@@ -27,14 +27,15 @@ def _chapters() -> "tuple[Chapter, ...]":
 
 
 def _plots() -> "Mapping[str, Describe]":
-    from groundstation.chapters.plots import landing, landing_beacons
+    from groundstation.systems.landing import plots as landing
+    from groundstation.systems.landing.beacons import plots as landing_beacons
 
     return {**landing_beacons.PLOTS, **landing.PLOTS}
 
 
 def _tabs() -> tuple[Tab, ...]:
-    from groundstation.viewer.tabs.landing import landing
-    from groundstation.viewer.tabs.landing_beacons import landing_beacons
+    from groundstation.systems.landing.beacons.tab import landing_beacons
+    from groundstation.systems.landing.tab import landing
 
     return (
         Tab(("landing",), landing),
@@ -43,7 +44,7 @@ def _tabs() -> tuple[Tab, ...]:
 
 
 def _study_approach() -> "Callable[..., StudyResult]":
-    from groundstation.studies.approach import study_approach
+    from groundstation.systems.landing.study import study_approach
 
     return study_approach
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from groundstation.estimators.latency.analysis import LATENCY
+from groundstation.systems.latency.analysis import LATENCY
 from groundstation.systems.system import System, Tab
 
 if TYPE_CHECKING:
@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
-    from groundstation.chapters.latency import latency
-    from groundstation.results.latency import Latencies
+    from groundstation.systems.latency.answer import Latencies
+    from groundstation.systems.latency.chapter import latency
 
     return (Chapter((Latencies,), latency),)
 
 
 def _plots() -> "Mapping[str, Describe]":
-    from groundstation.chapters.plots import latency
+    from groundstation.systems.latency import plots as latency
 
     return latency.PLOTS
 

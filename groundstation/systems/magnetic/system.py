@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from groundstation.estimators.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
+from groundstation.systems.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
 from groundstation.systems.system import Study, System, Tab
 
 if TYPE_CHECKING:
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
-    from groundstation.chapters.magnetic import magnetic
-    from groundstation.results.magnetic import MagneticResult
-    from groundstation.results.magnetic_ground import GroundDeviation
+    from groundstation.systems.magnetic.answer import MagneticResult
+    from groundstation.systems.magnetic.chapter import magnetic
+    from groundstation.systems.magnetic.ground_answer import GroundDeviation
 
     return (
         Chapter(
@@ -30,13 +30,13 @@ def _chapters() -> "tuple[Chapter, ...]":
 
 
 def _plots() -> "Mapping[str, Describe]":
-    from groundstation.chapters.plots import magnetic
+    from groundstation.systems.magnetic import plots as magnetic
 
     return magnetic.PLOTS
 
 
 def _tabs() -> tuple[Tab, ...]:
-    from groundstation.viewer.tabs.magnetic import magnetic
+    from groundstation.systems.magnetic.tab import magnetic
 
     return (
         Tab(
@@ -50,7 +50,7 @@ def _tabs() -> tuple[Tab, ...]:
 
 
 def _study_magnetic() -> "Callable[..., StudyResult]":
-    from groundstation.studies.magnetic import study_magnetic
+    from groundstation.systems.magnetic.study.magnetic import study_magnetic
 
     return study_magnetic
 

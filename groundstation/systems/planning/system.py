@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from groundstation.estimators.control.analysis import SESSION_PLAN
-from groundstation.estimators.landing_ranges.plan import LANDING_PLAN
+from groundstation.systems.planning.landing.plan import LANDING_PLAN
+from groundstation.systems.planning.session.analysis import SESSION_PLAN
 from groundstation.systems.system import Study, System, Tab
 
 if TYPE_CHECKING:
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
-    from groundstation.chapters.control import control
-    from groundstation.chapters.landing_ranges import landing_ranges
-    from groundstation.chapters.placement import placement
-    from groundstation.results.control import ControlPlan
-    from groundstation.results.landing_ranges import RangeLanding
-    from groundstation.results.placement import PlacementPlan
+    from groundstation.systems.planning.landing.answer import RangeLanding
+    from groundstation.systems.planning.landing.chapter import landing_ranges
+    from groundstation.systems.planning.session.answer import ControlPlan
+    from groundstation.systems.planning.session.chapter import control
+    from groundstation.systems.planning.session.placement_answer import PlacementPlan
+    from groundstation.systems.planning.session.placement_chapter import placement
 
     return (
         Chapter((ControlPlan,), control),
@@ -30,15 +30,17 @@ def _chapters() -> "tuple[Chapter, ...]":
 
 
 def _plots() -> "Mapping[str, Describe]":
-    from groundstation.chapters.plots import control, landing_ranges, placement
+    from groundstation.systems.planning.landing import plots as landing_ranges
+    from groundstation.systems.planning.session import placement_plots as placement
+    from groundstation.systems.planning.session import plots as control
 
     return {**control.PLOTS, **placement.PLOTS, **landing_ranges.PLOTS}
 
 
 def _tabs() -> tuple[Tab, ...]:
-    from groundstation.viewer.tabs.control import control
-    from groundstation.viewer.tabs.landing_ranges import landing_ranges
-    from groundstation.viewer.tabs.placement import placement
+    from groundstation.systems.planning.landing.tab import landing_ranges
+    from groundstation.systems.planning.session.placement_tab import placement
+    from groundstation.systems.planning.session.tab import control
 
     return (
         Tab(("control",), control),
@@ -48,13 +50,13 @@ def _tabs() -> tuple[Tab, ...]:
 
 
 def _study_control() -> "Callable[..., StudyResult]":
-    from groundstation.studies.control import study_control
+    from groundstation.systems.planning.session.study.control import study_control
 
     return study_control
 
 
 def _study_landing() -> "Callable[..., StudyResult]":
-    from groundstation.studies.landing import study_landing
+    from groundstation.systems.planning.landing.study.landing import study_landing
 
     return study_landing
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from groundstation.estimators.reference.analysis import REFERENCE
+from groundstation.systems.reference.analysis import REFERENCE
 from groundstation.systems.system import System, Tab
 
 if TYPE_CHECKING:
@@ -13,20 +13,20 @@ if TYPE_CHECKING:
 
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
-    from groundstation.chapters.reference import reference
-    from groundstation.results.reference import ReferenceResult
+    from groundstation.systems.reference.answer import ReferenceResult
+    from groundstation.systems.reference.chapter import reference
 
     return (Chapter((ReferenceResult,), reference),)
 
 
 def _plots() -> "Mapping[str, Describe]":
-    from groundstation.chapters.plots import reference
+    from groundstation.systems.reference import plots as reference
 
     return reference.PLOTS
 
 
 def _tabs() -> tuple[Tab, ...]:
-    from groundstation.viewer.tabs.reference import reference
+    from groundstation.systems.reference.tab import reference
 
     return (Tab(("reference",), reference),)
 

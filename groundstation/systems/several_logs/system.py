@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from groundstation.estimators.together.analysis import TOGETHER_ANALYSIS
+from groundstation.systems.several_logs.analysis import TOGETHER_ANALYSIS
 from groundstation.systems.system import System, Tab
 
 if TYPE_CHECKING:
@@ -13,20 +13,20 @@ if TYPE_CHECKING:
 
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
-    from groundstation.chapters.together import together
-    from groundstation.results.together import Together
+    from groundstation.systems.several_logs.answer import Together
+    from groundstation.systems.several_logs.chapter import together
 
     return (Chapter((Together,), together),)
 
 
 def _plots() -> "Mapping[str, Describe]":
-    from groundstation.chapters.plots import together
+    from groundstation.systems.several_logs import plots as together
 
     return together.PLOTS
 
 
 def _tabs() -> tuple[Tab, ...]:
-    from groundstation.viewer.tabs.together import together
+    from groundstation.systems.several_logs.tab import together
 
     return (Tab(("together",), together),)
 

@@ -9,8 +9,8 @@ import rerun.blueprint as rrb
 from groundstation.chapters.front import front
 from groundstation.chapters.markdown import front_markdown
 from groundstation.results.arrays.flight import GnssLanes, Overview, PhaseSpans, StateLanes
-from groundstation.results.arrays.heading import HeadingLanes
 from groundstation.results.flight import FlightResults
+from groundstation.systems.heading.arrays import HeadingLanes
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour
 from groundstation.viewer.names import path_parts

@@ -4,12 +4,12 @@ import numpy as np
 import rerun.blueprint as rrb
 
 from groundstation.base.signals import topics_of_kind
-from groundstation.chapters.latency import latency
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.quality import quality as quality_chapter
 from groundstation.results.arrays.flight import GapRows, LedgerRows
 from groundstation.results.flight import FlightResults
-from groundstation.results.latency import Latencies
+from groundstation.systems.latency.answer import Latencies
+from groundstation.systems.latency.chapter import latency
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer import colours
 from groundstation.viewer.names import label, path_parts, topic_label

@@ -9,9 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from groundstation.base.serial import from_json
-from groundstation.estimators.installation.analysis import sentence_of
-from groundstation.estimators.installation.series import Series, installation_of, series_of
-from groundstation.estimators.installation.settings import InstallationSettings
 from groundstation.pipeline.many_flights.fleet.rows import lesson_of
 from groundstation.pipeline.many_flights.fleet.scan import Scan
 from groundstation.pipeline.many_flights.fleet.table import lessons_of
@@ -20,7 +17,9 @@ from groundstation.pipeline.one_flight.sealing import note
 from groundstation.reports.flight_report import REPORT
 from groundstation.reports.installation import with_installation
 from groundstation.results.files import load, write_text
-from groundstation.results.installation import (
+from groundstation.systems import systems
+from groundstation.systems.heading.installation.analysis import sentence_of
+from groundstation.systems.heading.installation.answer import (
     INSTALLATIONS,
     METHOD_VERSION,
     Installation,
@@ -31,7 +30,8 @@ from groundstation.results.installation import (
     installations_in,
     installations_text,
 )
-from groundstation.systems import systems
+from groundstation.systems.heading.installation.series import Series, installation_of, series_of
+from groundstation.systems.heading.installation.settings import InstallationSettings
 
 
 def refresh_installations(out: Path, found: Scan, remade: Iterable[str]) -> list[str]:

@@ -16,27 +16,27 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.records import MAX_TEXT_CHARACTERS
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import ARCMIN_PER_DEG
-from groundstation.chapters.cooperative import REFERENCE, trusted
-from groundstation.estimators.heading.figures import IN_PAUSE
-from groundstation.estimators.heading.references import REFERENCE_SIGMA_DEG, logged_reference
-from groundstation.estimators.installation.lesson import lesson_of_flight
 from groundstation.methods.fleet.density import SampleHistogram, histogram_of
 from groundstation.methods.fleet.moments import Moments, moments_of
 from groundstation.methods.fleet.skill import SkillOfFlight
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS, Check, FlightShare, answer_values
 from groundstation.pipeline.many_flights.fleet.samples import FleetSamples, SampleStore
 from groundstation.reports.index import index_row, reasons_of
-from groundstation.results.arrays.heading import HeadingSamples
-from groundstation.results.arrays.reference import ReferenceChecks
 from groundstation.results.columns import Kind
-from groundstation.results.cooperative import CooperativeResult
 from groundstation.results.files import SavedFlight, load, mapping, utf8_text
 from groundstation.results.fleet import SessionRow
-from groundstation.results.forecast import TOO_FEW, WITHIN, CalibrationRow, ForecastResult, honesty
-from groundstation.results.heading import HeadingResult
-from groundstation.results.installation import Lesson
-from groundstation.results.reference import ReferenceResult
 from groundstation.systems import systems
+from groundstation.systems.cooperative.answer import CooperativeResult
+from groundstation.systems.cooperative.chapter import REFERENCE, trusted
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.heading.arrays import HeadingSamples
+from groundstation.systems.heading.figures import IN_PAUSE
+from groundstation.systems.heading.installation.answer import Lesson
+from groundstation.systems.heading.installation.lesson import lesson_of_flight
+from groundstation.systems.heading.references import REFERENCE_SIGMA_DEG, logged_reference
+from groundstation.systems.inertial.forecast_answer import TOO_FEW, WITHIN, CalibrationRow, ForecastResult, honesty
+from groundstation.systems.reference.answer import ReferenceResult
+from groundstation.systems.reference.arrays import ReferenceChecks
 from groundstation.tables.session_tracks import aircraft_named
 
 FloatArray = NDArray[np.float64]

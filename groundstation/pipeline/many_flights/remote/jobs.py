@@ -18,8 +18,8 @@ from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, finished
 from groundstation.reports.flight_report import PDF
-from groundstation.results.deviation import DEVIATION_CSV, STEER_CARD
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
+from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD
 
 STAGING, BY_LOG = ".staging", ".logs"  # in an OUT elsewhere: what is on its way; flight ids by digest of the log
 

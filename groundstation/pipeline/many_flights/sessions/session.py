@@ -15,8 +15,6 @@ from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import RecordBatch
 from groundstation.base.signals import kind_of
-from groundstation.chapters.cooperative import names_or_count
-from groundstation.estimators.cooperative.analysis import SessionKnown
 from groundstation.pipeline.many_flights.sessions.job import SessionJob, kept_session
 from groundstation.pipeline.one_flight.analyse import run_analyses
 from groundstation.pipeline.one_flight.convert import convert_log
@@ -41,6 +39,8 @@ from groundstation.results.files import load_document, load_manifest, put_failur
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.manifest import LogOfSession, Manifest, Resume
 from groundstation.systems import systems
+from groundstation.systems.cooperative.analysis import SessionKnown
+from groundstation.systems.cooperative.chapter import names_or_count
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.session_assemble import AssembledSession, session_from_flights
 from groundstation.tables.session_settings import Stations

@@ -1,1 +1,0 @@
-"""Mathematics of the five systems: no files, no wall clock, no prints."""

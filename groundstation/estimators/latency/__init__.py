@@ -1,1 +1,0 @@
-"""Latency between sensors, from the motion that they all show."""

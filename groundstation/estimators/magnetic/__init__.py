@@ -1,1 +1,0 @@
-"""In-flight magnetic deviation (system 3): found from turns of opposite bank, compensated, judged."""

@@ -1,1 +1,0 @@
-"""Monte Carlo behind the published figures."""

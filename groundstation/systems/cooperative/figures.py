@@ -1,0 +1,109 @@
+"""Arrays behind the figures of the cooperative answer."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from groundstation.results.arrays.cooperative import (
+    CooperativeGeometry,
+    CooperativeLinks,
+    CooperativeMap,
+    CooperativeTracks,
+    CooperativeTraffic,
+)
+from groundstation.results.arrays.typed import joined
+from groundstation.systems.cooperative.arrays import KINDS, PEER, POINT
+from groundstation.systems.cooperative.consistency import Judgement
+from groundstation.systems.cooperative.events import Prepared
+from groundstation.systems.cooperative.geometry import Geometry
+from groundstation.systems.cooperative.tracks import AlgorithmRun
+
+
+def source_name(prepared: Prepared, kind: int, source: int) -> str:
+    """Name of what a measurement came from."""
+    if kind == PEER:
+        return prepared.vehicles[source].name
+    return prepared.session.points[source].name if kind == POINT else KINDS[kind]
+
+
+def tracks_figure(runs: Sequence[tuple[AlgorithmRun, Sequence[Judgement | None]]]) -> CooperativeTracks:
+    """Positions, sigmas and errors of every vehicle under every algorithm."""
+    parts = []
+    for run, judgements in runs:
+        for track, judgement in zip(run.tracks, judgements, strict=True):
+            n = len(track.time_s)
+            nothing = np.full(n, np.nan)
+            error = nothing if judgement is None else np.linalg.norm(judgement.error_m, axis=1)
+            parts.append(
+                CooperativeTracks(
+                    time_s=track.time_s,
+                    vehicle=np.full(n, track.name),
+                    algorithm=np.full(n, run.algorithm),
+                    x_m=track.position_m[:, 0],
+                    y_m=track.position_m[:, 1],
+                    z_m=track.position_m[:, 2],
+                    sigma_north_m=np.sqrt(track.covariance[:, 0, 0]),
+                    sigma_east_m=np.sqrt(track.covariance[:, 1, 1]),
+                    sigma_up_m=track.sigma_up_m,
+                    correlation_north_east=track.correlation,
+                    two_sigma_r_m=track.two_sigma_r_m,
+                    error_m=error,
+                    nees=nothing if judgement is None else judgement.nees,
+                )
+            )
+    return joined(parts)
+
+
+def geometry_figure(geometry: Sequence[Geometry], bound: AlgorithmRun) -> CooperativeGeometry:
+    """Geometry of every vehicle with time, and the bound of its position (sigma_r)."""
+    return joined(
+        [
+            CooperativeGeometry(
+                time_s=one.time_s,
+                sources=one.sources,
+                hdop=one.hdop,
+                gdop=one.gdop,
+                determinant=one.determinant,
+                eigenvalue=one.eigenvalue,
+                gram_determinant=one.gram_determinant,
+                vehicle=np.full(len(one.time_s), one.name),
+                bound_m=np.interp(one.time_s, track.time_s, 0.5 * track.two_sigma_r_m),
+            )
+            for one, track in zip(geometry, bound.tracks, strict=True)
+        ]
+    )
+
+
+def map_figure(runs: Sequence[AlgorithmRun]) -> CooperativeMap:
+    """Spectral radius of the joint error map of every decentralised run, window by window."""
+    return CooperativeMap(
+        time_s=np.concatenate([run.map_time_s for run in runs]),
+        algorithm=np.concatenate([np.full(len(run.map_time_s), run.algorithm) for run in runs]),
+        spectral_radius=np.concatenate([run.map_radius for run in runs]),
+    )
+
+
+def links_figure(prepared: Prepared, run: AlgorithmRun) -> CooperativeLinks:
+    """Innovations of every range of one algorithm; mark 1 used, -1 gated."""
+    judged, events = run.judged, prepared.events
+    kind, source, receiver = (part[judged.event].tolist() for part in (events.kind, events.source, events.receiver))
+    names = [vehicle.name for vehicle in prepared.vehicles]
+    return CooperativeLinks(
+        time_s=events.time_s[judged.event],
+        receiver=np.array([names[one] for one in receiver], dtype=np.str_),
+        source=np.array([source_name(prepared, *one) for one in zip(kind, source, strict=True)], dtype=np.str_),
+        innovation=judged.innovation,
+        sigma=judged.sigma,
+        mark=judged.mark,
+    )
+
+
+def traffic_figure(runs: Sequence[AlgorithmRun]) -> CooperativeTraffic:
+    """Messages and bytes of every vehicle under every algorithm."""
+    rows = [(run.algorithm, name, *sent) for run in runs for name, sent in sorted(run.messages.items())]
+    return CooperativeTraffic(
+        algorithm=np.array([row[0] for row in rows], dtype=np.str_),
+        vehicle=np.array([row[1] for row in rows], dtype=np.str_),
+        messages=np.array([row[2] for row in rows], dtype=np.int64),
+        bytes=np.array([row[3] for row in rows], dtype=np.int64),
+    )

@@ -1,0 +1,156 @@
+"""Predicted measurements and their derivatives; tests check them by central differences."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+from groundstation.base.geodesy import EARTH_RATE_RADPS
+from groundstation.systems.cooperative.arrays import HEIGHT, PEER, POINT, SATELLITE
+from groundstation.systems.cooperative.observation import LIGHT_MPS, NEAREST_M
+from groundstation.systems.cooperative.plain.steps import Event
+from groundstation.systems.cooperative.vehicles import Vehicle, View
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One scalar measurement, linearised.
+
+    innovation = h (receiver) + place (source) + clock (source) + noise.
+
+    Parameters
+    ----------
+    innovation : float
+        Measured minus predicted.
+    receiver : ndarray, shape (n,)
+        Derivative of the prediction by the receiver's state.
+    place : ndarray, shape (3,)
+        By the source's position.
+    clock : float
+        By the source's clock offset.
+    variance : float
+        Of the sensor alone.
+    """
+
+    innovation: float
+    receiver: FloatArray
+    place: FloatArray
+    clock: float
+    variance: float
+
+    def by_source(self, vehicle: Vehicle, derivative: FloatArray) -> FloatArray:
+        """Derivative by the state of a vehicle that is the source."""
+        h = self.place @ derivative
+        if vehicle.clock >= 0 and self.clock != 0.0:
+            h[vehicle.clock] += self.clock
+        return h
+
+
+def rows_of(
+    event: Event,
+    vehicle: Vehicle,
+    x: FloatArray,
+    source_m: FloatArray | None,
+    source_clock_m: float,
+    about_m: FloatArray | None = None,
+) -> list[Row]:
+    """Linearise one event about the receiver's state and what is known of the source.
+
+    Parameters
+    ----------
+    event : Event
+    vehicle : Vehicle
+        The receiver.
+    x : ndarray, shape (n,)
+        Its state at the time of the event.
+    source_m : ndarray, shape (3,), optional
+        Position of a peer; points and satellites carry their own.
+    source_clock_m : float
+        Clock offset of a peer; 0 else.
+    about_m : ndarray, shape (3,), optional
+        Line from the source to the receiver about which the range is linearised; None: that of the estimate.
+
+    Returns
+    -------
+    list of Row
+        Range, then bearing, as far as the event has them.
+    """
+    if event.kind == HEIGHT:
+        h = np.zeros(vehicle.size)
+        h[vehicle.height] = -1.0
+        predicted = vehicle.height_m(event.time_s) - float(x[vehicle.height])
+        return [Row(event.value_m - predicted, h, np.zeros(3), 0.0, event.variance_m2)]
+    source = (event.place_m if source_m is None else source_m) - event.arm_m
+    view = vehicle.view(x, event.time_s)
+    line = view.place_m - source
+    distance = float(np.sqrt(line @ line))
+    if distance < NEAREST_M:
+        return []
+    rows = []
+    if np.isfinite(event.value_m):
+        direction = line / distance
+        if about_m is not None:
+            distance = float(np.sqrt(about_m @ about_m))
+            direction = about_m / distance
+            distance += float(direction @ (line - about_m))
+        rows.append(_range_row(event, vehicle, x, view, source, source_clock_m, direction, distance))
+    if np.isfinite(event.bearing_rad):
+        rows.append(_bearing_row(event, view, -line))
+    return rows
+
+
+def _range_row(
+    event: Event,
+    vehicle: Vehicle,
+    x: FloatArray,
+    view: View,
+    source: FloatArray,
+    source_clock_m: float,
+    direction: FloatArray,
+    distance: float,
+) -> Row:
+    if event.kind == SATELLITE:
+        direction, distance = _while_the_earth_turns(view.place_m, source, distance)
+    predicted = distance
+    h = direction @ view.derivative
+    by_source, by_clock = -direction, 0.0
+    clock = vehicle.receiver_clock if event.kind == SATELLITE else vehicle.clock
+    if clock >= 0 and not event.is_two_way:
+        predicted += float(x[clock]) - source_clock_m
+        h[clock] += 1.0
+        by_clock = 0.0 if event.kind in (POINT, SATELLITE) else -1.0
+    if event.kind != SATELLITE:
+        error, by_error, scale = vehicle.range_error(x, distance, is_peer=event.kind == PEER)
+        predicted += error
+        h = (1.0 + scale) * h + by_error if scale else h + by_error
+        by_source = (1.0 + scale) * by_source
+    return Row(event.value_m - predicted, h, by_source, by_clock, event.variance_m2)
+
+
+def _while_the_earth_turns(place: FloatArray, source: FloatArray, distance: float) -> tuple[FloatArray, float]:
+    """Return direction and distance from a satellite's place at emission.
+
+    They are in the ECEF axes of the instant of reception.
+    """
+    line = place - source
+    for _ in range(3):  # each gains six digits
+        turn = EARTH_RATE_RADPS * distance / LIGHT_MPS
+        cosine, sine = np.cos(turn), np.sin(turn)
+        x, y = cosine * source[0] + sine * source[1], cosine * source[1] - sine * source[0]
+        line = place - np.array([x, y, source[2]])
+        distance = float(np.sqrt(line @ line))
+    return line / distance, distance
+
+
+def _bearing_row(event: Event, view: View, line: FloatArray) -> Row:
+    """Return the row of a bearing off the sensor's heading.
+
+    The bearing is the direction to the source less the heading; ``line`` leads from the sensor to the source.
+    """
+    north, east = float(line[0]), float(line[1])
+    square = north * north + east * east
+    by_line = np.array([-east, north, 0.0]) / square
+    h = -by_line @ view.derivative - view.by_heading
+    innovation = event.bearing_rad - (np.arctan2(east, north) - view.heading_rad)
+    wrapped = float((innovation + np.pi) % (2.0 * np.pi) - np.pi)
+    return Row(wrapped, h, by_line, 0.0, event.bearing_variance_rad2)

@@ -1,0 +1,38 @@
+"""Monte Carlo study of navigation between aircraft.
+
+Every published figure with ours beside it, and how honest ours is.
+"""
+
+from collections.abc import Sequence
+
+from groundstation.systems.cooperative.study.cases import CASES, FIRST_SEED, Case
+from groundstation.systems.cooperative.study.page import page, study_table
+from groundstation.systems.cooperative.study.runs import WORKERS, Progress, run_cases
+from groundstation.systems.study import StudyResult
+
+
+def study_cooperative(
+    runs: int = 100,
+    seed: int = 0,
+    progress: Progress | None = None,
+    *,
+    cases: Sequence[Case] = CASES,
+    workers: int = WORKERS,
+) -> StudyResult:
+    """Fly every published case and compare.
+
+    Parameters
+    ----------
+    runs : int
+        Sessions of each case; 100 give NEES to 10 %.
+    seed : int
+        The runs' seed is ``FIRST_SEED + seed``.
+    progress : callable, optional
+        Called with one line for each case.
+    cases : sequence of Case
+    workers : int
+        Processes; the answer does not depend on them.
+    """
+    outcomes = run_cases(cases, runs, FIRST_SEED + seed, progress, workers)
+    table = study_table(cases, outcomes)
+    return StudyResult("cooperative", (table,), page(cases, table, runs, FIRST_SEED + seed))

@@ -1,0 +1,195 @@
+"""Results of a run: every vehicle's states at the times of output, and counts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+from groundstation.base.records import Int64Array, frozen
+from groundstation.systems.cooperative.arrays import (
+    CLOCK_LEAPS,
+    COUNTS,
+    GATED,
+    JUDGED,
+    LOST,
+    UNUSED,
+    USED,
+    Items,
+    Log,
+)
+from groundstation.systems.cooperative.events import Prepared
+from groundstation.systems.cooperative.motion import positions
+
+
+@dataclass(frozen=True)
+class Track:
+    """One vehicle under one algorithm.
+
+    Parameters
+    ----------
+    name : str
+    time_s : ndarray, shape (n,)
+    position_m : ndarray, shape (n, 3)
+        Estimated, frame of the session.
+    state : ndarray, shape (n, m)
+    covariance : ndarray, shape (n, m, m)
+    height : int
+        Index of the height in the state; -1 where there is none.
+    """
+
+    name: str
+    time_s: FloatArray
+    position_m: FloatArray
+    state: FloatArray
+    covariance: FloatArray
+    height: int = -1
+
+    def __post_init__(self) -> None:
+        for name in ("time_s", "position_m", "state", "covariance"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    @property
+    def horizontal_m2(self) -> FloatArray:
+        """Covariance north, east, shape (n, 2, 2)."""
+        return self.covariance[:, :2, :2]
+
+    @property
+    def two_sigma_r_m(self) -> FloatArray:
+        """Twice sqrt(sx^2 + sy^2), shape (n,)."""
+        return 2.0 * np.sqrt(self.covariance[:, 0, 0] + self.covariance[:, 1, 1])
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlation of the errors north and east, shape (n,); 0 where one is exact."""
+        product = np.sqrt(self.covariance[:, 0, 0] * self.covariance[:, 1, 1])
+        both = self.covariance[:, 0, 1]
+        return np.asarray(np.divide(both, product, out=np.zeros(len(both)), where=product > 0.0))
+
+    @property
+    def sigma_up_m(self) -> FloatArray:
+        """Sigma of the height, shape (n,); NaN for a vehicle whose height is no state."""
+        if self.height < 0:
+            return np.full(len(self.time_s), np.nan)
+        return np.sqrt(self.covariance[:, self.height, self.height])
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Measurements as the filter judged them: innovation, sigma, used (1) or gated (-1).
+
+    Parameters
+    ----------
+    event : ndarray of int, shape (r,)
+        Which of the prepared events.
+    innovation, sigma : ndarrays, shape (r,)
+        Metres; radians of a bearing.
+    mark : ndarray of int, shape (r,)
+    """
+
+    event: Int64Array
+    innovation: FloatArray
+    sigma: FloatArray
+    mark: Int64Array
+
+    def __post_init__(self) -> None:
+        for name in ("event", "innovation", "sigma", "mark"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def __len__(self) -> int:
+        return len(self.event)
+
+
+@dataclass(frozen=True)
+class AlgorithmRun:
+    """One algorithm over one session.
+
+    Parameters
+    ----------
+    algorithm, update : str
+    tracks : tuple of Track
+        In the order of the vehicles.
+    judged : Judged
+    counts : dict
+        ``used``, ``gated``, ``lost``, ``unused``, ``clock_leaps``, ``reopened``.
+    messages : dict of vehicle to (messages, bytes)
+    map_time_s, map_radius : ndarrays, shape (w,)
+        Spectral radius of the joint error map over each window; empty for a centralised filter.
+    """
+
+    algorithm: str
+    update: str
+    tracks: tuple[Track, ...]
+    judged: Judged
+    counts: dict[str, int]
+    messages: dict[str, tuple[int, int]]
+    map_time_s: FloatArray
+    map_radius: FloatArray
+
+
+def log_for(prepared: Prepared, items: Items) -> Log:
+    """Make an empty log for a run."""
+    k, n = prepared.fleet.density.shape
+    outputs, rows = int((items.vehicle >= 0).sum()), len(prepared.events.time_s)
+    return Log(
+        np.zeros((outputs, n)),
+        np.zeros((outputs, n, n)),
+        np.zeros(rows, dtype=np.int64),
+        np.zeros(rows),
+        np.zeros(rows),
+        np.zeros(rows, dtype=np.int64),
+        np.zeros(COUNTS, dtype=np.int64),
+        np.zeros(k, dtype=np.int64),
+    )
+
+
+def finished(
+    prepared: Prepared,
+    items: Items,
+    log: Log,
+    algorithm: str,
+    update: str,
+    messages: dict[str, tuple[int, int]],
+    radius: tuple[list[float], list[float]] = ([], []),
+) -> AlgorithmRun:
+    """Return everything as one frozen answer.
+
+    ``radius``: times, and spectral radii of the error map.
+    """
+    rows = int(log.counts[JUDGED])
+    mark = log.mark[:rows]
+    counts = {
+        "used": int((mark == USED).sum()),
+        "gated": int((mark == GATED).sum()),
+        "lost": int(log.counts[LOST]),
+        "unused": int(log.counts[UNUSED]),
+        "clock_leaps": int(log.counts[CLOCK_LEAPS]),
+    }
+    return AlgorithmRun(
+        algorithm,
+        update,
+        tuple(_track(prepared, items, log, who) for who in range(len(prepared.vehicles))),
+        Judged(log.event[:rows], log.innovation[:rows], np.sqrt(log.variance[:rows]), mark),
+        {name: count for name, count in counts.items() if count},
+        messages,
+        np.array(radius[0]),
+        np.array(radius[1]),
+    )
+
+
+def _track(prepared: Prepared, items: Items, log: Log, who: int) -> Track:
+    vehicle, n = prepared.vehicles[who], prepared.vehicles[who].size
+    mine = items.vehicle[items.vehicle >= 0] == who
+    time_s = items.time_s[items.vehicle == who]
+    state, covariance = log.x[mine][:, :n], log.P[mine][:, :n, :n]
+    position_m = np.empty((len(time_s), 3))
+    positions(prepared.fleet, who, time_s, np.ascontiguousarray(state), np.empty((3, n)), position_m)
+    return Track(vehicle.name, time_s, position_m, state, covariance, vehicle.height)
+
+
+def counted(prepared: Prepared, sent: Int64Array, size: int) -> dict[str, tuple[int, int]]:
+    """Messages and bytes of every vehicle that sent any."""
+    return {
+        vehicle.name: (count, count * size)
+        for vehicle, count in zip(prepared.vehicles, sent.tolist(), strict=True)
+        if count
+    }

@@ -1,0 +1,70 @@
+"""What a flight lacks for a heading correction, told by the gates that need no estimate."""
+
+from itertools import groupby
+
+import numpy as np
+
+from groundstation.methods.taxi.pair import HEADING_AND_VELOCITY
+from groundstation.methods.taxi.samples import Samples
+from groundstation.systems.analysis import Shortfall
+from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings
+from groundstation.systems.heading.standstill import find_standstill
+from groundstation.systems.heading.taxi import delay_of, straight_taxi
+from groundstation.systems.heading.verdict import STANDSTILL_GATE, Figures, build_gates
+from groundstation.systems.heading.wording import told
+from groundstation.systems.known import Known
+from groundstation.systems.latency.answer import Latencies
+from groundstation.tables.headings import true_heading
+from groundstation.tables.phases import ground_mask
+from groundstation.tables.sources import choose_pair
+from groundstation.tables.table import Flight
+
+STANDSTILL = ("standstill_duration", STANDSTILL_GATE)
+OF_DATA = frozenset((*STANDSTILL, "geometry", "integrity", "ground", "before_take_off", "taxi_seconds", "outliers"))
+Spans = tuple[tuple[float, float], ...]
+
+
+def examine_heading(flight: Flight, known: Known, settings: HeadingSettings) -> tuple[Shortfall, ...]:
+    """Judge the straight taxi of a flight by the gates of the data alone; precision and steadiness are not looked at.
+
+    Raises
+    ------
+    NotAssessableError
+        Where nothing can be estimated, with the reason that the estimate would give.
+    """
+    if known.intervals_problem:
+        raise known.intervals_problem
+    request = HeadingRequest(intervals=known.intervals)
+    topics = choose_pair(flight, HEADING_AND_VELOCITY, request.ins_topic, request.gnss_topic)
+    delay = delay_of(topics, known.answer(Latencies), known.aircraft, settings)
+    samples = straight_taxi(
+        *(flight, *topics),
+        settings=settings,
+        request=request,
+        on_ground=lambda time_ns: ground_mask(flight, time_ns),
+        heading=lambda topic: true_heading(flight, topic),
+        phases=known.phases,
+        gnss_latency_s=delay.latency_s if delay else 0.0,
+    )
+    standstill, taxi = find_standstill(samples, settings).answer, taxi_spans(samples)
+    stood = () if standstill is None else ((standstill.start_s, standstill.end_s),)
+    gates = build_gates(samples, standstill, _unestimated(samples, taxi), settings)
+    return tuple(
+        Shortfall(told((gate,)), () if gate.value is None else stood if gate.name in STANDSTILL else taxi)
+        for gate in gates
+        if gate.name in OF_DATA and gate.required and gate.state != "passed"
+    )
+
+
+def taxi_spans(samples: Samples) -> Spans:
+    """Flight seconds of the straight segments used."""
+    used = np.flatnonzero(samples.is_used)
+    runs = [list(rows) for _, rows in groupby(used, key=lambda row: samples.segment[row])]
+    return tuple((float(samples.time_s[rows[0]]), float(samples.time_s[rows[-1]])) for rows in runs)
+
+
+def _unestimated(samples: Samples, taxi: Spans) -> Figures:
+    """Figures of the gates without those that an estimate gives."""
+    seconds = sum(end_s - start_s + samples.interval_s for start_s, end_s in taxi)
+    nan = float("nan")
+    return Figures(nan, nan, nan, nan, nan, float(seconds), None, None, None, None, None, None, ())

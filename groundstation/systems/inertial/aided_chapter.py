@@ -1,0 +1,104 @@
+"""Chapter on an INS that GNSS corrects, or may correct.
+
+INS - GNSS, and the innovations that its own filter logged.
+"""
+
+from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
+from groundstation.chapters.wording import ABSENT, any_value, clock, number, percent, typeset, unit_sign
+from groundstation.systems.inertial.answer import Difference, InertialResult, OwnInnovation
+
+TITLE = "INS against GNSS"
+HEADLINES = {"gnss_aided": "GNSS corrects this INS", "unknown": "It is not known whether GNSS corrects this INS"}
+LEAD = "INS − GNSS shows how closely this INS follows its receiver, not how good either of them is."
+PLACES = {"m": 2, "mps": 3}
+
+
+def aided(answer: InertialResult) -> Section:
+    """Return the chapter of an INS that GNSS corrects, or may correct."""
+    position = answer.difference("position")
+    is_known = answer.kind == "gnss_aided"
+    within = f": within {number(position.p95, 1, 'm')} of it (95 %)" if position is not None and is_known else ""
+    parts: tuple[Part | None, ...] = (
+        _why(answer),
+        _differences(answer.differences),
+        Figure("inertial.differences", of="position"),
+        Figure("inertial.differences", of="velocity"),
+        _innovations(answer),
+        Figure("inertial.own_innovations"),
+    )
+    headline = f"{HEADLINES[answer.kind]}{within}"
+    return Section(
+        "inertial", TITLE, LEAD, kept(parts), headline, claim=_claim(answer, headline), appendix=(_pair(answer),)
+    )
+
+
+def _claim(answer: InertialResult, headline: str) -> Claim:
+    rows = [row for row in (answer.difference("position"), answer.difference("velocity")) if row is not None]
+    figures = tuple(
+        (f"INS − GNSS, {row.quantity}", number(row.p95, PLACES.get(row.unit, 3) - 1, unit_sign(row.unit)), "95 %")
+        for row in rows
+    )
+    reason = typeset(answer.kind_reason).strip().rstrip(".")
+    sentences = (f"{reason[:1].upper()}{reason[1:]}.",) if reason else ()
+    value = figures[0][1] if figures else ""
+    remark = "INS − GNSS, 95 %; its own drift cannot be seen" if figures else "its own drift cannot be seen"
+    word = "Aided" if answer.kind == "gnss_aided" else "Open"
+    return Claim(Rank.INERTIAL_OPEN, Mark("unknown", word), headline, value, remark, sentences, figures)
+
+
+def _why(answer: InertialResult) -> Note:
+    reason = typeset(answer.kind_reason).strip().rstrip(".")
+    unseen = "Errors that GNSS removes cannot be seen against GNSS, so nothing is estimated, corrected or forecast."
+    if answer.kind == "gnss_aided":
+        return Note(f"GNSS corrects this INS already: {reason}. {unseen}")
+    text = f"{HEADLINES[answer.kind]}: {reason}. {unseen} To decide it, state ins_kind in the aircraft file."
+    return Note(text, "unknown")
+
+
+def _differences(rows: tuple[Difference, ...]) -> Grid | None:
+    heads = (Head("INS − GNSS"), *(Head(title, True) for title in ("Mean", "Median", "95 %", "Largest", "Epochs")))
+    caption = "Mean with its sign; median, 95 % and largest of the magnitude."
+    cells = [(_title(row), *_sizes(row), _of(row, row.largest), number(row.samples, 0)) for row in rows]
+    return Grid("INS − GNSS", heads, cells, caption, ("inertial_differences",)) if cells else None
+
+
+def _innovations(answer: InertialResult) -> Grid | None:
+    rows = answer.own_innovations
+    titles = ["Mean", "Median", "95 %"]
+    has_sigma = any(row.sigma is not None for row in rows)
+    has_gate = any(row.share_rejected is not None for row in rows)
+    titles += ["Its σ", "Inside ± 1.96 σ"] if has_sigma else []
+    titles += ["Beyond its gate"] if has_gate else []
+    cells = []
+    for row in rows:
+        judged = [_of(row, row.sigma), percent(row.share_inside95, 1)] if has_sigma else []
+        judged += [percent(row.share_rejected, 1)] if has_gate else []
+        cells.append((_title(row), *_sizes(row), *judged, number(row.samples, 0)))
+    heads = (Head("Innovation"), *(Head(title, True) for title in (*titles, "Samples")))
+    caption = (
+        f"GNSS − what the INS's own filter predicted, from topic {answer.own_filter}. A mean far from zero, or many "
+        "samples beyond the gate, show that the filter and its receiver disagree."
+    )
+    return Grid("Innovations of the INS's own filter", heads, cells, caption) if cells else None
+
+
+def _title(row: Difference | OwnInnovation) -> str:
+    return f"{row.quantity.capitalize()} {row.axis}, {unit_sign(row.unit)}"
+
+
+def _sizes(row: Difference | OwnInnovation) -> tuple[str, str, str]:
+    mean = ABSENT if row.axis == "horizontal" else number(row.mean, PLACES.get(row.unit, 3), signed=True)
+    return mean, _of(row, row.median), _of(row, row.p95)
+
+
+def _of(row: Difference | OwnInnovation, value: float | None) -> str:
+    return number(value, PLACES.get(row.unit, 3))
+
+
+def _pair(answer: InertialResult) -> Facts:
+    others = f"not used: {any_value(answer.other_ins)}" if answer.other_ins else ""
+    pairs = (
+        ("Pair used", f"{answer.ins_topic} against {answer.gnss_topic}", others),
+        ("Epochs compared", number(answer.epochs, 0), f"{clock(answer.gnss_seconds)} of the flight with GNSS"),
+    )
+    return Facts("What was compared", pairs)

@@ -1,0 +1,151 @@
+"""System 2 as analyses: errors of the INS, and their forecast replayed on the flight."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from groundstation.base.errors import NotAssessableError
+from groundstation.methods.ins_noise import choose_class
+from groundstation.methods.roles import InsKinds
+from groundstation.results.answer import Answers, answer_of
+from groundstation.systems.analysis import Analysis, Found, RestsOn, Shortfall
+from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.inertial.columns import FORECAST_COLUMNS, INERTIAL_COLUMNS
+from groundstation.systems.inertial.forecast_answer import ForecastResult
+from groundstation.systems.inertial.settings import InertialSettings
+from groundstation.systems.known import AircraftData, Known
+from groundstation.tables.phases import Phases
+
+if TYPE_CHECKING:
+    from groundstation.tables.table import Flight
+
+FIELDS = ("latitude_deg", "longitude_deg", "velocity_north_mps", "velocity_east_mps")
+
+
+def take_off_s(phases: Phases) -> float:
+    """Return the flight time of the first lift-off.
+
+    0 for a log that begins in the air or never leaves the ground.
+    """
+    airborne = np.flatnonzero(phases.phase == "airborne")
+    return float(phases.start_s[airborne[0]]) if airborne.size else 0.0
+
+
+def _run(flight: "Flight", known: Known, settings: InertialSettings) -> Found[InertialResult]:
+    from groundstation.systems.inertial.aided import compare_aided
+    from groundstation.systems.inertial.estimate import estimate_compared
+    from groundstation.systems.inertial.examine import compared_with_kind
+    from groundstation.tables.ins_kind import UNAIDED
+
+    compared, kind = compared_with_kind(flight, known, settings)
+    if kind[0] != UNAIDED:
+        return Found(*compare_aided(flight, kind, settings=settings, excluded_s=known.excluded_s))
+    aircraft = known.aircraft
+    found = estimate_compared(
+        flight,
+        compared,
+        kind,
+        settings=settings,
+        aircraft_class=aircraft.ins_class,
+        nav_start_utc=aircraft.nav_start_utc,
+    )
+    return Found(found.result, found.findings, found)
+
+
+def _examine(flight: "Flight", known: Known, settings: InertialSettings) -> tuple[Shortfall, ...]:
+    from groundstation.systems.inertial.examine import examine_inertial
+
+    return examine_inertial(flight, known, settings)
+
+
+def _ins_kinds(known: Known) -> InsKinds:
+    from groundstation.systems.inertial.examine import offered
+
+    return offered(known)
+
+
+def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -> Found[ForecastResult]:
+    from groundstation.systems.inertial.estimate import Estimation
+    from groundstation.systems.inertial.forecast import assess_forecast
+    from groundstation.systems.inertial.kind import WHY_NOT
+    from groundstation.tables.ins_kind import AIDED
+
+    estimation = known.workings_of(Estimation)
+    if estimation is None:
+        inertial = known.answer(InertialResult)
+        says = WHY_NOT[AIDED if inertial is None else inertial.kind]
+        why = f" ({inertial.kind_reason})" if inertial is not None else ""
+        raise NotAssessableError("forecast", f"{says}{why}: its errors are not estimated")
+    phases = known.phases
+    return Found(assess_forecast(estimation, settings=settings, phase_of=phases.at, take_off_s=take_off_s(phases)))
+
+
+def _check(settings: InertialSettings, aircraft: AircraftData) -> None:
+    choose_class(settings.ins_class, aircraft.ins_class)
+
+
+def _rests_on(flight: "Flight", result: InertialResult) -> RestsOn:
+    topics = (result.ins_topic, result.gnss_topic)
+    both = [flight.time_s(topic) for topic in topics]
+    return RestsOn(topics, FIELDS, ((max(float(time[0]) for time in both), min(float(time[-1]) for time in both)),))
+
+
+def _is_forecast_expected(_flight: "Flight", known: Known) -> bool:
+    """Tell whether a forecast is expected.
+
+    For an INS that GNSS corrects, or may correct, a finding says already that a forecast means nothing.
+    """
+    inertial = known.answer(InertialResult)
+    return inertial is None or inertial.kind == "unaided"
+
+
+def _sentence(answers: Answers) -> str:
+    inertial, forecast = answer_of(answers, InertialResult), answer_of(answers, ForecastResult)
+    if inertial is None:
+        return ""
+    if inertial.kind != "unaided":
+        position = inertial.difference("position")
+        says = "INS corrected by GNSS" if inertial.kind == "gnss_aided" else "INS perhaps corrected by GNSS"
+        within = "" if position is None else f", within {position.p95:.1f} m of it (95 %)"
+        return f"{says}{within}: no errors, no forecast"
+    parts = []
+    if inertial.radial_error_rate_fit_nmiph is not None:
+        parts.append(f"{inertial.radial_error_rate_fit_nmiph:.2f} nmi/h")
+    elif inertial.navigation_start is not None and inertial.navigation_start.time_s is None:
+        parts.append("no rate: start of navigation not known")
+    if forecast is not None:
+        shipped = [row for row in forecast.skill if row.method == forecast.default_method]
+        longest = max(shipped, key=lambda row: row.horizon_min, default=None)
+        if longest is not None:
+            parts.append(f"forecast {longest.rms_m:.0f} m after {longest.horizon_min:g} min")
+    return f"INS {', '.join(parts)}" if parts else "INS errors estimated"
+
+
+INERTIAL = Analysis(
+    name="inertial",
+    title="INS errors estimated against GNSS, two channels of six states (Neusypin et al. 2003)",
+    subject="INS errors",
+    needs="ins and gnss positions (velocities too if logged), five minutes of both together",
+    settings=InertialSettings,
+    answer=InertialResult,
+    run=_run,
+    rests_on=_rests_on,
+    sentence=_sentence,
+    check=_check,
+    columns=INERTIAL_COLUMNS,
+    examine=_examine,
+    offers={InsKinds: _ins_kinds},
+)
+FORECAST = Analysis(
+    name="forecast",
+    title="forecast of the INS errors without GNSS, replayed throughout the flight",
+    subject="forecast of INS errors",
+    needs="what inertial needs, of an INS that GNSS does not correct; a calibration needs one Schuler period",
+    settings=InertialSettings,
+    answer=ForecastResult,
+    run=_run_forecast,
+    table="inertial",
+    requires=("inertial",),
+    is_expected=_is_forecast_expected,
+    columns=FORECAST_COLUMNS,
+)

@@ -1,0 +1,33 @@
+"""Columns that INS errors and their forecast give to the tables of flights."""
+
+from groundstation.results.columns import AnswerColumn
+from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.inertial.forecast_answer import ForecastResult
+
+INERTIAL_COLUMNS: tuple[AnswerColumn[InertialResult], ...] = (
+    AnswerColumn("ins_kind", "category", "unaided, gnss_aided or unknown", lambda inertial: inertial.kind),
+    AnswerColumn("radial_error_rate_fit_nmiph", "number", "INS radial position error rate, time-position fit"),
+    AnswerColumn("radial_error_rate_50_nmiph", "number", "the same, median over time"),
+    AnswerColumn("radial_error_rate_95_nmiph", "number", "the same, not exceeded 95 % of the time"),
+)
+
+
+def _rms_m(forecast: ForecastResult, horizon_min: float) -> float | None:
+    """RMS of the shipped method at a horizon; None where it was not replayed."""
+    rows = {row.horizon_min: row.rms_m for row in forecast.skill if row.method == forecast.default_method}
+    return rows.get(horizon_min)
+
+
+FORECAST_COLUMNS: tuple[AnswerColumn[ForecastResult], ...] = (
+    AnswerColumn(
+        "forecast_method", "category", "method the forecast figures belong to", lambda forecast: forecast.default_method
+    ),
+    AnswerColumn(
+        "forecast_30min_rms_m",
+        "number",
+        "radial error of the forecast after 30 min, RMS over starts",
+        lambda forecast: _rms_m(forecast, 30.0),
+    ),
+    AnswerColumn("forecast_60min_rms_m", "number", "after 60 min", lambda forecast: _rms_m(forecast, 60.0)),
+    AnswerColumn("forecast_120min_rms_m", "number", "after 120 min", lambda forecast: _rms_m(forecast, 120.0)),
+)

@@ -1,0 +1,152 @@
+"""Conclusions of the chapter on the forecast: skill, honesty of the sigma, windows."""
+
+from collections.abc import Mapping, Sequence
+
+from groundstation.chapters.parts import Note
+from groundstation.chapters.wording import is_number, number, percent, typeset
+from groundstation.systems.inertial.forecast_answer import FEWEST_STARTS, METHODS, ForecastResult, SkillRow
+
+HONEST = (0.90, 0.98)  # shares inside the 95 % band that pass for it
+SAME = 0.03  # two RMS values closer than this are not told apart
+HEADLINE_MIN = 60.0  # the horizon the conclusion quotes, or the longest there is
+
+
+def conclusions(answer: ForecastResult) -> list[Note]:
+    """Return a sentence or two for skill, honesty and windows."""
+    return [note for note in (_gain(answer), _honesty(answer), _windows(answer)) if note is not None]
+
+
+def rows_of(answer: ForecastResult, method: str) -> dict[float, SkillRow]:
+    """Return skill rows of a method by horizon, those that have an error."""
+    return {
+        float(row.horizon_min): row
+        for row in answer.skill
+        if row.method == method and is_number(row.horizon_min) and is_number(row.rms_m)
+    }
+
+
+def title_of(method: str) -> str:
+    """Return the title of a method for people."""
+    return METHODS.get(method, method)
+
+
+def _gain(answer: ForecastResult) -> Note | None:
+    default = answer.default_method
+    shipped, raw = rows_of(answer, default), rows_of(answer, "raw_ins")
+    shared = sorted(set(shipped) & set(raw))
+    if not shared:
+        return None
+    horizon = HEADLINE_MIN if HEADLINE_MIN in shared else shared[-1]
+    ours, theirs = shipped[horizon].rms_m, raw[horizon].rms_m
+    better = [lead for lead in shared if shipped[lead].rms_m < raw[lead].rms_m]
+    text = (
+        f"After {horizon:g} min without GNSS the shipped method ({title_of(default)}) is off by {number(ours, 0, 'm')} "
+        f"RMS, the raw INS by {number(theirs, 0, 'm')}, over {number(shipped[horizon].starts, 0)} starts; it "
+        f"beats the raw INS {_where(better, shared)}."
+    )
+    return Note(text, "good" if len(better) == len(shared) else "warn")
+
+
+def _honesty(answer: ForecastResult) -> Note | None:
+    few = _too_few(answer)
+    known = {
+        lead: row.coverage95
+        for lead, row in rows_of(answer, answer.default_method).items()
+        if is_number(row.coverage95)
+    }
+    shares = {lead: share for lead, share in known.items() if lead not in few}
+    start = _uncalibrated(answer)
+    unjudged = [lead for lead in known if lead in few]
+    why = f"fewer than {FEWEST_STARTS} independent starts"
+    if not shares:
+        text = f"{start}Its σ cannot be judged: {why}." if unjudged else start.strip()
+        return Note(text, "warn" if start else "unknown") if text else None
+    left = f" {_where(unjudged, list(known)).capitalize()} not judged: {why}." if unjudged else ""
+    low, high = percent(min(shares.values())), percent(max(shares.values()))
+    held = low if low == high else f"{low} to {high} (by horizon)"
+    text = f"{start}The 95 % band of the forecast held {held} of the errors: "
+    misfit = _misfit(shares, list(known))
+    if not misfit:
+        return Note(f"{text}the σ it claims is honest on this flight.{left}", "warn" if start else "good")
+    return Note(f"{text}{misfit}.{left}", "warn")
+
+
+def _uncalibrated(answer: ForecastResult) -> str:
+    """Return the sentence that opens the judgement of a forecast that is not calibrated."""
+    if answer.is_calibrated:
+        return ""
+    reason = typeset(answer.calibration_reason).strip().rstrip(".")
+    return f"Not calibrated: {reason or 'too little data before the outage'}. "
+
+
+def _misfit(shares: Mapping[float, float], every: Sequence[float]) -> str:
+    """Return at which horizons the band is too narrow or too wide; empty where it fits."""
+    narrow = [lead for lead, share in shares.items() if share < HONEST[0]]
+    wide = [lead for lead, share in shares.items() if share > HONEST[1]]
+    told = [
+        f"too narrow {_where(narrow, every)}" if narrow else "",
+        f"wider than needed {_where(wide, every)}" if wide else "",
+    ]
+    return " and ".join(filter(None, told))
+
+
+def _too_few(answer: ForecastResult) -> set[float]:
+    """Return the horizons at which the shipped method has too few independent starts."""
+    return {
+        float(row.horizon_min)
+        for row in answer.calibration
+        if row.method == answer.default_method and row.independent_starts < FEWEST_STARTS
+    }
+
+
+def _windows(answer: ForecastResult) -> Note | None:
+    """Return whether the windows of Neusypin 2003 help on this flight.
+
+    They are compared with the last estimate of their own model.
+    """
+    windows, last = rows_of(answer, "windows"), _separate_last(answer)
+    shared = sorted(set(windows) & set(last))
+    if not shared:
+        return None
+    pairs = {lead: (windows[lead].rms_m, last[lead]) for lead in shared}
+    helped = [lead for lead, (ours, theirs) in pairs.items() if ours < (1.0 - SAME) * theirs]
+    hurt = [lead for lead, (ours, theirs) in pairs.items() if ours > (1.0 + SAME) * theirs]
+    told = [_at(verb, leads, pairs) for verb, leads in (("help", helped), ("hurt", hurt)) if leads]
+    sentence = "The long-period windows of Neusypin 2003 " + (
+        " and ".join(told) if told else "change nothing on this flight"
+    )
+    return Note(f"{sentence}. One flight decides nothing: starts overlap.", "plain")
+
+
+def _separate_last(answer: ForecastResult) -> dict[float, float]:
+    """Return the RMS of the last estimate of two separate channels, by horizon.
+
+    The same whichever model the settings forecast by.
+    """
+    found = {float(row.horizon_min): row.rms_m / (1.0 - row.gain) for row in answer.coupled if row.gain < 1.0}
+    return found or {lead: row.rms_m for lead, row in rows_of(answer, "last_estimate").items()}
+
+
+def _at(verb: str, leads: Sequence[float], pairs: Mapping[float, tuple[float, float]]) -> str:
+    windows, last = pairs[leads[-1]]
+    sizes = f"{number(windows, 0, 'm')} against {number(last, 0, 'm')}"
+    example = f"at {leads[-1]:g} min {sizes} of the separate model's last estimate"
+    return f"{verb} {_where(leads, list(pairs))} ({example})"
+
+
+def _where(some: Sequence[float], every: Sequence[float]) -> str:
+    if not some:
+        return "at no horizon"
+    return "at every horizon" if len(some) == len(every) else f"at {listed(some)} min"
+
+
+def listed(values: Sequence[float]) -> str:
+    """Return numbers in a row of words.
+
+    Examples
+    --------
+    >>> listed([30.0, 60.0, 90.0]), listed([1.0])
+    ('30, 60 and 90', '1')
+    """
+    texts = [f"{value:g}" for value in sorted(values)]
+    return texts[0] if len(texts) == 1 else ", ".join(texts[:-1]) + f" and {texts[-1]}"

@@ -1,0 +1,354 @@
+"""Recorded approaches as an analysis: every final of a flight against its runway."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.signals import topics_of_kind
+from groundstation.results.answer import Answers, answer_of
+from groundstation.results.arrays.typed import joined
+from groundstation.results.figures import FigureData
+from groundstation.results.landing_categories import ACCURACY_ONLY, axis_category_met
+from groundstation.systems.analysis import Analysis, Found, RestsOn, Rules, Shortfall
+from groundstation.systems.known import Known
+from groundstation.systems.landing.answer import (
+    Approach,
+    Established,
+    HeightError,
+    LandingResult,
+    LeftOutApproach,
+    PositionError,
+    RunwayUsed,
+    Sensitivity,
+)
+from groundstation.systems.landing.arrays import LandingPath, LandingProtection
+from groundstation.systems.landing.columns import COLUMNS
+from groundstation.systems.landing.figures import path_columns
+from groundstation.systems.landing.finals import Final, ends_of, final_of
+from groundstation.systems.landing.findings import findings_of
+from groundstation.systems.landing.geometry import (
+    ROLL_OUT_MIN_MPS,
+    ROLL_OUT_S,
+    Against,
+    against,
+    along_and_across,
+    line_through,
+    runway_of,
+)
+from groundstation.systems.landing.height import height_error
+from groundstation.systems.landing.path import METRES_PER_DEG, FlightPath, path_of, position_topics, step_of
+from groundstation.systems.landing.protection import protection_along
+from groundstation.systems.landing.reference import (
+    Positions,
+    fits,
+    position_error,
+    sensitivity_of,
+)
+from groundstation.systems.landing.settings import LIMITS, LandingSettings
+from groundstation.systems.landing.stabilised import rejudge, stabilised
+from groundstation.systems.landing.touchdown import touchdown_of
+
+if TYPE_CHECKING:
+    from groundstation.tables.table import Flight
+
+SATELLITES = "GPS"  # as recorders name the source of guidance
+TURN_S = 180.0  # before a final, in which it is turned onto the course
+MOST_APPROACHES = 50
+
+
+@dataclass(frozen=True, eq=False)
+class _Told:
+    """An approach with the arrays behind its figures."""
+
+    approach: Approach
+    path: LandingPath
+    protection: LandingProtection | None
+
+
+def _run(flight: "Flight", known: Known, settings: LandingSettings) -> Found[LandingResult]:
+    path, finals, left_out = _finals(flight, known, settings)
+    told = [_approach(number, flight, path, final, settings) for number, final in enumerate(finals, 1)]
+    approaches = tuple(one.approach for one in told)
+    answer = LandingResult(
+        approaches,
+        left_out,
+        (ACCURACY_ONLY,),
+        asdict(settings),
+        _figures(told),
+    )
+    return Found(answer, findings_of(answer))
+
+
+def _finals(
+    flight: "Flight", known: Known, settings: LandingSettings
+) -> tuple[FlightPath, list[Final], tuple[LeftOutApproach, ...]]:
+    """The path of a flight, its straight finals, and the ends that none leads to.
+
+    Raises
+    ------
+    NotAssessableError
+        Where there is no final.
+    """
+    path = path_of(flight, settings)
+    ends = ends_of(path, known.phases, settings)
+    if not ends:
+        raise NotAssessableError("landing", "no landing in the log, and no guided descent followed by a climb")
+    found = [final_of(path, end, known.site, settings) for end in ends[:MOST_APPROACHES]]
+    left_out = tuple(one for one in found if isinstance(one, LeftOutApproach))
+    finals = [one for one in found if isinstance(one, Final)]
+    if not finals:
+        reasons = list(dict.fromkeys(one.reason for one in left_out))
+        raise NotAssessableError("landing", f"no straight final: {'; '.join(reasons[:3])}")
+    return path, finals, left_out
+
+
+def _examine(flight: "Flight", known: Known, settings: LandingSettings) -> tuple[Shortfall, ...]:
+    """Report ends without a final, and finals without a listed runway or without guidance."""
+    path, finals, left_out = _finals(flight, known, settings)
+
+    def where(some: list[Final]) -> tuple[tuple[float, float], ...]:
+        return tuple((float(path.time_s[one.first]), one.end.time_s) for one in some)
+
+    unlisted, unguided = ([one for one in finals if getattr(one, name) is None] for name in ("runway", "established"))
+    found = [Shortfall(f"no straight final: {one.reason}", ((one.time_s, one.time_s),)) for one in left_out]
+    if unlisted:
+        found.append(Shortfall("no runway of the site file: course and threshold from the positions", where(unlisted)))
+    if unguided:
+        found.append(Shortfall("no guidance followed: errors across the course are not measured", where(unguided)))
+    return tuple(found)
+
+
+def _figures(told: Sequence[_Told]) -> tuple[FigureData, ...]:
+    """All approaches, one after the other, and the protection levels of those that have any."""
+    levels = [one.protection for one in told if one.protection is not None]
+    return joined([one.path for one in told]), *([joined(levels)] if levels else [])
+
+
+def _approach(number: int, flight: "Flight", path: FlightPath, final: Final, settings: LandingSettings) -> _Told:
+    runway = runway_of(path, final, settings)
+    near = against(path, final, runway)
+    rows = near.rows
+    height = near.height_m[near.is_final]
+    step_m, source = _step_m(path), _source(flight, path, final)
+    sensitivity = _sensitivity(path, near, runway, source, float(np.hypot(*step_m))) if path.guidance_topic else None
+    errors = _position_errors(flight, path, final, runway, source, sensitivity, settings)
+    protection = protection_along(flight, path.time_s[final.first], final.end.time_s, number)
+    lands = final.end.outcome == "landing"
+    approach = Approach(
+        number,
+        final.end.outcome,
+        float(path.time_s[final.first]),
+        final.end.time_s,
+        float(near.distance_m[0]),
+        float(np.nanmin(height)) if np.isfinite(height).any() else None,
+        path.position_topic,
+        path.guidance_topic,
+        source,
+        path.altitude_source,
+        runway,
+        _established(path, final, near),
+        sensitivity,
+        touchdown_of(flight, path, final, runway, near) if lands else None,
+        stabilised(path, near, settings),
+        errors,
+        None if protection is None else protection[0],
+        _claim(errors, runway),
+        step_m if any(step_m) else None,
+        _height_errors(flight, path, runway, final.end.time_s, settings) if lands else (),
+    )
+    return _Told(approach, path_columns(number, path, near, rows), None if protection is None else protection[1])
+
+
+def _step_m(path: FlightPath) -> tuple[float, float]:
+    """Steps in which positions are written, north and east, metres; 0 where too fine to count."""
+    cosine = float(np.cos(np.deg2rad(np.median(path.latitude_deg))))
+    return step_of(path.latitude_deg) * METRES_PER_DEG, step_of(path.latitude_deg) * METRES_PER_DEG * cosine
+
+
+def _source(flight: "Flight", path: FlightPath, final: Final) -> str:
+    """Return the source of guidance at the end of the final, as the recorder names it."""
+    if not path.guidance_topic:
+        return ""
+    table = flight[path.guidance_topic]
+    names = table.text("source")[flight.time_s(path.guidance_topic) <= final.end.time_s]
+    frequency = table.values("frequency_mhz")[flight.time_s(path.guidance_topic) <= final.end.time_s]
+    name = next((str(one) for one in names[::-1] if one), "")
+    tuned = frequency[np.isfinite(frequency)]
+    return name or (f"{tuned[-1]:.2f} MHz" if tuned.size else "")
+
+
+def _established(path: FlightPath, final: Final, near: Against) -> Established | None:
+    if final.established is None:
+        return None
+    first, last = final.established
+    rows = slice(first, last)
+    own = slice(first - near.rows.start, last - near.rows.start)
+    line = line_through(path, rows)
+    height = near.height_m[own]
+    vertical_m, vertical_dots = _rms(near.vertical_guidance_m[own]), _rms(path.vertical_dots[rows])
+    return Established(
+        float(path.time_s[first]),
+        float(path.time_s[last - 1]),
+        line.length_m,
+        _or_none(height[0]),
+        _or_none(height[-1]),
+        line.course_deg,
+        _rms(path.lateral_dots[rows]) or 0.0,
+        vertical_dots,
+        _rms(near.lateral_guidance_m[own]) or 0.0,
+        vertical_m,
+    )
+
+
+def _or_none(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _rms(values: FloatArray) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else None
+
+
+def _sensitivity(path: FlightPath, near: Against, runway: RunwayUsed, source: str, step_m: float) -> Sensitivity:
+    """Estimate the localizer's sensitivity on the final and the turn onto it.
+
+    The final alone has few deviations. Satellite guidance is judged on the final only.
+    """
+    last = near.rows.start + int(np.count_nonzero(near.is_final))
+    first = near.rows.start
+    if SATELLITES not in source:  # which guides along the leg before, until the turn is made
+        first = int(np.searchsorted(path.time_s, path.time_s[first] - TURN_S))
+    distance_m, across_m = along_and_across(path.latitude_deg[first:last], path.longitude_deg[first:last], runway)
+    return sensitivity_of(path.time_s[first:last], path.lateral_dots[first:last], distance_m, across_m, runway, step_m)
+
+
+def _position_errors(
+    flight: "Flight",
+    path: FlightPath,
+    final: Final,
+    runway: RunwayUsed,
+    source: str,
+    sensitivity: Sensitivity | None,
+    settings: LandingSettings,
+) -> tuple[PositionError, ...]:
+    """Return the error of each source of positions across the course.
+
+    Nothing where no localizer was followed.
+    """
+    if final.established is None:
+        return ()
+    if SATELLITES in source:
+        reason = "guidance was by a satellite receiver, not a localizer"
+        return (PositionError(path.position_topic, "not measured", reason, 0),)
+    if sensitivity is not None and not fits(sensitivity):
+        reason = f"positions move by {sensitivity.ratio:.2f} of what the localizer shows: no reference"
+        return (PositionError(path.position_topic, "not measured", reason, 0),)
+    start_s, end_s = (float(path.time_s[row]) for row in (final.established[0], final.established[1] - 1))
+    return tuple(
+        _error_of(flight, topic, path, runway, (start_s, end_s, final.end.time_s), final.end.outcome, settings)
+        for topic in position_topics(flight)
+    )
+
+
+def _height_errors(
+    flight: "Flight", path: FlightPath, runway: RunwayUsed, touchdown_s: float, settings: LandingSettings
+) -> tuple[HeightError, ...]:
+    """The error of each recorded altitude of an INS or receiver on the roll-out."""
+    found = (height_error(flight, topic, path, runway, touchdown_s, settings) for topic in position_topics(flight))
+    return tuple(one for one in found if one is not None)
+
+
+def _error_of(
+    flight: "Flight",
+    topic: str,
+    path: FlightPath,
+    runway: RunwayUsed,
+    times_s: tuple[float, float, float],
+    outcome: str,
+    settings: LandingSettings,
+) -> PositionError:
+    """Return the error of a topic's positions on the guided part, then on the roll-out."""
+    table = flight[topic].unique_times()
+    time_s = flight.seconds(table.time_ns)
+    last_s = times_s[2] + (ROLL_OUT_S if outcome == "landing" else 0.0)
+    rows = table.valid("latitude_deg", "longitude_deg") & (time_s >= times_s[0]) & (time_s <= last_s)
+    table, time_s = table.take(rows), time_s[rows]
+    steps = (step_of(flight[topic].values("latitude_deg")),) * 2
+    shift = 0.5 if settings.positions_rounded == "down" else 0.0
+    latitude, longitude = (
+        table.values(name) + shift * step for name, step in zip(("latitude_deg", "longitude_deg"), steps, strict=True)
+    )
+    distance_m, _across = along_and_across(latitude, longitude, runway)
+    order = np.argsort(distance_m)
+    crossing_s = float(np.interp(0.0, distance_m[order], time_s[order])) if len(order) else times_s[1]
+    speed = np.interp(time_s, path.time_s, path.ground_speed_mps)
+    positions = Positions(topic, time_s - crossing_s, latitude, longitude, steps)
+    return position_error(
+        positions,
+        np.interp(time_s, path.time_s, path.lateral_dots, left=np.nan, right=np.nan),
+        (time_s <= times_s[1]),
+        (time_s > times_s[2]) & (speed >= ROLL_OUT_MIN_MPS),
+        runway,
+        crossing_s,
+        settings,
+    )
+
+
+def _claim(errors: tuple[PositionError, ...], runway: RunwayUsed) -> str:
+    """Tell what accuracy across the course the log supports."""
+    measured = next((one for one in errors if one.state == "measured"), None)
+    if measured is None or measured.confidence95_m is None:
+        return "" if not errors else errors[0].reason
+    bound_m = max(abs(end) for end in measured.confidence95_m)
+    met = axis_category_met(bound_m, "horizontal")
+    text = (
+        f"{measured.topic} within {bound_m:.0f} m across the course at the threshold, with the localizer as reference"
+    )
+    return f"{text}: {'the figure of ' + met.label if met else 'no category'} across the course"
+
+
+def _is_expected(flight: "Flight", _known: Known) -> bool:
+    return any(topics_of_kind("guidance", flight.topics()))
+
+
+def _rests_on(_flight: "Flight", answer: LandingResult) -> RestsOn:
+    topics = {one.position_topic for one in answer.approaches} | {one.guidance_topic for one in answer.approaches}
+    fields = ("latitude_deg", "longitude_deg", "lateral_deviation_dots", "vertical_deviation_dots")
+    spans = tuple((one.start_s, one.end_s) for one in answer.approaches)
+    return RestsOn(tuple(sorted(topics - {""})), fields, spans)
+
+
+def _sentence(answers: Answers) -> str:
+    answer = answer_of(answers, LandingResult)
+    return "" if answer is None else "; ".join(sentence_of(one) for one in answer.approaches[:3])
+
+
+def sentence_of(one: Approach) -> str:
+    """An approach in a line."""
+    verdicts = ", ".join(f"{row.verdict} from {row.height_m:.0f} m" for row in one.stabilised if row.time_s is not None)
+    where = f"runway {one.runway.name}" if one.runway.name else f"course {one.runway.true_course_deg:.1f} deg"
+    closely = ""
+    if one.established is not None:
+        closely = f", {one.established.lateral_rms_dots:.2f} dot RMS off the course"
+    return f"{one.outcome} on {where}{closely}{': ' + verdicts if verdicts else ''}"
+
+
+LANDING = Analysis(
+    name="landing",
+    title="approaches and landings against their runway, localizer and glide path",
+    subject="approach",
+    needs="positions, a height, a landing or a go-around; guidance deviations and a site file with the runway add more",
+    settings=LandingSettings,
+    answer=LandingResult,
+    run=_run,
+    is_expected=_is_expected,
+    rests_on=_rests_on,
+    sentence=_sentence,
+    columns=COLUMNS,
+    rules=Rules(LIMITS, rejudge),
+    examine=_examine,
+)

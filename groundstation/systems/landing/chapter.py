@@ -1,0 +1,335 @@
+"""Chapter on recorded approaches.
+
+How each was flown, where it touched down, and what shows accuracy.
+"""
+
+from groundstation.chapters.gates import limit_text, setting_facts, state_of
+from groundstation.chapters.parts import (
+    Cell,
+    Claim,
+    Facts,
+    Figure,
+    Grid,
+    Head,
+    Mark,
+    Note,
+    Part,
+    Rank,
+    Section,
+    Tone,
+    kept,
+)
+from groundstation.chapters.wording import (
+    ABSENT,
+    clock,
+    interval,
+    is_number,
+    number,
+    number_with_unit,
+    percent,
+    sentence,
+    significant,
+    typeset,
+    unit_sign,
+)
+from groundstation.results.flight import FlightResults
+from groundstation.systems.landing.answer import Approach, HeightError, LandingResult, PositionError, StabilisedAt
+
+LEAD = "How each approach was flown against its runway, and where it touched down."
+TITLE = "Approaches"
+TONES: dict[str, Tone] = {"stabilised": "good", "not stabilised": "warn", "not measured": "unknown"}
+MOST_TOLD = 6
+HOW = (
+    "How computed: a final leads straight to a touchdown, or follows the guidance down to a height where a climb "
+    "begins. Deviations are converted to metres by the course sector (two dots to its edge) and by 0.12 of the glide "
+    "angle per dot. If runway and localizer are known, position minus localizer is the error across the course, "
+    "without GNSS: generalised least squares, with tolerances of course line, bends, width, steps and runway bearing "
+    "in the covariance."
+)
+
+
+def landing(results: FlightResults) -> Section | None:
+    """Return the chapter; None without approaches."""
+    answer = results.answer(LandingResult)
+    if answer is None:
+        return None
+    told = answer.approaches[:MOST_TOLD]
+    parts: list[Part | None] = [_overview(answer)]
+    for one in told:
+        parts += _approach(one)
+    if len(answer.approaches) > MOST_TOLD:
+        parts.append(Note(f"Approaches {MOST_TOLD + 1} to {len(answer.approaches)} are only in the table above."))
+    parts += [_left_out(answer), *(Note(sentence(remark)) for remark in answer.remarks)]
+    workings = (
+        *(_basis(one) for one in told),
+        *(Note(HOW), setting_facts(answer.settings, "landing")),
+    )
+    headline, claim = _headline(answer), _claim(answer)
+    return Section("landing", TITLE, LEAD, kept(parts), headline, claim=claim, appendix=kept(workings))
+
+
+def _claim(answer: LandingResult) -> Claim | None:
+    """Return the last landing, or the last approach of a flight without one."""
+    if not answer.approaches:
+        return None
+    landings = [one for one in answer.approaches if one.outcome == "landing"]
+    one = (landings or answer.approaches)[-1]
+    state = _verdict(one)
+    others = len(answer.approaches) - 1
+    also = f" {others} more {'approach' if others == 1 else 'approaches'} in the log." if others else ""
+    return Claim(
+        Rank.LANDING,
+        Mark(state.tone, state.text.capitalize()),
+        f"{_name(one).capitalize()}: {state.text}",
+        value=state.text.capitalize(),
+        remark=_name(one),
+        sentences=(f"{_why(one)}{also}",),
+        figures=_figures(one),
+    )
+
+
+def _why(one: Approach) -> str:
+    """Return the verdict of each gate height, with the criteria that failed."""
+    told = []
+    for at in one.stabilised:
+        failed = [gate.title for gate in at.gates if gate.state == "failed"]
+        height = number(at.height_m, 0, "m")
+        why = f" ({', '.join(failed)})" if failed else ""
+        told.append(f"From {height}: {at.verdict}{why}.")
+    return " ".join(told) or "No gate height was passed."
+
+
+def _figures(one: Approach) -> tuple[tuple[str, str, str], ...]:
+    on, down = one.established, one.touchdown
+    error = next((row for row in one.position_errors if row.state == "measured"), None)
+    found = (
+        ("Off the course", number(on.lateral_rms_dots, 2, "dot") if on else ABSENT, "RMS while established"),
+        ("Off the path", number(on.vertical_rms_dots, 2, "dot") if on else ABSENT, "RMS while established"),
+        ("Sink rate at touchdown", number(down.sink_rate_mps, 1, "m/s") if down else ABSENT, "over the last 3 s"),
+        (
+            "Positions across the course",
+            number(error.error_m, 0, "m", signed=True) if error else ABSENT,
+            f"{error.topic} by the localizer; 95 % {interval(error.confidence95_m, 0, 'm')}" if error else "",
+        ),
+    )
+    return tuple(figure for figure in found if figure[1] != ABSENT)
+
+
+def _headline(answer: LandingResult) -> str:
+    return "; ".join(f"{_name(one)}: {_verdict(one).text}" for one in answer.approaches[:3])
+
+
+def _name(one: Approach) -> str:
+    where = f"runway {typeset(one.runway.name)}" if one.runway.name else f"course {_course(one)}"
+    return f"{one.outcome}, {where}"
+
+
+def _course(one: Approach) -> str:
+    return number(one.runway.true_course_deg, 1, "°")
+
+
+def _verdict(one: Approach) -> Mark:
+    """Return the worst of both gates."""
+    verdicts = [row.verdict for row in one.stabilised]
+    worst = next((word for word in ("not stabilised", "stabilised") if word in verdicts), "not measured")
+    return Mark(TONES[worst], worst)
+
+
+def _overview(answer: LandingResult) -> Grid:
+    titles = ("Straight for, km", "Lateral RMS, dot", "Vertical RMS, dot", "Touchdown, m/s down", "Peak, g")
+    heads = (
+        *(Head(title) for title in ("", "Approach", "Flight time", "Guidance", "From the gates")),
+        *(Head(title, True) for title in titles),
+    )
+    caption = (
+        "RMS of the guidance deviations while established: within half a dot of the course and one dot of the path."
+    )
+    return Grid("Approaches", heads, [_row(one) for one in answer.approaches], caption, ("landing_path",))
+
+
+def _row(one: Approach) -> tuple[Cell, ...]:
+    on, down = one.established, one.touchdown
+    return (
+        str(one.number),
+        _name(one),
+        f"{clock(one.start_s)} – {clock(one.end_s)}",
+        typeset(one.guidance_source or ("ILS" if one.guidance_topic else ABSENT)),
+        _verdict(one),
+        number(one.final_length_m / 1000.0, 1),
+        number(on.lateral_rms_dots, 3) if on else ABSENT,
+        number(on.vertical_rms_dots, 3) if on else ABSENT,
+        number(down.sink_rate_mps, 1) if down else ABSENT,
+        number(down.peak_load_g, 2) if down else ABSENT,
+    )
+
+
+def _approach(one: Approach) -> list[Part | None]:
+    of = str(one.number)
+    return [
+        Note(f"Approach {one.number}, {_name(one)}. {_told(one)}"),
+        Figure("landing.deviations", of),
+        Figure("landing.final", of),
+        _gates(one),
+        _touchdown(one),
+        *(_error(one, error) for error in one.position_errors),
+        *(_height(one, error) for error in one.height_errors),
+        Figure("landing.protection", of) if one.protection else None,
+        _protection(one),
+    ]
+
+
+def _told(one: Approach) -> str:
+    """Return what a reader must know before the figures."""
+    told = [_accuracy(error) for error in one.position_errors[:2]]
+    if one.protection is not None:
+        told.append(
+            "No reference: protection levels bound the error at the integrity that the receiver claims; they are not "
+            "errors."
+        )
+    if not one.guidance_topic:
+        told.append("The log has no guidance; deviations are those of the positions from a line through them.")
+    return " ".join(told)
+
+
+def _accuracy(error: PositionError) -> str:
+    if error.state == "measured":
+        return (
+            f"With the localizer as reference, {error.topic} is {number(error.error_m, 0, 'm', signed=True)} across "
+            f"the course at the threshold (95 % {interval(error.confidence95_m, 0, 'm')}), right positive."
+        )
+    return f"Error of {error.topic} across the course not measured: {typeset(error.reason)}."
+
+
+def _gates(one: Approach) -> Grid | None:
+    rows = [row for at in one.stabilised for row in _gate_rows(at)]
+    if not rows:
+        return None
+    heads = (Head("From"), Head("State"), Head("Criterion"), Head("Worst", True), Head("Limit", True), Head("Reason"))
+    caption = (
+        "Worst value from the gate height down to 30 m. Limits: FSF ALAR Briefing Note 7.1 (deviations, sink rate, "
+        "speed), Airbus Flight Operations Briefing Notes (bank)."
+    )
+    return Grid(f"Approach {one.number}: stabilised?", heads, rows, caption)
+
+
+def _gate_rows(at: StabilisedAt) -> list[tuple[Cell, ...]]:
+    height = number(at.height_m, 0, "m")
+    if not at.gates:
+        return [(height, Mark("unknown", "not measured"), "", ABSENT, ABSENT, sentence(at.reason))]
+    return [
+        (
+            height,
+            state_of(gate),
+            gate.title[:1].upper() + gate.title[1:],
+            number_with_unit(significant(gate.value, 3), unit_sign(gate.unit)),
+            limit_text(gate),
+            typeset(gate.reason),
+        )
+        for gate in at.gates
+    ]
+
+
+def _touchdown(one: Approach) -> Facts | None:
+    down = one.touchdown
+    if down is None:
+        return None
+    pairs = [
+        ("Time", f"{clock(down.time_s)} ± {number(down.time_sigma_s, 1, 's')}", f"by {typeset(down.found_by)}"),
+        ("Place", f"{number(down.latitude_deg, 5, '°')}, {number(down.longitude_deg, 5, '°')}", "as recorded"),
+        ("Beyond the threshold", number(down.past_threshold_m, 0, "m"), typeset(one.runway.place_reason)),
+        ("Ground speed", number(down.ground_speed_mps, 1, "m/s"), ""),
+        ("Sink rate", number(down.sink_rate_mps, 2, "m/s"), "over the last 3 s"),
+        ("Peak normal acceleration", number(down.peak_load_g, 2, "g"), "within 2 s, spikes of single samples left out"),
+        ("Course of the roll-out", number(down.rollout_course_deg, 1, "°"), "line through its positions, true"),
+    ]
+    return Facts(f"Approach {one.number}: touchdown", tuple(pairs))
+
+
+def _error(one: Approach, error: PositionError) -> Grid | Facts | None:
+    if error.state == "measured":
+        rate = f"{number(error.rate_mps, 2, signed=True)} ± {number(error.rate_sigma_mps, 2, 'm/s')}"
+        pairs = [
+            ("At the threshold", _with_sigma(error.error_m, error.sigma_m), interval(error.confidence95_m, 0, "m")),
+            ("Growth", rate, "along the final"),
+            ("On the roll-out", _with_sigma(error.rollout_error_m, error.rollout_sigma_m), "centre line as truth"),
+            ("Roll-out − final", _with_sigma(error.change_m, error.change_sigma_m), "each checks the other"),
+            ("Per hour", number(error.drift_nmi_per_h, 2, "nmi/h"), "over the flight so far, across the course only"),
+            ("Residuals", number(error.residual_ratio, 2), "RMS over expected RMS"),
+            *((f"σ by {part.name}", number(part.sigma_m, 1, "m"), "") for part in error.parts),
+        ]
+        return Facts(f"Approach {one.number}: {error.topic} across the course, by the localizer", tuple(pairs))
+    if not is_number(error.change_m):
+        return None
+    pair = (
+        "Roll-out − final",
+        _with_sigma(error.change_m, error.change_sigma_m),
+        "on the course of the final, continued",
+    )
+    return Facts(f"Approach {one.number}: {error.topic} across the course", (pair,))
+
+
+def _height(one: Approach, error: HeightError) -> Facts | None:
+    if error.state != "measured":
+        return None
+    pairs = [
+        ("On the roll-out", _with_sigma(error.error_m, error.sigma_m), interval(error.confidence95_m, 0, "m")),
+        *((f"σ by {part.name}", number(part.sigma_m, 1, "m"), "") for part in error.parts),
+    ]
+    return Facts(f"Approach {one.number}: altitude of {error.topic}, by the elevation of the runway", tuple(pairs))
+
+
+def _with_sigma(value: float | None, sigma: float | None) -> str:
+    return f"{number(value, 1, signed=True)} ± {number(sigma, 1, 'm')}" if is_number(value) else ABSENT
+
+
+def _protection(one: Approach) -> Facts | None:
+    found = one.protection
+    if found is None:
+        return None
+    pairs = (
+        ("Horizontal, greatest", number(found.horizontal_max_m, 1, "m"), _limit(found.horizontal_alarm_limit_m)),
+        ("Vertical, greatest", number(found.vertical_max_m, 1, "m"), _limit(found.vertical_alarm_limit_m)),
+        ("Within the alarm limits", percent(found.within_share), f"of {number(found.epochs, 0)} epochs"),
+        ("Meets the alarm limits of", "; ".join(found.operations) or ABSENT, "ICAO Annex 10, table 3.7.2.4-1"),
+    )
+    return Facts(f"Approach {one.number}: protection levels", pairs)
+
+
+def _limit(limit_m: float | None) -> str:
+    return f"alarm limit {number(limit_m, 0, 'm')}" if is_number(limit_m) else "no alarm limit logged"
+
+
+def _basis(one: Approach) -> Facts:
+    runway = one.runway
+    step = one.position_step_m
+    pairs = [
+        ("Positions", one.position_topic, f"steps of {number(step[0], 0)} × {number(step[1], 0, 'm')}" if step else ""),
+        ("Guidance", typeset(one.guidance_topic or ABSENT), typeset(one.guidance_source)),
+        ("Height", typeset(one.height_source or ABSENT), ""),
+        (
+            "Runway",
+            f"{_course(one)} ± {number(runway.course_sigma_deg, 2, '°')}",
+            f"placed by {runway.placed_by}" + (f", threshold {runway.place_reason}" if runway.place_reason else ""),
+        ),
+        (
+            "Course sector",
+            f"{number(runway.localizer_width_m, 0, 'm')} at the threshold",
+            f"antenna {number(runway.localizer_distance_m, 0, 'm')} beyond it",
+        ),
+        (
+            "Path",
+            number(runway.glide_angle_deg, 2, "°"),
+            f"{number(runway.threshold_crossing_height_m, 0, 'm')} above the threshold",
+        ),
+    ]
+    if one.sensitivity is not None and is_number(one.sensitivity.ratio):
+        value = f"{number(one.sensitivity.ratio, 2)} ± {number(one.sensitivity.sigma, 2)}"
+        pairs.append(("Positions over guidance", value, "1 if sense and width of the course are right"))
+    return Facts(f"Approach {one.number}: basis", tuple(pairs), compact=False)
+
+
+def _left_out(answer: LandingResult) -> Note | None:
+    if not answer.left_out:
+        return None
+    rows = "; ".join(f"{clock(one.time_s)} {typeset(one.reason)}" for one in answer.left_out[:5])
+    return Note(f"Not counted as approaches: {rows}.")

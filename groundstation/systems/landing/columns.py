@@ -1,0 +1,94 @@
+"""Columns that approaches give to the tables of flights; the last landing counts."""
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from groundstation.results.columns import AnswerColumn
+from groundstation.systems.landing.answer import (
+    Approach,
+    Established,
+    HeightError,
+    LandingResult,
+    PositionError,
+    Touchdown,
+)
+
+Value = TypeVar("Value")
+
+
+def _last(value: Callable[[Approach], Value | None]) -> Callable[[LandingResult], Value | None]:
+    return lambda landing: value(landing.approaches[-1]) if landing.approaches else None
+
+
+def _flown(value: Callable[[Established], float | None]) -> Callable[[LandingResult], float | None]:
+    return _last(lambda one: None if one.established is None else value(one.established))
+
+
+def _touchdown(value: Callable[[Touchdown], float | None]) -> Callable[[LandingResult], float | None]:
+    return _last(lambda one: None if one.touchdown is None else value(one.touchdown))
+
+
+def _measured(value: Callable[[PositionError], float | None]) -> Callable[[LandingResult], float | None]:
+    """Make a column of the first topic whose error the localizer measured."""
+
+    def of_approach(one: Approach) -> float | None:
+        return next((value(error) for error in one.position_errors if error.state == "measured"), None)
+
+    return _last(of_approach)
+
+
+def _height(value: Callable[[HeightError], float | None]) -> Callable[[LandingResult], float | None]:
+    """Make a column of the first topic whose altitude the runway measured."""
+
+    def of_approach(one: Approach) -> float | None:
+        return next((value(error) for error in one.height_errors if error.state == "measured"), None)
+
+    return _last(of_approach)
+
+
+def _at_the_low_gate(one: Approach) -> str | None:
+    return min(one.stabilised, key=lambda row: row.height_m).verdict if one.stabilised else None
+
+
+COLUMNS: tuple[AnswerColumn[LandingResult], ...] = (
+    AnswerColumn("landing_approaches", "count", "approaches found", lambda landing: len(landing.approaches)),
+    AnswerColumn(
+        "landing_go_arounds",
+        "count",
+        "of these, go-arounds",
+        lambda landing: sum(one.outcome == "go-around" for one in landing.approaches),
+    ),
+    AnswerColumn(
+        "landing_stabilised", "category", "the last approach from the lower height down", _last(_at_the_low_gate)
+    ),
+    AnswerColumn(
+        "landing_lateral_rms_dots",
+        "number",
+        "deviation from the course of the last approach, RMS",
+        _flown(lambda flown: flown.lateral_rms_dots),
+    ),
+    AnswerColumn(
+        "landing_vertical_rms_dots",
+        "number",
+        "deviation from its glide path, RMS",
+        _flown(lambda flown: flown.vertical_rms_dots),
+    ),
+    AnswerColumn(
+        "landing_sink_rate_mps", "number", "before the last touchdown", _touchdown(lambda one: one.sink_rate_mps)
+    ),
+    AnswerColumn("landing_peak_load_g", "number", "around it", _touchdown(lambda one: one.peak_load_g)),
+    AnswerColumn(
+        "landing_position_error_m",
+        "number",
+        "of the recorded positions across the course of the last approach, by the localizer, right positive",
+        _measured(lambda error: error.error_m),
+    ),
+    AnswerColumn("landing_position_error_sigma_m", "number", "its sigma", _measured(lambda error: error.sigma_m)),
+    AnswerColumn(
+        "landing_height_error_m",
+        "number",
+        "of the recorded altitude on the roll-out of the last approach, by the elevation of the runway, upwards",
+        _height(lambda error: error.error_m),
+    ),
+    AnswerColumn("landing_height_error_sigma_m", "number", "its sigma", _height(lambda error: error.sigma_m)),
+)

@@ -1,0 +1,49 @@
+"""Findings about the approaches of a flight."""
+
+from groundstation.base.findings import Finding
+from groundstation.systems.landing.answer import Approach, LandingResult
+from groundstation.systems.landing.reference import fits
+
+
+def findings_of(answer: LandingResult) -> tuple[Finding, ...]:
+    """Findings of all approaches, in their order."""
+    found = [finding for one in answer.approaches for finding in _of(one)]
+    for left in answer.left_out[:5]:
+        found.append(Finding("info", "landing.left_out", f"no approach at {left.time_s:.0f} s: {left.reason}"))
+    return tuple(found)
+
+
+def _of(one: Approach) -> list[Finding]:
+    place = f"{one.start_s:.0f} to {one.end_s:.0f} s"
+    name = f"approach {one.number}"
+    found: list[Finding] = []
+    for row in one.stabilised:
+        failed = [f"{gate.title} {gate.value:.1f} {gate.unit}" for gate in row.gates if gate.state == "failed"]
+        if failed:
+            text = f"{name} not stabilised from {row.height_m:.0f} m down: {', '.join(failed)}"
+            found.append(Finding("warn", "landing.not_stabilised", text, one.position_topic, place))
+    if one.sensitivity is not None and one.sensitivity.ratio is not None and not fits(one.sensitivity):
+        ratio = one.sensitivity.ratio
+        what = "another width of the course, or another runway"
+        code = "landing.sensitivity"
+        if ratio < 0.0:
+            what, code = "its sign is reversed, or it is of another runway", "landing.deviation_reversed"
+        text = f"{name}: positions move by {ratio:.2f} of what {one.guidance_topic} shows: {what}"
+        found.append(Finding("warn", code, text, one.guidance_topic, place))
+    if one.position_step_m is not None:
+        north_m, east_m = one.position_step_m
+        text = f"{name}: positions are written in steps of {north_m:.0f} m north, {east_m:.0f} m east"
+        found.append(Finding("info", "landing.coarse_positions", text, one.position_topic, place))
+    for error in one.position_errors:
+        if error.state == "measured" and error.error_m is not None and error.sigma_m is not None:
+            text = f"{name}: {error.topic} is {error.error_m:+.0f} m across the course (sigma {error.sigma_m:.0f} m)"
+            found.append(Finding("info", "landing.position_error", text, error.topic, place))
+    for height in one.height_errors:
+        if height.state == "measured" and height.error_m is not None and height.sigma_m is not None:
+            text = f"{name}: altitude of {height.topic} is off by {height.error_m:+.1f} m on the runway"
+            text = f"{text} (sigma {height.sigma_m:.1f} m)"
+            found.append(Finding("info", "landing.height_error", text, height.topic, place))
+    if one.runway.placed_by == "positions":
+        text = f"{name}: no runway of the site file: course from the positions, threshold {one.runway.place_reason}"
+        found.append(Finding("info", "landing.runway_placed", text, one.position_topic, place))
+    return found

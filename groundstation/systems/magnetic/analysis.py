@@ -1,0 +1,155 @@
+"""System 3 as analyses: the deviation from opposite turns in flight, and the heading sensor on ground runs."""
+
+from typing import TYPE_CHECKING
+
+from groundstation.base.findings import Finding
+from groundstation.base.signals import topics_of_kind
+from groundstation.methods.roles import HeadingOnGround
+from groundstation.results.answer import Answers, answer_of
+from groundstation.results.rules import Rejudged
+from groundstation.systems.analysis import Analysis, Found, Rules, Shortfall
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.known import Known
+from groundstation.systems.latency.answer import Latencies
+from groundstation.systems.magnetic.answer import MagneticResult
+from groundstation.systems.magnetic.columns import COLUMNS
+from groundstation.systems.magnetic.ground_answer import GroundDeviation
+from groundstation.systems.magnetic.ground_settings import MagneticGroundSettings
+from groundstation.systems.magnetic.settings import LIMITS, MagneticSettings
+
+if TYPE_CHECKING:
+    from groundstation.tables.table import Flight
+
+SURE_SIGMAS = 2.0
+
+
+def _run(flight: "Flight", known: Known, settings: MagneticSettings) -> Found[MagneticResult]:
+    from groundstation.systems.magnetic.estimate import estimate_deviation
+
+    inertial = known.answer(InertialResult)
+    found = estimate_deviation(
+        flight,
+        settings=settings,
+        heading=known.answer(HeadingResult),
+        on_ground=known.role(HeadingOnGround),
+        inertial=inertial,
+        latencies=known.answer(Latencies),
+        kinds={inertial.ins_topic: inertial.kind} if inertial else {},
+        aircraft=known.aircraft,
+        phases=known.phases,
+    )
+    return Found(found, (_verdict(found),))
+
+
+def _examine(flight: "Flight", known: Known, settings: MagneticSettings) -> tuple[Shortfall, ...]:
+    from groundstation.systems.magnetic.examine import examine_magnetic
+
+    return examine_magnetic(flight, known, settings)
+
+
+def _verdict(found: MagneticResult) -> Finding:
+    """The verdict: a rejected one is a warning."""
+    text = f"magnetic deviation: {found.verdict}: {found.verdict_reason}"
+    topic = found.magnetometer_topic
+    return Finding("warn" if found.verdict == "reject" else "info", f"magnetic.{found.verdict}", text, topic)
+
+
+def _has_readings(flight: "Flight", _known: Known) -> bool:
+    return any(topics_of_kind("magnetometer", flight.topics()))
+
+
+def _sentence(answers: Answers) -> str:
+    magnetic = answer_of(answers, MagneticResult)
+    if magnetic is None:
+        return ""
+    if magnetic.verdict == "reject" or magnetic.residual_rms_deg is None:
+        return f"magnetic deviation {magnetic.verdict} ({magnetic.verdict_reason})"
+    residual = magnetic.residual_rms_deg
+    return f"magnetic deviation {magnetic.verdict}: {residual.before:.2f} deg RMS before, {residual.after:.2f} after"
+
+
+def _run_on_ground(flight: "Flight", known: Known, settings: MagneticGroundSettings) -> Found[GroundDeviation]:
+    from groundstation.systems.magnetic.ground_runs import estimate_ground_deviation
+
+    found = estimate_ground_deviation(
+        flight,
+        settings=settings,
+        phases=known.phases,
+        aircraft=known.aircraft,
+        latencies=known.answer(Latencies),
+        excluded_s=known.excluded_s,
+    )
+    text = _ground_text(found)
+    return Found(found, (Finding("info", "magnetic_ground.found", text, found.ins_topic), *_too_wrong(found, settings)))
+
+
+def _ground_text(found: GroundDeviation) -> str:
+    errors = [run.error_deg for run in found.used if run.error_deg is not None]
+    spanned = " to ".join(f"{round(error, 1) + 0.0:+.1f}" for error in sorted({min(errors), max(errors)}))
+    runs = f"{_count(len(errors), 'straight ground run')} in {_count(found.directions, 'direction')}"
+    return f"heading sensor on {runs}: error {spanned} deg"
+
+
+def _too_wrong(found: GroundDeviation, settings: MagneticGroundSettings) -> tuple[Finding, ...]:
+    """A warning for the run that is surely beyond the limit by most."""
+    rows = [(run, run.error_deg, run.sigma_deg) for run in found.used]
+    known = [(run, error, sigma) for run, error, sigma in rows if error is not None and sigma is not None]
+    run, error, sigma = max(known, key=lambda row: abs(row[1]) - SURE_SIGMAS * row[2])
+    if abs(error) - SURE_SIGMAS * sigma <= settings.error_max_deg:
+        return ()
+    text = (
+        f"heading sensor reads {error:+.1f} deg wrong at {run.magnetic_heading_deg:.0f} deg on the ground run at "
+        f"{run.start_s:.0f} s (sigma {sigma:.1f}), more than {settings.error_max_deg:g} deg"
+    )
+    return (Finding("warn", "magnetic_ground.error", text, found.ins_topic),)
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'s' * (number != 1)}"
+
+
+def _has_magnetic_heading(flight: "Flight", _known: Known) -> bool:
+    return any(flight[topic].has("magnetic_heading_deg") for topic in topics_of_kind("ins", flight.topics()))
+
+
+def _ground_sentence(answers: Answers) -> str:
+    found = answer_of(answers, GroundDeviation)
+    return "" if found is None else _ground_text(found)
+
+
+def _rejudge(answer: MagneticResult, settings: MagneticSettings) -> tuple[Rejudged, ...]:
+    from groundstation.systems.magnetic.verdict import rejudge
+
+    return rejudge(answer, settings)
+
+
+MAGNETIC = Analysis(
+    name="magnetic",
+    title="magnetic deviation from opposite turns in flight, with its coefficients A to E",
+    subject="magnetic deviation",
+    needs="magnetometer on three axes, ins roll, pitch and a true heading that no magnetometer corrects, a turn "
+    "each way at one steady bank that together cover the circle, level flight to judge by",
+    settings=MagneticSettings,
+    answer=MagneticResult,
+    run=_run,
+    builds_on=("heading", "inertial", "latency"),
+    is_expected=_has_readings,
+    sentence=_sentence,
+    columns=COLUMNS,
+    examine=_examine,
+    rules=Rules(LIMITS, _rejudge),
+)
+MAGNETIC_GROUND = Analysis(
+    name="magnetic_ground",
+    title="errors of the installed heading sensor on straight ground runs",
+    subject="heading sensor on ground runs",
+    needs="ins magnetic heading, gnss velocities and positions, a date, proof of ground contact, straight runs "
+    "above 3 m/s",
+    settings=MagneticGroundSettings,
+    answer=GroundDeviation,
+    run=_run_on_ground,
+    builds_on=("latency",),
+    is_expected=_has_magnetic_heading,
+    sentence=_ground_sentence,
+)

@@ -1,0 +1,54 @@
+"""What the magnetic deviation gives to the tables of flights."""
+
+from collections.abc import Callable, Mapping
+
+from groundstation.results.columns import AnswerColumn
+from groundstation.systems.magnetic.answer import LETTERS, MagneticResult, Method
+
+
+def _recommended(magnetic: MagneticResult) -> Method:
+    return magnetic.method(magnetic.recommended_method)
+
+
+def _of(letter: str, values: Callable[[Method], Mapping[str, float]]) -> Callable[[MagneticResult], float | None]:
+    """The value of a coefficient, or its sigma, by the method that is recommended."""
+    return lambda magnetic: values(_recommended(magnetic)).get(letter)
+
+
+def _coefficient(letter: str) -> tuple[AnswerColumn[MagneticResult], AnswerColumn[MagneticResult]]:
+    stem, meaning = f"magnetic_{letter.lower()}", f"coefficient {letter} of the magnetic heading error"
+    return (
+        AnswerColumn(f"{stem}_deg", "number", meaning, _of(letter, lambda method: method.coefficients_deg)),
+        AnswerColumn(
+            f"{stem}_sigma_deg", "number", "its sigma", _of(letter, lambda method: method.coefficients_sigma_deg)
+        ),
+    )
+
+
+COLUMNS: tuple[AnswerColumn[MagneticResult], ...] = (
+    AnswerColumn(
+        "magnetic_verdict",
+        "category",
+        "of the magnetic deviation: accept, reject, undecided",
+        lambda magnetic: magnetic.verdict,
+    ),
+    AnswerColumn(
+        "magnetic_method",
+        "category",
+        "method recommended for the correction; the coefficients are from it",
+        lambda magnetic: magnetic.recommended_method,
+    ),
+    AnswerColumn(
+        "magnetic_before_rms_deg",
+        "number",
+        "magnetic heading error in level flight that no fit used, RMS",
+        lambda magnetic: magnetic.residual_rms_deg.before if magnetic.residual_rms_deg else None,
+    ),
+    AnswerColumn(
+        "magnetic_after_rms_deg",
+        "number",
+        "the same after correction",
+        lambda magnetic: magnetic.residual_rms_deg.after if magnetic.residual_rms_deg else None,
+    ),
+    *(column for letter in LETTERS for column in _coefficient(letter)),
+)

@@ -1,0 +1,67 @@
+"""What was flown for the deviation: readings with attitude, turns of steady bank, and the figures that they make."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.records import BoolArray
+from groundstation.systems.latency.answer import Latencies
+from groundstation.systems.magnetic.manoeuvre import Figure, FoundTurn, find_figures, find_turns
+from groundstation.systems.magnetic.readings import ANALYSIS, Readings, gather, why_not_independent
+from groundstation.systems.magnetic.settings import MagneticSettings
+from groundstation.tables.phases import Phases
+from groundstation.tables.table import Flight
+
+IN_THE_AIR = ("airborne", "unknown")  # ground contact is a phase of its own where it is proven
+
+
+@dataclass(frozen=True)
+class Flown:
+    """Readings, in which of them the aircraft flies, and the figures and turns found; the latency taken off."""
+
+    readings: Readings
+    is_airborne: BoolArray
+    figures: list[Figure]
+    turns: list[FoundTurn]
+    latency_s: float
+
+
+def find_flown(
+    flight: Flight,
+    topics: tuple[str, str],
+    phases: Phases,
+    kinds: Mapping[str, str],
+    latencies: Latencies | None,
+    settings: MagneticSettings,
+) -> Flown:
+    """Find the opposite turns of a flight; parameters as of ``estimate_deviation``.
+
+    Raises
+    ------
+    NotAssessableError
+        With the reason: no independent heading, hardly a reading, no figure.
+    """
+    objection = why_not_independent(flight, topics[0], dict(kinds), settings)
+    if objection:
+        raise NotAssessableError(ANALYSIS, objection)
+    readings, latency_s = gather(flight, topics, latencies, settings)
+    is_airborne = np.isin(phases.at(readings.time_s), IN_THE_AIR)
+    figures, turns = find_figures(readings, find_turns(readings, is_airborne, settings), settings)
+    if not figures:
+        raise NotAssessableError(ANALYSIS, _why_no_figure(turns))
+    return Flown(readings, is_airborne, figures, turns, latency_s)
+
+
+def _why_no_figure(turns: list[FoundTurn]) -> str:
+    """What was found instead of a figure, the longest turns first."""
+    if not turns:
+        return "no turn of steady bank in flight: opposite turns over the whole circle are needed"
+    longest = sorted(turns, key=lambda one: -abs(one.turn.turned_deg))[:3]
+    told = "; ".join(
+        f"at {one.turn.start_s:.0f} s {one.turn.turned_deg:+.0f} deg at {one.turn.bank_deg:+.0f} deg of bank: "
+        f"{one.turn.reason}"
+        for one in longest
+    )
+    return f"no opposite turns that cover the circle: {told}"

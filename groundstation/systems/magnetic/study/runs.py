@@ -1,0 +1,169 @@
+"""Runs of the magnetic study: every seed flies all setups, on several processes.
+
+A small outcome of each is kept.
+"""
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
+from groundstation.systems.magnetic.study.bias import Biases, formula_biases
+from groundstation.systems.magnetic.study.cases import (
+    BANK_DEG,
+    EXACT,
+    INCOMPLETE,
+    JUDGED,
+    REFERENCE,
+    WIDE,
+    Setup,
+    seed_of,
+)
+from groundstation.systems.magnetic.study.flights import Hangar, judged_outcome, wide_outcome
+from groundstation.systems.magnetic.study.judge import Outcome
+from groundstation.systems.magnetic.study.taxis import TaxiOutcome, taxi_cells, taxi_outcome
+
+Progress = Callable[[str], None]
+
+SWEPT_SHARE = 0.5  # of the seeds fly the sweeps: each seed is the same at every point, so that curves are smooth
+INCOMPLETE_SHARE = 0.25  # of the seeds fly incomplete figures, too: each of them is refused for a reason, not by chance
+POOLED_FROM = 8  # fewer seeds are done before other processes have started
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Job:
+    """Flights of one seed.
+
+    ``wide`` is the cell of the second family, ``taxi`` that of the third.
+    """
+
+    run: int
+    seed: int
+    setups: tuple[Setup, ...]
+    judged: MagneticFamilySettings | None
+    is_incomplete: bool
+    wide: str = ""
+    taxi: str = ""
+
+
+@dataclass(frozen=True)
+class RunOutcome:
+    """All flights of one seed.
+
+    Parameters
+    ----------
+    run : int
+    swept : tuple of Outcome
+        In the order of the setups; empty where this seed does not fly them.
+    judged : Outcome or None
+        The whole flight of the judged family.
+    incomplete : mapping of kind of figure to Outcome
+    biases : Biases
+        Of this seed's iron, by formula.
+    wide : mapping of cell to Outcome
+        The flight of the second family.
+    taxi : TaxiOutcome or None
+        The flight of the third family.
+    """
+
+    run: int
+    swept: tuple[Outcome, ...]
+    judged: Outcome | None
+    incomplete: dict[str, Outcome]
+    biases: Biases
+    wide: dict[str, Outcome] = field(default_factory=dict)
+    taxi: TaxiOutcome | None = None
+
+
+def jobs_of(runs: int, seed: int, swept_setups: tuple[Setup, ...]) -> list[Job]:
+    """Return one job for each run; the seed alone decides how each setup is flown."""
+    cells, taxis = tuple(WIDE), tuple(taxi_cells())
+    swept, incomplete = (max(2, round(share * runs)) for share in (SWEPT_SHARE, INCOMPLETE_SHARE))
+    return [
+        Job(
+            run,
+            seed_of(seed, run),
+            swept_setups if run < swept else (),
+            JUDGED,
+            run < incomplete,
+            cells[run % len(cells)],
+            taxis[run % len(taxis)],
+        )
+        for run in range(runs)
+    ]
+
+
+def run_jobs(jobs: Sequence[Job], progress: Progress | None = None) -> tuple[RunOutcome, ...]:
+    """Fly all jobs, on as many processes as there are cores.
+
+    The outcomes are in the order of the jobs.
+    """
+    found = []
+    with _mapped(len(jobs)) as mapped:
+        for outcome in mapped(fly_job, jobs):
+            found.append(outcome)
+            if progress:
+                progress(f"run {outcome.run}: {_told(outcome)}")
+    return tuple(found)
+
+
+def fly_job(job: Job) -> RunOutcome:
+    """Fly everything of one seed."""
+    hangar = Hangar(job.seed)
+    iron = draw_magnetic_scenario(EXACT, job.seed).magnetometer
+    assert iron is not None
+    figures = {kind: make(BANK_DEG) for kind, make in INCOMPLETE.items()} if job.is_incomplete else {}
+    return RunOutcome(
+        job.run,
+        tuple(hangar.outcome(setup) for setup in job.setups),
+        judged_outcome(job.judged, job.seed) if job.judged else None,
+        {kind: hangar.outcome(REFERENCE, figure) for kind, figure in figures.items()},
+        formula_biases(iron),
+        {job.wide: wide_outcome(WIDE[job.wide], job.seed)} if job.wide else {},
+        taxi_outcome(job.taxi, job.seed) if job.taxi else None,
+    )
+
+
+def _told(outcome: RunOutcome) -> str:
+    flights = [
+        *outcome.swept,
+        *outcome.incomplete.values(),
+        *outcome.wide.values(),
+        *([outcome.judged] if outcome.judged else []),
+    ]
+    accepted = sum(flight.verdict == "accept" for flight in flights)
+    return f"{accepted} of {len(flights)} flights accepted"
+
+
+@contextmanager
+def _mapped(jobs: int) -> Iterator[Callable[[Callable[[Job], RunOutcome], Sequence[Job]], Iterator[RunOutcome]]]:
+    """Return a map over jobs: in this process for a few, else in single-threaded processes."""
+    workers = min(jobs, os.cpu_count() or 1)
+    if jobs < POOLED_FROM or workers < 2:
+        yield map
+        return
+    with _environment(dict.fromkeys(ONE_THREAD, "1")):
+        pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+        try:
+            yield pool.map
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _environment(changes: dict[str, str]) -> Iterator[None]:
+    """Set environment variables for processes started meanwhile."""
+    before = {name: os.environ.get(name) for name in changes}
+    os.environ.update(changes)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value

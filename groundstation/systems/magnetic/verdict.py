@@ -1,0 +1,155 @@
+"""Gates and verdict of the magnetic deviation."""
+
+from dataclasses import replace
+
+from groundstation.results.gates import Bound, Gate, GateState, judged_gate
+from groundstation.results.rules import Rejudged
+from groundstation.systems.magnetic.alignment import against_heading
+from groundstation.systems.magnetic.answer import (
+    Alignment,
+    BankBias,
+    Coverage,
+    MagneticResult,
+    MagneticVerdict,
+    MethodName,
+    Residual,
+    Swing,
+    Turn,
+)
+from groundstation.systems.magnetic.settings import MagneticSettings
+
+
+def build_gates(
+    turns: list[Turn],
+    swings: list[Swing],
+    coverage: Coverage,
+    alignment: Alignment,
+    residual: Residual | None,
+    bias: BankBias | None,
+    method: MethodName,
+    dip_sigmas: float | None,
+    settings: MagneticSettings,
+) -> tuple[Gate, ...]:
+    """Every gate with its figure. ``turns`` are those used, ``bias`` is that of the bank flown.
+
+    ``dip_sigmas``: by how many sigma the vertical field of the readings differs from the model's.
+    """
+    altitude = min((turn.altitude_m for turn in turns if turn.altitude_m is not None), default=None)
+    unequal = max(abs(abs(swing.right_bank_deg) - abs(swing.left_bank_deg)) for swing in swings)
+    repeat = max((swing.difference_rms_deg for swing in swings if swing.difference_rms_deg is not None), default=None)
+    unsteady = max(turn.bank_sd_deg for turn in turns)
+    after = residual.after if residual else None
+    contradicted = against_heading(alignment)
+    bounds = gate_bounds(settings)
+    return (
+        _gate(bounds, "coverage", "circle covered by both branches", coverage.share),
+        _gate(bounds, "bank_difference", "difference of opposite banks", unequal, "deg"),
+        _gate(bounds, "bank_steadiness", "standard deviation of bank in a turn", unsteady, "deg"),
+        _gate(bounds, "alignment", "sigma of the INS heading at the figure", alignment.sigma_deg, "deg"),
+        _gate(
+            bounds,
+            "heading",
+            "alignment, hence A, against the heading analysis of this log, in sigmas",
+            contradicted,
+            is_required=contradicted is not None,
+            reason="no heading analysis of this INS",
+        ),
+        _gate(
+            bounds,
+            "held_out",
+            "rms error after correction in flight that no fit used",
+            after,
+            "deg",
+            reason="no level flight beside the figure",
+        ),
+        _gate(
+            bounds,
+            "bank_bias",
+            "rms of the forecast bank bias of the average of branches",
+            bias.rms_deg if bias else None,
+            "deg",
+            is_required=method == "compass_table",
+            reason="no iron fitted to forecast it from",
+        ),
+        _gate(
+            bounds,
+            "dip",
+            "dip of the field, readings against model, in sigmas",
+            dip_sigmas,
+            is_required=dip_sigmas is not None,
+            reason="no model of the field, or no iron fitted",
+        ),
+        _gate(
+            bounds,
+            "altitude",
+            "lowest mean altitude of a turn",
+            altitude,
+            "m",
+            is_required=False,
+            reason="no altitude in the log",
+        ),
+        _gate(
+            bounds,
+            "repeatability",
+            "rms difference of repeated figures",
+            repeat,
+            "deg",
+            is_required=len(swings) > 1,
+            reason="one figure alone",
+        ),
+    )
+
+
+def gate_bounds(settings: MagneticSettings) -> dict[str, Bound]:
+    """Lowest and highest value with which each gate passes."""
+    return {
+        "coverage": (settings.coverage_min, None),
+        "bank_difference": (None, settings.bank_difference_max_deg),
+        "bank_steadiness": (None, settings.bank_sd_max_deg),
+        "alignment": (None, settings.alignment_sigma_max_deg),
+        "heading": (None, settings.heading_sigmas_max),
+        "held_out": (None, settings.held_out_rms_max_deg),
+        "bank_bias": (None, settings.bank_bias_max_deg),
+        "dip": (None, settings.dip_sigmas_max),
+        "altitude": (settings.altitude_min_m, None),
+        "repeatability": (None, settings.repeat_rms_max_deg),
+    }
+
+
+def rejudge(answer: MagneticResult, settings: MagneticSettings) -> tuple[Rejudged, ...]:
+    """The gates and the verdict of an answer under other limits, from the values that it was judged by."""
+    bounds = gate_bounds(settings)
+    after = tuple(_told(gate.under(bounds[gate.name])) if gate.name in bounds else gate for gate in answer.gates)
+    return (Rejudged("magnetic", answer.verdict, decide(after)[0], answer.gates, after),)
+
+
+def decide(gates: tuple[Gate, ...]) -> tuple[MagneticVerdict, str]:
+    """Reject on a required gate failed, undecided on one not measured, else accept; and the reason."""
+    outcomes: tuple[tuple[GateState, MagneticVerdict], ...] = (("failed", "reject"), ("not_measured", "undecided"))
+    for state, verdict in outcomes:
+        telling = [gate for gate in gates if gate.required and gate.state == state]
+        if telling:
+            return verdict, "; ".join(f"{gate.title}: {gate.reason}" for gate in telling)
+    return "accept", "every required gate passed"
+
+
+def _gate(
+    bounds: dict[str, Bound],
+    name: str,
+    title: str,
+    value: float | None,
+    unit: str = "",
+    *,
+    is_required: bool = True,
+    reason: str = "not measured",
+) -> Gate:
+    return _told(judged_gate(bounds[name], name, title, value, unit=unit, required=is_required, reason=reason))
+
+
+def _told(gate: Gate) -> Gate:
+    """The gate with figure and limit for its reason where it failed, with none where it passed."""
+    if gate.value is None:
+        return gate
+    wanted = "at least" if gate.sense == "at_least" else "at most"
+    told = f"{gate.value:.3g} {gate.unit}, {wanted} {gate.limit:g}".replace(" ,", ",")
+    return replace(gate, reason=told if gate.state == "failed" else "")

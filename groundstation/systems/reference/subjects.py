@@ -1,0 +1,54 @@
+"""Subjects of the comparison, as tables of canonical fields.
+
+They are the recorded GNSS and INS, and what the estimators made of them.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from groundstation.base.angles import FloatArray, wrap_360
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.records import Column
+from groundstation.base.signals import topics_of_kind
+from groundstation.systems.heading.answer import HeadingResult
+from groundstation.systems.known import Known
+from groundstation.tables.epochs import distinct_epochs
+from groundstation.tables.headings import true_heading
+from groundstation.tables.table import Flight, Table
+from groundstation.tables.tracks import HasTracks, ins_table
+
+
+def subjects_of(flight: Flight, known: Known) -> Iterator[tuple[str, Table]]:
+    """Name and table of everything that may be judged, in the order it is shown."""
+    for topic in topics_of_kind("gnss", flight.topics()):
+        table = flight[topic].trusted()
+        moving = distinct_epochs(table)
+        yield topic, moving if len(moving) >= 2 else table
+    for topic in topics_of_kind("ins", flight.topics()):
+        yield topic, _ins(flight, topic)
+    for working in known.workings.values():
+        if isinstance(working, HasTracks):
+            yield from working.tracks(flight.start_ns)
+    heading = known.answer(HeadingResult)
+    if heading is not None and heading.ins_topic in flight:
+        corrected = wrap_360(_true_heading(flight, heading.ins_topic) - heading.error_deg)
+        sigma = np.full(len(corrected), heading.standard_error_deg)
+        columns = {"true_heading_deg": corrected, "true_heading_sigma_deg": sigma}
+        yield "heading", ins_table(flight[heading.ins_topic].time_ns, columns)
+
+
+def _ins(flight: Flight, topic: str) -> Table:
+    """An INS that navigates, its heading from true north."""
+    table = flight[topic]
+    heading = _true_heading(flight, topic)
+    columns = {**table.columns, "true_heading_deg": Column(heading, np.isfinite(heading))}
+    return replace(table, columns=columns).trusted()
+
+
+def _true_heading(flight: Flight, topic: str) -> FloatArray:
+    try:
+        return true_heading(flight, topic).values_deg
+    except NotAssessableError:
+        return np.full(len(flight[topic]), np.nan)
