@@ -14,12 +14,11 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from groundstation.pipeline.many_flights.batch import run_many
 
 from groundstation.chapters.parts import Figure
-from groundstation.chapters.plots import PLOTS
 from groundstation.chapters.plots.comparison import COMPARED, sides_of
 from groundstation.chapters.plots.fleet import FLEET_PLOTS
+from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.verbs.compare import compare
 from groundstation.plots.marks import AnyMark
@@ -31,6 +30,7 @@ from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import Manifest
 from tests import plot_cases, viewer_example
 from tests.saved import load
+from tests.told import PLOTS
 
 Contents = dict[str, dict[str, list[str]]]  # lines by plot and panel
 KEPT = Path(__file__).parent / "references" / "plots.json"

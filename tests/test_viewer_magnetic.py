@@ -58,7 +58,7 @@ def test_field_lies_on_the_sphere_once_it_is_freed_of_the_iron() -> None:
 def test_sphere_and_eight_are_in_the_tab(contents: Contents) -> None:
     assert {"/magnetic/field/model", "/magnetic/field/as_read", "/magnetic/field/freed_of_iron"} <= set(contents.fixed)
     assert {"/magnetic/track/north/00_curve", "/magnetic/track/north/axes/grid"} <= set(contents.fixed)
-    assert "/magnetic/track/north/01_told" in contents.batches, "the aircraft moves along its track"
+    assert "/magnetic/track/north/01_told/0" in contents.batches, "the aircraft moves along its track"
 
 
 def test_text_holds_verdict_card_and_reasons(contents: Contents) -> None:
