@@ -10,6 +10,7 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1] / "groundstation"
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "rooms.svg"
+SYSTEMS = "systems/*"
 WIDTH, BOX, HEIGHT, GAP, ROW = 900, 116, 34, 18, 92
 INK, LINE, FILL = "#1c2530", "#8d97a3", "#d3e7f5"
 
@@ -25,11 +26,18 @@ def imports_between_rooms() -> set[tuple[str, str]]:
     """Which room imports which."""
     found: set[tuple[str, str]] = set()
     for path in sorted(PACKAGE.glob("*/**/*.py")):
-        room = path.relative_to(PACKAGE).parts[0]
         names = [node.module or "" for node in import_nodes(path) if isinstance(node, ast.ImportFrom)]
-        parts = [name.split(".") for name in names if name.startswith("groundstation.")]
-        found |= {(room, part[1]) for part in parts if part[1] != room}
-    return found
+        room = _box(path.relative_to(PACKAGE).with_suffix("").parts)
+        boxes = [_box(tuple(name.split(".")[1:])) for name in names if name.startswith("groundstation.")]
+        is_system = room == SYSTEMS
+        found |= {(room, box) for box in boxes if box != room and (box != SYSTEMS or is_system)}
+    return found | {("pipeline", SYSTEMS)}
+
+
+def _box(parts: tuple[str, ...]) -> str:
+    """Room of a module; the folders of the systems are one box, the files beside them another."""
+    inside = parts[0] == "systems" and len(parts) > 1 and (PACKAGE / "systems" / parts[1]).is_dir()
+    return SYSTEMS if inside else parts[0]
 
 
 def rows_of(edges: set[tuple[str, str]]) -> dict[str, int]:

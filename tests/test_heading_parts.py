@@ -14,7 +14,6 @@ from groundstation.base.records import Column
 from groundstation.base.toml_settings import settings_from
 from groundstation.methods.intervals import effective_samples
 from groundstation.methods.taxi.gating import gate_samples, intervals_without_epoch
-from groundstation.methods.taxi.intervals import Interval
 from groundstation.methods.taxi.samples import Samples, pair_samples, window_slope, without_arm
 from groundstation.methods.taxi.settings import GroundLimits
 from groundstation.results.gates import Gate
@@ -39,6 +38,7 @@ from groundstation.systems.heading.steps import heading_steps
 from groundstation.systems.heading.verdict import decide, explain
 from groundstation.systems.known import AircraftData, Runway, SiteData, Stand
 from groundstation.tables.epochs import distinct_epochs
+from groundstation.tables.intervals import Interval
 from groundstation.tables.table import Flight, Table
 
 SETTINGS = HeadingSettings()

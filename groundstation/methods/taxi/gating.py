@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.records import BoolArray
-from groundstation.methods.taxi.intervals import Interval
 from groundstation.methods.taxi.samples import GATE_TEXT, USED, Samples
 from groundstation.methods.taxi.settings import TaxiLimits
+from groundstation.tables.intervals import Interval
 from groundstation.tables.phases import Phases
 
 NOT_TAXI = ("take-off run", "landing roll")  # phases, and reasons: power and wind crab the aircraft

@@ -20,7 +20,6 @@ from groundstation.base.ledger import Ledger
 from groundstation.base.signals import topics_of_kind
 from groundstation.integrity.ledger import gaps_of
 from groundstation.methods import overview
-from groundstation.methods.taxi.intervals import Interval
 from groundstation.pipeline.one_flight import configuration as configured
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.damage import damage_finding
@@ -34,6 +33,7 @@ from groundstation.systems.analysis import Analysis, Found, in_order_of_need
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.known import Known
+from groundstation.tables.intervals import Interval
 from groundstation.tables.phases import ALWAYS_ON_GROUND, flight_phases
 from groundstation.tables.table import Flight
 

@@ -13,7 +13,6 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
 from groundstation.methods.taxi.delay import known_delay
 from groundstation.methods.taxi.gating import gate_samples
-from groundstation.methods.taxi.intervals import Interval
 from groundstation.methods.taxi.samples import USED, HeadingValues, OnGround, Samples, pair_samples
 from groundstation.methods.taxi.settings import GroundLimits
 from groundstation.systems.known import AircraftData
@@ -24,6 +23,7 @@ from groundstation.systems.magnetic.ground_settings import MagneticGroundSetting
 from groundstation.systems.magnetic.readings import NO_DATE, PLACE_WANTED
 from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.headings import FARTHEST_POSITION_S
+from groundstation.tables.intervals import Interval
 from groundstation.tables.phases import ground_mask
 from groundstation.tables.resample import join
 from groundstation.tables.sources import GNSS_VELOCITY, Need, PairNeed
