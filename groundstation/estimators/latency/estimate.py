@@ -29,7 +29,7 @@ MOTIONS: Mapping[Quantity, str] = {
 def estimate_latencies(
     flight: Flight, *, settings: LatencySettings | None = None, kinds: Mapping[str, str] | None = None
 ) -> Latencies:
-    """Estimate how much later than the INS each sensor shows the motion, by the time stamps of the log.
+    """Estimate how much later than the INS each sensor shows the motion, by time stamps.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def _row(pair: Pair, fit: DelayFit, unit: str, settings: LatencySettings, is_aid
 
 
 def _why_not(quantity: Quantity, fit: DelayFit, settings: LatencySettings) -> str:
-    """Why a fit is no observation; empty when it is one."""
+    """Return why a fit is no observation; empty when it is one."""
     half_s = max(fit.half_width_s, BOUND95 * fit.modelled_sigma_s)  # so that a lucky scatter does not pass
     if fit.freedom < settings.freedom_min or not half_s <= settings.half_width_max_s:
         return (

@@ -1,4 +1,4 @@
-"""What is compared: signals of an INS and of another sensor that show the same motion."""
+"""Signals of an INS and of another sensor that show the same motion, ready to compare."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -26,7 +26,9 @@ LEAST_SAMPLES, LEAST_NODES = 10, 3
 
 @dataclass(frozen=True)
 class Comparison:
-    """A reference and the samples of another sensor, on flight seconds: times (n,), values (n, c) in ``unit``.
+    """Reference signal and the samples of another sensor, on flight seconds.
+
+    Times have shape (n,), values (n, c) in ``unit``.
 
     ``prior_sigma`` (q,): of the nuisances in the reference.
     """
@@ -39,11 +41,14 @@ class Comparison:
 
 
 class NotComparableError(Exception):
-    """Why two topics cannot be compared, in a few words."""
+    """Reason why two topics cannot be compared, in a few words."""
 
 
 def pairs_of(flight: Flight) -> list[tuple[str, str, Quantity]]:
-    """Topics and quantities that may be compared: the first INS that has the signal against every other sensor."""
+    """Return the topics and quantities that may be compared.
+
+    The first INS that has the signal is paired with every other sensor.
+    """
     units = [topic for topic in sources_of_kind(flight, "ins") if len(flight[topic])]
 
     def others(kind: str, *fields: str) -> list[str]:
@@ -111,14 +116,20 @@ def _columns(unit: Table, sensor: Table, quantity: Quantity) -> tuple[tuple[str,
 
 
 def _nodes(made: Comparison, samples: int, settings: LatencySettings) -> int:
-    """Reference samples to average: as long as the other's means are, and so that their noise does not show."""
+    """Return how many reference samples to average.
+
+    They span as much time as the means of the other sensor, and are enough that their noise does not show.
+    """
     step_s = float(np.median(np.diff(made.reference.time_s))) if len(made.reference.time_s) > 1 else 1.0
     width_s = settings.other_step_s if samples > 1 else 0.0
     return max(LEAST_NODES, 2 * round(0.5 * width_s / step_s) + 1)
 
 
 def _velocity(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> Comparison:
-    """GNSS velocity against INS velocity: azimuth error, scale and the antenna's arm are nuisances."""
+    """Compare GNSS velocity with INS velocity.
+
+    Azimuth error, scale and the lever arm of the antenna are nuisances.
+    """
     names = [name for name in (*VELOCITY, *ATTITUDE, *HEADINGS) if unit.has(name)]
     time_s, columns = _averaged(flight, unit, names, settings.reference_step_s)
     north, east = columns[VELOCITY[0]], columns[VELOCITY[1]]
@@ -138,7 +149,10 @@ def _velocity(flight: Flight, unit: Table, sensor: Table, settings: LatencySetti
 
 
 def _altitude(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> Comparison:
-    """Pressure altitude against height from the vertical speed of the INS, or its altitude: a scale is the nuisance."""
+    """Compare pressure altitude with the height of the INS; a scale is the nuisance.
+
+    The height is integrated from the vertical speed of the INS, or is its altitude.
+    """
     (name,), _seen = _columns(unit, sensor, "altitude")
     time_s, columns = _averaged(flight, unit, [name], settings.reference_step_s)
     height = columns[name]
@@ -225,7 +239,10 @@ def _check_rates(topic: str, table: Table, longest_s: float) -> None:
 def _averaged(
     flight: Flight, table: Table, names: Sequence[str], step_s: float
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Means of a table's rows over ``step_s``, at their mean times; headings and roll continuous."""
+    """Average the rows of a table over ``step_s``, at their mean times.
+
+    Headings and roll are made continuous first.
+    """
     table = table.unique_times()
     time_s = flight.seconds(table.time_ns)
     columns = {
@@ -244,7 +261,10 @@ def _averaged(
 
 
 def _nose(columns: dict[str, FloatArray], north: FloatArray, east: FloatArray) -> FloatArray:
-    """Heading for the antenna's arm: logged, else the track of a moving aircraft, held while it is slow."""
+    """Return the heading (deg) that turns the antenna's arm.
+
+    It is the logged one, else the track of the moving aircraft, held while it is slow.
+    """
     for name in HEADINGS:
         if name in columns and np.isfinite(columns[name]).all():
             return columns[name]
