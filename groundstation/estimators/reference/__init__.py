@@ -1,1 +1,1 @@
-"""Judging by a reference: errors of what was recorded and estimated, and claimed against seen."""
+"""Comparison with a reference: errors of recorded and estimated data against their sigmas."""

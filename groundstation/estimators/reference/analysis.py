@@ -1,4 +1,4 @@
-"""Against the reference: an analysis that alone may see the truth, after all others have run."""
+"""Analysis against the reference; it alone may see the truth, after all others have run."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""Single answers against the reference: the heading error found, and the replayed forecast."""
+"""Single answers against the reference: heading error found, replayed forecast."""
 
 import numpy as np
 
@@ -21,7 +21,9 @@ NEAR_S = 2.0  # between a time of the forecast and the nearest error that is kno
 
 
 def heading_check(heading: HeadingResult, errors: Errors) -> HeadingCheck | None:
-    """The heading error found against INS minus reference at the same samples; None where too few are known.
+    """Compare the heading error found with INS minus reference at the same samples.
+
+    None where too few are known.
 
     ``errors`` are those of the INS as logged. Interval and reference are independent: their variances add.
     """
@@ -52,7 +54,10 @@ def heading_check(heading: HeadingResult, errors: Errors) -> HeadingCheck | None
 
 
 def forecast_checks(forecast: ForecastResult, inertial: InertialResult, errors: Errors) -> tuple[ForecastCheck, ...]:
-    """The default method of the replay at the usual horizons, against how the INS error grew by the reference."""
+    """Compare the replayed forecast with the growth of the INS error by the reference.
+
+    It is the default method of the replay, at the usual horizons.
+    """
     fan = found_in(forecast.figures, ForecastFan)
     if fan is None or inertial.ins_topic != errors.subject or kind_of(errors.subject) != "ins":
         return ()

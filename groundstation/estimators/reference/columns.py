@@ -1,4 +1,4 @@
-"""What the comparison with a reference gives to the tables of flights."""
+"""Columns that the comparison with a reference gives to the tables of flights."""
 
 from groundstation.base.signals import kind_of
 from groundstation.results.columns import AnswerColumn
@@ -6,7 +6,10 @@ from groundstation.results.reference import ReferenceResult
 
 
 def _rmse(answer: ReferenceResult, kind: str, quantity: str, axis: str) -> float | None:
-    """RMS of an axis of the first of a kind; None where it was not compared, or the reference judges nothing."""
+    """Return the RMS error along an axis of the first subject of a kind.
+
+    None where it was not compared, or the reference judges nothing.
+    """
     row = answer.error(_first(answer, kind, quantity, axis), quantity, axis) if answer.is_judge else None
     return None if row is None else row.spread.rmse
 
@@ -19,7 +22,10 @@ def _share(answer: ReferenceResult, kind: str) -> float | None:
 
 
 def _first(answer: ReferenceResult, kind: str, quantity: str, axis: str) -> str:
-    """The first subject of a kind that was compared along an axis: ``gnss``, or ``gnss.b`` of another log."""
+    """Return the first subject of a kind that was compared along an axis.
+
+    It is ``gnss``, or ``gnss.b`` of another log.
+    """
     compared = (row.subject for row in answer.errors if (row.quantity, row.axis) == (quantity, axis))
     return next((subject for subject in compared if kind_of(subject) == kind), kind)
 

@@ -1,4 +1,4 @@
-"""Errors of a table of positions, velocities and angles against the reference: error = estimate - reference."""
+"""Errors of positions, velocities and angles against the reference: estimate - reference."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -79,7 +79,10 @@ class Errors:
         return np.asarray(np.hypot(self.position_m[:, 0], self.position_m[:, 1]))
 
     def along_cross(self, north_east: FloatArray, moving_mps: float) -> tuple[FloatArray, FloatArray]:
-        """North and east (n, 2) along the reference's motion and to its right; NaN where it hardly moves."""
+        """Resolve north and east (n, 2) along the reference's motion and to its right.
+
+        NaN where it hardly moves.
+        """
         speed = np.hypot(*self.motion_mps.T)
         with np.errstate(invalid="ignore", divide="ignore"):
             north, east = np.where(speed > moving_mps, self.motion_mps.T / speed, np.nan)
@@ -89,7 +92,10 @@ class Errors:
         )
 
     def without_arm(self, forward_m: float, right_m: float) -> "Errors":
-        """The errors of the subject brought back to the reference's point by a level arm in body axes."""
+        """Return the errors of the subject moved to the reference's point.
+
+        The lever arm is in body axes.
+        """
         position, velocity = self.position_m.copy(), self.velocity_mps.copy()
         turned = turned_arm(self.heading_deg, forward_m, right_m)
         known = np.isfinite(turned).all(axis=1)
@@ -112,7 +118,9 @@ def _rate(values: FloatArray, time_s: FloatArray) -> FloatArray:
 def errors_of(
     subject: str, table: Table, reference: Table, start_ns: int, *, settings: ReferenceSettings
 ) -> Errors | None:
-    """Compare a table with the reference at the samples of the slower of the two; None without a common time.
+    """Compare a table with the reference at the samples of the slower of the two.
+
+    None without a common time.
 
     The faster one is interpolated linearly to them, over no gap longer than ``gap_max_s``. Samples without a position
     are compared in what they have.

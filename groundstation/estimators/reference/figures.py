@@ -1,4 +1,7 @@
-"""Arrays behind the figures of the comparison with a reference, thinned to what a page or a viewer can show."""
+"""Arrays behind the figures of the comparison with a reference.
+
+They are thinned to what a page or a viewer can show.
+"""
 
 from collections.abc import Sequence
 
@@ -15,7 +18,10 @@ ROWS = 2_000  # of each subject
 
 
 def errors_figure(listed: Sequence[Errors]) -> ReferenceErrors:
-    """Errors of every subject over time with the sigmas that it and the reference claim together."""
+    """Return the errors of every subject over time and their claimed sigmas.
+
+    The sigmas are those that the subject and the reference claim together.
+    """
     parts = []
     for errors in listed:
         rows = _thinned(len(errors))
@@ -55,7 +61,10 @@ def _total(errors: Errors, name: str) -> FloatArray:
 
 
 def track_figure(listed: Sequence[Errors]) -> ReferenceTrack | None:
-    """Plan view: the reference and every subject with positions, metres from where the reference begins."""
+    """Return the plan view of the reference and of every subject with positions.
+
+    Metres from where the reference begins.
+    """
     with_place = [one for one in listed if np.isfinite(one.position_m[:, :2]).any()]
     if not with_place:
         return None
@@ -72,7 +81,10 @@ def track_figure(listed: Sequence[Errors]) -> ReferenceTrack | None:
 
 
 def checks_figure(listed: Sequence[Checked]) -> ReferenceChecks | None:
-    """Of every claim as many samples, evenly spaced, as are independent: what a fleet may count."""
+    """Return as many evenly spaced samples of every claim as are independent.
+
+    These are what a fleet may count.
+    """
     parts = []
     for one in listed:
         rows = np.unique(np.linspace(0, len(one.z) - 1, max(int(one.row.effective_samples), 1)).round().astype(int))

@@ -1,4 +1,7 @@
-"""A flight judged by its truth: errors, what was claimed of them, arm and clock of the reference."""
+"""Comparison of one flight with its truth.
+
+It covers the errors, the sigmas claimed for them, and the lever arm and clock of the reference.
+"""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -79,7 +82,10 @@ def _step_s(reference: "Table") -> float:
 
 
 def _placed(as_logged: Sequence[Errors], settings: ReferenceSettings) -> tuple[tuple[Placed, ...], list[Errors]]:
-    """Arm and clock of what was recorded; what the filters made of the INS stands where the GNSS antenna does."""
+    """Estimate lever arm and clock of the recorded sources, and return the errors without arm.
+
+    The filters' solutions of the INS stand where the GNSS antenna does.
+    """
     placed, listed = [], []
     antenna: Placed | None = None
     for one in as_logged:
@@ -96,7 +102,10 @@ def _placed(as_logged: Sequence[Errors], settings: ReferenceSettings) -> tuple[t
 def _gross_offset_s(
     subjects: "dict[str, Table]", reference: "Table", start_ns: int, settings: ReferenceSettings
 ) -> float:
-    """How much later than the reference the first subject that has both moves, where that is seconds; else 0."""
+    """Return how much later than the reference the subjects move, where that is seconds.
+
+    The first subject with enough samples decides; 0 where the offset is small.
+    """
     true_s, true_speed = _speeds(reference, start_ns)
     for table in subjects.values():
         time_s, speed = _speeds(table, start_ns)

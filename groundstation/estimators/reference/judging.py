@@ -1,4 +1,4 @@
-"""Rows of the answer: errors along every axis with their statistics, and claimed against seen."""
+"""Rows of the answer: errors along every axis with their statistics, claimed against seen."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ LEAST_SIGMA = 1e-9  # m, m/s or deg: no device measures so well, and a smaller o
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of an error: ``sigma`` names the claim on it; ``values`` (n,), NaN where unknown.
+    """One axis of an error: values (n,), NaN where unknown; ``sigma`` names the claim on it.
 
     ``parts`` (n, c) are its components: north and east of a length, which the sigma counts together; else itself.
     """
@@ -38,13 +38,17 @@ class Axis:
 
     @property
     def components(self) -> int:
-        """How many components its sigma counts together."""
+        """Number of components that its sigma counts together."""
         return int(self.parts.shape[1])
 
 
 @dataclass(frozen=True)
 class Checked:
-    """A claim sample by sample: times, each error as a standard normal variable if the claim is true, inside or not."""
+    """A claim checked sample by sample.
+
+    ``z`` is each error as a standard normal variable if the claim is true; ``is_inside`` tells whether the error is
+    inside the claimed region.
+    """
 
     row: ClaimRow
     time_s: FloatArray
@@ -93,7 +97,10 @@ def error_row(errors: Errors, axis: Axis, settings: ReferenceSettings) -> ErrorR
 
 
 def _reference_sigma(axis: Axis) -> str:
-    """The sigma of the reference on an axis: that of both horizontal components for one of them."""
+    """Name the sigma of the reference on an axis.
+
+    A single horizontal component has the sigma of both.
+    """
     if axis.name in ("along", "cross"):
         return "horizontal_sigma_m" if axis.quantity == "position" else "velocity_sigma_mps"
     return axis.sigma
@@ -108,7 +115,9 @@ def _rms_of(sigmas: Mapping[str, FloatArray], name: str, rows: BoolArray) -> flo
 
 
 def checked(errors: Errors, axis: Axis) -> Checked | None:
-    """Hold an error against the 95 % region that subject and reference claim together; None without a claim.
+    """Check an error against the 95 % region that subject and reference claim together.
+
+    None without a claim.
 
     A length of north and east has a chi distribution with two degrees of freedom, both components taken to be equal.
     Sigmas that the reference does not tell count as nothing: then the share seen is at most that of honest claims.

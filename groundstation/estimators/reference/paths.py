@@ -37,7 +37,10 @@ def path_rows(errors: Errors) -> tuple[PathRow, ...]:
 
 
 def relative_rows(errors: Errors, settings: ReferenceSettings) -> tuple[RelativeRow, ...]:
-    """By how much the horizontal position error changes over each time and way of the settings that fits."""
+    """Return how much the horizontal position error changes over a time or a way.
+
+    One row for each time and way of the settings that fits into the flight.
+    """
     known = np.isfinite(errors.position_m[:, :2]).all(axis=1) & np.isfinite(errors.place_m).all(axis=1)
     if known.sum() < LEAST_PAIRS:
         return ()
@@ -65,7 +68,10 @@ def relative_rows(errors: Errors, settings: ReferenceSettings) -> tuple[Relative
 
 
 def _pairs(progress: FloatArray, length: float) -> tuple[Int64Array, Int64Array]:
-    """Rows that lie a time or way apart, each first row with the row nearest to it; none that misses it by a tenth."""
+    """Pair each row with the row nearest to a time or way later.
+
+    Pairs that miss it by more than a tenth are left out.
+    """
     wanted = progress + length
     after = np.clip(np.searchsorted(progress, wanted), 1, len(progress) - 1)
     nearest = after - (wanted - progress[after - 1] < progress[after] - wanted)

@@ -1,4 +1,6 @@
-"""Where a subject stands against the reference's point, and whose clock is late: one fit of the position error.
+"""Lever arm of a subject from the reference's point and its clock offset, by one fit.
+
+The fit is to the position error.
 
 A subject that stands ``arm`` away in body axes and shows its positions ``offset`` seconds later errs by
 
@@ -29,7 +31,7 @@ LEAST_COMPARED = 20
 
 @dataclass(frozen=True)
 class PlaceFit:
-    """Arm forward and right (m) and clock offset (s), shape (3,), with half widths of their 95 % intervals."""
+    """Arm forward and right (m) and clock offset (s), shape (3,), with 95 % half widths."""
 
     values: FloatArray
     half_widths: FloatArray
@@ -102,7 +104,9 @@ def _design(errors: Errors, known: np.ndarray) -> FloatArray:
 
 
 def place(errors: Errors, settings: ReferenceSettings, *, takes_stated: bool) -> tuple[Placed, Errors]:
-    """Where the subject stands and how late it is, and its errors with the arm taken out where it is known.
+    """Estimate arm and clock offset of a subject, and return its errors without the arm.
+
+    The arm is taken out where it is known.
 
     ``takes_stated``: whether the arm of the settings is this subject's.
     """
@@ -135,7 +139,7 @@ def place(errors: Errors, settings: ReferenceSettings, *, takes_stated: bool) ->
 
 
 def _reason(fit: PlaceFit | None, half_m: float, half_s: float, settings: ReferenceSettings) -> str:
-    """What the fit rests on, or why arm or clock are not observable."""
+    """Return what the fit rests on, or why arm or clock are not observable."""
     if fit is None:
         return "too few positions with motion and heading"
     parts = [f"{fit.freedom.min():.0f} degrees of freedom at least"]
@@ -152,7 +156,9 @@ def _reason(fit: PlaceFit | None, half_m: float, half_s: float, settings: Refere
 def gross_offset_s(
     errors_at: FloatArray, speed: FloatArray, true_s: FloatArray, true_speed: FloatArray, most: float
 ) -> float:
-    """How many seconds later a subject shows the speeds of the reference, where that is grossly not zero; else 0.
+    """Return how many seconds later a subject shows the speeds of the reference.
+
+    0 where the offset is not grossly different from zero.
 
     Parameters
     ----------

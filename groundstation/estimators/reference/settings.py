@@ -10,7 +10,7 @@ UseArm = Literal["when_observed", "never"]
 
 @dataclass(frozen=True)
 class ReferenceSettings:
-    """How a reference is laid beside a flight, and when it judges.
+    """Settings of how a reference is aligned with a flight, and when it judges.
 
     ``clock_offset_s`` is added to the reference's times. The arm leads from the reference's point to the GNSS antenna
     of the log, in body axes; where none is stated it is estimated and taken out of the errors, if the turns show it.

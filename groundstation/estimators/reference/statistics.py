@@ -1,4 +1,4 @@
-"""Statistics of errors that are correlated in time: intervals by the effective number of samples."""
+"""Statistics of time-correlated errors: intervals by the effective number of samples."""
 
 import math
 from dataclasses import dataclass
@@ -18,7 +18,9 @@ FEWEST_FOR_A_CLAIM = 10.0  # with fewer any share is within the interval
 
 
 def independent(values: FloatArray) -> float:
-    """Effective number of samples of errors in order of time, shape (n,), their mean being unknown.
+    """Return the effective number of samples of errors in order of time, shape (n,).
+
+    Their mean is unknown.
 
     Notes
     -----
@@ -64,7 +66,7 @@ def spread_of(values: FloatArray) -> Spread:
 
 
 def root_mean_interval(squares: FloatArray, count: float) -> tuple[float, float] | None:
-    """The 95 % interval of the root of the mean of squares, shape (n,); None where they are none.
+    """Return the 95 % interval of the root mean of squares, shape (n,); None where they are 0.
 
     ``count`` is the effective number of the errors themselves; that of the squares counts where it is smaller.
     """
@@ -84,7 +86,10 @@ def _median_interval(values: FloatArray, count: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Share:
-    """Share inside a region claimed for 95 %, by how many independent samples, its 95 % interval, and what it says."""
+    """Share of errors inside a region claimed for 95 %, with its 95 % interval and verdict.
+
+    ``effective_samples`` is the number of independent samples.
+    """
 
     inside: float
     effective_samples: float

@@ -1,4 +1,7 @@
-"""What is judged: the recorded GNSS and INS, and what the estimators made of them, as tables of canonical fields."""
+"""Subjects of the comparison, as tables of canonical fields.
+
+They are the recorded GNSS and INS, and what the estimators made of them.
+"""
 
 from collections.abc import Iterator
 from dataclasses import replace

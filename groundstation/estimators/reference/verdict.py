@@ -1,4 +1,7 @@
-"""Whether a reference may judge at all, and what a user must know of it: another place, datum, clock, or too coarse."""
+"""Verdict on a reference: whether it may judge at all, and what a user must know of it.
+
+It may stand at another place, use another datum or clock, or be too coarse.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -20,7 +23,7 @@ LEAP_SECONDS = range(13, 20)
 
 @dataclass(frozen=True)
 class Standing:
-    """Whether the reference judges, and why not."""
+    """Decision whether the reference may judge, with the reason when not."""
 
     is_judge: bool
     reason: str = ""
@@ -49,14 +52,17 @@ def standing_of(
 
 
 def _is_own_solution(row: ErrorRow) -> bool:
-    """Whether the reference repeats what a receiver logged: nearer to it than its own sigma allows."""
+    """Tell whether the reference repeats what a receiver logged.
+
+    It does when it is nearer to the receiver than its own sigma allows.
+    """
     if (kind_of(row.subject), row.quantity, row.axis) != ("gnss", "position", "horizontal"):
         return False
     return row.spread.rmse < max(SAME_M, SAME_SHARE * (row.reference_sigma or 0.0))
 
 
 def findings_of(answer: ReferenceResult, gross_s: float, interval_s: float) -> tuple[Finding, ...]:
-    """What a user must know of the reference and of the claims that it contradicts."""
+    """Return what a user must know of the reference and of the claims that it contradicts."""
     return (*_of_reference(answer, gross_s, interval_s), *_of_claims(answer))
 
 
