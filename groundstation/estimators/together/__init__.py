@@ -1,1 +1,4 @@
-"""Several logs of one flight: how they were joined, how well their motions agree, which sources are used."""
+"""Several logs of one flight: how they are joined, how well they agree, which are used.
+
+The motions of the logs are compared; the sources in use are listed.
+"""

@@ -1,4 +1,4 @@
-"""The joining of several logs as an analysis: what the MCAP keeps of it, checked on the joined tables."""
+"""Joining of several logs as an analysis: the MCAP's record, checked on the joined tables."""
 
 import json
 from dataclasses import asdict
@@ -58,7 +58,10 @@ def _chosen(flight: "Flight", kind: str) -> ChosenSource:
 
 
 def _shown(flight: "Flight", log: JoinedLog) -> tuple[MotionAgreement, list[FigureData]] | None:
-    """The motion of a joined log over that of the log with the flight's clock, and the difference of the two."""
+    """Compare the motion of a joined log with that of the log with the flight's clock.
+
+    Also returns the figures: both motions and their difference.
+    """
     topics = log.reference_topic, log.topic
     if not log.signals or any(topic not in flight for topic in topics):
         return None
