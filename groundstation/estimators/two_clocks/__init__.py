@@ -1,1 +1,4 @@
-"""The clocks of two logs of one flight: offset and drift between them, by GNSS time and by the motion both show."""
+"""Offset and drift between the clocks of two logs of one flight.
+
+They are found by GNSS time and by the motion that both logs show.
+"""

@@ -1,4 +1,4 @@
-"""What two logs show of one motion: a pair of topics, one of each log, and the signals that both have."""
+"""Signals that two logs have of one motion: a pair of topics, one of each log."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -31,9 +31,10 @@ LEAST_WEIGHT = 1  # altitudes alone
 
 @dataclass(frozen=True)
 class Side:
-    """Signals of one topic: seconds since the start of its flight (n,), increasing, and values (n, c).
+    """Signals of one topic: seconds since the start of its flight (n,), and values (n, c).
 
-    ``attitude_deg``: roll, pitch and heading (n, 3) where it has a heading, for the arm between two sensors.
+    The times increase. ``attitude_deg``: roll, pitch and heading (n, 3) where it has a heading, for the arm between two
+    sensors.
     """
 
     topic: str
@@ -64,11 +65,11 @@ class Pair:
 def pair_of(
     first: Flight, other: Flight, longest_s: float, *, is_late: tuple[bool, bool] = (False, False)
 ) -> Pair | None:
-    """The pair of topics that shows most of the motion, with the signals that both have; None where there is none.
+    """Return the pair of topics that shows most of the motion; None where there is none.
 
-    Velocities say more than speed, an INS more than GNSS (it is stamped when it is measured), fast topics more than
-    slow ones. A topic slower than one sample in ``longest_s`` says nothing. ``is_late``: GNSS messages of a log came to
-    its recorder late; they are used where nothing else shows the motion.
+    The pair comes with the signals that both have. Velocities say more than speed, an INS more than GNSS (it is stamped
+    when it is measured), fast topics more than slow ones. A topic slower than one sample in ``longest_s`` says nothing.
+    ``is_late``: GNSS messages of a log came to its recorder late; they are used where nothing else shows the motion.
     """
     sides = [[_channels(flight, topic) for topic in _topics(flight)] for flight in (first, other)]
     best, rank = None, (False, -2, 0, 0, 0.0)
@@ -161,7 +162,7 @@ def _channels(flight: Flight, topic: str) -> _Channels:
 
 
 def _tells(values: FloatArray, more_than: int) -> bool:
-    """Whether there are enough values, and not all are the same."""
+    """Tell whether there are enough values, and not all are the same."""
     finite = values[np.isfinite(values)]
     return len(finite) > more_than and float(np.ptp(finite)) > 0.0
 

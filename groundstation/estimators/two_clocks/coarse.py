@@ -1,4 +1,4 @@
-"""The first search: where two motions fit on an even grid, and where one of the clocks steps."""
+"""Coarse search for the lag between two motions on an even grid, and for clock steps."""
 
 from dataclasses import dataclass
 
@@ -18,8 +18,9 @@ LIVELY = 0.1  # share of the usual motion that a stretch must have to be judged
 
 @dataclass(frozen=True)
 class Place:
-    """Where the other log lies: ``lag_s`` is added to its seconds to give those of the first.
+    """Lag between two logs: ``lag_s`` added to seconds of the other gives those of the first.
 
+    ``correlation`` is that of the two motions at this lag, ``rival`` the next best fit as a share of the best.
     ``correlation``: of the two motions there; ``rival``: share of the best fit that the next best place has.
     """
 
@@ -31,7 +32,10 @@ class Place:
 
 @dataclass(frozen=True)
 class Grids:
-    """Both motions on even grids of ``step_s``, freed of slow motion, zero where not known: (c, n) and (c, m)."""
+    """Both motions on even grids of ``step_s``: (c, n) and (c, m).
+
+    Slow motion is filtered out; zero where nothing is known.
+    """
 
     first: FloatArray
     other: FloatArray
@@ -80,10 +84,10 @@ def _spread(values: FloatArray) -> FloatArray:
 
 
 def place_of(grids: Grids, settings: TwoClocksSettings, near_s: tuple[float, float] | None) -> Place | None:
-    """Find the lag at which the two motions fit best; ``near_s`` bounds it. None where they never lie together.
+    """Find the lag at which the two motions fit best; ``near_s`` bounds it.
 
-    The product of the two motions is held against what chance gives, its standard deviation for motions that have
-    nothing to do with each other: a short common part counts less than a long one.
+    None where they never overlap. The product of the two motions is held against what chance gives, its standard
+    deviation for motions that have nothing to do with each other: a short common part counts less than a long one.
     """
     a, b, step_s = grids.first, grids.other, grids.step_s
     size = a.shape[1] + b.shape[1]
@@ -114,10 +118,10 @@ def place_of(grids: Grids, settings: TwoClocksSettings, near_s: tuple[float, flo
 
 
 def steps_of(grids: Grids, place: Place, settings: TwoClocksSettings) -> list[tuple[float, float]]:
-    """Stretches between steps of a clock: seconds of the other log where each begins, and the lag of each.
+    """Find the stretches between steps of a clock.
 
-    The lag is found anew in windows of the other log that move; where it changes by more than ``step_s`` and stays
-    there, a clock was set.
+    Each is given by its begin, in seconds of the other log, and its lag. The lag is found anew in windows of the other
+    log that move; where it changes by more than ``step_s`` and stays there, a clock was set.
     """
     at_s, lags_s = _local_lags(grids, place, settings)
     begins = [(-np.inf, place.lag_s)]
@@ -140,7 +144,10 @@ def steps_of(grids: Grids, place: Place, settings: TwoClocksSettings) -> list[tu
 
 
 def _local_lags(grids: Grids, place: Place, settings: TwoClocksSettings) -> tuple[FloatArray, FloatArray]:
-    """Middles of windows of the other log that move, in its seconds, and the lag of each, shapes (k,)."""
+    """Return the lag in windows of the other log that move, with their middles, shapes (k,).
+
+    The middles are in seconds of the other log.
+    """
     step_s = grids.step_s
     length, reach = round(settings.step_window_s / step_s), round(settings.step_search_s / step_s)
     usual = float(np.mean(grids.other**2))
@@ -170,7 +177,10 @@ def _row_in_first(grids: Grids, row: int, lag_s: float) -> int:
 def _moment(
     grids: Grids, before_s: float, after_s: float, between_s: tuple[float, float], settings: TwoClocksSettings
 ) -> float:
-    """Second of the other log at which the lag changes: what is left over is least when it changes there."""
+    """Return the second of the other log at which the lag changes.
+
+    It is the one that leaves the least residual.
+    """
     low, high = (
         round((second - grids.other_start_s) / grids.step_s)
         for second in (between_s[0] - 0.5 * settings.step_window_s, between_s[1] + 0.5 * settings.step_window_s)

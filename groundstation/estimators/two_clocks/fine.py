@@ -1,4 +1,7 @@
-"""The fine fit: offset and drift of one clock against another over a stretch without steps, with their intervals."""
+"""Fine fit of offset and drift between two clocks, over a stretch without steps.
+
+Both come with their intervals.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -25,9 +28,10 @@ USUAL_SCALE_SIGMA, AZIMUTH_SIGMA_RAD = 0.03, 0.05
 
 @dataclass(frozen=True)
 class MotionFit:
-    """First time = other time + ``lag_s`` - ``drift`` (other time - ``middle_s``), in seconds of the flights.
+    """Lag and drift of a clock, fitted to the motion over one stretch.
 
-    Sigmas are such that 1.96 of them hold the truth in 95 of 100: Student's quantile is in them.
+    First time = other time + ``lag_s`` - ``drift`` (other time - ``middle_s``), in seconds of the flights. Sigmas are
+    such that 1.96 of them hold the truth in 95 of 100: Student's quantile is in them.
     """
 
     middle_s: float
@@ -107,9 +111,10 @@ def _why_not(fit: DelayFit, settings: TwoClocksSettings) -> str:
 
 
 def _hidden_by_arm_s(pair: Pair, other: Side, settings: TwoClocksSettings) -> float:
-    """One sigma of what an arm between two antennas hides where no attitude tells it apart: its length over the speed.
+    """Return the lag, one sigma, that a lever arm between two antennas can hide.
 
-    In a turn of one radius an antenna that stands ahead looks as one that is early.
+    It is the length of the arm over the speed, where no attitude tells the two apart. In a turn of one radius an
+    antenna that stands ahead looks as one that is early.
     """
     if "north" not in pair.names or any(side.attitude_deg is not None for side in (pair.first, other)):
         return 0.0
@@ -122,16 +127,16 @@ def _slow(interval_s: float) -> float:
 
 
 def _is_reference(first: Side, other: Side) -> bool:
-    """Whether the first is to be the reference: an INS before GNSS, whose noise would draw the fit to its samples.
+    """Tell whether the first side is to be the reference.
 
-    Else the faster one.
+    An INS goes before GNSS, whose noise would draw the fit to its samples. Else the faster one.
     """
     first_is_ins, other_is_ins = _is_quiet(first), _is_quiet(other)
     return first_is_ins > other_is_ins or (first_is_ins == other_is_ins and first.interval_s <= other.interval_s)
 
 
 def _is_quiet(side: Side) -> bool:
-    """Whether the noise of single samples is small: that of a fast INS."""
+    """Tell whether single samples have little noise, as those of a fast INS."""
     return side.topic.startswith("ins") and side.interval_s <= SLOW_S
 
 
@@ -143,7 +148,10 @@ def _nodes(width_s: float, interval_s: float) -> int:
 def _fit(
     names: tuple[str, ...], fast: Side, slow: Side, middle_s: float, settings: TwoClocksSettings
 ) -> tuple[DelayFit, float] | str:
-    """Fit one side (``slow``) against the reference (``fast``), both on the first's seconds; and the middle used."""
+    """Fit one side (``slow``) to the reference (``fast``); return the fit and its middle time.
+
+    Both sides are on the seconds of the first log. Where it fails the reason is returned.
+    """
     reference = averaged(fast, REFERENCE_STEP_S)
     if _is_quiet(fast):
         sensor = averaged(slow, OTHER_STEP_S)
@@ -172,7 +180,10 @@ def _fit(
 
 
 def _noise(names: tuple[str, ...], reference: Side, sensor: Side) -> FloatArray:
-    """Scatter of each signal of the sensor about the reference from sample to sample, shape (c,); north is as east."""
+    """Return the noise of each signal of the sensor, shape (c,).
+
+    It is the scatter about the reference from sample to sample; north has that of east.
+    """
     inside = (sensor.time_s > reference.time_s[0]) & (sensor.time_s < reference.time_s[-1])
     left = np.column_stack(
         [
@@ -199,7 +210,7 @@ def _series(
     settings: TwoClocksSettings,
     fine: LatencySettings,
 ) -> tuple[Series, FloatArray, int]:
-    """The reference with what may be wrong of it, the priors, and the number of the drift among them.
+    """Return the reference with its nuisances, their priors, and the index of the drift.
 
     It is averaged over ``width_s`` as the sensor was, and so that the noise of its single samples does not show.
     """
@@ -228,7 +239,10 @@ def _series(
 
 
 def _arms(names: tuple[str, ...], side: Side, size: FloatArray) -> FloatArray:
-    """What an arm of 1 m along each body axis adds to the signals, shape (n, 3 c): velocities of a turning body."""
+    """Return what a lever arm of 1 m along each body axis adds to the signals, shape (n, 3 c).
+
+    It adds the velocity of a turning body.
+    """
     north, east = side.values[:, 0] * size[0], side.values[:, 1] * size[1]
     if side.attitude_deg is None:
         attitude = np.column_stack([np.zeros((len(north), 2)), _track(north, east)])
@@ -244,7 +258,10 @@ def _arms(names: tuple[str, ...], side: Side, size: FloatArray) -> FloatArray:
 
 
 def _track(north_mps: FloatArray, east_mps: FloatArray) -> FloatArray:
-    """Direction of motion, continuous, held where it is slow: where the nose of a body without heading points."""
+    """Return the direction of motion, continuous, held where it is slow.
+
+    It stands for the heading of a body that logs none.
+    """
     known = np.flatnonzero(np.hypot(north_mps, east_mps) > SLOW_MPS)
     if not known.size:
         return np.zeros(len(north_mps))
@@ -252,7 +269,7 @@ def _track(north_mps: FloatArray, east_mps: FloatArray) -> FloatArray:
 
 
 def _middle(series: Series, windows: Windows) -> float:
-    """Where the motion lies in time: about it the offset is known best."""
+    """Return the mean time of the motion, about which the offset is known best."""
     rate = series.at(windows.time_s)[1][..., 0]
     weight = np.sum(rate**2, axis=-1) * windows.weight
     return float(np.sum(weight * windows.time_s) / max(float(np.sum(weight)), 1e-12))

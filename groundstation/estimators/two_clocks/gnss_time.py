@@ -16,7 +16,10 @@ OWN_SIGMA_S = 0.001
 
 @dataclass(frozen=True)
 class GnssStretch:
-    """A stretch of a log over which GNSS time = own time + ``offset_s`` - ``drift`` (own time - ``middle_ns``)."""
+    """Stretch of a log with one offset and drift to GNSS time.
+
+    GNSS time = own time + ``offset_s`` - ``drift`` (own time - ``middle_ns``).
+    """
 
     begin_ns: int
     middle_ns: int
@@ -36,7 +39,10 @@ class GnssStretch:
 
 @dataclass(frozen=True)
 class GnssTime:
-    """GNSS time of a log; ``is_own``: it is the log's own clock, not one that messages told its recorder."""
+    """GNSS time of a log, in stretches.
+
+    ``is_own``: the log's own clock runs on it; else messages told it to the recorder.
+    """
 
     stretches: tuple[GnssStretch, ...]
     is_own: bool

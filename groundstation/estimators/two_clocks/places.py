@@ -1,4 +1,4 @@
-"""How far two logs are from each other at one time: those of one flight are near."""
+"""Distance between the positions of two logs at one time; those of one flight are near."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,14 +17,20 @@ LARGEST_GAP_S = 10.0
 
 @dataclass(frozen=True)
 class Apart:
-    """Median distance over the ground; ``is_inertial``: one of the positions is that of an INS, which may drift."""
+    """Median distance over the ground; ``is_inertial``: one position is that of an INS.
+
+    An INS may drift.
+    """
 
     distance_m: float
     is_inertial: bool
 
 
 def apart_m(first: Flight, other: Flight, first_time_ns: Callable[[Int64Array], Int64Array]) -> Apart | None:
-    """Distance of the positions of two logs at one time; None where one has none or they never lie together."""
+    """Return the distance between the positions of two logs at one time.
+
+    None where one has no position or they never overlap.
+    """
     a, b = _positions(first), _positions(other)
     if a is None or b is None:
         return None

@@ -1,4 +1,4 @@
-"""Put the clock of one log on that of another of the same flight, by GNSS time and by the motion that both show."""
+"""Relation of the clocks of two logs of the same flight, by GNSS time and by motion."""
 
 from dataclasses import replace
 
@@ -95,7 +95,10 @@ def _by_file_time(lag_s: float | None) -> tuple[Stretch, ...]:
 
 
 def _by_gnss_time(first: TimedLog, other: TimedLog, settings: TwoClocksSettings) -> tuple[Stretch, ...]:
-    """The relation by GNSS time of both, a stretch for each pair of theirs; empty where one does not tell it."""
+    """Relate the logs by the GNSS time of both; empty where one does not have it.
+
+    There is a stretch for each pair of theirs.
+    """
     if first.gnss_time is None or other.gnss_time is None:
         return ()
     arrival_s = (
@@ -121,9 +124,10 @@ def _by_gnss_time(first: TimedLog, other: TimedLog, settings: TwoClocksSettings)
 def _placed(
     pair: Pair | None, by_gnss: tuple[Stretch, ...], files_lag_s: float | None, settings: TwoClocksSettings
 ) -> tuple[Place | None, str]:
-    """Where the motions fit; or None, and why the motion does not tell.
+    """Return the lag at which the motions fit; or None, and why the motion does not tell it.
 
-    Of several places that fit alike that near to the times of the files is taken, where both are in UTC.
+    Of several lags that fit alike the one near to the times of the files is taken, where both are in UTC. Of several
+    places that fit alike that near to the times of the files is taken, where both are in UTC.
     """
     if pair is None:
         return None, "no motion that both show"
@@ -168,7 +172,7 @@ def _by_motion(
     logs: tuple[TimedLog, TimedLog],
     settings: TwoClocksSettings,
 ) -> tuple[LogRelation | None, str]:
-    """The relation with the motion fitted in each stretch, weighed with GNSS time where that tells.
+    """Fit the motion in each stretch, and weigh it with GNSS time where that is known.
 
     None, and why, where no stretch can be fitted and GNSS time does not tell.
     """
@@ -212,7 +216,10 @@ def _by_motion(
 def _settled(
     begin_s: float, fit: MotionFit, prior: Stretch | None, settings: TwoClocksSettings
 ) -> tuple[Stretch, tuple[float, float] | None]:
-    """A stretch by the motion, with GNSS time where it does not contradict it; GNSS time less motion with its sigma."""
+    """Return a stretch by the motion, weighed with GNSS time where the two agree.
+
+    Also returns GNSS time less motion with its sigma.
+    """
     moving = Stretch(begin_s, fit.middle_s, fit.lag_s, fit.lag_sigma_s, fit.drift, fit.drift_sigma, "motion")
     if prior is None:
         return moving, None
@@ -223,16 +230,20 @@ def _settled(
 
 
 def _stamps_late(log: TimedLog) -> bool:
-    """Whether a log has GNSS messages that came to a recorder of something else, too, by whose clock they are stamped.
+    """Tell whether a log's GNSS messages may be stamped late, by the clock of its recorder.
 
-    Of a log of GNSS alone no other clock matters than that of its own stamps.
+    That is so where the recorder also records something else. Of a log of GNSS alone no other clock matters than that
+    of its own stamps.
     """
     is_own = log.gnss_time is not None and log.gnss_time.is_own
     return not is_own and any(topic.startswith("ins") for topic in log.flight.topics())
 
 
 def _hidden_s(*sides: tuple[TimedLog, Side], settings: TwoClocksSettings) -> float:
-    """One sigma of what the motion does not show: filters of INS that GNSS corrects, GNSS messages that came late."""
+    """Return one sigma of the lag that the motion does not show.
+
+    It comes from INS filters that GNSS corrects, and from GNSS messages that came late.
+    """
     hidden = [settings.aided_sigma_s for log, side in sides if _is_aided(log, side)]
     hidden += [settings.arrival_sigma_s for log, side in sides if side.topic.startswith("gnss") and _stamps_late(log)]
     return float(np.linalg.norm(hidden)) if hidden else 0.0
@@ -248,7 +259,7 @@ def _is_aided(log: TimedLog, side: Side) -> bool:
 def _unfitted(
     prior: Stretch | None, begin_s: float, span_s: tuple[float, float], lag_s: float, settings: TwoClocksSettings
 ) -> Stretch:
-    """A stretch that the first search alone placed, which is rough; by GNSS time where that tells."""
+    """Return a stretch that only the coarse search placed; by GNSS time where that is known."""
     if prior is not None:
         return replace(prior, begin_s=begin_s)
     sigma = 1e-6 * settings.drift_sigma_ppm
@@ -256,7 +267,10 @@ def _unfitted(
 
 
 def _weighed(motion: Stretch, prior: Stretch) -> Stretch:
-    """Both by their variances, at the middle of the motion, where its offset and drift are uncorrelated."""
+    """Return the mean of both stretches, weighted by their variances.
+
+    It is taken at the middle of the motion, where its offset and drift are uncorrelated.
+    """
     lag_s, lag_sigma_s = _mean(
         motion.lag_s, motion.lag_sigma_s, float(prior.lag_at(motion.middle_s)), float(prior.sigma_at(motion.middle_s))
     )

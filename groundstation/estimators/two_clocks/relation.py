@@ -1,4 +1,4 @@
-"""How the clock of one log stands to that of another of the same flight: offset and drift with their 95 % interval."""
+"""Offset and drift between the clocks of two logs of a flight, with 95 % intervals."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -17,7 +17,10 @@ Method = Literal["gnss_time", "motion", "gnss_time_and_motion", "file_time"]
 
 
 class NotOneFlightError(GroundstationError):
-    """Two logs cannot be put on one clock: nothing places them, or they are of different flights."""
+    """Two logs cannot be put on one clock.
+
+    Nothing tells the lag between them, or they are of different flights.
+    """
 
 
 @dataclass(frozen=True)
@@ -40,10 +43,11 @@ class TimedLog:
 
 @dataclass(frozen=True)
 class Stretch:
-    """First time = other time + ``lag_s`` - ``drift`` (other time - ``middle_s``), seconds of both flights.
+    """Lag and drift between the clocks of two logs over one stretch.
 
-    Sigmas are such that 1.96 of them hold the truth in 95 of 100 cases; infinite where nothing tells. ``drift`` is
-    positive where the other clock is fast.
+    First time = other time + ``lag_s`` - ``drift`` (other time - ``middle_s``), seconds of both flights. Sigmas are
+    such that 1.96 of them hold the truth in 95 of 100 cases; infinite where nothing tells. ``drift`` is positive where
+    the other clock is fast.
     """
 
     begin_s: float
@@ -55,7 +59,7 @@ class Stretch:
     method: Method
 
     def lag_at(self, other_s: FloatArray | float) -> FloatArray:
-        """What is added to seconds of the other to give those of the first."""
+        """Return what is added to seconds of the other log to give those of the first."""
         return np.asarray(self.lag_s - self.drift * (np.asarray(other_s) - self.middle_s))
 
     def sigma_at(self, other_s: FloatArray | float) -> FloatArray:
@@ -99,7 +103,7 @@ class LogRelation:
 
     @property
     def method(self) -> Method:
-        """What the first stretch rests on; each says it of itself."""
+        """Method of the first stretch; every stretch has its own."""
         return self.stretches[0].method
 
     def seconds(self, other_ns: Int64Array) -> FloatArray:
@@ -120,12 +124,15 @@ class LogRelation:
         return np.asarray(other_ns + base_ns + np.rint(lag_s * NS_PER_S).astype(np.int64), dtype=np.int64)
 
     def half_width95_s(self, other_ns: Int64Array) -> FloatArray:
-        """Half of the 95 % interval of :meth:`first_time_ns`, seconds; infinite where nothing tells it."""
+        """Return half of the 95 % interval of :meth:`first_time_ns`, seconds.
+
+        Infinite where nothing tells it.
+        """
         other_s = self.seconds(other_ns)
         number = self.stretch_of(other_s)
         return NORMAL_95 * self._of_stretch(number, [one.sigma_at(other_s) for one in self.stretches])
 
     @staticmethod
     def _of_stretch(number: Int64Array, values: list[FloatArray]) -> FloatArray:
-        """Of values by every stretch those of the stretch that each time is in; any number of stretches."""
+        """Pick for each time the value by the stretch that it is in; any number of stretches."""
         return np.asarray(np.take_along_axis(np.stack(values), np.asarray(number)[None], axis=0)[0])
