@@ -1,1 +1,4 @@
-"""Landing by two locators and an additional beacon: deviations from course and glide path by relative bearings."""
+"""Landing by two locators and an additional beacon.
+
+Relative bearings give the deviations from course and glide path.
+"""

@@ -104,7 +104,7 @@ def _beacons_heard(flight: "Flight", site: SiteData) -> tuple[Runway, tuple[Beac
 
 
 def _has_height(flight: "Flight") -> bool:
-    """Whether the log has a radio altitude."""
+    """Tell whether the log has a radio altitude."""
     return any(flight[topic].has("height_m") for topic in topics_of_kind("radio_altimeter", flight.topics()))
 
 
@@ -140,7 +140,7 @@ def _bearings(flight: "Flight", topic: str, time_ns: Int64Array, settings: Landi
 
 
 def _why_not(speed_mps: float) -> str:
-    """Why the places of an approach cannot be right; empty where they can."""
+    """Return why the places of an approach cannot be right; empty where they can."""
     wrong = "bearings of the wrong sign or quadrant, or beacons on the wrong side of the runway"
     if not np.isfinite(speed_mps):
         return f"bearings and beacons give too few places: {wrong}"
@@ -196,7 +196,7 @@ def _sentence(answers: Answers) -> str:
 
 
 def _last(value: Callable[[DeviationRow], Value]) -> Callable[[BeaconLanding], Value | None]:
-    """Of the row nearest to the threshold of the last approach."""
+    """Make a column of the row nearest to the threshold of the last approach."""
     return lambda landing: value(landing.rows[-1]) if landing.rows else None
 
 

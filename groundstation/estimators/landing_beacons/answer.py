@@ -1,4 +1,4 @@
-"""The answer of landing by locators: rows at round distances, arrays of the figure, what the accuracy claims."""
+"""Answer of landing by locators: rows at round distances, figure, claimed accuracy."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -62,7 +62,10 @@ def _approach(number: int, part: Sampled, found: Deviations, told: Belief) -> Be
 
 
 def _rows(number: int, flown: Flown) -> list[DeviationRow]:
-    """Rows at round distances: means over a second about the time at which the straight flight is there."""
+    """Return rows at round distances before the threshold.
+
+    Each holds means over a second about the time at which the straight flight is there.
+    """
     part, found, told = flown
     rows = []
     for distance_m in DISTANCES_M:

@@ -1,4 +1,4 @@
-"""One approach by bearings: the places along it, deviations with their sigmas, and whether they can be believed."""
+"""One approach by bearings: places along it, deviations with sigmas, plausibility checks."""
 
 from dataclasses import dataclass, replace
 
@@ -18,7 +18,10 @@ END_S = 2.0  # of an approach, over which the ground counts as that of the thres
 
 @dataclass(frozen=True)
 class Sampled:
-    """Everything at the times of one direction finder, shape (n,): bearings (n, k), NaN where there is nothing."""
+    """Signals at the times of one direction finder, shape (n,); bearings (n, k).
+
+    NaN where there is nothing.
+    """
 
     time_s: FloatArray
     bearings_deg: FloatArray
@@ -61,7 +64,7 @@ class Deviations:
 
     @property
     def found(self) -> BoolArray:
-        """Where there is a place."""
+        """Samples that have a place."""
         return np.asarray(np.isfinite(self.fix.along_m))
 
 
@@ -110,7 +113,9 @@ def deviations(sampled: Sampled, beacons_m: FloatArray, runway: Runway, settings
 
 
 def ground_m(before_m: FloatArray, runway: Runway) -> FloatArray:
-    """Height of the ground above the threshold by the profile of the site file; level without one, NaN beyond its ends.
+    """Return the height of the ground above the threshold by the profile of the site file.
+
+    Level without a profile, NaN beyond its ends.
 
     Examples
     --------
@@ -126,10 +131,10 @@ def ground_m(before_m: FloatArray, runway: Runway) -> FloatArray:
 
 
 def unknown_rise_m(sampled: Sampled, told: "Belief", runway: Runway) -> FloatArray:
-    """Rise of the ground above that under the end of the approach, less the profile; NaN where no altitude tells it.
+    """Return the rise of the ground above that under the approach's end, less the profile.
 
-    Altitude less radio altitude is the ground; what altitude errs by for the whole approach drops out. The distance is
-    that of a straight flight: single ones err too much.
+    NaN where no altitude tells it. Altitude less radio altitude is the ground; what altitude errs by for the whole
+    approach drops out. The distance is that of a straight flight: single ones err too much.
     """
     ground = sampled.altitude_m - sampled.height_m
     if runway.ground and np.isfinite(told.threshold_s):
@@ -142,8 +147,9 @@ def unknown_rise_m(sampled: Sampled, told: "Belief", runway: Runway) -> FloatArr
 
 
 def over_known_ground(found: Deviations, rise_m: FloatArray, most_m: float) -> Deviations:
-    """Deviations without those from the glide path over ground that rises or falls by more than so much.
+    """Drop the glide path deviations over ground that rises or falls by more than ``most_m``.
 
+    Those whose rise is unknown, beyond the ends of the profile, go too, where an altitude tells the rise of the rest.
     Nor those whose rise is unknown, beyond the ends of the profile, where an altitude tells it for the rest.
     """
     is_kept = (np.abs(rise_m) <= most_m) | ~np.isfinite(rise_m).any()
@@ -152,7 +158,7 @@ def over_known_ground(found: Deviations, rise_m: FloatArray, most_m: float) -> D
 
 @dataclass(frozen=True)
 class Belief:
-    """What speaks for or against the places of one approach; NaN where the log does not say.
+    """Evidence for or against the places of one approach; NaN where the log does not say.
 
     ``threshold_s`` is when the straight flight that ``speed_mps`` belongs to crosses the threshold.
     """
@@ -165,7 +171,10 @@ class Belief:
 
 
 def belief(sampled: Sampled, found: Deviations, runway: Runway) -> Belief:
-    """Speed at which the distance shrinks, heading against the INS, and the ground under the approach."""
+    """Return the speed at which the distance shrinks, and what else speaks for the places.
+
+    That is the heading against the INS, and the ground under the approach.
+    """
     good = found.found & (found.distance_sigma_m < WELL_KNOWN_M)
     speed = threshold_s = float("nan")
     if good.sum() >= LEAST_FIXES:

@@ -1,4 +1,4 @@
-"""Where an aircraft is by the relative bearings of beacons about a runway, and how errors of bearings travel.
+"""Place of an aircraft by relative bearings of beacons, and how bearing errors act on it.
 
 Frame of the runway: along (in the direction of landing), right and up from the middle of the threshold. A beacon at
 (X, Y) is seen from the place (x, y) with heading p off the course at the relative bearing atan2(Y - y, X - x) - p,
@@ -47,7 +47,9 @@ class BearingFix:
 def relative_bearings(
     along_m: ArrayLike, right_m: ArrayLike, off_course_deg: ArrayLike, beacons_m: FloatArray
 ) -> FloatArray:
-    """Relative bearings, degrees in [-180, 180), of beacons (k, 2) from places (n,), shape (n, k).
+    """Return the relative bearings of beacons (k, 2) from places (n,), shape (n, k).
+
+    Degrees in [-180, 180).
 
     Examples
     --------
@@ -62,9 +64,10 @@ def relative_bearings(
 def side_from_difference_m(
     difference_deg: ArrayLike, before_m: ArrayLike, outer_m: float, inner_m: float
 ) -> FloatArray:
-    """Right of the course by bearing of the outer locator minus that of the inner one, at a known distance.
+    """Return the deviation right of the course by the bearings of two locators.
 
-    Its sign changes where a locator is passed.
+    The difference is the bearing of the outer locator minus that of the inner one, at a known distance. Its sign
+    changes where a locator is passed.
 
     Parameters
     ----------
@@ -94,7 +97,9 @@ def side_from_difference_m(
 
 
 def side_sigma_m(before_m: ArrayLike, bearing_sigma_deg: float, outer_m: float, inner_m: float) -> FloatArray:
-    """Sigma of that near the course: sqrt(2) sigma |(before - outer)(before - inner)| / (outer - inner).
+    """Return the sigma of :func:`side_from_difference_m` near the course.
+
+    It is sqrt(2) sigma |(before - outer)(before - inner)| / (outer - inner).
 
     Examples
     --------
@@ -106,7 +111,9 @@ def side_sigma_m(before_m: ArrayLike, bearing_sigma_deg: float, outer_m: float, 
 
 
 def distance_from_bearing_m(bearing_deg: ArrayLike, side_m: float) -> FloatArray:
-    """Distance before the threshold by the bearing from the course of a beacon level with it: D0 cot(bearing).
+    """Return the distance before the threshold by the bearing of a beacon level with it.
+
+    It is D0 cot(bearing), the bearing being counted from the course.
 
     Examples
     --------
@@ -119,7 +126,9 @@ def distance_from_bearing_m(bearing_deg: ArrayLike, side_m: float) -> FloatArray
 
 
 def distance_sigma_m(before_m: ArrayLike, bearing_sigma_deg: float, side_m: float) -> FloatArray:
-    """Sigma of that where the course is taken from one locator: sqrt(2) sigma (D0^2 + D^2) / |D0|.
+    """Return the sigma of :func:`distance_from_bearing_m`: sqrt(2) sigma (D0^2 + D^2) / |D0|.
+
+    The course is taken from one locator.
 
     Examples
     --------
@@ -131,7 +140,9 @@ def distance_sigma_m(before_m: ArrayLike, bearing_sigma_deg: float, side_m: floa
 
 
 def solve_bearings(bearings_deg: FloatArray, beacons_m: FloatArray, sigma_deg: float) -> BearingFix:
-    """Place and heading off the course from the relative bearings of three beacons or more, by least squares.
+    """Solve for place and heading off the course by the bearings of three beacons or more.
+
+    By least squares over the relative bearings.
 
     Parameters
     ----------
@@ -191,10 +202,10 @@ def _regular(matrices: FloatArray) -> FloatArray:
 
 
 def _start(bearings_deg: FloatArray, beacons_m: FloatArray) -> FloatArray:
-    """Distance by the beacon aside, within the stretch that locators ahead and behind leave; side by their difference.
+    """Return a first place: distance by the beacon aside, side by the others' difference.
 
-    The beacon farthest from the axis is the one aside; the line of the others is the course, in the sense that has it
-    on its own side.
+    The distance is kept within the stretch that locators ahead and behind leave. The beacon farthest from the axis is
+    the one aside; the line of the others is the course, in the sense that has it on its own side.
     """
     aside = int(np.argmax(np.abs(beacons_m[:, 1])))
     others = [place for place in range(len(beacons_m)) if place != aside]
@@ -216,7 +227,10 @@ def _start(bearings_deg: FloatArray, beacons_m: FloatArray) -> FloatArray:
 
 
 def _jacobian(place: FloatArray, beacons_m: FloatArray) -> FloatArray:
-    """Derivatives of the bearings (radians) by along, right and heading off the course, shape (n, k, 3)."""
+    """Return the derivatives of the bearings (radians), shape (n, k, 3).
+
+    They are by along, right and heading off the course.
+    """
     ahead = beacons_m[:, 0] - place[:, 0, None]
     aside = beacons_m[:, 1] - place[:, 1, None]
     square = ahead**2 + aside**2

@@ -7,7 +7,7 @@ from groundstation.base.toml_settings import check_ranges, number
 
 @dataclass(frozen=True)
 class LandingBeaconsSettings:
-    """What bearings and radio altitude are believed to err by, and what counts as an approach.
+    """Assumed errors of bearings and radio altitude, and what counts as an approach.
 
     Parameters
     ----------
