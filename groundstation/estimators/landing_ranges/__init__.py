@@ -1,1 +1,1 @@
-"""Landing by ranges to ground reference points and to a moving one: the filter of the approach."""
+"""Landing by ranges to ground points and to a moving point: the filter of the approach."""

@@ -1,4 +1,4 @@
-"""The answer of landing by ranges: tables, stretches where a category's accuracy is met, arrays of the figures."""
+"""Answer of landing by ranges: tables, stretches that meet a category, figures' arrays."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -36,9 +36,10 @@ TRIAL_PLACES_M = (3500.0, 2000.0, 1000.0, 500.0, 0.0)  # before the threshold; t
 
 
 def range_landing(scenario: RangeApproach) -> RangeLanding:
-    """Accuracy along an approach by ranges, and how honest the filter is over simulated approaches.
+    """Return the accuracy along an approach by ranges, and the filter's consistency.
 
-    Where ranges are correlated a filter that takes them for white flies the same approaches as well.
+    The consistency is that over simulated approaches. Where ranges are correlated a filter that takes them for white
+    flies the same approaches as well.
     """
     track, moving = covariance_along(scenario), fly_moving_point(scenario)
     filters = (HONEST, WHITE) if scenario.noise.correlated_m > 0.0 else (HONEST,)
@@ -143,7 +144,7 @@ def _trial_rows(name: str, trials: Trials) -> list[TrialRow]:
 
 
 def _remarks(rows: Sequence[TrialRow]) -> list[str]:
-    """What the trials say against the filter."""
+    """Return what the trials say against the filter."""
     remarks = []
     wrong = [row for row in rows if row.filter == HONEST and row.nees > row.nees_high]
     if wrong:
@@ -188,7 +189,7 @@ def _path_figure(scenario: RangeApproach, track: ApproachTrack, moving: MovingTr
 
 
 def _space_figure(scenario: RangeApproach, track: ApproachTrack, moving: MovingTrack | None) -> RangesSpace:
-    """Where the aircraft, the ground points (once) and the moving point are."""
+    """Return the places of the aircraft, the ground points (once) and the moving point."""
     n = len(track.time_s)
     parts = [("aircraft", track.time_s, track.true_m, np.full(n, scenario.path.speed_mps))]
     if moving is not None:

@@ -1,4 +1,4 @@
-"""The filter of the approach, on simulated or recorded ranges, and its covariance along the path without any."""
+"""Filter of the approach on simulated or recorded ranges, and its covariance without any."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ MIRRORED_SIGMA = 3.0  # below ground by more: the mirror image of the aircraft w
 
 @dataclass(frozen=True)
 class ApproachReadings:
-    """What the filter is given at each of n epochs.
+    """Inputs of the filter at each of n epochs.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class ApproachReadings:
 
 @dataclass(frozen=True)
 class ApproachTrack:
-    """What the filter says along the path.
+    """Output of the filter along the path.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def nominal_readings(scenario: RangeApproach) -> ApproachReadings:
 def with_errors(
     nominal: ApproachReadings, model: ErrorModel, errors: FloatArray, white_m: FloatArray
 ) -> ApproachReadings:
-    """Readings with the errors of a model, shape (n, states), and white errors of the ranges, shape (n, k)."""
+    """Add errors of a model, shape (n, states), and white range errors (n, k) to readings."""
     points = nominal.points_m.copy()
     slow = 0.0 if model.slow < 0 else errors[:, model.slow : model.slow + points.shape[1]]
     if model.moving >= 0:
@@ -149,7 +149,10 @@ def filter_ranges(
 
 
 class _Run:
-    """Passes of the compiled filter over one approach; each pass overwrites what it goes over again."""
+    """Passes of the compiled filter over one approach.
+
+    A later pass overwrites innovations and heights where it goes again; places stay those of the first pass.
+    """
 
     def __init__(self, scenario: RangeApproach, model: ErrorModel, readings: ApproachReadings) -> None:
         self.scenario, self.model, self.readings = scenario, model, readings
@@ -169,7 +172,11 @@ class _Run:
         self.outputs = 0
 
     def to(self, until: int, reference_m: FloatArray, reference_p: FloatArray, *, is_curved: bool = True) -> None:
-        """Filter from the start to an epoch (not included); what was kept before the last pass's end stays."""
+        """Filter from the start to an epoch (not included).
+
+        Only the places beyond the end of the last pass are kept; earlier ones stay. Results that earlier passes kept
+        beyond it stay.
+        """
         from groundstation.estimators.landing_ranges.loop import filter_approach
 
         model, dynamics = self.model, self.transition.dynamics
@@ -225,7 +232,7 @@ class _Run:
         return np.column_stack([x[0] - x[2] * moved_s, x[1] - x[3] * moved_s, up_m])
 
     def track(self) -> ApproachTrack:
-        """What was kept of the passes."""
+        """Return the results of the passes."""
         return ApproachTrack(
             self.scenario.time_s[self.kept],
             self.scenario.places_m[self.kept],

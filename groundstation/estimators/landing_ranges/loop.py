@@ -1,4 +1,7 @@
-"""Compiled loop of the approach: an extended filter over the measurements, linearised about its own estimate."""
+"""Compiled loop of the approach: an extended filter over the measurements.
+
+It is linearised about its own estimate.
+"""
 
 import numpy as np
 
@@ -148,7 +151,9 @@ def filter_approach(
 
 @compiled
 def smooth_walk(height: FloatArray, step_variance: float) -> None:
-    """Smooth the estimates of a random walk in place, as if it were alone: shape (n, 2), estimate and variance.
+    """Smooth the estimates of a random walk in place, as if it were alone.
+
+    Shape (n, 2): estimate and variance.
 
     Source: Rauch, Tung and Striebel, Maximum likelihood estimates of linear dynamic systems, AIAA Journal 3(8), 1965.
     """

@@ -1,4 +1,6 @@
-"""Error states of the approach and how they move: the seven of the local frame, the moving point's, the ranges' own.
+"""Error states of the approach and their dynamics.
+
+There are seven of the local frame, then those of the moving point and of the ranges.
 
 State: INS position along, right (m), INS velocity along, right (m/s), barometric height (m), clock offset (m), clock
 rate (m/s); then the moving point's along, right, up (m); then one slow range error for each point (m), where modelled.

@@ -1,4 +1,4 @@
-"""How the moving reference point flies: its speed is steered so that the geometry of the ranges becomes best.
+"""Flight of the moving reference point, steered in speed for the best range geometry.
 
 Local criterion: at every step the speed, within reach of the acceleration, whose place at the end of the step gives the
 largest measure of observability det(H'H), where a row of H is the direction to a point and 1 for the clock.

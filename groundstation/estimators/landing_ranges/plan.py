@@ -45,7 +45,7 @@ def _of_places(scenario: RangeApproach) -> tuple[Finding, ...]:
 
 
 def _findings(answer: RangeLanding) -> tuple[Finding, ...]:
-    """A warning where simulated approaches contradict the filter, and where no category is met at touchdown."""
+    """Warn where simulated approaches contradict the filter, or touchdown meets no category."""
     found = []
     wrong = [row for row in answer.trials if row.filter == HONEST and row.nees > row.nees_high]
     if wrong:
@@ -72,7 +72,7 @@ def _sentence(answers: Answers) -> str:
 
 
 def where_met(answer: RangeLanding) -> str:
-    """Where each category's accuracy is met in all axes, in words."""
+    """Tell in words where each category's accuracy is met in all axes."""
     told = []
     for category in CATEGORIES:
         spans = [one for one in answer.spans if one.category == category.name and one.axis == ALL_AXES]

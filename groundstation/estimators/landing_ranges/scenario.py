@@ -1,7 +1,8 @@
-"""An approach by ranges: path, reference points, noise, and what the aircraft itself brings, as frozen dataclasses.
+"""Scenario of an approach by ranges, as frozen dataclasses.
 
-Frame of the runway: along (in the direction of landing), right and up from the middle of the threshold, metres. A place
-before the threshold has a negative along; the scenario states distances before the threshold as positive numbers.
+It states path, reference points, noise, and the errors of the aircraft itself. Frame of the runway: along (in the
+direction of landing), right and up from the middle of the threshold, metres. A place before the threshold has a
+negative along; the scenario states distances before the threshold as positive numbers.
 """
 
 from dataclasses import dataclass, field
@@ -45,12 +46,12 @@ class StraightPath:
 
     @property
     def touchdown_m(self) -> float:
-        """Where the path meets the ground, beyond the threshold."""
+        """Distance beyond the threshold at which the path meets the ground."""
         return self.threshold_height_m / float(np.tan(np.deg2rad(self.glide_angle_deg)))
 
     @property
     def duration_s(self) -> float:
-        """From the start to the ground; the speed is that over the ground."""
+        """Time from the start to the ground; the speed is that over the ground."""
         return (self.start_m + self.touchdown_m) / self.speed_mps
 
     def at(self, along_m: FloatArray) -> FloatArray:
@@ -76,7 +77,9 @@ class GroundPoint:
 
 @dataclass(frozen=True)
 class MovingPoint:
-    """An aircraft in the course plane that sends ranges and its own position, whose errors are states of the filter.
+    """An aircraft in the course plane that sends ranges and its own position.
+
+    The errors of that position are states of the filter.
 
     Parameters
     ----------
@@ -113,7 +116,7 @@ class MovingPoint:
 
 @dataclass(frozen=True)
 class RangeNoise:
-    """Errors of a range: white from one measurement to the next, and a Gauss-Markov process of each point."""
+    """Errors of a range: white noise, and a Gauss-Markov process of each point."""
 
     interval_s: float = number(0.01, 0.001, 10.0)
     white_m: float = number(3.0, 0.01, 1000.0)
@@ -126,7 +129,7 @@ class RangeNoise:
 
 @dataclass(frozen=True)
 class OwnErrors:
-    """What the aircraft brings to the start of the approach: INS, barometric height and clock.
+    """Errors of the aircraft at the start of the approach: INS, barometric height and clock.
 
     Position and velocity of the INS along and right; velocity, height and clock rate are Gauss-Markov processes.
     """
@@ -185,7 +188,10 @@ class RangeApproach:
 
     @property
     def time_s(self) -> FloatArray:
-        """Times of the measurements from the start of the approach; the last is at touchdown or just before."""
+        """Times of the measurements from the start of the approach.
+
+        The last is at touchdown or just before.
+        """
         steps = int(self.path.duration_s / self.noise.interval_s + 1e-9)
         return frozen(self.noise.interval_s * np.arange(steps + 1))
 

@@ -1,4 +1,4 @@
-"""Simulated approaches: errors drawn from the model, filtered, and held against what the filter computes."""
+"""Simulated approaches: drawn errors are filtered and compared with the filter's sigmas."""
 
 from dataclasses import dataclass
 
