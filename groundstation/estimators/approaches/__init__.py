@@ -1,1 +1,4 @@
-"""Recorded approaches: found, measured against their path, and what the localizer says of the position."""
+"""Recorded approaches: found, measured against their path, and checked by the localizer.
+
+The localizer gives the error of the recorded position.
+"""

@@ -107,7 +107,7 @@ def _finals(
 
 
 def _examine(flight: "Flight", known: Known, settings: LandingSettings) -> tuple[Shortfall, ...]:
-    """Whether every end has a final, and every final a runway of the site file and a guidance followed."""
+    """Report ends without a final, and finals without a listed runway or without guidance."""
     path, finals, left_out = _finals(flight, known, settings)
 
     def where(some: list[Final]) -> tuple[tuple[float, float], ...]:
@@ -170,7 +170,7 @@ def _step_m(path: FlightPath) -> tuple[float, float]:
 
 
 def _source(flight: "Flight", path: FlightPath, final: Final) -> str:
-    """What guided at the end of the final, as the recorder names it."""
+    """Return the source of guidance at the end of the final, as the recorder names it."""
     if not path.guidance_topic:
         return ""
     table = flight[path.guidance_topic]
@@ -214,7 +214,10 @@ def _rms(values: FloatArray) -> float | None:
 
 
 def _sensitivity(path: FlightPath, near: Against, runway: RunwayUsed, source: str, step_m: float) -> Sensitivity:
-    """From the turn onto a localizer as well: the final alone has few deviations."""
+    """Estimate the localizer's sensitivity on the final and the turn onto it.
+
+    The final alone has few deviations. Satellite guidance is judged on the final only.
+    """
     last = near.rows.start + int(np.count_nonzero(near.is_final))
     first = near.rows.start
     if SATELLITES not in source:  # which guides along the leg before, until the turn is made
@@ -232,7 +235,10 @@ def _position_errors(
     sensitivity: Sensitivity | None,
     settings: LandingSettings,
 ) -> tuple[PositionError, ...]:
-    """The error of each source of positions across the course; nothing where no localizer was followed."""
+    """Return the error of each source of positions across the course.
+
+    Nothing where no localizer was followed.
+    """
     if final.established is None:
         return ()
     if SATELLITES in source:
@@ -265,7 +271,7 @@ def _error_of(
     outcome: str,
     settings: LandingSettings,
 ) -> PositionError:
-    """Error of the positions of a topic between the start and the end of the guided part, then on the roll-out."""
+    """Return the error of a topic's positions on the guided part, then on the roll-out."""
     table = flight[topic].unique_times()
     time_s = flight.seconds(table.time_ns)
     last_s = times_s[2] + (ROLL_OUT_S if outcome == "landing" else 0.0)
@@ -293,7 +299,7 @@ def _error_of(
 
 
 def _claim(errors: tuple[PositionError, ...], runway: RunwayUsed) -> str:
-    """What the log lets one say of the accuracy across the course."""
+    """Tell what accuracy across the course the log supports."""
     measured = next((one for one in errors if one.state == "measured"), None)
     if measured is None or measured.confidence95_m is None:
         return "" if not errors else errors[0].reason

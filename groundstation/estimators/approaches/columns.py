@@ -1,4 +1,4 @@
-"""What approaches give to the tables of flights; of several landings the last one counts."""
+"""Columns that approaches give to the tables of flights; the last landing counts."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -22,7 +22,7 @@ def _touchdown(value: Callable[[Touchdown], float | None]) -> Callable[[LandingR
 
 
 def _measured(value: Callable[[PositionError], float | None]) -> Callable[[LandingResult], float | None]:
-    """Of the first topic whose error the localizer measured."""
+    """Make a column of the first topic whose error the localizer measured."""
 
     def of_approach(one: Approach) -> float | None:
         return next((value(error) for error in one.position_errors if error.state == "measured"), None)
@@ -31,7 +31,7 @@ def _measured(value: Callable[[PositionError], float | None]) -> Callable[[Landi
 
 
 def _height(value: Callable[[HeightError], float | None]) -> Callable[[LandingResult], float | None]:
-    """Of the first topic whose altitude the runway measured."""
+    """Make a column of the first topic whose altitude the runway measured."""
 
     def of_approach(one: Approach) -> float | None:
         return next((value(error) for error in one.height_errors if error.state == "measured"), None)

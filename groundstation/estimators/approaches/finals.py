@@ -1,4 +1,4 @@
-"""Finds the finals of a flight: what led straight to a touchdown, or down and up again on the guidance."""
+"""Search for the finals of a flight: straight to a touchdown, or down and up on guidance."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -25,7 +25,7 @@ NEAR_M = 2_000.0  # from the end, within which the course is taken
 
 @dataclass(frozen=True)
 class End:
-    """Where an approach ends: a touchdown or the lowest point before a climb."""
+    """End of an approach: a touchdown or the lowest point before a climb."""
 
     time_s: float
     outcome: Outcome
@@ -35,7 +35,10 @@ class End:
 
 @dataclass(frozen=True, eq=False)
 class Final:
-    """Samples [first, last) of a straight final, the part of it on the guidance, its course so far, its runway."""
+    """Samples [first, last) of a straight final.
+
+    With them come the part of it on the guidance, its course so far and its runway.
+    """
 
     end: End
     first: int
@@ -128,7 +131,7 @@ def _track(path: FlightPath, first: int, last: int) -> FloatArray:
 
 
 def _chord_s(path: FlightPath) -> float:
-    """How long a chord must be for its direction to be known to some degrees."""
+    """Return the length of a chord (s) whose direction is known to some degrees."""
     step_m = METRES_PER_DEG * step_of(path.latitude_deg)
     fast = path.ground_speed_mps[path.ground_speed_mps > 1.0]
     return float(np.clip(STEPS_OF_A_CHORD * step_m / (np.median(fast) if fast.size else 1.0), CHORD_S, LONGEST_CHORD_S))
@@ -140,7 +143,10 @@ def _median_direction(track_deg: FloatArray) -> float:
 
 
 def _runway(path: FlightPath, row: int, track_deg: float, site: SiteData, settings: LandingSettings) -> Runway | None:
-    """The runway of the site file that the final leads to: the one that its line passes nearest."""
+    """Return the runway of the site file that the final leads to.
+
+    It is the one whose threshold the line of the final passes nearest.
+    """
     best: tuple[float, Runway] | None = None
     for runway in site.runways:
         if abs(float(wrap_180(track_deg - runway.true_bearing_deg))) > settings.course_tolerance_deg:
@@ -160,7 +166,7 @@ def _runway(path: FlightPath, row: int, track_deg: float, site: SiteData, settin
 def _too_short(
     path: FlightPath, first: int, last: int, from_end_m: FloatArray, end: End, settings: LandingSettings
 ) -> str:
-    """Why what is straight before an end is no final; empty where it is one."""
+    """Return why a straight part before an end is no final; empty where it is one."""
     if last - first < 3:
         return "no straight flight before its end"
     length_m = float(from_end_m[first])

@@ -1,4 +1,4 @@
-"""What a user must know of the approaches of a flight."""
+"""Findings about the approaches of a flight."""
 
 from groundstation.base.findings import Finding
 from groundstation.estimators.approaches.reference import fits

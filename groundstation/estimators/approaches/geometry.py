@@ -36,7 +36,7 @@ class Line:
 
 @dataclass(frozen=True, eq=False)
 class Against:
-    """Samples of a final, its roll-out with it, against the path. Arrays of shape (n,), NaN where not known."""
+    """Samples of a final and its roll-out against the path, shape (n,), NaN where not known."""
 
     rows: slice
     distance_m: FloatArray
@@ -114,7 +114,10 @@ def _placed(line: Line, latitude_deg: float, longitude_deg: float, settings: Lan
 
 
 def _course_line(path: FlightPath, final: Final, settings: LandingSettings) -> Line:
-    """The course line that positions show: where they lie, less what the guidance says they lie beside it."""
+    """Return the course line that positions show.
+
+    It is fitted to the positions less the deviations that the guidance shows.
+    """
     rows = _line_rows(path, final)
     line = line_through(path, rows)
     dots = path.lateral_dots[rows]
@@ -142,7 +145,7 @@ def _line_rows(path: FlightPath, final: Final) -> slice:
 
 
 def _threshold(path: FlightPath, final: Final, line: Line, settings: LandingSettings) -> tuple[float, float, str]:
-    """Latitude and longitude of the threshold that a final without a listed runway leads to, and what says so."""
+    """Return latitude and longitude of the threshold of an unlisted runway, and their source."""
     end = final.last - 1
     course_rad = np.deg2rad(line.course_deg)
     direction = np.array([np.cos(course_rad), np.sin(course_rad)])
@@ -163,7 +166,7 @@ def _threshold(path: FlightPath, final: Final, line: Line, settings: LandingSett
 
 
 def against(path: FlightPath, final: Final, runway: RunwayUsed) -> Against:
-    """Where a final and its roll-out lie against the path of the runway."""
+    """Compare a final and its roll-out with the path of the runway."""
     last = final.last
     if final.end.outcome == "landing":
         rolls = (path.time_s <= final.end.time_s + ROLL_OUT_S) & ~(path.ground_speed_mps < ROLL_OUT_MIN_MPS)
@@ -194,7 +197,10 @@ def against(path: FlightPath, final: Final, runway: RunwayUsed) -> Against:
 
 
 def metres_per_dot(distance_m: FloatArray, runway: RunwayUsed) -> FloatArray:
-    """Width of a dot of the localizer: its course sector narrows towards the antenna behind the runway."""
+    """Return the width of a dot of the localizer.
+
+    The course sector narrows towards the antenna behind the runway.
+    """
     widening = np.clip(1.0 + distance_m / runway.localizer_distance_m, 0.05, None)
     return np.asarray(0.5 * runway.localizer_width_m / DOTS_PER_FULL_SCALE * widening)
 

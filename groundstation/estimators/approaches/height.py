@@ -1,4 +1,4 @@
-"""Error of recorded altitudes on the runway: its elevation is a reference that needs no GNSS.
+"""Error of recorded altitudes on the runway, whose elevation is a reference without GNSS.
 
 On its wheels the aircraft stands on the runway, so altitude less elevation less the height of the altitude's reference
 above the ground is the error, at the touchdown and for some seconds after it. Before, the glide slope does not show it:

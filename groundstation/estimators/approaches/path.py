@@ -1,4 +1,4 @@
-"""The channels of a flight that speak of its approaches, on the times of one source of positions."""
+"""Channels of a flight that matter to its approaches, on the times of one position source."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -148,7 +148,10 @@ def _ground_speed(flight: "Flight", topic: str, time_ns: Int64Array) -> FloatArr
 
 
 def slope(time_s: FloatArray, values: FloatArray, over_s: float = SMOOTHED_S) -> FloatArray:
-    """Rate of change of a stepped signal: difference over ``over_s`` about each time, NaN where not known."""
+    """Return the rate of change of a stepped signal, NaN where not known.
+
+    It is the difference over ``over_s`` about each time.
+    """
     known = np.isfinite(values)
     if known.sum() < 2:
         return np.full(len(time_s), np.nan)
@@ -177,7 +180,10 @@ def step_of(values_deg: FloatArray) -> float:
 def on_guidance(
     time_s: FloatArray, lateral_dots: FloatArray, vertical_dots: FloatArray, settings: LandingSettings
 ) -> tuple[tuple[int, int], ...]:
-    """Stretches [first, last) of samples established on the guidance; where no glide path is logged, on course."""
+    """Return the stretches [first, last) of samples established on the guidance.
+
+    Where no glide path is logged, the course alone counts.
+    """
     is_on = np.abs(lateral_dots) < settings.established_lateral_dots
     if np.isfinite(vertical_dots).any():
         is_on &= np.abs(vertical_dots) < settings.established_vertical_dots
@@ -190,7 +196,7 @@ def on_guidance(
 
 
 def _guidance_told(flight: "Flight", settings: LandingSettings) -> str:
-    """What the guidance of a log without positions says."""
+    """Tell what the guidance of a log without positions shows."""
     topic = next(iter(_topics(flight, "guidance", "lateral_deviation_dots")), "")
     if not topic:
         return ""

@@ -1,4 +1,7 @@
-"""Protection levels of a satellite receiver along a final, against alarm limits: bounds of an error, not errors."""
+"""Protection levels of a satellite receiver along a final, against alarm limits.
+
+They bound an error; they are not errors.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -25,7 +28,10 @@ OPERATIONS = (
 def protection_along(
     flight: "Flight", start_s: float, end_s: float, number: int
 ) -> tuple[Protection, LandingProtection] | None:
-    """Protection levels of an approach between two times, and their arrays; None where the log has none there."""
+    """Return the protection levels of an approach between two times, and their arrays.
+
+    None where the log has none there.
+    """
     for topic in topics_of_kind("gnss_integrity", flight.topics()):
         table, time_s = flight[topic], flight.time_s(topic)
         window = (time_s >= start_s) & (time_s <= end_s)

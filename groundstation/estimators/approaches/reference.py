@@ -1,4 +1,6 @@
-"""Error of recorded positions across the course, with the localizer for reference: a line that needs no GNSS.
+"""Error of recorded positions across the course; the reference is the localizer.
+
+The localizer is a line that needs no GNSS.
 
 Across the runway the localizer says where the aircraft is: deviation times the width of the course there. What the
 positions say beyond it is their error, fitted as e(t) = e0 + r t, t counted from the threshold, by generalised least
@@ -47,9 +49,10 @@ LEAST_MOVE_M, SAMPLES_ALIKE = 100.0, 5.0
 
 @dataclass(frozen=True, eq=False)
 class Positions:
-    """Positions of one topic on a final and its roll-out: times from the threshold, seconds, and how they are written.
+    """Positions of one topic on a final and its roll-out, and their resolution.
 
-    ``step_deg``: steps of latitude and longitude, 0 where they are too fine to count.
+    Times count from the threshold, in seconds. ``step_deg``: steps of latitude and longitude, 0 where they are too fine
+    to count.
     """
 
     topic: str
@@ -67,7 +70,7 @@ def sensitivity_of(
     runway: RunwayUsed,
     step_m: float,
 ) -> Sensitivity:
-    """Regress what positions say across the course on what the localizer shows, a steady drift beside it.
+    """Regress positions across the course on the localizer's deviation, with a steady drift.
 
     Only where the needle is not at its stop; told where the aircraft moved enough across the course.
     """
@@ -88,7 +91,10 @@ def sensitivity_of(
 
 
 def fits(sensitivity: Sensitivity) -> bool:
-    """Whether a localizer may serve as reference: nothing says surely that its sense or width is another."""
+    """Tell whether a localizer may serve as reference.
+
+    It may unless its sense or width is surely another.
+    """
     if sensitivity.ratio is None or sensitivity.sigma is None:
         return True
     reach = SURE_SIGMAS * sensitivity.sigma
@@ -160,7 +166,10 @@ def position_error(
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Error and its rate at the threshold; ``gain`` (n, 2) makes them of the observations at ``time_s``."""
+    """Error and its rate at the threshold.
+
+    ``gain`` (n, 2) makes them of the observations at ``time_s``.
+    """
 
     time_s: FloatArray
     parts: tuple[tuple[str, FloatArray], ...]
@@ -169,7 +178,7 @@ class _Fit:
     residual_ratio: float
 
     def sigma_of(self, name: str, weights: FloatArray) -> float:
-        """What a part of the covariance contributes to the sigma of ``weights`` times the state.
+        """Return the share of a covariance part in the sigma of ``weights`` times the state.
 
         Residuals larger than expected widen what is noise, not what is common to all samples.
         """
@@ -224,7 +233,7 @@ def _parts(
 
 
 def step_across_m(positions: Positions, runway: RunwayUsed) -> FloatArray:
-    """What a step of latitude and one of longitude make across the course, metres."""
+    """Return the size across the course of a step of latitude and of longitude, metres."""
     north_m = np.deg2rad(positions.step_deg[0]) * 6_371_000.0
     east_m = np.deg2rad(positions.step_deg[1]) * 6_371_000.0 * np.cos(np.deg2rad(runway.latitude_deg))
     course_rad = np.deg2rad(runway.true_course_deg)
@@ -263,14 +272,18 @@ def _steps(positions: Positions, used: Rows, runway: RunwayUsed) -> FloatArray:
 
 
 def _drifting(place: FloatArray) -> FloatArray:
-    """Covariance, over that of a uniform error, of one that drifts from anywhere to anywhere; place in [0, 1]."""
+    """Return the covariance of an error that drifts from one uniform value to another.
+
+    It is over the covariance of one uniform error; ``place`` is in [0, 1].
+    """
     return np.asarray(0.5 + np.outer(1.0 - place, 1.0 - place) + np.outer(place, place))
 
 
 def _rounding_m(positions: Positions, runway: RunwayUsed, settings: LandingSettings) -> float:
-    """Sigma of a shift of all positions: cut off, each coordinate lies half a step too low; nobody says whether.
+    """Return the sigma of a shift of all positions by truncation, where nobody tells of it.
 
-    It is nothing or the whole of it; both coordinates may add up.
+    Cut off instead of rounded, each coordinate lies half a step too low. It is nothing or the whole of it; both
+    coordinates may add up.
     """
     if settings.positions_rounded != "unknown":
         return 0.0
@@ -279,7 +292,10 @@ def _rounding_m(positions: Positions, runway: RunwayUsed, settings: LandingSetti
 
 @dataclass(frozen=True)
 class _RollOut:
-    """Mean displacement on the roll-out, when, its sigma with the centre line for truth, and that of itself alone."""
+    """Mean displacement on the roll-out, its time and its sigmas.
+
+    ``sigma_m`` is with the centre line for truth, ``own_sigma_m`` that of the mean alone.
+    """
 
     mean_m: float
     at_s: float

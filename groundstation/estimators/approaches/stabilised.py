@@ -1,4 +1,4 @@
-"""The criteria of a stabilised approach, from a gate height down to where the flare begins."""
+"""Criteria of a stabilised approach, from a gate height down to the start of the flare."""
 
 import numpy as np
 
@@ -20,7 +20,10 @@ def stabilised(path: FlightPath, near: Against, settings: LandingSettings) -> tu
 
 
 def _from(path: FlightPath, near: Against, gate_m: float, settings: LandingSettings) -> StabilisedAt:
-    """Worst values from the last time the aircraft was above the gate down to the floor, or to the lowest point."""
+    """Return the worst values from a gate down to the floor, or to the lowest point.
+
+    They count from the last time the aircraft was above the gate.
+    """
     height = np.where(near.is_final, near.height_m, np.nan)
     known = np.isfinite(height)
     above = np.flatnonzero(known & (height >= gate_m))
@@ -60,13 +63,16 @@ def gate_bounds(settings: LandingSettings) -> dict[str, Bound]:
 
 
 def decide(gates: tuple[Gate, ...]) -> StabilisedVerdict:
-    """Not stabilised where a criterion failed, stabilised where any was met."""
+    """Return the verdict: not stabilised if a criterion failed, stabilised if any was met."""
     states = {gate.state for gate in gates}
     return "not stabilised" if "failed" in states else "stabilised" if "passed" in states else "not measured"
 
 
 def rejudge(answer: LandingResult, settings: LandingSettings) -> tuple[Rejudged, ...]:
-    """The criteria of every approach under other limits, from the worst values that they were judged by."""
+    """Apply other limits to the criteria of every approach.
+
+    The worst values are those by which they were judged.
+    """
     bounds = gate_bounds(settings)
     found = []
     for place, approach in enumerate(answer.approaches, start=1):
@@ -78,7 +84,7 @@ def rejudge(answer: LandingResult, settings: LandingSettings) -> tuple[Rejudged,
 
 
 def _not_passed(height_m: FloatArray, gate_m: float) -> str:
-    """Why a gate height was not passed on a final; empty where it was."""
+    """Return why a gate height was not passed on a final; empty where it was."""
     if not np.isfinite(height_m).any():
         return "no height above the threshold"
     if np.nanmax(height_m) < gate_m:

@@ -49,7 +49,10 @@ def touchdown_of(flight: "Flight", path: FlightPath, final: Final, runway: Runwa
 
 
 def _sink_rate(flight: "Flight", path: FlightPath, at_s: float) -> float | None:
-    """Sink rate before a touchdown: by the radio altimeter where there is one, else by what gives the height."""
+    """Return the sink rate before a touchdown.
+
+    It is by the radio altimeter where there is one, else by the source of the height.
+    """
     for topic in topics_of_kind("radio_altimeter", flight.topics()):
         rate = _rate_before(flight.time_s(topic), flight[topic].values("height_m"), at_s)
         if rate is not None:
