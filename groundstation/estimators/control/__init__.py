@@ -1,1 +1,1 @@
-"""How aircraft should move and where ground points should stand, for the accuracy one needs."""
+"""Plans of a session: motion of aircraft and places of ground points for a given accuracy."""

@@ -1,4 +1,4 @@
-"""Accuracy of a session that has not been flown, and how it changes with every place of every source.
+"""Accuracy of a session that has not been flown, and its derivative by every position.
 
 The covariance of the centralised local filter needs the geometry alone. Seven states an aircraft that is not exact:
 position north, east (m), velocity north, east (m/s), height (m), clock offset (m), clock frequency (m/s).
@@ -27,8 +27,10 @@ PLACE = np.array([NORTH, EAST, HEIGHT])
 
 @dataclass(frozen=True)
 class Links:
-    """Who ranges to whom: ``receiver`` and ``source`` (l,) number the sources, aircraft first; ``line_m`` (epochs, l,
-    3) leads from source to receiver, ``range_m`` (epochs, l)."""
+    """Ranging links: ``receiver`` and ``source`` (l,) number the sources, aircraft first.
+
+    ``line_m`` (epochs, l, 3) leads from source to receiver, ``range_m`` is (epochs, l).
+    """
 
     receiver: Int64Array
     source: Int64Array
@@ -53,7 +55,10 @@ class Links:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Covariances of a session: ``covariance`` (epochs, n, n), the first before any range; and what gave them."""
+    """Covariances of a session (epochs, n, n), and what gave them.
+
+    The first is before any range.
+    """
 
     covariance: FloatArray
     links: Links
@@ -96,7 +101,10 @@ class AccuracyModel:
         return STATES * self.estimated.index(aircraft) if aircraft in self.estimated else -1
 
     def _models(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Transition of all aircraft over a step, covariance of its noise, and covariance at the start."""
+        """Return transition and noise covariance over a step, and the covariance at the start.
+
+        They are of all aircraft.
+        """
         F, Q, P = (np.zeros((self.size, self.size)) for _ in range(3))
         for place, number in enumerate(self.estimated):
             errors = self.plan.aircraft[number].errors
@@ -183,7 +191,7 @@ class AccuracyModel:
 
 @compiled
 def _carry_back(F, rows, covariance, K, S, by_P, by_rows):  # type: ignore[no-untyped-def]
-    """Fill the derivative by every row h of the measurement matrix, from the last measurement to the first.
+    """Fill the derivative by every row h of the measurement matrix, from last to first.
 
     L is the derivative by the covariance. Through an update P+ = (I - K h) P with K = P h' / S: L <- (I - K h)' L
     (I - K h), and the derivative by h is -2 P+ L K, for d(P+^-1) = (dh' h + h' dh) / R and P+ h' = R K. The covariance

@@ -1,4 +1,4 @@
-"""The gradient method: spectral projected gradients over controls that have bounds and limits of their change.
+"""Spectral projected gradient method over controls with bounds and limits of their change.
 
 Source: Birgin, Martinez and Raydan, Nonmonotone spectral projected gradient methods on convex sets, SIAM Journal on
 Optimization 10(4), 2000 (algorithm SPG1); Frank and Wolfe, An algorithm for quadratic programming, 1956 (the gap that
@@ -25,7 +25,7 @@ FAR = 1e3  # in widths of the set: a step so long ends where the linear model is
 
 @dataclass(frozen=True)
 class Minimum:
-    """Where a descent ended.
+    """End of a descent.
 
     Parameters
     ----------
@@ -127,7 +127,10 @@ def _largest(slope: FloatArray) -> float:
 
 
 def _shorter(value: float, reached: float, gain: float) -> float:
-    """Factor on a step that was too long: the least of the parabola through what is known, kept within bounds."""
+    """Return the factor on a step that was too long.
+
+    It is the minimum of the parabola through what is known, kept within bounds.
+    """
     if not np.isfinite(reached):
         return 0.1
     bend = reached - value - gain
@@ -142,7 +145,7 @@ def _gap(x: FloatArray, value: float, slope: FloatArray, project: Project, reach
 
 
 def nearest_law(wanted: FloatArray, start: float, low: float, high: float, change: float) -> FloatArray:
-    """Nearest control (least squares) within bounds that changes by at most so much in each step.
+    """Return the nearest control (least squares) within bounds and within a change per step.
 
     Parameters
     ----------
@@ -185,7 +188,7 @@ def nearest_law(wanted: FloatArray, start: float, low: float, high: float, chang
 
 
 def _lowest(at: FloatArray, slope: FloatArray) -> float:
-    """Where a derivative that never falls passes zero, or the end that is nearest to it."""
+    """Return where a non-decreasing derivative passes zero, or the end nearest to it."""
     right = int(np.searchsorted(slope, 0.0))
     if right == 0 or right == len(at):
         return float(at[min(right, len(at) - 1)])
@@ -194,7 +197,10 @@ def _lowest(at: FloatArray, slope: FloatArray) -> float:
 
 
 def _within(at: FloatArray, slope: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray]:
-    """The knots between two ends, with at least one at each; where the derivative jumps there are two at one place."""
+    """Return the knots between two ends, with at least one at each.
+
+    Where the derivative jumps there are two at one place.
+    """
     low, high = max(low, float(at[0])), min(high, float(at[-1]))
     first, last = np.searchsorted(at, low), np.searchsorted(at, high, side="right")
     ends = np.interp([low, high], at, slope)

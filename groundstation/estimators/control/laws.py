@@ -1,4 +1,4 @@
-"""Laws of control: the best measure of geometry at each step, or the least variance at the end of the interval.
+"""Laws of control: best geometry at each step, or least variance at the end.
 
 Source: Skrypnik, Inter-aircraft navigation in air traffic management, 2010, chapter 5.2: local criterion, equation
 (29); integral criterion, least tr(Theta P) at the last epoch.
@@ -85,7 +85,7 @@ class Session:
         return geometry_of(links.direction[:, mine], self.plan.control.axes)
 
     def crowding(self, position_m: FloatArray) -> tuple[float, FloatArray]:
-        """By how much aircraft come nearer to each other than the separation, and its derivative by the positions.
+        """Return how much aircraft violate the separation, and its derivative by the positions.
 
         Sum of max(0, 1 - distance^2 / separation^2)^2 over all epochs but the first and all pairs of which one is
         controlled: 0 where the separation is kept.
@@ -102,9 +102,10 @@ class Session:
         return total, found
 
     def variance(self, controls: FloatArray, weight: float = 0.0) -> tuple[float, FloatArray]:
-        """Weighted variance tr(Theta P) at the end, times 1 + ``weight`` crowding, and its derivative by the controls.
+        """Return the weighted variance tr(Theta P) at the end, and its derivative by the controls.
 
-        Infinite where anybody comes so near to a source that the geometry has no meaning: no descent steps there.
+        It is multiplied by 1 + ``weight`` crowding. Infinite where anybody comes so near to a source that the geometry
+        has no meaning: no descent steps there.
         """
         paths = self.motion.paths(controls)
         if self.model.links(paths.position_m).range_m.min() < NEAREST_M:
@@ -122,7 +123,7 @@ class Session:
 
 
 class StepMeasure:
-    """Loss at the end of one step as function of the controls of that step, those before it being given."""
+    """Loss at the end of one step as a function of its controls, those before it being given."""
 
     def __init__(self, session: Session, criterion: LocalCriterion, controls: FloatArray, step: int) -> None:
         self._session, self._criterion, self._controls, self._step = session, criterion, controls, step
@@ -230,7 +231,10 @@ def _descents(session: Session, starts: Sequence[FloatArray], weight: float) -> 
 
 
 def random_starts(session: Session, count: int, seed: int) -> list[FloatArray]:
-    """Controls that wander within the bounds: knots drawn at random, straight lines between them."""
+    """Draw controls that wander within the bounds.
+
+    They are straight lines between random knots.
+    """
     rng = np.random.default_rng(seed)
     plan, found = session.plan, []
     time_s = plan.step_s * np.arange(1, plan.steps + 1)

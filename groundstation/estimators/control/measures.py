@@ -1,7 +1,7 @@
-"""Measures of the geometry at one epoch, and their derivatives: determinant, least eigenvalue, dilution of precision.
+"""Measures of the geometry at one epoch, with derivatives.
 
-H holds a row for each source that the judged aircraft ranges to: the direction from the source to it, in the axes asked
-for, and 1 for the clock.
+They are the determinant, the least eigenvalue and the dilution of precision. H holds a row for each source that the
+judged aircraft ranges to: the direction from the source to it, in the axes asked for, and 1 for the clock.
 
 Source: Skrypnik, Inter-aircraft navigation in air traffic management, 2010, equation (29) (determinant); arXiv
 2411.03747 (least eigenvalue); Misra and Enge, Global Positioning System, 2nd ed. 2006, section 6.1 (dilution).
@@ -21,7 +21,10 @@ SINGULAR = 1e-12  # of the least eigenvalue over the number of sources: less is 
 
 @dataclass(frozen=True)
 class Geometry:
-    """H'H at each epoch as eigenvalues (epochs, a), ascending, and vectors (epochs, a, a); ``H`` (epochs, l, a)."""
+    """Eigenvalues (epochs, a), ascending, and vectors (epochs, a, a) of H'H at each epoch.
+
+    ``H`` has shape (epochs, l, a).
+    """
 
     H: FloatArray
     eigenvalues: FloatArray
@@ -39,11 +42,14 @@ class Geometry:
 
     @property
     def is_singular(self) -> np.ndarray:
-        """Where the sources do not tell all axes apart, shape (epochs,)."""
+        """Epochs at which the sources do not tell all axes apart, shape (epochs,)."""
         return np.asarray(self.eigenvalues[:, 0] <= SINGULAR * self.H.shape[1])
 
     def dilution(self, axes: Sequence[int] | None = None) -> FloatArray:
-        """Root of the trace of (H'H)^-1, of all columns or those named, shape (epochs,); NaN where singular."""
+        """Return the root of the trace of (H'H)^-1, shape (epochs,); NaN where singular.
+
+        The trace is over all columns or those named.
+        """
         chosen = range(self.H.shape[2]) if axes is None else axes
         with np.errstate(divide="ignore"):
             inverse = np.where(self.is_singular[:, None], np.nan, 1.0 / self.eigenvalues)
@@ -67,7 +73,7 @@ def geometry_of(direction: FloatArray, axes: Sequence[Axis]) -> Geometry:
 
 
 def loss(geometry: Geometry, criterion: LocalCriterion) -> FloatArray:
-    """What a local criterion makes least at each epoch, shape (epochs,).
+    """Return the quantity that a local criterion minimises at each epoch, shape (epochs,).
 
     Minus the determinant, minus the least eigenvalue, or the dilution; that is infinite where H'H is singular.
     """

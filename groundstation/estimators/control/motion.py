@@ -1,4 +1,4 @@
-"""How aircraft move under controls, and how a measure of their places changes with the controls.
+"""Motion of aircraft under controls, and derivatives of a measure by the controls.
 
 A control is the speed or the heading of one aircraft at the end of every step. Between two epochs the aircraft moves
 with the mean speed along the mean heading. All controls have one unit, m/s: headings count as heading times the speed
@@ -17,7 +17,7 @@ from groundstation.estimators.control.scenario import Controlled, SessionPlan
 
 @dataclass(frozen=True)
 class Bounds:
-    """One control: of whom, within which values, and by how much it may change in a step; all in m/s.
+    """One control with its bounds: which aircraft, range of values, change per step; in m/s.
 
     Parameters
     ----------
@@ -39,8 +39,10 @@ class Bounds:
 
 @dataclass(frozen=True)
 class Paths:
-    """Where everybody is: ``position_m`` (epochs, sources, 3) north, east, up; ``speed_mps``, ``heading_rad`` (epochs,
-    aircraft)."""
+    """Positions, speeds and headings of a session at every epoch.
+
+    ``position_m`` (epochs, sources, 3) is north, east, up; ``speed_mps`` and ``heading_rad`` are (epochs, aircraft).
+    """
 
     position_m: FloatArray
     speed_mps: FloatArray
@@ -53,7 +55,7 @@ class Paths:
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion of a session: aircraft first, then ground points, in the order of the scenario."""
+    """Motion of a session: aircraft first, then ground points, in the order of the scenario."""
 
     plan: SessionPlan
 
@@ -100,9 +102,10 @@ class Motion:
         return Paths(np.concatenate([flown, still], axis=1), speed, heading)
 
     def by_controls(self, paths: Paths, by_position: FloatArray) -> FloatArray:
-        """Derivative by the controls from that by the positions, (epochs, sources, 3) to (controls, steps).
+        """Convert the derivative by the positions to that by the controls.
 
-        What moves an aircraft in step k moves it at every later epoch: the derivatives are summed from the end.
+        Shapes (epochs, sources, 3) and (controls, steps). What moves an aircraft in step k moves it at every later
+        epoch: the derivatives are summed from the end.
         """
         later = np.cumsum(by_position[:0:-1], axis=0)[::-1] * self.plan.step_s
         found = np.zeros(self.shape)

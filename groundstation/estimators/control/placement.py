@@ -1,4 +1,4 @@
-"""The placement of ground points: every design side by side, a map, and what to say of them."""
+"""Placement of ground points: comparison of every design, a map, and remarks."""
 
 from dataclasses import asdict, dataclass, field
 
@@ -133,7 +133,10 @@ def _row(site: Site, model: AccuracyModel, one: Design) -> DesignRow:
 
 
 def _worst_loss(site: Site, position_m: FloatArray) -> tuple[str, tuple[float | None, ...]]:
-    """The ground point whose loss costs most at the fixed point, and twice the sigmas without it."""
+    """Return the ground point whose loss costs most at the fixed point.
+
+    With it come twice the sigmas without this point.
+    """
     if len(site.plan.points) < 2:
         return "", (None, None, None)
     weights = site.plan.placement
@@ -171,7 +174,7 @@ def _places(site: Site, model: AccuracyModel, one: Design) -> list[PlaceRow]:
 
 
 def _under(way_m: FloatArray, place_m: FloatArray) -> tuple[float, float]:
-    """How far beside a way a place is at its nearest, and how far below it there."""
+    """Return a place's least horizontal distance from a way, and its depth below it there."""
     begin, move = way_m[:-1], np.diff(way_m, axis=0)
     length = np.maximum((move[:, :2] ** 2).sum(axis=1), 1e-12)
     share = np.clip(((place_m[:2] - begin[:, :2]) * move[:, :2]).sum(axis=1) / length, 0.0, 1.0)
@@ -229,7 +232,10 @@ def _figures(site: Site, model: AccuracyModel, designs: list[Design], best: Desi
 
 
 def _map(site: Site, model: AccuracyModel, best: Design) -> PlacementMap:
-    """Weighted sigma and determinant at the fixed point over places of the last placed point, the others standing."""
+    """Map weighted sigma and determinant at the fixed point over places of the last point.
+
+    The other points stay where they are.
+    """
     region, side = site.regions[-1], site.plan.placement.map_side
     north, east = (np.linspace(low, high, side) for low, high in zip(region.low_m, region.high_m, strict=True))
     grid = np.array([(one, other) for one in north for other in east])

@@ -1,4 +1,6 @@
-"""The search for places of ground points: best for a fixed point of the way, its worst point, or with one point lost.
+"""Search for places of ground points.
+
+They are best for a fixed point of the way, for its worst point, or with one point lost.
 
 Source: Skrypnik, Inter-aircraft navigation in air traffic management, 2010, chapter 6.2 (largest det(H'H) at a fixed
 point of the path, gradient method).
@@ -24,7 +26,7 @@ REACH = 0.01  # of the rectangle: so far a gain that is left is looked for
 
 
 class Site:
-    """The points of a session that are to be placed, along the way of its aircraft without control.
+    """Ground points to be placed, along the way of the aircraft without control.
 
     Parameters
     ----------
@@ -77,7 +79,7 @@ class Site:
         return np.array([region.nearest(place) for region, place in zip(self.regions, places, strict=True)])
 
     def positions(self, places: FloatArray) -> FloatArray:
-        """Positions of everybody at every epoch, (epochs, sources, 3), with the points at these places."""
+        """Return the positions of all at every epoch, (epochs, sources, 3), with points at places."""
         found = self.way.copy()
         found[:, self.sources, :2] = places
         for number, row in self.mirrors.items():

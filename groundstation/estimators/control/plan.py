@@ -39,12 +39,12 @@ class Flown:
 
     @property
     def horizon(self) -> Horizon:
-        """What the criterion looks at."""
+        """Horizon of the criterion."""
         return "none" if self.name == UNCONTROLLED else "end" if self.name == INTEGRAL else "each step"
 
 
 def plan_session(plan: SessionPlan) -> Planned:
-    """Find laws of control of a session where anything is controlled, and places of points that are to be placed.
+    """Find laws of control and places of points for a session, where the scenario asks them.
 
     Raises
     ------

@@ -1,4 +1,7 @@
-"""Where a ground point may stand: a rectangle without polygons that are kept out; nearest allowed places."""
+"""Region of a ground point: a rectangle without the polygons that are kept out.
+
+It finds the nearest allowed places.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,7 +38,7 @@ class Region:
         object.__setattr__(self, "keep_out", tuple(frozen(np.asarray(one, dtype=np.float64)) for one in self.keep_out))
 
     def mirrored(self) -> "Region":
-        """What of the region is allowed on both sides of the axis east = 0."""
+        """Return the part of the region that is allowed on both sides of the axis east = 0."""
         flipped = tuple(one * np.array([1.0, -1.0]) for one in self.keep_out)
         half = min(-self.low_m[1], self.high_m[1])
         low, high = np.array([self.low_m[0], -half]), np.array([self.high_m[0], half])
@@ -56,7 +59,7 @@ class Region:
 
     @cached_property
     def corners(self) -> FloatArray:
-        """Corners of the allowed places and where edges cross, shape (c, 2); none where nothing is allowed."""
+        """Corners of the allowed places and edge crossings, shape (c, 2); none if none is allowed."""
         edges = self._edges
         begin, way = edges[:, 0], edges[:, 1] - edges[:, 0]
         one, other = np.triu_indices(len(edges), 1)
@@ -71,11 +74,11 @@ class Region:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no place is allowed."""
+        """Tell whether no place is allowed."""
         return bool(np.any(self.low_m > self.high_m)) or not len(self.corners)
 
     def allows(self, place_m: FloatArray) -> BoolArray:
-        """Whether each place (n, 2) is allowed."""
+        """Tell whether each place (n, 2) is allowed."""
         inside_box = ((place_m >= self.low_m - EDGE_M) & (place_m <= self.high_m + EDGE_M)).all(axis=1)
         if not self.keep_out:
             return np.asarray(inside_box)
@@ -117,7 +120,7 @@ def _nearest_on(edges: FloatArray, place_m: FloatArray) -> tuple[FloatArray, Flo
 
 
 def _is_crossed(edges: FloatArray, place_m: FloatArray) -> Int64Array:
-    """Whether a ray from each place to the east crosses each edge, shape (n, e)."""
+    """Tell whether a ray from each place to the east crosses each edge, shape (n, e)."""
     begin, end = edges[:, 0], edges[:, 1]
     north, east = place_m[:, :1], place_m[:, 1:]
     straddles = (begin[:, 0] > north) != (end[:, 0] > north)

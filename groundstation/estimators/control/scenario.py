@@ -1,4 +1,7 @@
-"""Scenario of a session to be planned: who flies, who may be controlled within which bounds, what is measured."""
+"""Scenario of a session to be planned: who flies, what is controlled, what is measured.
+
+Controls have bounds.
+"""
 
 import math
 from dataclasses import dataclass, field
@@ -40,7 +43,9 @@ class PlannedErrors:
 
 @dataclass(frozen=True)
 class PlannedAircraft:
-    """One aircraft: where it starts (north and east of the origin), how it flies, what of it may be controlled.
+    """One aircraft: its start, its flight, and what of it may be controlled.
+
+    The start is given north and east of the origin.
 
     Parameters
     ----------
@@ -120,7 +125,10 @@ class PlannedPoint:
 
 @dataclass(frozen=True)
 class KeepOut:
-    """A polygon without ground points: water, the runway strip, a village. Corners are north, east in metres."""
+    """Polygon without ground points: water, the runway strip, a village.
+
+    Corners are north, east in metres.
+    """
 
     name: str
     corners_m: tuple[tuple[float, float], ...]
@@ -134,7 +142,7 @@ class KeepOut:
 
 @dataclass(frozen=True)
 class Placement:
-    """Where points that are to be placed may stand and what is asked of them.
+    """Places allowed to the points that are to be placed, and the aim of the search.
 
     Parameters
     ----------
@@ -226,7 +234,7 @@ class Ranging:
 
 @dataclass(frozen=True)
 class Control:
-    """How laws of control are found and which of them is recommended.
+    """Search for laws of control, and the choice of the recommended one.
 
     Parameters
     ----------
