@@ -42,7 +42,7 @@ class Trials:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Of the mean NEES of so many trials, 95 %."""
+        """Limits (95 %) of the mean NEES of so many trials."""
         return nees_limits(FREEDOM, len(self.error_m))
 
     @property
