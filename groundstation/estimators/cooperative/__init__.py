@@ -1,1 +1,4 @@
-"""Navigation between aircraft: centralised and decentralised filters on one input, geometry, bounds, consistency."""
+"""Navigation between aircraft: centralised and decentralised filters on one input.
+
+Geometry, bounds and consistency are judged beside them.
+"""

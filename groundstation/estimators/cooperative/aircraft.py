@@ -1,4 +1,7 @@
-"""An aircraft: which error states there are, how they start, and the tables from which the compiled loops move them."""
+"""An aircraft as seen by the filters: its error states, their start and their dynamics.
+
+The dynamics are tables from which the compiled loops move the states.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -95,7 +98,10 @@ class Aircraft:
 
     @property
     def receiver_clock(self) -> int:
-        """Place of the clock offset of the satellite receiver: the link's where there is one clock."""
+        """Index of the clock offset of the satellite receiver.
+
+        It is that of the link where there is one clock.
+        """
         return self.at("receiver_clock_m") if "receiver_clock_m" in self.states else self.clock
 
     @property
@@ -115,7 +121,7 @@ class Aircraft:
 
     @property
     def doubts(self) -> Mapping[int, float]:
-        """Its clocks: they may leap."""
+        """Clock states, which may leap, with the variance added when they are reopened."""
         return {self.clock: LEAP_M**2, self.receiver_clock: LEAP_M**2}
 
     def start(self) -> tuple[FloatArray, FloatArray]:
@@ -130,13 +136,16 @@ class Aircraft:
         return moved, phi, noise
 
     def place(self, x: FloatArray, at_s: float) -> tuple[FloatArray, FloatArray]:
-        """Position of the antenna in the frame of the session, and its derivative by the state, shape (3, n)."""
+        """Return the antenna's position and its derivative by the state, shape (3, n).
+
+        The position is in the frame of the session.
+        """
         reading, derivative = np.empty(3), np.empty((3, self.size))
         place(self._alone, 0, at_s, reading, derivative)
         return reading + derivative @ x, derivative
 
     def view(self, x: FloatArray, at_s: float) -> View:
-        """That of the antenna."""
+        """Return the view of the antenna; it has no heading."""
         place_m, derivative = self.place(x, at_s)
         return View(place_m, derivative, float("nan"), np.zeros(self.size))
 
@@ -181,7 +190,10 @@ def fleet_of(vehicles: Sequence[Aircraft]) -> Fleet:
 
 
 def aircraft_of(track: DeadReckoning, frame: Frame, settings: CooperativeSettings) -> Aircraft:
-    """An aircraft with INS, barometric altimeter and clock: 7 states in a local frame, 13 or 15 in the global one."""
+    """Make an aircraft with INS, barometric altimeter and clock.
+
+    It has 7 states in a local frame, 13 or 15 in the global one.
+    """
     b = settings.ins
     tilt, azimuth = b.tilt_arcsec * RAD_PER_ARCSEC, 60.0 * b.azimuth_arcmin * RAD_PER_ARCSEC
     gyro = b.gyro_dph * RAD_PER_ARCSEC
@@ -214,7 +226,10 @@ def aircraft_of(track: DeadReckoning, frame: Frame, settings: CooperativeSetting
 
 
 def _epochs_of(track: DeadReckoning, frame: Frame) -> FloatArray:
-    """Table of an aircraft's epochs; what stands for the step to the next epoch is the mean of both."""
+    """Return the table of an aircraft's epochs.
+
+    Columns for the step to the next epoch hold the mean of both.
+    """
     table = np.zeros((len(track), EPOCH_COLUMNS))
     table[:, TIME], table[:, PLACE : PLACE + 3] = track.time_s, track.position_m
     table[:, RATE : RATE + 3] = np.einsum("nij,nj->ni", track.axes, track.velocity_mps)
@@ -241,7 +256,10 @@ def _epochs_of(track: DeadReckoning, frame: Frame) -> FloatArray:
 
 
 def _specific_force(table: FloatArray, height_m: FloatArray, change: FloatArray) -> FloatArray:
-    """Specific force north, east, down: change of velocity, Coriolis and transport terms, less gravity."""
+    """Return the specific force north, east, down.
+
+    It is change of velocity, Coriolis and transport terms, less gravity.
+    """
     sine, cosine = np.sin(table[:, LATITUDE]), np.cos(table[:, LATITUDE])
     meridian, normal = table[:, MERIDIAN], table[:, NORMAL]
     north, east, down = table[:, VELOCITY : VELOCITY + 3].T

@@ -1,4 +1,4 @@
-"""Every algorithm by its name: in compiled loops where these know the vehicles, else in plain numpy."""
+"""Algorithms by name: compiled loops where these know the vehicles, else plain numpy."""
 
 import numpy as np
 

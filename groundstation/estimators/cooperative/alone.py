@@ -1,4 +1,7 @@
-"""Compiled loop of the filters in which every vehicle estimates its own states alone. See ``decentralised``."""
+"""Compiled loop of the filters in which every vehicle estimates its own states alone.
+
+See ``decentralised``.
+"""
 
 import numpy as np
 
@@ -180,7 +183,10 @@ def _listen(
     room: Room,
     log: Log,
 ) -> int:
-    """Entry of what the source of a range told in its slot: what it knew some slots ago, moved to now."""
+    """Return the entry of the broadcast of a range's source in its slot.
+
+    It holds what the source knew some slots ago, moved to now.
+    """
     source, slot, at_s, slots = events.source[event], events.slot[event], events.time_s[event], len(past.slot)
     if slot != NO_SLOT and heard.slot[source] == slot:
         return int(heard.of[source])
@@ -243,7 +249,10 @@ def _tell(
     entry: int,
     room: Room,
 ) -> None:
-    """Fill the message: place and clock, their covariance, and their covariance with the errors of the points."""
+    """Fill the message: place and clock, and their covariances.
+
+    One is their own, the other is with the errors of the points.
+    """
     n, clock, told = fleet.size[source], fleet.clock[source], heard.told[entry]
     place(fleet, source, at_s, room.reading, room.derivative)
     position(n, room.reading, room.derivative, x, heard.place_m[entry])
@@ -353,7 +362,10 @@ def _linearise(
     rows: Rows,
     log: Log,
 ) -> int:
-    """Put the rows of an event into the batch, referred to the receiver's state now; return how many there are."""
+    """Put the rows of an event into the batch; return how many there are.
+
+    They are referred to the receiver's state now.
+    """
     who, at_s = events.receiver[event], events.time_s[event]
     n, x, phi = fleet.size[who], room.x, room.phi
     for i in range(n):
@@ -390,7 +402,7 @@ def _linearise(
 def _bring(
     points: Points, events: Events, event: int, by: int, method: Method, heard: Heard, batch: Batch, to: int
 ) -> None:
-    """Variance that the source brings with it, and the derivative by the errors of uncertain points."""
+    """Set the variance that the source adds, and the derivative by errors of uncertain points."""
     for c in range(batch.by_shared.shape[1]):
         batch.by_shared[to, c] = 0.0
     brought = 0.0
@@ -420,7 +432,10 @@ def _passes(
     batch: Batch,
     log: Log,
 ) -> bool:
-    """Whether an innovation is inside the gate; counts, and opens the clock after many rejections."""
+    """Tell whether an innovation is inside the gate.
+
+    It also counts, and opens the clock after many rejections.
+    """
     event = batch.event[row]
     who = events.receiver[event]
     total = batch.own[row] * events.spread[event] + batch.brought[row]

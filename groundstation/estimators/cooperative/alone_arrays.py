@@ -1,4 +1,4 @@
-"""What the loop of the filters of vehicles that estimate alone is handed: arrays under names. No numba here."""
+"""Arrays handed to the loop of the filters of vehicles that estimate alone. No numba here."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ NOBODY = -1
 
 
 class Own(NamedTuple):
-    """Filters of k vehicles, at most n states each, q errors of uncertain points; N states in all."""
+    """Filters of k vehicles: at most n states each, q errors of uncertain points; N states."""
 
     time_s: FloatArray  # (k,)
     x: FloatArray  # (k, n)
@@ -21,7 +21,7 @@ class Own(NamedTuple):
 
 
 class Past(NamedTuple):
-    """What all filters were at the beginning of the last slots, oldest first."""
+    """Past states of all filters, at the beginning of the last slots, oldest first."""
 
     slot: Int64Array  # (slots,)
     begun: Int64Array  # (1,) how many slots have begun
@@ -33,7 +33,10 @@ class Past(NamedTuple):
 
 
 class Heard(NamedTuple):
-    """Broadcasts of the measurements of a group; the last of each sender is kept for those who hear it next."""
+    """Broadcasts heard by the measurements of a group.
+
+    The last of each sender is kept for those who hear it next.
+    """
 
     place_m: FloatArray  # (h, 3)
     clock_m: FloatArray  # (h,)
@@ -48,7 +51,7 @@ class Heard(NamedTuple):
 
 
 class Method(NamedTuple):
-    """What a filter makes of its neighbours."""
+    """Settings of how a filter uses its neighbours."""
 
     algorithm: int
     gate_sigma: float

@@ -1,4 +1,7 @@
-"""Updates of a vehicle that estimates alone by a batch of rows: noise that two sources share, split covariances."""
+"""Updates of a vehicle that estimates alone, by a batch of rows.
+
+Two sources may share noise; covariances may be split.
+"""
 
 import numpy as np
 
@@ -27,7 +30,10 @@ JACOBI_SWEEPS = 8  # each doubles the digits once it has any
 
 @in_place
 def solve(count: int, width: int, A: FloatArray, B: FloatArray) -> None:
-    """B <- A^-1 B by elimination with the largest pivots; A (count, count) is spoiled, B is (count, width)."""
+    """Solve B <- A^-1 B by elimination with the largest pivots.
+
+    A (count, count) is overwritten, B is (count, width).
+    """
     for c in range(count):
         best = c
         for r in range(c + 1, count):
@@ -56,7 +62,10 @@ def solve(count: int, width: int, A: FloatArray, B: FloatArray) -> None:
 def _mix(
     fleet: Fleet, who: int, count: int, own: Own, heard: Heard, batch: Batch, first: int, mixed: FloatArray
 ) -> None:
-    """Errors that each row of an update brings in, by the errors of all at the beginning of the window."""
+    """Fill the errors that each row of an update brings in.
+
+    They are given by the errors of all at the beginning of the window.
+    """
     width = own.map_rows.shape[2]
     for row in range(first, first + count):
         by = batch.heard[row]
@@ -98,11 +107,12 @@ def update(
     batch: Batch,
     room: Room,
 ) -> None:
-    """Kalman update with the noise of the algorithm; shared errors are considered, not estimated.
+    """Run the Kalman update with the noise of the algorithm.
 
-    The gain solves S K' = H P + C', where C is the covariance of the states with the noise of the rows: errors of the
-    points are in the states, in the rows themselves and in what neighbours tell. Without the last of these a filter
-    comes to claim less than the errors that it shares, and its covariance can lose its positive eigenvalues.
+    Shared errors are considered, not estimated. The gain solves S K' = H P + C', where C is the covariance of the
+    states with the noise of the rows: errors of the points are in the states, in the rows themselves and in what
+    neighbours tell. Without the last of these a filter comes to claim less than the errors that it shares, and its
+    covariance can lose its positive eigenvalues.
     """
     n, P, S, right, is_modified = fleet.size[who], own.P[who], room.S, room.right, method.algorithm == MODIFIED
     q = len(method.point_variance) if is_modified else 0
@@ -161,7 +171,10 @@ def _told_shared(row: int, c: int, heard: Heard, batch: Batch) -> float:
 
 @in_place
 def _common(events: Events, r: int, s: int, method: Method, heard: Heard, batch: Batch, cross: FloatArray) -> float:
-    """Covariance of the noise of two rows: all of it for one neighbour's two, else (modified) through the points."""
+    """Return the covariance of the noise of two rows.
+
+    It is all of it for two rows of one neighbour, else (modified) that through the points.
+    """
     one, two, total = batch.event[r], batch.event[s], 0.0
     if method.algorithm == EXACT:
         return 0.0
@@ -180,9 +193,10 @@ def _common(events: Events, r: int, s: int, method: Method, heard: Heard, batch:
 
 @in_place
 def _between(heard: Heard, one: int, two: int, cross: FloatArray) -> None:
-    """Fill ``cross[0]`` with the covariance of the errors in two messages of one sender: root times root.
+    """Fill ``cross[0]`` with the covariance of the errors in two messages of one sender.
 
-    Errors of one sender are common to its messages. The symmetric roots make it a covariance whatever the two are.
+    It is the product of their square roots. Errors of one sender are common to its messages. The symmetric roots make
+    it a covariance whatever the two are.
     """
     if one == two:
         for a in range(4):
@@ -200,7 +214,9 @@ def _between(heard: Heard, one: int, two: int, cross: FloatArray) -> None:
 
 @in_place
 def _root(covariance: FloatArray, root: FloatArray, A: FloatArray, V: FloatArray) -> None:
-    """Symmetric square root of a 4 x 4 covariance by Jacobi rotations; an eigenvalue that rounding left below 0 is 0.
+    """Compute the symmetric square root of a 4 x 4 covariance by Jacobi rotations.
+
+    An eigenvalue that rounding left below 0 is taken as 0.
 
     Source: Golub and Van Loan, Matrix Computations, 4th ed. 2013, section 8.5.
     """
@@ -304,7 +320,10 @@ def _best_weight(
     weights: FloatArray,
     lines: FloatArray,
 ) -> float:
-    """Weight of the dependent part that leaves the least sum of variances, each over what it was; 0: none is better."""
+    """Return the weight of the dependent part with the least sum of relative variances.
+
+    Each variance is over what it was before; 0: no weight is better.
+    """
     by_dependent, by_independent = lines[0], lines[1]
     one, two, least, best = 0.0, 0.0, 0.0, 0.0
     for i in range(n):

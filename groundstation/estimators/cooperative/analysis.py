@@ -22,7 +22,7 @@ LEAST_OF_A_STATION, GATED_SHARE, OTHERS_SHARE = 10, 0.2, 0.05
 
 @dataclass(frozen=True)
 class SessionKnown:
-    """What an analysis of a session may use besides the session.
+    """Inputs of an analysis of a session besides the session itself.
 
     Parameters
     ----------
@@ -48,7 +48,10 @@ def _run(session: "Session", known: SessionKnown, settings: CooperativeSettings)
 
 
 def _examine(session: "Session", _known: SessionKnown, settings: CooperativeSettings) -> tuple[Shortfall, ...]:
-    """Whether ranges between the vehicles, or to ground points, are left when what cannot be used is left out."""
+    """Report if no usable ranges between vehicles or to ground points are left.
+
+    Those that cannot be used are left out first.
+    """
     from groundstation.estimators.cooperative.arrays import PEER, POINT
     from groundstation.estimators.cooperative.events import prepare, require_vehicles
 
@@ -60,7 +63,10 @@ def _examine(session: "Session", _known: SessionKnown, settings: CooperativeSett
 
 
 def innovations_of(answer: CooperativeResult) -> dict[str, float]:
-    """Mean normalised innovation squared of the default algorithm by kind of range; 1 is right."""
+    """Return the mean normalised innovation squared by kind of range; 1 is right.
+
+    It is that of the default algorithm.
+    """
     kinds = dict.fromkeys(link.kind for link in answer.links)
     found: dict[str, float] = {}
     for kind in kinds:
@@ -72,7 +78,7 @@ def innovations_of(answer: CooperativeResult) -> dict[str, float]:
 
 
 def _too_sure(answer: CooperativeResult) -> tuple[Finding, ...]:
-    """A warning where ranges contradict the sigmas that the filter was given: it needs no truth."""
+    """Warn where ranges contradict the sigmas given to the filter; this needs no truth."""
     return tuple(
         Finding(
             "warn",
@@ -87,7 +93,7 @@ def _too_sure(answer: CooperativeResult) -> tuple[Finding, ...]:
 
 
 def _misplaced(answer: CooperativeResult) -> tuple[Finding, ...]:
-    """A warning for a station whose ranges the default algorithm gates, where it takes those of the others.
+    """Warn of a station whose ranges the default algorithm gates while it uses the others.
 
     With honest sigmas one range in 10^8 or fewer is beyond a gate of 6 sigma.
     """

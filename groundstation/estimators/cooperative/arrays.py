@@ -1,4 +1,4 @@
-"""What the compiled loops of this room are handed: arrays under names. No numba here."""
+"""Arrays handed to the compiled loops of this folder, under names. No numba here."""
 
 from typing import NamedTuple
 
@@ -75,7 +75,7 @@ class Events(NamedTuple):
 
 
 class Points(NamedTuple):
-    """Ground points: axes north and east, how wrong each is, and its place among the uncertain ones (-1: exact)."""
+    """Ground points: axes north and east, sigma, index among the uncertain ones (-1: exact)."""
 
     axes: FloatArray  # (p, 3, 2)
     sigma_m: FloatArray  # (p,)
@@ -83,7 +83,10 @@ class Points(NamedTuple):
 
 
 class Items(NamedTuple):
-    """What happens, in order: output of a vehicle, or (vehicle -1) measurements first to last in one update."""
+    """Events in order: an output of a vehicle, or (vehicle -1) measurements in one update.
+
+    The measurements are those from first to last.
+    """
 
     time_s: FloatArray  # (i,)
     vehicle: Int64Array
@@ -102,9 +105,9 @@ class Rules(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """One event linearised, a range or a height: innovation = receiver + place + clock + noise; row 0 holds it.
+    """One event linearised, a range or a height; row 0 holds it.
 
-    ``line`` is room.
+    innovation = receiver + place + clock + noise. ``line`` is room.
     """
 
     innovation: FloatArray  # (1,)
@@ -121,7 +124,7 @@ def rows_for(n: int) -> Rows:
 
 
 class Log(NamedTuple):
-    """What a run writes down: states at every output, every measurement as it was judged, and counts."""
+    """Records of a run: states at every output, every measurement as judged, and counts."""
 
     x: FloatArray  # (outputs, n)
     P: FloatArray  # (outputs, n, n)

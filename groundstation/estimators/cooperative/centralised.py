@@ -1,8 +1,9 @@
-"""One extended Kalman filter of all vehicles: 7 k states in a local frame, 13 k (15 k) in the global one.
+"""Centralised extended Kalman filter of all vehicles.
 
-A vehicle's block is moved on when a measurement or an output asks for it: noise of different vehicles is independent,
-so that blocks may stand at different times. Vehicles that are not there yet keep their start. Ground points whose own
-position is uncertain are constant states. Dead reckoning is the same filter without measurements.
+It has 7 k states in a local frame, 13 k (15 k) in the global one. A vehicle's block is moved on when a measurement or
+an output asks for it: noise of different vehicles is independent, so that blocks may stand at different times. Vehicles
+that are not there yet keep their start. Ground points whose own position is uncertain are constant states. Dead
+reckoning is the same filter without measurements.
 
 A range between two aircraft is linearised, value and direction, about a reference place of each: its dead reckoning
 less an offset, at first 0. While the line between the estimates lies within ``KNOWN_WRONG_SIGMAS`` claimed sigmas of
@@ -54,7 +55,10 @@ def run_centralised(
 
 
 def _start(prepared: Prepared) -> Joint:
-    """State and covariance of all vehicles and uncertain points; a vehicle that is not there yet keeps its start."""
+    """Return the start state and covariance of all vehicles and uncertain points.
+
+    A vehicle that is not there yet keeps its start.
+    """
     sigmas = prepared.points.sigma_m[prepared.points.uncertain >= 0]
     starts = [vehicle.start() for vehicle in prepared.vehicles]
     sizes = [len(x) for x, _ in starts]
@@ -68,14 +72,17 @@ def _start(prepared: Prepared) -> Joint:
 
 
 def is_about_reckoning(prepared: Prepared, settings: CooperativeSettings) -> bool:
-    """Whether ranges between aircraft are linearised about their dead reckoning."""
+    """Tell whether ranges between aircraft are linearised about their dead reckoning."""
     if settings.derivatives == "auto":
         return not np.isin(prepared.events.kind, (POINT, SATELLITE)).any()
     return settings.derivatives == "reckoning"
 
 
 def reports(prepared: Prepared, settings: CooperativeSettings) -> dict[str, tuple[int, int]]:
-    """What the vehicles send to the centre: their dead reckoning and what they measured, once a frame."""
+    """Count the vehicles' reports to the centre and their bytes.
+
+    Once a frame each sends its dead reckoning and what it measured.
+    """
     events = prepared.events
     frame = np.floor((events.time_s + SAME_TIME_S) / settings.frame_s).astype(np.int64)
     report, ranges = np.unique(frame * len(prepared.vehicles) + events.receiver, return_counts=True)

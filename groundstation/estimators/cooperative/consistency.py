@@ -1,4 +1,4 @@
-"""How errors compare with the sigmas a filter claims, and whether it diverges."""
+"""Consistency: errors against the sigmas that a filter claims, and divergence."""
 
 from dataclasses import dataclass
 
@@ -31,11 +31,14 @@ class Judgement:
 
     @property
     def rms_m(self) -> float:
-        """Of the horizontal error over all epochs."""
+        """RMS of the horizontal error over all epochs."""
         return float(np.sqrt(np.nanmean((self.error_m**2).sum(axis=1)))) if np.isfinite(self.error_m).any() else np.nan
 
     def diverges(self, track: Track) -> bool:
-        """Whether the error of the last tenth of the session is beyond three computed sigma_r, or has no sigma."""
+        """Tell whether the error of the session's last tenth exceeds three computed sigma_r.
+
+        An error without a sigma counts as well.
+        """
         error = np.linalg.norm(self.error_m, axis=1)
         sigma = 0.5 * track.two_sigma_r_m
         last = slice(int((1.0 - LAST_PART) * len(error)), None)
@@ -45,7 +48,10 @@ class Judgement:
 
 
 def judge(track: Track, vehicle: DeadReckoning | Odometry, time_s: FloatArray, position_m: FloatArray) -> Judgement:
-    """Hold a track against the true positions of its vehicle (m, 3), interpolated to its epochs, not over long gaps."""
+    """Compare a track with the true positions of its vehicle (m, 3).
+
+    The truth is interpolated to the epochs of the track, not over long gaps.
+    """
     true = np.column_stack(
         [np.interp(track.time_s, time_s, position_m[:, axis], left=np.nan, right=np.nan) for axis in range(3)]
     )
@@ -59,7 +65,7 @@ def judge(track: Track, vehicle: DeadReckoning | Odometry, time_s: FloatArray, p
 
 
 def _in_gap(at_s: FloatArray, time_s: FloatArray) -> BoolArray:
-    """Where times lie between two samples that are too far apart.
+    """Tell which times lie between two samples that are too far apart.
 
     Examples
     --------

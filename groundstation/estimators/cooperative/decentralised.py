@@ -1,6 +1,6 @@
-"""Filters in which every vehicle estimates its own states alone and hears what its neighbours broadcast.
+"""Decentralised filters: every vehicle estimates its own states alone.
 
-Four algorithms differ in what they make of a neighbour's estimate:
+It hears what its neighbours broadcast. Four algorithms differ in what they make of a neighbour's estimate:
 
 - ``neighbour_exact``: it is the truth.
 - ``ranked``: only neighbours of a higher rank are used, and h P h' of their covariance is added to the noise.

@@ -1,8 +1,9 @@
-"""How errors of all vehicles act on one another: the linear map of a stretch of time, and its spectral radius.
+"""Linear map of the errors of all vehicles over a stretch of time; its spectral radius.
 
-A decentralised filter that takes its neighbours' estimates mixes their errors into its own: e_i becomes
-(I - K h_i) e_i - K h_j e_j. The product of these maps over a stretch tells whether errors feed themselves: a spectral
-radius above 1 means that some pattern of errors grows, whatever the noise. Errors here are truth - estimate.
+It tells how errors act on one another. A decentralised filter that takes its neighbours' estimates mixes their errors
+into its own: e_i becomes (I - K h_i) e_i - K h_j e_j. The product of these maps over a stretch tells whether errors
+feed themselves: a spectral radius above 1 means that some pattern of errors grows, whatever the noise. Errors here are
+truth - estimate.
 """
 
 from collections.abc import Sequence
@@ -15,7 +16,10 @@ from groundstation.estimators.cooperative.arrays import Fleet, Items
 
 
 def unit_rows(fleet: Fleet, window_s: float) -> FloatArray:
-    """Rows of the unit map, shape (k, n, N): a block for each vehicle, filled up to the longest state; N 0: no map."""
+    """Return the rows of the unit map, shape (k, n, N).
+
+    There is a block for each vehicle, filled up to the longest state; N 0: no map.
+    """
     k, n = fleet.density.shape
     if window_s <= 0.0:
         return np.zeros((k, n, 0))
@@ -27,7 +31,10 @@ def unit_rows(fleet: Fleet, window_s: float) -> FloatArray:
 
 
 def windows(items: Items, window_s: float) -> list[tuple[int, int]]:
-    """Stretches of items, first and behind the last of each, that begin where the one before has lasted so long."""
+    """Split items into windows of ``window_s``: (first, behind the last) of each.
+
+    A window begins where the one before has lasted so long.
+    """
     if window_s <= 0.0:
         return [(0, len(items.time_s))]
     begins, end_s = [], -np.inf

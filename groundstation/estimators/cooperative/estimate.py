@@ -221,7 +221,7 @@ def _link_rows(prepared: Prepared, run: AlgorithmRun) -> tuple[LinkRow, ...]:
 
 
 def _findings(judged: Sequence[Judged], settings: CooperativeSettings) -> list[Finding]:
-    """What a user must know of the runs themselves."""
+    """Return findings about the runs themselves."""
     found = []
     for one in judged:
         name, counts = one.run.algorithm, one.run.counts

@@ -31,7 +31,7 @@ AT_MOST_RANGE_M = 1e8
 
 @dataclass(frozen=True)
 class Prepared:
-    """What every algorithm runs on.
+    """Inputs of every algorithm.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Prepared:
 
     @property
     def is_of_aircraft(self) -> bool:
-        """Whether all vehicles are aircraft: then the compiled loops know them."""
+        """Tell whether all vehicles are aircraft, which the compiled loops know."""
         return all(isinstance(vehicle, Aircraft) for vehicle in self.vehicles)
 
     @cached_property
@@ -115,7 +115,7 @@ def _points_of(session: Session) -> Points:
 
 
 def _clean(track: DeadReckoning | Odometry, findings: list[Finding]) -> DeadReckoning | Odometry | None:
-    """A track without rows that are no numbers or step back in time; None when nothing is left."""
+    """Drop rows of a track that are no numbers or step back in time; None when none is left."""
     parts = {name: value for name, value in vars(track).items() if isinstance(value, np.ndarray)}
     needed = [value for name, value in parts.items() if name not in ("latitude_deg", "heading_deg")]
     good = np.ones(len(track), dtype=bool)
@@ -151,7 +151,7 @@ def _count(findings: list[Finding], code: str, text: str, bad: BoolArray, topic:
 
 
 def _is_there(vehicles: tuple[Vehicle, ...], who: Int64Array, time_s: FloatArray) -> BoolArray:
-    """Whether each vehicle has dead reckoning then; ``who`` below 0: nobody asks."""
+    """Tell whether each vehicle has dead reckoning then; ``who`` below 0: nobody asks."""
     spans = np.array([(vehicle.first_s, vehicle.last_s) for vehicle in vehicles] + [(-np.inf, np.inf)])
     return np.asarray((spans[who, 0] - 1e-9 <= time_s) & (time_s <= spans[who, 1] + 1e-9))
 
@@ -271,10 +271,11 @@ def _link_events(
 
 
 def _as_white(table: Ranges, settings: CooperativeSettings) -> FloatArray:
-    """Factor of the variance of each row, so that what repeats itself weighs no more than it tells.
+    """Return the factor of the variance of each row.
 
-    A share c of the variance decays with the time t: readings every dt seconds are worth white ones of the variance
-    times 1 - c + c coth(dt / 2 t) (the spectral density at frequency 0 of a first-order Gauss-Markov sequence).
+    It makes repetitions weigh no more than they tell. A share c of the variance decays with the time t: readings every
+    dt seconds are worth white ones of the variance times 1 - c + c coth(dt / 2 t) (the spectral density at frequency 0
+    of a first-order Gauss-Markov sequence).
     """
     share, time_s = settings.correlated_share, settings.correlation_s
     if share <= 0.0:

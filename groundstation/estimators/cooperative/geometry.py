@@ -1,7 +1,8 @@
-"""Geometry of ranging: dilution of precision, determinant, smallest eigenvalue, Gram determinant, information bound.
+"""Geometry of ranging, and the information bound.
 
-H holds one row for each source that a vehicle hears in a frame: the horizontal direction from the source to it (two
-columns), and 1 for its clock where ranges are one-way. Sources count as exact.
+Dilution of precision, determinant, smallest eigenvalue, Gram determinant. H holds one row for each source that a vehicle
+hears in a frame: the horizontal direction from the source to it (two columns), and 1 for its clock where ranges are
+one-way. Sources count as exact.
 
 Source: Skrypnik, Inter-aircraft navigation in air traffic management, 2010, chapters 4.3 and 5.2 (det(H'H), Gram);
 Misra and Enge, Global Positioning System, 2nd ed. 2006, section 6.1 (dilution); Tichavsky, Muravchik and Nehorai,
@@ -144,11 +145,11 @@ Truth = dict[str, tuple[FloatArray, FloatArray]]
 
 
 def bound_of(session: Session, settings: CooperativeSettings, truth: Truth) -> AlgorithmRun:
-    """Run the centralised filter along the true tracks, without error in any reading: its covariance is the bound.
+    """Run the centralised filter along the true tracks; its covariance is the bound.
 
-    Vehicles without truth keep their own dead reckoning; then the bound is one along the tracks as they were read.
-    Measured values have no say in it: innovations far from zero only move the point of linearisation, so the gate is
-    off and every measurement is replaced by what is predicted.
+    No reading has an error. Vehicles without truth keep their own dead reckoning; then the bound is one along the
+    tracks as they were read. Measured values have no say in it: innovations far from zero only move the point of
+    linearisation, so the gate is off and every measurement is replaced by what is predicted.
     """
     vehicles = []
     for vehicle in session.vehicles:

@@ -34,7 +34,10 @@ SAME_TIME_S = 1e-12
 
 
 class Joint(NamedTuple):
-    """State x and covariance P of all vehicles, then of the uncertain points; changed in place."""
+    """Joint state x and covariance P of all vehicles, then of the uncertain points.
+
+    Changed in place.
+    """
 
     first: Int64Array  # (k + 1,) places of the vehicles in x
     x: FloatArray  # (N,)
@@ -160,7 +163,10 @@ def _keep(fleet: Fleet, joint: Joint, who: int, log: Log) -> None:
 
 @inlined
 def _is_behind(joint: Joint, who: int, to_s: float) -> bool:
-    """Whether a vehicle's block is to be moved on; asked before the call, which copies what it is handed."""
+    """Tell whether a vehicle's block is to be moved on.
+
+    It is asked before the call, which copies what it is handed.
+    """
     return bool(to_s > joint.time_s[who] + SAME_TIME_S)
 
 
@@ -194,9 +200,9 @@ def _advance(fleet: Fleet, joint: Joint, who: int, to_s: float, room: Room) -> N
 
 @inlined
 def _look_at(fleet: Fleet, joint: Joint, who: int, at_s: float, end: int, room: Room) -> bool:
-    """State of a vehicle at a time, its derivative by the state it has now, and its place; end 0 receives, 1 sends.
+    """Fill the state of a vehicle at a time, its place, and the derivative by its state now.
 
-    Return whether the time is another than that of its state.
+    End 0 receives, 1 sends. Return whether the time is another than that of its state.
     """
     n, first = fleet.size[who], joint.first[who]
     x, phi = room.x[end], room.phi[end]
@@ -281,7 +287,10 @@ def _linearise(
 
 @inlined
 def _put(n: int, h: FloatArray, is_back: bool, phi: FloatArray, first: int, lines: Lines, entry: int) -> int:
-    """Write the derivative by a vehicle's states now, h phi, where it is not zero; return the next free entry."""
+    """Write the derivative by a vehicle's states now, h phi, where it is not zero.
+
+    Returns the next free entry.
+    """
     for j in range(n):
         total = h[j]
         if is_back:
@@ -296,7 +305,10 @@ def _put(n: int, h: FloatArray, is_back: bool, phi: FloatArray, first: int, line
 
 @in_place
 def _refer(fleet: Fleet, joint: Joint, who: int, source: int, arm_m: FloatArray, room: Room) -> None:
-    """Line between two aircraft about which their range is linearised; its ends move when known to be wrong."""
+    """Fill the line between two aircraft about which their range is linearised.
+
+    Its ends move when known to be wrong.
+    """
     here, about, across = room.line[2], room.line[1], room.line[3]
     position(fleet.size[who], room.reading[0], room.derivative[0], room.x[0], here)
     along = square = length = 0.0
@@ -331,7 +343,10 @@ def _refer(fleet: Fleet, joint: Joint, who: int, source: int, arm_m: FloatArray,
 def _judge(
     fleet: Fleet, events: Events, event: int, rules: Rules, joint: Joint, lines: Lines, at: int, log: Log
 ) -> bool:
-    """Whether a row is inside the gate; opens the clock of a vehicle none of whose ranges fits any more."""
+    """Tell whether a row is inside the gate.
+
+    It opens the clock of a vehicle none of whose ranges fits any more.
+    """
     total = lines.variance[at] * events.spread[event] + predicted_variance(
         lines.columns, lines.values, lines.starts[at], lines.starts[at + 1], joint.P
     )
@@ -378,8 +393,11 @@ def _use(
     lines: Lines,
     log: Log,
 ) -> None:
-    """All measurements in one update: one linearisation for all. Their noise is independent, so they may be used one
-    after the other, each with what those before it have moved taken off its innovation."""
+    """Use all measurements in one update, linearised once.
+
+    Their noise is independent, so they may be used one after the other, each with what those before it have moved taken
+    off its innovation.
+    """
     count = 0
     for event in range(first, last):
         found = _linearise(fleet, points, events, event, rules, joint, room, rows, lines, count)

@@ -1,4 +1,4 @@
-"""What every compiled loop does with a judged measurement: it is written down, and rejections in a row are counted."""
+"""Log of a judged measurement and count of rejections in a row, for every compiled loop."""
 
 from groundstation.base.compile import in_place
 from groundstation.base.records import Int64Array
@@ -21,7 +21,7 @@ def write_down(event: int, innovation: float, variance: float, passes: bool, log
 def count_rejection(
     fleet: Fleet, who: int, passes: bool, may_open: bool, rejected: Int64Array, first: int, P: FloatArray, log: Log
 ) -> None:
-    """Count rejections in a row; open the clock of a vehicle none of whose ranges fits any more.
+    """Count rejections in a row; open the clock of a vehicle that no range fits any more.
 
     ``first`` is where its states begin in ``P``.
     """

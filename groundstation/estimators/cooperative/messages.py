@@ -1,4 +1,4 @@
-"""What the filters say over the data link, as bytes.
+"""Messages of the filters over the data link, as bytes.
 
 Little-endian; positions and covariances of full vectors as 8-byte numbers, the covariance of a broadcast position as
 4-byte ones: a centimetre of an ECEF position does not fit into four. One byte each for sender and rank allows 256.
@@ -20,7 +20,7 @@ KINDS = ("neighbour_exact", "ranked", "modified", "split_intersection")
 
 @dataclass(frozen=True, slots=True)
 class Broadcast:
-    """What a vehicle tells its neighbours of itself.
+    """Broadcast of a vehicle to its neighbours about itself.
 
     Parameters
     ----------
@@ -95,7 +95,9 @@ def report_bytes(ranges: int) -> int:
 
 
 def pairwise_bytes(states: int, peer_states: int) -> tuple[int, int]:
-    """Bytes of the two messages of a pairwise update: state, covariance and factor there, the same corrected back.
+    """Return the bytes of the two messages of a pairwise update.
+
+    State, covariance and factor go there; the same come back corrected.
 
     Examples
     --------

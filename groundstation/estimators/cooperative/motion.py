@@ -92,7 +92,7 @@ def _fill_platform(flown: FloatArray, gyro_s: float, F: FloatArray) -> None:
 
 @in_place
 def first_not_before(fleet: Fleet, who: int, at_s: float) -> int:
-    """Place among a vehicle's epochs of the first that is not before a time (their number: none)."""
+    """Return the index of a vehicle's first epoch not before a time (their number: none)."""
     low, high = fleet.first[who], fleet.first[who + 1]
     while low < high:
         middle = (low + high) // 2
@@ -168,7 +168,7 @@ def step(
     noise: FloatArray,
     room: FloatArray,
 ) -> None:
-    """Move the state of a vehicle to another time; fill its transition and the covariance of the noise.
+    """Move the state of a vehicle to another time; fill transition and noise covariance.
 
     Parameters
     ----------
@@ -203,7 +203,10 @@ def step(
 def _over_epochs(
     fleet: Fleet, who: int, from_s: float, to_s: float, phi: FloatArray, noise: FloatArray, room: FloatArray
 ) -> None:
-    """Transition and noise in the global frame, piece by piece between the epochs of the dead reckoning."""
+    """Fill transition and noise in the global frame, piece by piece between epochs.
+
+    The epochs are those of the dead reckoning.
+    """
     n, F, one, q, w = fleet.size[who], room[4], room[5], room[6], room[7]
     first, count = fleet.first[who], fleet.first[who + 1] - fleet.first[who]
     cut = first_not_before(fleet, who, from_s + SAME_TIME_S)
@@ -228,9 +231,10 @@ def _over_epochs(
 
 @in_place
 def place(fleet: Fleet, who: int, at_s: float, reading: FloatArray, derivative: FloatArray) -> None:
-    """Position of the antenna = reading + derivative x: fill what dead reckoning has, (3,), and the derivative, (3, n).
+    """Fill reading (3,) and derivative (3, n): antenna position = reading + derivative x.
 
-    Between two epochs the position is cubic through both positions and velocities.
+    The reading is that of the dead reckoning. Between two epochs the position is cubic through both positions and
+    velocities.
     """
     for axis in range(3):
         reading[axis] = 0.0
@@ -277,7 +281,10 @@ def position(n: int, reading: FloatArray, derivative: FloatArray, x: FloatArray,
 def positions(
     fleet: Fleet, who: int, time_s: FloatArray, states: FloatArray, derivative: FloatArray, out: FloatArray
 ) -> None:
-    """Fill the positions (m, 3) at some times from the states there (m, n); ``derivative`` (3, n) is room."""
+    """Fill the positions (m, 3) at some times from the states there (m, n).
+
+    ``derivative`` (3, n) is room.
+    """
     for row in range(len(time_s)):
         place(fleet, who, time_s[row], out[row], derivative)
         position(fleet.size[who], out[row], derivative, states[row], out[row])

@@ -1,4 +1,7 @@
-"""Compiled predictions of measurements and their derivatives; tests hold them against central differences."""
+"""Compiled predictions of measurements and their derivatives.
+
+Tests hold them against central differences.
+"""
 
 import numpy as np
 
@@ -24,7 +27,7 @@ def observe(
     is_about: bool,
     rows: Rows,
 ) -> int:
-    """Linearise one event about the receiver's state and what is known of the source; return how many rows it has.
+    """Linearise one event about the receiver's state and the source; return its rows' number.
 
     One; none where the source is on top of the receiver.
 
@@ -117,7 +120,10 @@ def _range_row(
 def _while_the_earth_turns(
     line: FloatArray, source_m: FloatArray, distance: float, direction: FloatArray, seen: FloatArray
 ) -> float:
-    """Direction and distance from where a satellite was at emission, in the ECEF axes of the instant of reception."""
+    """Return the distance from a satellite's place at emission, and fill the direction.
+
+    Both are in the ECEF axes of the instant of reception.
+    """
     for _ in range(3):  # each gains six digits
         turn = EARTH_RATE_RADPS * distance / LIGHT_MPS
         cosine, sine = np.cos(turn), np.sin(turn)

@@ -28,7 +28,10 @@ from groundstation.methods.link_dynamics import ROOMS
 
 
 class Members(NamedTuple):
-    """k vehicles: times, states, covariances, factors towards the others, rows of the error map."""
+    """Filters of k vehicles: times, states, covariances, factors towards the others, map rows.
+
+    The map rows are those of the error map.
+    """
 
     time_s: FloatArray  # (k,)
     x: FloatArray  # (k, n)
@@ -179,7 +182,10 @@ def _passes(
     members: Members,
     log: Log,
 ) -> bool:
-    """Whether an innovation is inside the gate; counts, and opens clocks after many rejections."""
+    """Tell whether an innovation is inside the gate.
+
+    It also counts, and opens clocks after many rejections.
+    """
     passes = gate_sigma <= 0.0 or innovation**2 <= gate_sigma**2 * total
     write_down(event, innovation, total, passes, log)
     for end in range(2 if events.kind[event] == PEER else 1):
@@ -291,7 +297,10 @@ def _join(fleet: Fleet, one: int, two: int, members: Members, both: FloatArray) 
 
 @in_place
 def _share(fleet: Fleet, one: int, two: int, innovation: float, members: Members, room: Room) -> None:
-    """Give both vehicles their part of the update; factors towards third ones are scaled by P(after) P(before)^-1."""
+    """Give both vehicles their part of the update.
+
+    Factors towards third ones are scaled by P(after) P(before)^-1.
+    """
     n, width = fleet.size[one], members.map_rows.shape[2]
     both, gain, h, mixed = room.both, room.gain, room.h, room.mixed
     for c in range(width):
@@ -327,7 +336,10 @@ def _share(fleet: Fleet, one: int, two: int, innovation: float, members: Members
 
 @in_place
 def _over(n: int, first: int, both: FloatArray, before: FloatArray, room: Room) -> None:
-    """Fill ``room.phi`` with after before^-1, scaled by the sigmas: states differ by eight powers of ten."""
+    """Fill ``room.phi`` with after before^-1, scaled by the sigmas.
+
+    States differ by eight powers of ten.
+    """
     normal, right = room.step[1], room.step[2]
     for i in range(n):
         for j in range(n):

@@ -1,4 +1,6 @@
-"""Decentralised filter with stored pairwise cross-covariances: close to the centralised one at the price of an answer.
+"""Decentralised filter with stored pairwise cross-covariances.
+
+It is close to the centralised one, at the price of an answer to each message.
 
 Each vehicle i keeps its own state and, for every other j, a factor s_ij so that the cross-covariance is s_ij s_ji'. It
 moves the factor on and corrects it by itself; only the two vehicles of a range exchange anything, and they update as

@@ -1,4 +1,4 @@
-"""Settings of the cooperative filters: what they believe of INS, odometry and clocks, and how they update."""
+"""Settings of the cooperative filters: assumed errors of INS, odometry, clocks; updates."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -19,7 +19,7 @@ ALGORITHMS: dict[str, str] = {
 
 @dataclass(frozen=True)
 class InsBelief:
-    """Sigmas that the filter starts from and is driven by; one aircraft with INS, baro and clocks.
+    """Assumed sigmas of one aircraft with INS, baro and clocks, at start and as it goes on.
 
     Global frame: 13 states (15 with separate clocks): tilt, azimuth and gyro count, ``velocity_s`` does not. Local
     frame: 7 states, ``velocity_s`` counts.
@@ -45,7 +45,7 @@ class InsBelief:
 
 @dataclass(frozen=True)
 class OdometryBelief:
-    """Sigmas of one wheeled vehicle: where it starts, noise of speed and turn rate, and their scale errors.
+    """Assumed sigmas of one wheeled vehicle: start, noise and scale of speed and turn rate.
 
     Speed and turn noise are densities: metres and degrees of a random walk over one second. ``slip_m_per_sqrt_m`` adds
     noise along and across in proportion to the way. Scale states exist where their sigma is above 0.
@@ -66,7 +66,9 @@ class OdometryBelief:
 
 @dataclass(frozen=True)
 class CameraBelief:
-    """Sigmas of what a wheeled vehicle's camera adds to ranges and bearings; a state each where above 0.
+    """Assumed sigmas of the camera of a wheeled vehicle; a state each where above 0.
+
+    They add to ranges and bearings.
 
     Parameters
     ----------
@@ -90,7 +92,7 @@ class CameraBelief:
 
 @dataclass(frozen=True)
 class CooperativeSettings:
-    """How the cooperative filters work.
+    """Settings of the cooperative filters.
 
     Parameters
     ----------

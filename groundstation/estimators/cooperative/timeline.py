@@ -1,4 +1,4 @@
-"""The order in which a filter works: measurements, alone or a frame together, and times of output between them."""
+"""Order in which a filter works: measurements, single or by frame, and output times."""
 
 import numpy as np
 
@@ -11,9 +11,10 @@ SAME_TIME_S = 1e-9
 
 
 def timeline(prepared: Prepared, settings: CooperativeSettings, *, together: bool) -> Items:
-    """Groups of measurements and outputs in order of time; an output sees every group that is not later.
+    """Return groups of measurements and outputs in order of time.
 
-    Measurements that are used together make their update at the time of the last of them.
+    An output sees every group that is not later. Measurements that are used together make their update at the time of
+    the last of them.
     """
     time_s = prepared.events.time_s
     first = np.arange(len(time_s))
@@ -36,7 +37,10 @@ def timeline(prepared: Prepared, settings: CooperativeSettings, *, together: boo
 
 
 def _places(groups: int, after: Int64Array) -> Int64Array:
-    """Sort key: group g has g + 1, an output that sees g groups has g and follows by the second key."""
+    """Return sort keys: group g has g + 1, an output that sees g groups has g.
+
+    The output follows by the second key.
+    """
     return np.concatenate([np.arange(1, groups + 1), after])
 
 

@@ -1,4 +1,4 @@
-"""What a run leaves behind: every vehicle's states at the times of output, and counts."""
+"""Results of a run: every vehicle's states at the times of output, and counts."""
 
 from dataclasses import dataclass
 
@@ -60,14 +60,14 @@ class Track:
 
     @property
     def correlation(self) -> FloatArray:
-        """Of the errors north and east, shape (n,); 0 where one is exact."""
+        """Correlation of the errors north and east, shape (n,); 0 where one is exact."""
         product = np.sqrt(self.covariance[:, 0, 0] * self.covariance[:, 1, 1])
         both = self.covariance[:, 0, 1]
         return np.asarray(np.divide(both, product, out=np.zeros(len(both)), where=product > 0.0))
 
     @property
     def sigma_up_m(self) -> FloatArray:
-        """Of the height, shape (n,); NaN for a vehicle whose height is no state."""
+        """Sigma of the height, shape (n,); NaN for a vehicle whose height is no state."""
         if self.height < 0:
             return np.full(len(self.time_s), np.nan)
         return np.sqrt(self.covariance[:, self.height, self.height])
@@ -75,7 +75,7 @@ class Track:
 
 @dataclass(frozen=True)
 class Judged:
-    """Every measurement as the filter judged it: innovation, its sigma, and whether it was used (1) or gated (-1).
+    """Measurements as the filter judged them: innovation, sigma, used (1) or gated (-1).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the filters ask of a vehicle. Two kinds can do it.
+"""Interface of a vehicle to the filters, with two kinds.
 
 An aircraft's state is the error of its INS, barometer and clocks, counted off its dead reckoning: corrected = reading -
 estimated error (aircraft.py). A wheeled vehicle's state is its place and heading themselves (wheeled_vehicle.py).
@@ -16,7 +16,7 @@ Step = tuple[FloatArray, FloatArray, FloatArray]
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """Where the sensor of a vehicle was and looked when it took a measurement.
+    """Position and direction of a vehicle's sensor when it took a measurement.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Vehicle(Protocol):
 
     @property
     def name(self) -> str:
-        """Of the vehicle."""
+        """Name of the vehicle."""
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -69,7 +69,7 @@ class Vehicle(Protocol):
 
     @property
     def doubts(self) -> Mapping[int, float]:
-        """States that are opened when nothing fits any more, each with the variance that it then gets on top."""
+        """Doubtful states: reopened when nothing fits, each with the variance then added."""
 
     @property
     def first_s(self) -> float:
@@ -90,13 +90,19 @@ class Vehicle(Protocol):
         """State after a step, its transition matrix and the covariance of the noise."""
 
     def place(self, x: FloatArray, at_s: float) -> tuple[FloatArray, FloatArray]:
-        """Position of the antenna in the frame of the session, and its derivative by the state, shape (3, n)."""
+        """Return the antenna's position and its derivative by the state, shape (3, n).
+
+        The position is in the frame of the session.
+        """
 
     def view(self, x: FloatArray, at_s: float) -> View:
         """Place and heading of the sensor of a measurement stamped ``at_s``."""
 
     def range_error(self, x: FloatArray, distance_m: float, *, is_peer: bool) -> tuple[float, FloatArray, float]:
-        """Error of a range to a peer or point, its derivative by the state, shape (n,), and by the distance."""
+        """Return the error of a range to a peer or point, and its derivatives.
+
+        They are by the state, shape (n,), and by the distance.
+        """
 
     def height_m(self, at_s: float) -> float:
         """Height as dead reckoning has it."""

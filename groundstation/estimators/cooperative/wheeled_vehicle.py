@@ -1,8 +1,8 @@
-"""A ground vehicle on wheels: its place and heading are the state, with the errors of its odometry and its camera.
+"""Ground vehicle on wheels: its place and heading are the state.
 
-What the camera adds to a range is bias + scale distance (+ bias of the markers that vehicles carry); it looks past the
-nose by its mounting angle, and its stamps are late. Each is a state where its sigma is above 0: nothing is calibrated
-beforehand.
+The errors of its odometry and its camera are states as well. What the camera adds to a range is bias + scale distance
+(+ bias of the markers that vehicles carry); it looks past the nose by its mounting angle, and its stamps are late. Each
+is a state where its sigma is above 0: nothing is calibrated beforehand.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,10 @@ LOST_M, LOST_RAD = 1.0, 0.5  # a vehicle that slipped or was carried away
 
 
 def _squares(track: Odometry) -> tuple[float, float]:
-    """Mean squares of speed and rate of turn, (m/s)^2 and (rad/s)^2: what a held reading may be wrong by."""
+    """Return the mean squares of speed and rate of turn, (m/s)^2 and (rad/s)^2.
+
+    A held reading may be wrong by that.
+    """
     return float(np.mean(track.speed_mps**2)), float(np.mean(np.deg2rad(track.turn_rate_dps) ** 2))
 
 
@@ -61,7 +64,7 @@ class WheeledVehicle:
         return len(self.states)
 
     def start(self) -> tuple[FloatArray, FloatArray]:
-        """Where the table says it stood."""
+        """Return the start state and its covariance, at the place that the table gives."""
         belief = self._settings.odometry
         x = np.zeros(self.size)
         x[:3] = [*self._track.position_m, np.deg2rad(self._track.heading_deg)]
@@ -136,7 +139,7 @@ class WheeledVehicle:
         return np.array([x[0], x[1], 0.0]), derivative
 
     def view(self, x: FloatArray, at_s: float) -> View:
-        """Where the camera was, and looked, when it took what is stamped ``at_s``."""
+        """Return place and direction of the camera when it took what is stamped ``at_s``."""
         place, derivative = self.place(x, at_s)
         heading, by_heading = float(x[2]) + self._error(x, "mount_rad"), np.zeros(self.size)
         by_heading[2] = 1.0
@@ -171,5 +174,5 @@ class WheeledVehicle:
         return value, h, scale
 
     def height_m(self, at_s: float) -> float:
-        """On the floor."""
+        """Return the height, which is that of the floor: 0."""
         return 0.0

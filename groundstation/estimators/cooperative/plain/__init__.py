@@ -1,4 +1,7 @@
-"""The filters in plain numpy, as their books write them: for vehicles of any kind; the oracle of the compiled loops."""
+"""Filters in plain numpy, as their books write them, for vehicles of any kind.
+
+They are the oracle of the compiled loops.
+"""
 
 from groundstation.estimators.cooperative.plain.centralised import run_centralised
 from groundstation.estimators.cooperative.plain.decentralised import run_decentralised

@@ -1,4 +1,4 @@
-"""Plain numpy form of the centralised filter: the method stands in cooperative/centralised.py."""
+"""Centralised filter in plain numpy; the method stands in cooperative/centralised.py."""
 
 from itertools import pairwise
 
@@ -57,7 +57,10 @@ class _Joint:
         self.times[who] = to_s
 
     def rows(self, event: Event) -> list[tuple[Row, FloatArray]]:
-        """Rows of an event at the vehicles' own times, each with its derivative by the whole state."""
+        """Return the rows of an event at the vehicles' own times.
+
+        Each comes with its derivative by the whole state.
+        """
         vehicles, found = self.prepared.vehicles, []
         here = self._at(event.receiver, event.time_s)
         source_m, clock_m = None, 0.0
@@ -82,7 +85,10 @@ class _Joint:
         return found
 
     def _reference_line(self, event: Event) -> FloatArray | None:
-        """Line between two aircraft about which their range is linearised; its ends move when known to be wrong."""
+        """Return the line between two aircraft about which their range is linearised.
+
+        Its ends move when known to be wrong.
+        """
         vehicles = self.prepared.vehicles
         ends = (event.receiver, event.source)
         if event.kind != PEER or any(vehicles[who].clock < 0 for who in ends):
@@ -104,7 +110,10 @@ class _Joint:
         return np.asarray(line)
 
     def _at(self, who: int, at_s: float) -> tuple[FloatArray, FloatArray]:
-        """State of a vehicle at a time not later than its own, and its derivative by the state it has."""
+        """Return a vehicle's state at a time not later than its own, and its derivative.
+
+        The derivative is by the state that it has.
+        """
         x = self.x[self.slices[who]]
         if abs(at_s - self.times[who]) < 1e-12:
             return x, np.eye(len(x))
@@ -130,7 +139,7 @@ class _Joint:
 
 
 def _whole_block(first: int, size: int) -> tuple[Pattern, Int64Array, Int64Array]:
-    """Where the transition of one vehicle has entries, and where its noise has (one side of the diagonal)."""
+    """Return the entries of one vehicle's transition and of its noise (one diagonal side)."""
     rows = np.arange(first, first + size)
     one, two = np.triu_indices(size)
     return Pattern(rows, size * np.arange(size + 1), np.tile(rows, size)), one + first, two + first

@@ -1,8 +1,8 @@
-"""Plain numpy form of the filters of vehicles that estimate alone: the method stands in cooperative/decentralised.py.
+"""Filters of vehicles that estimate alone, in plain numpy.
 
-Beyond the compiled form, who measures range and bearing of another tells it where it stands (sighting.py): each of the
-two learns from what one of them measured, under the same rule. Both then share the noise of the sensor: nothing of
-theirs is independent.
+The method stands in cooperative/decentralised.py. Beyond the compiled form, who measures range and bearing of another
+tells it where it stands (sighting.py): each of the two learns from what one of them measured, under the same rule. Both
+then share the noise of the sensor: nothing of theirs is independent.
 """
 
 from collections import deque
@@ -30,7 +30,10 @@ RANKED = ("ranked", "modified")
 
 @dataclass(frozen=True, slots=True)
 class Own:
-    """One vehicle's filter: state, covariance, independent part (split), covariance with the points, error map rows."""
+    """One vehicle's filter: state, covariance, independent part (split), error map rows.
+
+    Also the covariance with the points.
+    """
 
     time_s: float
     x: FloatArray
@@ -42,7 +45,10 @@ class Own:
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """A broadcast, a square root of its covariance and, for the error map alone, derivative and rows of its sender."""
+    """A broadcast and a square root of its covariance.
+
+    For the error map alone: derivative and rows of its sender.
+    """
 
     message: Broadcast
     root: FloatArray
@@ -52,7 +58,10 @@ class Heard:
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """A measurement for one vehicle: its own with what the source broadcast, or where another has seen it."""
+    """A measurement for one vehicle.
+
+    It is its own with what the source broadcast, or where another has seen it.
+    """
 
     who: int
     event: Event
@@ -62,7 +71,10 @@ class Offer:
 
 @dataclass(frozen=True, slots=True)
 class Used:
-    """One row ready for an update: derivative by the state now, by the shared errors, and what its source brings."""
+    """One row ready for an update: its derivatives and what its source brings.
+
+    The derivatives are by the state now and by the shared errors.
+    """
 
     offer: Offer
     row: Row
@@ -76,7 +88,7 @@ class Used:
 
     @property
     def source(self) -> tuple[int, int]:
-        """Whose error it brings."""
+        """Vehicle or point whose error the row brings."""
         event = self.offer.event
         return event.kind, event.receiver if self.offer.sighting is not None else event.source
 
@@ -116,7 +128,10 @@ class Decentralised:
         return self.recorder.finish(self._algorithm, "simultaneous" if together else "sequential")
 
     def _begin_window(self, at_s: float) -> None:
-        """Judge the error map and begin it anew; errors of messages under way count as those of their senders now."""
+        """Judge the error map and begin it anew.
+
+        Errors of messages under way count as those of their senders now.
+        """
         if np.isfinite(self._window_end_s):
             self.recorder.map_time_s.append(at_s)
             self.recorder.map_radius.append(spectral_radius([own.map_rows for own in self._own]))
@@ -142,7 +157,10 @@ class Decentralised:
         )
 
     def _use(self, events: tuple[Event, ...], at_s: float) -> None:
-        """One measurement, or all of a frame, vehicle by vehicle; what is told is what was known before."""
+        """Use one measurement, or all of a frame, vehicle by vehicle.
+
+        What is told is what was known before.
+        """
         offers = [Offer(event.receiver, event, self._listen(event) if event.kind == PEER else None) for event in events]
         offers = [offer for offer in offers if self._is_used(offer)]
         offers += [told for event in events if event.kind == PEER and (told := self._tell(event)) is not None]
@@ -158,7 +176,7 @@ class Decentralised:
                 self._own[who] = self._update(self._own[who], [used for rows in pieces for used in rows])
 
     def _may_use(self, who: int, source: int) -> bool:
-        """Whether the rule of the algorithm lets a vehicle use what another tells."""
+        """Tell whether the algorithm lets a vehicle use what another tells."""
         return self._algorithm not in RANKED or self._prepared.ranks[source] < self._prepared.ranks[who]
 
     def _is_used(self, offer: Offer) -> bool:
@@ -173,7 +191,10 @@ class Decentralised:
         return offer.heard is not None
 
     def _tell(self, event: Event) -> Offer | None:
-        """Where the receiver of a range with a bearing saw its source, as a message to it."""
+        """Return the place where the receiver of a range with bearing saw its source.
+
+        It is a message to the source.
+        """
         observer = event.receiver
         if not np.isfinite(event.bearing_rad) or not self._may_use(event.source, observer):
             return None
@@ -186,7 +207,10 @@ class Decentralised:
         return Offer(event.source, event, heard, sighting)
 
     def _listen(self, event: Event) -> Heard | None:
-        """What the source of a range told in its slot: its knowledge of some slots ago, at the time of transmission."""
+        """Return the broadcast of a range's source in its slot.
+
+        It holds what the source knew some slots ago, at the time of transmission.
+        """
         key = (event.source, event.slot)
         if event.slot != NO_SLOT and key in self._heard:
             return self._heard[key]
@@ -209,7 +233,10 @@ class Decentralised:
         return heard
 
     def _send(self, who: int, slot: int, place_m: FloatArray, clock_m: float, own: Own, told: FloatArray) -> Heard:
-        """A message as it arrives; ``told`` is the derivative of place and clock by the sender's state ``own``."""
+        """Return a message as it arrives.
+
+        ``told`` is the derivative of place and clock by the sender's state ``own``.
+        """
         algorithm = self._algorithm
         message = Broadcast(
             who,
@@ -251,7 +278,10 @@ class Decentralised:
         return found
 
     def _brought(self, rows: list[Used]) -> FloatArray:
-        """Covariance of what the sources bring with them: errors of one source are common to all its rows."""
+        """Return the covariance of what the sources bring.
+
+        Errors of one source are common to all its rows.
+        """
         brought, parts = np.zeros((len(rows), len(rows))), []
         for i, used in enumerate(rows):
             heard = used.offer.heard
@@ -267,7 +297,10 @@ class Decentralised:
         return brought
 
     def _passes(self, who: int, rows: list[Used]) -> bool:
-        """Whether all rows of a measurement pass the gate; counts, opens what is in doubt after many rejections."""
+        """Tell whether all rows of a measurement pass the gate.
+
+        It also counts, and opens the doubtful states after many rejections.
+        """
         own, vehicle = self._own[who], self._prepared.vehicles[who]
         offer, brought = rows[0].offer, np.diag(self._brought(rows))
         passes = True
@@ -290,7 +323,10 @@ class Decentralised:
         return passes
 
     def _update(self, own: Own, rows: list[Used]) -> Own:
-        """Kalman update with the noise of the algorithm; shared errors are considered, not estimated."""
+        """Run the Kalman update with the noise of the algorithm.
+
+        Shared errors are considered, not estimated.
+        """
         H = np.array([used.h for used in rows])
         Hc = np.array([used.by_shared for used in rows])
         R = np.diag([used.row.variance for used in rows]) + self._brought(rows)
@@ -310,7 +346,10 @@ class Decentralised:
         return Own(own.time_s, x, 0.5 * (P + P.T), own.independent, shared, self._mixed(own, gain, H, rows))
 
     def _through_what_they_share(self, rows: list[Used], told: FloatArray) -> FloatArray:
-        """Covariance of the noise of different neighbours (and points) through the uncertain ground points."""
+        """Return the covariance of the noise of different neighbours and points.
+
+        It comes through the uncertain ground points.
+        """
         through = told + np.array([used.by_shared for used in rows]) @ self._Pc
         between = through @ self._inverse_Pc @ through.T if len(self._Pc) else np.zeros((len(rows), len(rows)))
         for i, one in enumerate(rows):
@@ -320,7 +359,10 @@ class Decentralised:
         return between
 
     def _split_update(self, own: Own, rows: list[Used], about: FloatArray) -> Own:
-        """Split covariance intersection with the rows of one measurement, linearised about the state ``about``."""
+        """Fuse the rows of one measurement by split covariance intersection.
+
+        They are linearised about the state ``about``.
+        """
         H, sensor = np.array([used.h for used in rows]), np.diag([used.row.variance for used in rows])
         fused = fuse(own.P, own.independent, H, sensor, self._brought(rows))
         if fused is None:
@@ -342,7 +384,10 @@ class Decentralised:
 
 
 def _root(covariance: FloatArray | None) -> FloatArray:
-    """Symmetric square root; zero without a covariance. Rounding to 4-byte numbers may leave an eigenvalue below 0."""
+    """Return the symmetric square root; zero without a covariance.
+
+    Rounding to 4-byte numbers may leave an eigenvalue below 0.
+    """
     if covariance is None:
         return np.zeros((4, 4))
     values, vectors = np.linalg.eigh(covariance)

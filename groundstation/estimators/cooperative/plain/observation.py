@@ -1,4 +1,4 @@
-"""Predicted measurements and their derivatives; tests hold them against central differences."""
+"""Predicted measurements and their derivatives; tests check them by central differences."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,9 @@ from groundstation.estimators.cooperative.vehicles import Vehicle, View
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One scalar measurement, linearised: innovation = h (receiver) + place (source) + clock (source) + noise.
+    """One scalar measurement, linearised.
+
+    innovation = h (receiver) + place (source) + clock (source) + noise.
 
     Parameters
     ----------
@@ -126,7 +128,10 @@ def _range_row(
 
 
 def _while_the_earth_turns(place: FloatArray, source: FloatArray, distance: float) -> tuple[FloatArray, float]:
-    """Direction and distance from where a satellite was at emission, in the ECEF axes of the instant of reception."""
+    """Return direction and distance from a satellite's place at emission.
+
+    They are in the ECEF axes of the instant of reception.
+    """
     line = place - source
     for _ in range(3):  # each gains six digits
         turn = EARTH_RATE_RADPS * distance / LIGHT_MPS
@@ -138,7 +143,10 @@ def _while_the_earth_turns(place: FloatArray, source: FloatArray, distance: floa
 
 
 def _bearing_row(event: Event, view: View, line: FloatArray) -> Row:
-    """Bearing off the sensor's heading: direction to the source less it; line leads from the sensor to the source."""
+    """Return the row of a bearing off the sensor's heading.
+
+    The bearing is the direction to the source less the heading; ``line`` leads from the sensor to the source.
+    """
     north, east = float(line[0]), float(line[1])
     square = north * north + east * east
     by_line = np.array([-east, north, 0.0]) / square

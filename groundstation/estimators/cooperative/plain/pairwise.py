@@ -1,4 +1,7 @@
-"""Plain numpy form of the filter with pairwise cross-covariances: the method stands in cooperative/pairwise.py."""
+"""Filter with pairwise cross-covariances in plain numpy.
+
+The method stands in cooperative/pairwise.py.
+"""
 
 import numpy as np
 
@@ -16,7 +19,7 @@ from groundstation.estimators.cooperative.tracks import AlgorithmRun
 
 
 class _Member:
-    """One vehicle: its time, state, covariance, factors towards the others, and rows of the error map."""
+    """One vehicle: time, state, covariance, factors towards the others, error map rows."""
 
     def __init__(self, time_s: float, x: FloatArray, P: FloatArray, map_rows: FloatArray) -> None:
         self.time_s, self.x, self.P, self.map_rows = time_s, x, P, map_rows

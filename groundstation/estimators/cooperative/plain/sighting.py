@@ -1,4 +1,4 @@
-"""A vehicle that measures range and bearing of another tells it where it stands: a fix in the plane.
+"""Fix in the plane that a vehicle tells another after measuring its range and bearing.
 
 Along the line of sight the fix is as good as the range, across it as the bearing; the error of the observer's own place
 and heading is in both. Without it a vehicle would learn only from what it measures itself.
@@ -17,7 +17,7 @@ from groundstation.estimators.cooperative.vehicles import Vehicle
 
 
 class Sighting(NamedTuple):
-    """Where an observer saw another.
+    """Place where an observer saw another vehicle.
 
     ``place_m`` (3,) with its derivative by the observer's state, (3, n); the line of sight as a unit vector; variances
     of the sensor along and across it.
@@ -30,7 +30,10 @@ class Sighting(NamedTuple):
     across_m2: float
 
     def rows(self, seen: Vehicle, x: FloatArray, at_s: float, told_m: FloatArray) -> list[Row]:
-        """The fix as two scalar measurements of the one that was seen; ``told_m`` is the place as it arrived."""
+        """Return the fix as two scalar measurements of the vehicle that was seen.
+
+        ``told_m`` is the place as it arrived.
+        """
         place, derivative = seen.place(x, at_s)
         across = np.array([-self.line[1], self.line[0], 0.0])
         return [
@@ -40,7 +43,10 @@ class Sighting(NamedTuple):
 
 
 def sighting_of(event: Event, observer: Vehicle, x: FloatArray) -> Sighting | None:
-    """The fix that an observer with state ``x`` at the time of the event can tell; None without range and bearing."""
+    """Return the fix that an observer with state ``x`` can tell; None without one.
+
+    ``x`` is the state at the time of the event; range and bearing are both needed.
+    """
     view = observer.view(x, event.time_s)
     if event.kind != PEER or not np.isfinite([event.value_m, event.bearing_rad, view.heading_rad]).all():
         return None

@@ -1,4 +1,4 @@
-"""Measurements one by one, in the order in which a filter works, and what it writes down of them."""
+"""Measurements one by one in the order of the filter, and what it writes down of them."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -72,7 +72,7 @@ class Recorder:
         self._judged.append((event.number, innovation, float(np.sqrt(variance)), USED if passes else GATED))
 
     def opened(self, vehicle: Vehicle) -> None:
-        """Count that nothing fitted a vehicle's estimate any more and its states in doubt were opened."""
+        """Count that a vehicle's doubtful states were opened because nothing fitted any more."""
         self.counts["clock_leaps" if vehicle.clock >= 0 else "reopened"] += 1
 
     def sent(self, who: int, size: int) -> None:
