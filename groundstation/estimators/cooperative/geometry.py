@@ -1,8 +1,8 @@
 """Geometry of ranging, and the information bound.
 
-Dilution of precision, determinant, smallest eigenvalue, Gram determinant. H holds one row for each source that a vehicle
-hears in a frame: the horizontal direction from the source to it (two columns), and 1 for its clock where ranges are
-one-way. Sources count as exact.
+Dilution of precision, determinant, smallest eigenvalue, Gram determinant. H holds one row for each source that a
+vehicle hears in a frame: the horizontal direction from the source to it (two columns), and 1 for its clock where ranges
+are one-way. Sources count as exact.
 
 Source: Skrypnik, Inter-aircraft navigation in air traffic management, 2010, chapters 4.3 and 5.2 (det(H'H), Gram);
 Misra and Enge, Global Positioning System, 2nd ed. 2006, section 6.1 (dilution); Tichavsky, Muravchik and Nehorai,
