@@ -1,1 +1,4 @@
-"""System 2: INS errors estimated against GNSS, and their forecast without it (Neusypin, Smolkin, Kharin, 2003)."""
+"""INS errors estimated against GNSS, and their forecast without it: system 2.
+
+Source: Neusypin, Smolkin, Kharin, 2003.
+"""

@@ -1,7 +1,8 @@
-"""An INS that GNSS corrects, or may: INS minus GNSS alone, and what its own filter logged. Nothing is estimated.
+"""Comparison of an INS that GNSS corrects, or may, with GNSS alone; nothing is estimated.
 
-Against the GNSS that corrects it an INS cannot show its own errors: tilt and drift are taken out before anyone sees
-them, and a model of an INS left alone would find states with small sigmas that mean nothing.
+It shows INS minus GNSS and what the INS's own filter logged. Against the GNSS that corrects it an INS cannot show its
+own errors: tilt and drift are taken out before anyone sees them, and a model of an INS left alone would find states
+with small sigmas that mean nothing.
 """
 
 from dataclasses import replace
@@ -34,9 +35,10 @@ def compare_aided(
     settings: InertialSettings,
     excluded_s: tuple[tuple[float, float], ...] = (),
 ) -> tuple[InertialResult, tuple[Finding, ...]]:
-    """Describe INS minus GNSS of an INS that GNSS corrects, or may, and the innovations its own filter logged.
+    """Describe INS minus GNSS of an aided INS, and the innovations its own filter logged.
 
-    Jumps are shown as they are: which of the two jumped cannot be told, and no filter has to be spared them.
+    The INS is one that GNSS corrects, or may. Jumps are shown as they are: which of the two jumped cannot be told, and
+    no filter has to be spared them.
 
     Parameters
     ----------

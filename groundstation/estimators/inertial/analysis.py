@@ -1,4 +1,4 @@
-"""System 2 as analyses: the errors of the INS, and the forecast of them replayed on the flight."""
+"""System 2 as analyses: errors of the INS, and their forecast replayed on the flight."""
 
 from typing import TYPE_CHECKING
 
@@ -23,7 +23,10 @@ FIELDS = ("latitude_deg", "longitude_deg", "velocity_north_mps", "velocity_east_
 
 
 def take_off_s(phases: Phases) -> float:
-    """Flight time of the first lift-off; 0 for a log that begins in the air or never leaves the ground."""
+    """Return the flight time of the first lift-off.
+
+    0 for a log that begins in the air or never leaves the ground.
+    """
     airborne = np.flatnonzero(phases.phase == "airborne")
     return float(phases.start_s[airborne[0]]) if airborne.size else 0.0
 
@@ -88,7 +91,10 @@ def _rests_on(flight: "Flight", result: InertialResult) -> RestsOn:
 
 
 def _is_forecast_expected(_flight: "Flight", known: Known) -> bool:
-    """Of an INS that GNSS corrects, or may correct, a finding says already that a forecast means nothing."""
+    """Tell whether a forecast is expected.
+
+    Of an INS that GNSS corrects, or may correct, a finding says already that a forecast means nothing.
+    """
     inertial = known.answer(InertialResult)
     return inertial is None or inertial.kind == "unaided"
 

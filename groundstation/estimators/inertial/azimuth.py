@@ -1,4 +1,4 @@
-"""Azimuth (heading) error of an INS from what changes of velocity do to its velocity error.
+"""Azimuth (heading) error of an INS by the effect of velocity changes on velocity error.
 
 An INS whose north is turned by a heading error psi (INS - truth, clockwise positive) turns every change of velocity by
 psi: change of velocity error = psi x (-change east, +change north). Straight flight shows nothing of it.
@@ -39,7 +39,10 @@ S_PER_H, LEAST_PRODUCT = 3600.0, 1e-300
 
 @dataclass(frozen=True)
 class AzimuthFit:
-    """Parameters fitted (6,), their covariance (6, 6), residuals over their sigma (m, 2), degrees of freedom."""
+    """Fitted parameters (6,) with covariance (6, 6) and residuals over their sigma (m, 2).
+
+    ``freedom``: degrees of freedom.
+    """
 
     values: FloatArray
     covariance: FloatArray
@@ -49,7 +52,7 @@ class AzimuthFit:
 
     @property
     def sigma_rad(self) -> float:
-        """Sigma of the azimuth such that +- 1.96 sigma holds 95 %, widened where the residuals are too large.
+        """Sigma of the azimuth, widened where residuals are too large; +- 1.96 sigma holds 95 %.
 
         Scaled by sqrt(chi-square / degrees of freedom) where that exceeds one, and then by Student's quantile: the
         scatter of a few turns is itself uncertain.
@@ -58,7 +61,7 @@ class AzimuthFit:
 
     @property
     def widening(self) -> float:
-        """What the sigmas of the covariance are multiplied by."""
+        """Factor by which the sigmas of the covariance are multiplied."""
         spread = float(np.sum(np.square(self.normalised))) / self.freedom
         if spread <= 1.0:
             return self.sigma_scale
@@ -137,7 +140,10 @@ def _early(
     limits: AzimuthLimits,
     whole: AzimuthFit,
 ) -> EarlyAzimuth | None:
-    """The azimuth from the first hour of changes; None where they are too few, or all point one way."""
+    """Return the azimuth from the first hour of changes.
+
+    None where they are too few, or all point one way.
+    """
     first = changes.first(EARLY_S)
     if len(first) < limits.least_changes or first.point_one_way(limits):
         return None
@@ -198,7 +204,10 @@ def _refused(changes: int, largest: float, reason: str) -> AzimuthEstimate:
 
 
 def _without_azimuth(differences: Differences, parameters: FloatArray, reference_s: float, known: BoolArray) -> Epochs:
-    """Velocity differences less what an azimuth error makes of the velocity; positions are left out."""
+    """Return the velocity differences less the effect of an azimuth error on the velocity.
+
+    Positions are left out.
+    """
     epochs = differences.epochs
     azimuth_rad = parameters[AZIMUTH] + parameters[AZIMUTH_DRIFT] * (epochs.time_s - reference_s)
     velocity = epochs.velocity_mps - azimuth_rad[:, None] * turned(differences.velocity_mps)
@@ -207,7 +216,10 @@ def _without_azimuth(differences: Differences, parameters: FloatArray, reference
 
 
 def _unpredicted(run: FilterRun, changes: Changes) -> tuple[FloatArray, FloatArray]:
-    """Change of velocity error that the filter did not foresee, shape (m, 2), and its variance (m,)."""
+    """Return the change of velocity error that the filter did not predict, and its variance.
+
+    Shapes (m, 2) and (m,).
+    """
     time_s, velocity = run.epochs.time_s, np.nan_to_num(run.epochs.velocity_mps)
     out = mean_known(changes.after, velocity, changes.known) - mean_known(changes.before, velocity, changes.known)
     gnss, density = run.noise.gnss, run.noise.densities()
@@ -234,7 +246,10 @@ def _ends(changes: Changes, index: int) -> tuple[float, float]:
 
 
 def _quiet_scale(run: FilterRun, quiet: Changes) -> float:
-    """How much larger the variance across quiet stretches is than believed; 1 with few of them."""
+    """Return how much larger the variance across quiet stretches is than modelled.
+
+    1 with few of them.
+    """
     few = 10
     if len(quiet) < few:
         return 1.0
@@ -243,7 +258,10 @@ def _quiet_scale(run: FilterRun, quiet: Changes) -> float:
 
 
 def _regression(columns: FloatArray, change: FloatArray, variance: FloatArray, prior: FloatArray) -> AzimuthFit:
-    """Weighted least squares with prior sigmas; columns (m, 2, p), change (m, 2), variance (m,), prior (p,)."""
+    """Fit by weighted least squares with prior sigmas.
+
+    Columns (m, 2, p), change (m, 2), variance (m,), prior (p,).
+    """
     weight = 1.0 / np.sqrt(variance)
     rows = (columns * weight[:, None, None]).reshape(-1, columns.shape[2]) * prior  # in units of the prior sigmas
     right = (change * weight[:, None]).ravel()

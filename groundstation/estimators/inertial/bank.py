@@ -1,4 +1,4 @@
-"""A bank of noise sets: filters that believe different things of the INS, weighted by how their forecasts came out.
+"""Bank of noise sets: filters with different noise, weighted by their past forecasts.
 
 No one set of noise serves every INS of a class and every way of flying. Each set of the bank has a filter of its own.
 Outages that were over before a start tell how likely each set is; the forecast is the mixture of the sets' forecasts,
@@ -51,14 +51,20 @@ class NoiseBank:
         object.__setattr__(self, "end_s", frozen(self.end_s))
 
     def forecast(self, path: Path) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance of the mixture from every start at every lead, metres and m^2, shapes (s, l, c)."""
+        """Forecast mean and variance of the mixture from every start at every lead.
+
+        Metres and m^2, shapes (s, l, c).
+        """
         weight = self.weights(path.start_s)[:, :, None, None]
         means, variances = self._each(path)
         mean = np.sum(weight * means, axis=0)
         return mean, np.sum(weight * (variances + np.square(means - mean)), axis=0)
 
     def weights(self, start_s: FloatArray) -> FloatArray:
-        """Weight of each set at each start, shape (k, s), from outages that were over by then; equal before any was."""
+        """Return the weight of each set at each start, shape (k, s); equal before any outage.
+
+        Only outages that were over by then count.
+        """
         evidence = np.zeros((len(start_s), len(self.runs)))
         for lead_s, (begun_s, likelihood) in self._evidence.items():
             mean, independent = past_mean(likelihood, begun_s, lead_s, start_s)
@@ -68,7 +74,10 @@ class NoiseBank:
 
     @cached_property
     def _evidence(self) -> dict[float, tuple[FloatArray, FloatArray]]:
-        """By horizon the starts (s,) and the logarithmic likelihood (s, k) of what GNSS showed by each set."""
+        """Return starts (s,) and log likelihood (s, k) of what GNSS showed by each set.
+
+        Keyed by horizon.
+        """
         epochs, found = self.flown.epochs, {}
         at = start_epochs(epochs, float(epochs.time_s[0]) + PAST_FROM_S, self.settings.start_step_s)
         for lead_s in JUDGED_S if len(at) else ():  # a short flight has no past to judge by
@@ -93,7 +102,10 @@ class NoiseBank:
         return np.stack(means), np.stack(variances)
 
     def starts(self, start_s: FloatArray) -> list[Initial]:
-        """What each set knows at times, from nothing later, its position known: x (s, 6, c), P (s, g, 6, 6)."""
+        """Return the state of each set at some times, from nothing later, its position known.
+
+        x (s, 6, c), P (s, g, 6, 6).
+        """
         time_s = self.runs[0].epochs.time_s
         last = np.maximum(np.searchsorted(self.end_s, start_s + 1e-6, side="right") - 1, 0)
         seconds = np.round(np.maximum(start_s - time_s[last], 0.0), 3)
@@ -111,7 +123,10 @@ class NoiseBank:
 
 
 def run_bank(run: FilterRun, settings: InertialSettings) -> NoiseBank:
-    """Filter a flight with every set of its class's bank; what the flight's own filter rejected is used by none."""
+    """Filter a flight with every set of its class's bank.
+
+    What the flight's own filter rejected is used by none.
+    """
     coarse, runs = Coarse.of(run), []
     for noise in run.noise.bank.sets(run.noise):
         model = replace(run.model, beta_per_s=noise.beta_per_s)

@@ -1,4 +1,7 @@
-"""Channels that share a covariance, filtered together; outages at whose end GNSS is beyond the gate are widened."""
+"""Channels with a common covariance, filtered together over the outages.
+
+Outages at whose end GNSS is beyond the gate are widened.
+"""
 
 from dataclasses import dataclass
 
@@ -20,7 +23,7 @@ KINDS = np.array([POSITION, VELOCITY])
 
 @dataclass(frozen=True)
 class Part:
-    """Run of the channels of a group, the steps it took, and the seams that widened some of them.
+    """Run of the channels of a group, with its steps and the seams that widened some of them.
 
     ``mark`` (n, 2): rejected -1, absent 0, used 1; rejected too what was odd at a seam and not shown to the filter.
     """
@@ -31,7 +34,10 @@ class Part:
     seams: tuple[Seam, ...]
 
     def forecast(self, drive: Drive, at: int, end: int) -> tuple[FloatArray, FloatArray]:
-        """States and covariances at the epochs behind ``at`` up to ``end`` if nothing were measured from there on."""
+        """Forecast states and covariances at the epochs behind ``at`` up to ``end``.
+
+        Nothing is measured from there on.
+        """
         x, P, states, covariances = self.run.x[at], self.run.P[at], [], []
         for epoch in range(at + 1, end + 1):
             step = self.steps.index[epoch]
@@ -45,7 +51,7 @@ class Part:
 
 @dataclass(frozen=True)
 class ChannelGroup:
-    """What the filter is given of c channels that are measured at the same epochs.
+    """Inputs of the filter for c channels that are measured at the same epochs.
 
     Parameters
     ----------
@@ -75,9 +81,10 @@ class ChannelGroup:
     start: kalman.Start
 
     def run_over_seams(self, steps: Steps) -> Part:
-        """Filter; where GNSS comes back beyond the gate but agrees with itself, with the outage before it widened.
+        """Run the filter, and widen outages after which GNSS is beyond the gate but consistent.
 
-        Each seam is judged by what was known at it; the run is made again before the next one is looked for.
+        Such an outage is widened where GNSS comes back and agrees with itself. Each seam is judged by what was known at
+        it; the run is made again before the next one is looked for.
         """
         part = self._part(steps, ())
         for back in returns_of(self.time_s, np.asarray(np.isfinite(self.measured).any(axis=(1, 2)))):
@@ -115,7 +122,10 @@ class ChannelGroup:
         )
 
     def _seam_at(self, part: Part, back: int) -> Seam | None:
-        """The seam at a return of GNSS; None where the gate let it pass, fixes disagree, or no factor explains them."""
+        """Return the seam at a return of GNSS, or None.
+
+        None where the gate let it pass, fixes disagree, or no factor explains them.
+        """
         fixes = fixes_since(self.time_s, self.measured[:, 0], self.measured[:, 1], back)
         used = np.flatnonzero((part.mark[:back] == USED).any(axis=1))
         if not len(fixes) or not (part.mark[back : fixes[-1] + 1] == REJECTED).any():

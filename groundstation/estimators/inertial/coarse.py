@@ -1,4 +1,4 @@
-"""Coarse epochs: means of what was measured over some seconds, where the same flight is filtered many times over."""
+"""Coarse epochs: means over some seconds, for filtering the same flight many times."""
 
 from dataclasses import dataclass, replace
 
@@ -67,7 +67,10 @@ class Coarse:
         return replace(noise, gnss=noise.gnss.averaged(self.samples))
 
     def blinded(self, epoch: int, begin_s: float, end_s: float, behind_s: float) -> Epochs:
-        """From one epoch of the flight to a time behind a gap in which nothing is measured, the epoch included."""
+        """Return epochs from one of the flight to a time behind a gap without measurements.
+
+        The first epoch is included.
+        """
         use = (self.begin_s > begin_s) & (self.epochs.time_s < behind_s)
         is_blind = np.append(True, self.begin_s[use] < end_s)[:, None]
         own, flown = self.epochs, self.flown.epochs

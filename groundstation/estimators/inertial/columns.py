@@ -1,4 +1,4 @@
-"""What the INS errors and their forecast give to the tables of flights."""
+"""Columns that INS errors and their forecast give to the tables of flights."""
 
 from groundstation.results.columns import AnswerColumn
 from groundstation.results.forecast import ForecastResult

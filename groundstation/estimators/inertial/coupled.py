@@ -101,12 +101,12 @@ class CoupledRun:
 
 
 def coupled_values(motion: CraftMotion, beta_per_s: float) -> FloatArray:
-    """Entries of A (x' = A x) over each interval, in the order of :data:`PATTERN`, shape (m, 41).
+    """Return the entries of A (x' = A x) over each interval, shape (m, 41).
 
-    Velocity error' = -phi x f - (2 Earth rate + craft rate) x velocity error - (2 error of the Earth rate + error of
-    the craft rate) x velocity; phi' = -(Earth rate + craft rate) x phi + error of both - gyro error, where the errors
-    of the rates come from the errors of latitude and velocity. Left out: vertical motion and its errors, the change of
-    gravity with the position error.
+    They are in the order of :data:`PATTERN`. Velocity error' = -phi x f - (2 Earth rate + craft rate) x velocity error
+    - (2 error of the Earth rate + error of the craft rate) x velocity; phi' = -(Earth rate + craft rate) x phi + error
+    of both - gyro error, where the errors of the rates come from the errors of latitude and velocity. Left out:
+    vertical motion and its errors, the change of gravity with the position error.
 
     Source: Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed. 2004, section 12.3; Groves,
     Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems, 2nd ed. 2013, section 14.2.4 (attitude
@@ -140,7 +140,10 @@ def coupled_values(motion: CraftMotion, beta_per_s: float) -> FloatArray:
 
 
 def coupled_matrix(motion: CraftMotion, beta_per_s: float) -> FloatArray:
-    """A of x' = A x over each interval, shape (m, 16, 16), SI units; see :func:`coupled_values`."""
+    """Return A of x' = A x over each interval, shape (m, 16, 16), SI units.
+
+    See :func:`coupled_values`.
+    """
     values = coupled_values(motion, beta_per_s)
     out = np.zeros((len(values), SIZE, SIZE))
     out[:, ROWS, COLUMNS] = values
@@ -150,7 +153,9 @@ def coupled_matrix(motion: CraftMotion, beta_per_s: float) -> FloatArray:
 def run_coupled(
     differences: Differences, noise: InsNoise, settings: InertialSettings, *, every: int = EVERY
 ) -> CoupledRun:
-    """Estimate the errors of both channels and the azimuth together; where GNSS is absent they are forecast.
+    """Estimate the errors of both channels and the azimuth together.
+
+    Where GNSS is absent they are forecast.
 
     The noise of a horizontal channel is the class's; the azimuth starts with ``azimuth_deg``, its gyro with the
     constant drift of the class, and walks like a tilt. An azimuth sigma of zero leaves two coupled channels of six.
@@ -207,7 +212,10 @@ def run_coupled(
 
 @dataclass(frozen=True)
 class _Stretch:
-    """Transitions over neighbouring epochs: which of them each step takes, and the step that ends at each epoch."""
+    """Transitions over neighbouring epochs, with their steps.
+
+    ``step`` is the transition of each step, ``last`` the step that ends at each epoch.
+    """
 
     transition: Transition
     step: Int64Array
@@ -232,7 +240,10 @@ def _seam_at(
     lines: Lines,
     gate: float,
 ) -> tuple[int, float]:
-    """Epoch of the first fix of those that agree after a return, and the factor on the filter's sigma; 1: none."""
+    """Return the first agreeing fix after a return of GNSS, and the factor on the sigma.
+
+    The fix is given by its epoch; factor 1: none.
+    """
     fixes = fixes_since(epochs.time_s, epochs.position_m, epochs.velocity_mps, back)
     if not len(fixes) or epochs.is_reset[back : fixes[-1] + 1].any():
         return back, 1.0
@@ -248,7 +259,10 @@ def _seam_at(
 
 
 def _at_epochs(run: kalman.FilterRun, last: Int64Array) -> tuple[FloatArray, FloatArray]:
-    """States and variances at the epochs: steps of a long interval that lie between are left out."""
+    """Return states and variances at the epochs.
+
+    Steps in between of a long interval are left out.
+    """
     return run.x[last, :, 0], run.record.variance[last]
 
 

@@ -1,4 +1,7 @@
-"""Forecasts of the coupled north-east model, their variance, and its gain over the two separate channels."""
+"""Forecasts of the coupled north-east model, their variance, and their gain.
+
+The gain is over the two separate channels.
+"""
 
 from collections.abc import Sequence
 
@@ -107,7 +110,9 @@ def coupled_rows(
     horizons_min: Sequence[float] = HORIZONS_MIN,
     method: str = "last_estimate",
 ) -> tuple[CoupledRow, ...]:
-    """Gain of the coupled model over the separate channels: same starts, same horizons, last estimate of both.
+    """Compare the coupled model with the separate channels: the gain at every horizon.
+
+    Starts and horizons are the same, last estimate of both.
 
     Parameters
     ----------

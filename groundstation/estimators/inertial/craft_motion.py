@@ -1,4 +1,4 @@
-"""Motion of the craft as its INS knows it, and what follows from it: rates of Earth and craft, specific force."""
+"""Motion of the craft by its INS, with Earth and craft rates and specific force."""
 
 from dataclasses import dataclass, fields
 

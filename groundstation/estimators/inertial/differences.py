@@ -1,4 +1,4 @@
-"""From the tables of a flight to what the filter is given: INS minus GNSS, with what could not be believed left out."""
+"""Differences INS minus GNSS for the filter, with what could not be believed left out."""
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -72,7 +72,7 @@ class Differences:
 
     @cached_property
     def motion_known(self) -> tuple[FloatArray, ...]:
-        """Latitude, altitude and velocities north and east of the INS at every epoch, filled in where it was silent."""
+        """Latitude, altitude and velocities north and east of the INS at every epoch, gaps filled."""
         time_s, found = self.epochs.time_s, []
         for values in (self.latitude_deg, self.altitude_m, *self.velocity_mps.T):
             known = np.isfinite(values)
@@ -82,9 +82,10 @@ class Differences:
 
     @cached_property
     def unwrapped_heading_rad(self) -> FloatArray:
-        """Heading at every epoch without steps of a turn, shape (n,): of the INS, of its track where that is unknown.
+        """Heading at every epoch without wrap, shape (n,).
 
-        Held where the INS tells neither and the aircraft is slower than :data:`TRACK_MPS`; zero if it never moved.
+        Of the INS, of its track where that is unknown. Held where the INS tells neither and the aircraft is slower than
+        :data:`TRACK_MPS`; zero if it never moved.
         """
         north, east = self.velocity_mps.T
         track = np.where(np.hypot(north, east) > TRACK_MPS, np.arctan2(east, north), np.nan)
@@ -162,10 +163,11 @@ def differences(
 
 
 def drag_per_s(latitude_deg: FloatArray, altitude_m: FloatArray, velocity_mps: FloatArray) -> FloatArray:
-    """Rates by which position errors in metres drag each other along while the aircraft flies, shape (n, 2, 2), 1/s.
+    """Return the rates by which position errors drag each other along in flight, 1/s.
 
-    The error east is that of longitude times the radius of the parallel: (error east)' = velocity error east +
-    tan(latitude) / R (velocity east x error north - velocity north x error east). Zero where the motion is unknown.
+    The shape is (n, 2, 2), errors are in metres. The error east is that of longitude times the radius of the parallel:
+    (error east)' = velocity error east + tan(latitude) / R (velocity east x error north - velocity north x error east).
+    Zero where the motion is unknown.
     """
     _, prime_vertical = curvature_radii_m(np.nan_to_num(latitude_deg))
     slope = np.tan(np.deg2rad(np.clip(latitude_deg, -88.0, 88.0))) / (prime_vertical + np.nan_to_num(altitude_m))
@@ -190,7 +192,7 @@ def _within(time_s: FloatArray, intervals_s: tuple[tuple[float, float], ...]) ->
 
 
 def _astride(gnss_ns: Int64Array, ins_ns: Int64Array, reset_ns: Int64Array) -> BoolArray:
-    """GNSS samples between the last sample of the INS before a reset and the first one after it: half of each."""
+    """Find GNSS samples between the INS samples before and after a reset: half of each."""
     mask = np.zeros(len(gnss_ns), dtype=bool)
     for after_ns in reset_ns:
         row = int(np.searchsorted(ins_ns, after_ns))
@@ -244,7 +246,10 @@ def _binned(
     velocity: FloatArray,
     settings: InertialSettings,
 ) -> tuple[FloatArray, FloatArray]:
-    """Means over equal intervals of flight time: times (n,), and differences (n, 4) with NaN where GNSS is absent."""
+    """Return means over equal intervals of flight time: times (n,), differences (n, 4).
+
+    NaN where GNSS is absent.
+    """
     interval = settings.epoch_interval_s
     ins_s, gnss_s = flight.seconds(ins.time_ns), flight.seconds(gnss.time_ns)
     last = max([*ins_s[-1:], *gnss_s[-1:], 0.0])
@@ -260,7 +265,10 @@ def _binned(
 
 
 def mean_in(bin_of: Int64Array, values: FloatArray, bins: int) -> FloatArray:
-    """Means of the columns of values (n, k) over the samples of each bin, shape (bins, k); NaN where none is known."""
+    """Return means of values (n, k) over the samples of each bin, shape (bins, k).
+
+    NaN where none is known.
+    """
     known = np.isfinite(values)
     out = np.full((bins, values.shape[1]), np.nan)
     for column in range(values.shape[1]):

@@ -1,4 +1,4 @@
-"""The estimator of INS errors: from the tables of a flight to states, what they rest on, and the corrected track."""
+"""Estimator of INS errors: from flight tables to states, their basis, and corrected track."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -128,7 +128,10 @@ def estimate_compared(
     aircraft_class: str = "",
     nav_start_utc: str = "",
 ) -> Estimation:
-    """Estimate the errors of an INS that is compared with GNSS already; ``kind`` and the reason for it are known."""
+    """Estimate the errors of an INS that is compared with GNSS already.
+
+    ``kind`` and the reason for it are known.
+    """
     noise, origin = choose_class(settings.ins_class, aircraft_class, said_of(flight, compared.ins_topic, "ins_class"))
     model = ChannelModel.at(*_mean_place(compared), noise.beta_per_s, settings.transition)
     used = only_used(compared.epochs, settings)
@@ -143,7 +146,10 @@ def estimate_compared(
 
 
 def _mean_place(compared: Differences) -> tuple[float, float]:
-    """Mean latitude, degrees, and altitude, metres, where the INS knew them; the equator at sea level where not."""
+    """Return mean latitude, degrees, and altitude, metres, where the INS knew them.
+
+    Else the equator at sea level.
+    """
     places = (compared.latitude_deg, compared.altitude_m)
     latitude, altitude = (
         float(np.mean(values[np.isfinite(values)])) if np.isfinite(values).any() else 0.0 for values in places
@@ -152,7 +158,10 @@ def _mean_place(compared: Differences) -> tuple[float, float]:
 
 
 def observability(run: FilterRun) -> FloatArray:
-    """1 - sigma / sigma without GNSS of every state at every epoch, shape (n, 6, c), in [0, 1]."""
+    """Return 1 - sigma / sigma without GNSS of every state at every epoch, in [0, 1].
+
+    Shape (n, 6, c).
+    """
     blind = np.sqrt(np.einsum("nii->ni", run.covariance_without_data))
     seen = np.stack([run.sigma(channel) for channel in range(run.x.shape[2])], axis=2)
     return np.asarray(np.clip(1.0 - seen / np.maximum(blind, 1e-300)[:, :, None], 0.0, 1.0))
@@ -251,10 +260,10 @@ Rates = tuple[float, float, float] | tuple[None, None, None]
 
 
 def _radial_rates(epochs: Epochs, radial_m: FloatArray, start_s: float | None) -> Rates:
-    """Radial error over the time since navigation began or the INS was last reset, nmi/h: median, 95 %, and the fit.
+    """Return the radial error rate, nmi/h: median, 95 %, and the fit.
 
-    Median and 95 % over epochs later than ten minutes after it, the fit over all; none where nobody knows when
-    navigation began, or no epoch is so late.
+    It is over the time since navigation began or the INS was last reset. Median and 95 % over epochs later than ten
+    minutes after it, the fit over all; none where nobody knows when navigation began, or no epoch is so late.
     """
     if start_s is None:
         return None, None, None
@@ -292,7 +301,10 @@ def _findings(compared: Differences, run: FilterRun, result: InertialResult) -> 
 
 
 def _seam_findings(compared: Differences, run: FilterRun) -> list[Finding]:
-    """One finding for each outage at whose end GNSS was beyond the gate and used, or one for all where many are."""
+    """Return a finding for each outage at whose end GNSS was beyond the gate and used.
+
+    One stands for all where many are.
+    """
     time_s, found = run.epochs.time_s, []
     says = "agrees with itself but not with the forecast: used, sigma through the outage times"
     if len(run.seams) > OUTAGES_LISTED:

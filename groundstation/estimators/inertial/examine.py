@@ -1,4 +1,4 @@
-"""What a flight lacks for an estimate of the INS errors, told from the comparison with GNSS alone."""
+"""Shortfalls of a flight for an estimate of INS errors, by comparison with GNSS alone."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ LISTED = 5  # outages
 
 
 def compared_with_kind(flight: Flight, known: Known, settings: InertialSettings) -> tuple[Differences, tuple[str, str]]:
-    """INS minus GNSS of a flight, and whether GNSS corrects the INS with the reason for thinking so.
+    """Return INS minus GNSS of a flight, and whether GNSS corrects the INS, with the reason.
 
     Raises
     ------
@@ -45,7 +45,9 @@ def offered(known: Known) -> InsKinds:
 
 
 def examine_inertial(flight: Flight, known: Known, settings: InertialSettings) -> tuple[Shortfall, ...]:
-    """Judge INS and GNSS of a flight: is the INS left alone, is GNSS there throughout, is one Schuler period covered.
+    """Report what of INS and GNSS falls short for an estimate.
+
+    The INS must be left alone, GNSS be there throughout, and one Schuler period be covered.
 
     Raises
     ------

@@ -95,13 +95,16 @@ def _states(run: FilterRun, smoothed: Smoothed, channel: int, rows: Int64Array) 
 
 
 def _normalised(run: FilterRun, channel: int) -> FloatArray:
-    """Innovation of the position over its sigma, of the velocity where no position was measured."""
+    """Return the position innovation over its sigma; the velocity's where none was measured."""
     ratio = run.innovation[:, :, channel] / np.sqrt(run.innovation_variance[:, :, channel])
     return np.where(np.isfinite(ratio[:, 0]), ratio[:, 0], ratio[:, 1])
 
 
 def observability_figure(run: FilterRun, observability: FloatArray) -> InertialObservability:
-    """How far each state's sigma is below what it would be without GNSS; ``observability`` has shape (n, 6, c)."""
+    """Return how far each state's sigma is below what it would be without GNSS.
+
+    ``observability`` has shape (n, 6, c).
+    """
     rows = thinned(len(run.epochs))
     north, east = (_observability(observability[rows, :, channel]) for channel in (0, 1))
     return InertialObservability(time_s=run.epochs.time_s[rows], north=north, east=east)
@@ -121,7 +124,10 @@ def _observability(values: FloatArray) -> ObservabilityOfChannel:
 
 
 def track_figure(compared: Differences, corrected_m: FloatArray, smoothed_m: FloatArray) -> InertialTrack:
-    """Track of the INS, of GNSS, of the INS minus its estimated error, and minus its smoothed error."""
+    """Return the tracks of the INS, of GNSS, and of the INS as corrected and as smoothed.
+
+    The last two are the INS minus its estimated error, and minus its smoothed error.
+    """
     measured = compared.epochs.position_m
     rows = thinned(len(measured))
     corrected, reference = _places(compared, corrected_m, rows), _places(compared, smoothed_m, rows)
@@ -206,7 +212,10 @@ def map_figure(replay: Hindcast) -> ForecastMap:
 
 
 def growth_figure(replay: Hindcast, claimed: Claimed | None) -> ForecastGrowth:
-    """RMS over the starts at every lead, one column per method, and what the default method claims."""
+    """Return the RMS error over the starts at every lead, one column per method.
+
+    With it comes what the default method claims.
+    """
     known = np.asarray(np.isfinite(replay.actual_m).all(axis=2))
     starts = known.sum(axis=0)
     sigma_m = None
@@ -248,9 +257,10 @@ def fan_figure(replay: Hindcast, method: str, claimed: Claimed | None) -> Foreca
 
 
 def classic_figure(replay: Hindcast, known_m: FloatArray, default_method: str) -> ForecastClassic:
-    """The paper's figure 2: error east of the whole rest of the flight, measured and forecast, for its four starts.
+    """Return the paper's figure 2: error east over the rest of the flight, from four starts.
 
-    ``known_m`` is the measured position error at each start, shape (s, c): errors are shown, not their growth.
+    It is shown as measured and as forecast. ``known_m`` is the measured position error at each start, shape (s, c):
+    errors are shown, not their growth.
     """
     leads = len(replay.lead_s)
     east = known_m[:, 1][:, None]

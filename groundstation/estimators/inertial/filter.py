@@ -1,4 +1,4 @@
-"""Kalman filter and smoother of the two channels over one flight, on irregular epochs and across gaps."""
+"""Kalman filter and smoother of both channels, on irregular epochs and across gaps."""
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -24,7 +24,7 @@ STANDARD_GATE = 25.0  # squared sigmas
 
 @dataclass(frozen=True)
 class Epochs:
-    """What the filter is given: differences INS minus GNSS on one time axis, strictly increasing.
+    """Inputs of the filter: differences INS minus GNSS on one strictly increasing time axis.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Epochs:
 
     @cached_property
     def gnss_intervals_s(self) -> tuple[float, float]:
-        """Median interval of the epochs with a position and of those with a velocity; 1 s for fewer than two."""
+        """Median intervals between positions and between velocities; 1 s for fewer than two."""
         found = []
         for measured in (self.position_m, self.velocity_mps):
             times = self.time_s[np.isfinite(measured).any(axis=1)]
@@ -74,13 +74,16 @@ class Epochs:
 
     @property
     def has_gnss(self) -> BoolArray:
-        """Where position or velocity was compared in at least one channel, shape (n,)."""
+        """Epochs with a position or velocity compared in at least one channel, shape (n,)."""
         return np.asarray(np.isfinite(self.position_m).any(axis=1) | np.isfinite(self.velocity_mps).any(axis=1))
 
 
 @dataclass(frozen=True)
 class Initial:
-    """States (6, c) and covariances (g, 6, 6) before the first epoch, g = 1 where the channels share one."""
+    """States (6, c) and covariances (g, 6, 6) before the first epoch.
+
+    g = 1 where the channels share one.
+    """
 
     x: FloatArray
     P: FloatArray
@@ -144,7 +147,10 @@ class FilterRun:
         return [channels] if len(self.parts) == 1 else [[channel] for channel in channels]
 
     def measured(self, kind: int) -> FloatArray:
-        """Position (0) or velocity (1) differences, shape (n, c), NaN also where the filter rejected them."""
+        """Return position (0) or velocity (1) differences, shape (n, c).
+
+        NaN also where the filter rejected them.
+        """
         values = (self.epochs.position_m, self.epochs.velocity_mps)[kind]
         return np.where(self.used[:, kind] == REJECTED, np.nan, values)
 
@@ -153,7 +159,10 @@ class FilterRun:
         return np.asarray(self.P[min(channel, len(self.P) - 1)])
 
     def covariance_beforehand(self, channel: int) -> FloatArray:
-        """Covariance of a channel, shape (n, 6, 6), inside outages as it was claimed before GNSS came back."""
+        """Return the covariance of a channel as claimed before GNSS came back, shape (n, 6, 6).
+
+        It differs inside outages.
+        """
         seams = self.seams_of_parts[min(channel, len(self.P) - 1)] if self.seams_of_parts else ()
         out = np.array(self.covariance(channel)) if seams else self.covariance(channel)
         for seam in seams:
@@ -162,7 +171,7 @@ class FilterRun:
 
     @cached_property
     def covariance_without_data(self) -> FloatArray:
-        """Covariance Pi of the true states at every epoch had nothing been measured, shape (n, 6, 6)."""
+        """Covariance Pi of the true states at every epoch without measurements, shape (n, 6, 6)."""
         nothing = np.full((len(self.epochs), 1), np.nan)
         blind = replace(Epochs.plain(self.epochs.time_s, nothing, nothing), is_reset=self.epochs.is_reset)
         return frozen(run_filter(blind, self.model, self.noise, steps=self.steps).P[0])
@@ -173,9 +182,10 @@ class FilterRun:
 
 
 def initial_of(epochs: Epochs, noise: InsNoise) -> Initial:
-    """Start from what the first samples show: a recording may begin in flight, hours after the alignment of the INS.
+    """Return a start from what the first samples show.
 
-    Position and velocity error are the medians of the first :data:`FIRST_SAMPLES` differences, with the class's sigma.
+    A recording may begin in flight, hours after the alignment of the INS. Position and velocity error are the medians
+    of the first :data:`FIRST_SAMPLES` differences, with the class's sigma.
     """
     x = np.zeros((SIZE, epochs.position_m.shape[1]))
     for state, measured in ((POSITION, epochs.position_m), (VELOCITY, epochs.velocity_mps)):
@@ -268,10 +278,11 @@ def _stacked(parts: list[FloatArray]) -> FloatArray:
 
 
 def measurement_variances(epochs: Epochs, noise: InsNoise) -> tuple[FloatArray, FloatArray]:
-    """Variances of position and velocity, shape (2,) each: as they are weighted, and as a single one errs.
+    """Return the variances of position and velocity for weighting and for the gate.
 
-    The first are inflated for slow errors; the second are not, or the gate would be as wide as the inflation, but leave
-    room for a receiver worse than the class thinks and for the lag of a filter that weighs it little.
+    Shape (2,) each: as they are weighted, and as a single one errs. The first are inflated for slow errors; the second
+    are not, or the gate would be as wide as the inflation, but leave room for a receiver worse than the class thinks
+    and for the lag of a filter that weighs it little.
     """
     weighted = [noise.gnss.variances(interval)[kind] for kind, interval in enumerate(epochs.gnss_intervals_s)]
     believed = replace(noise.gnss, is_inflated=False).variances(1.0)
@@ -279,12 +290,15 @@ def measurement_variances(epochs: Epochs, noise: InsNoise) -> tuple[FloatArray, 
 
 
 def patience_of(epochs: Epochs) -> Int64Array:
-    """Rejections in a row of each kind, shape (2,), after which the filter takes GNSS to be right."""
+    """Return the count of rejections in a row after which GNSS is taken to be right.
+
+    Shape (2,), one of each kind.
+    """
     return np.array([max(1, round(PATIENCE_S / interval)) for interval in epochs.gnss_intervals_s], dtype=np.int64)
 
 
 def _pushed(drag: FloatArray, group: list[int], earlier: list[FloatArray]) -> FloatArray:
-    """Metres by which a channel alone is dragged by the one that was run before it, shape (n, c)."""
+    """Return the metres by which a channel run alone is dragged by the one before, (n, c)."""
     push = np.zeros((len(drag), len(group)))
     if len(group) == 1 and earlier:
         north = earlier[0][:, POSITION, 0]
@@ -294,7 +308,7 @@ def _pushed(drag: FloatArray, group: list[int], earlier: list[FloatArray]) -> Fl
 
 @dataclass(frozen=True)
 class Smoothed:
-    """Smoothed states (n, 6, c) and their variances (n, 6, c), NaN outside the interval asked for."""
+    """Smoothed states and variances, both (n, 6, c), NaN outside the interval asked for."""
 
     x: FloatArray
     variance: FloatArray

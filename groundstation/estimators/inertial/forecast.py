@@ -1,4 +1,4 @@
-"""The forecast mode judged on the flight itself: outages replayed, every method, and how honest the sigma is."""
+"""Forecast mode judged on the flight itself: outages replayed, every method, its sigma."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -36,7 +36,7 @@ PHASE_STEP_S, PHASE_FROM_S = 60.0, 600.0
 def assess_forecast(
     estimation: Estimation, *, settings: InertialSettings, phase_of: PhaseOf | None = None, take_off_s: float = 0.0
 ) -> ForecastResult:
-    """Replay outages all over a flight and compare each method's forecast with what GNSS showed.
+    """Replay outages all over a flight and compare each method's forecast with GNSS.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def _of_model(replay: Hindcast, coupled: CoupledRun, settings: InertialSettings)
 
 
 def _with_own_variance(replay: Hindcast, coupled: CoupledRun, settings: InertialSettings) -> Hindcast:
-    """The replay with the variance of the coupled last estimate, where the settings choose that model."""
+    """Return the replay with the coupled last estimate's variance, if the settings choose it."""
     if settings.model == "separate":
         return replay
     own = {"last_estimate": coupled_variance(coupled, replay.at, replay.lead_s)}
@@ -150,7 +150,7 @@ def _phases(
 def _classic(
     run: FilterRun, coupled: CoupledRun, bank: NoiseBank, settings: InertialSettings, take_off_s: float
 ) -> tuple[tuple[ClassicStart, ...], tuple[FigureData, ...]]:
-    """The paper's four starts: at equal horizons as rows, to the end of the flight as its figure 2."""
+    """Replay the paper's four starts: rows at equal horizons, figure 2 to the flight's end."""
     time_s = run.epochs.time_s
     wanted = np.array([take_off_s + 3600.0 * hours for hours in CLASSIC_H])
     if wanted[-1] + 60.0 * CLASSIC_HORIZONS_MIN[0] > time_s[-1]:

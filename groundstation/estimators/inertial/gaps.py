@@ -1,4 +1,7 @@
-"""Replayed gaps with GNSS on both sides: how far a forecast from the near side, and a smoother from both, go wrong."""
+"""Replayed gaps with GNSS on both sides: errors of a forecast and of a smoother.
+
+The forecast starts from the near side, the smoother uses both.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,7 +33,7 @@ class _Replayed:
 def gap_rows(
     run: FilterRun, at: Int64Array, lengths_min: Sequence[float] = LENGTHS_MIN, *, settings: InertialSettings
 ) -> tuple[GapRow, ...]:
-    """Take GNSS away from every start for each length, and compare what was made of it with what GNSS showed.
+    """Take GNSS away from every start for each length, and compare the result with GNSS.
 
     Parameters
     ----------
@@ -70,7 +73,7 @@ def gap_rows(
 def _replay(
     run: FilterRun, coarse: Coarse, epoch: int, length_s: float, settings: InertialSettings
 ) -> _Replayed | None:
-    """None where the gap does not fit the flight or GNSS was not there to judge it."""
+    """Replay one gap; None where it does not fit the flight or GNSS cannot judge it."""
     time_s = run.epochs.time_s
     begin_s, end_s = float(time_s[epoch]), float(time_s[epoch]) + length_s
     behind = int(np.searchsorted(time_s, end_s + AFTER_S))

@@ -1,4 +1,4 @@
-"""The forecast replayed: started at many moments of a flight, against what GNSS showed later."""
+"""Forecast replayed from many moments of a flight, against what GNSS showed later."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Whether GNSS corrects an INS already: then there is nothing to forecast."""
+"""Kind of an INS: whether GNSS corrects it already; then there is nothing to forecast."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,9 @@ DRIFT_MPS = 0.005  # an INS that stays below has not drifted: 0.01 nmi/h
 
 
 def stated_kind(aircraft_kind: str, metadata: Mapping[str, str]) -> tuple[str, str]:
-    """What the aircraft file, else the head of the log (``ins_kind``) says of the INS, and who said it; or nothing.
+    """Return the INS kind stated by the aircraft file or the log head, and who said it.
+
+    The aircraft file goes before ``ins_kind`` of the log; empty texts where neither says.
 
     Examples
     --------

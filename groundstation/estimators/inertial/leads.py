@@ -1,4 +1,7 @@
-"""Starts and leads of forecasts: when they begin, what GNSS showed to build up, states carried along by a model."""
+"""Starts and leads of forecasts: when they begin, and how errors build up.
+
+The build-up is that shown by GNSS and that of states carried along by a model.
+"""
 
 from dataclasses import dataclass
 
@@ -36,9 +39,10 @@ def leads_of(step_s: float, longest_s: float) -> FloatArray:
 
 
 def built_up(epochs: Epochs, at: Int64Array, lead_s: FloatArray) -> FloatArray:
-    """Position error that built up from each start to each lead as GNSS showed it, shape (s, l, c), NaN unknown.
+    """Return the position error built up from each start to each lead, as GNSS showed it.
 
-    Unknown too where the INS was reset in between: what built up then is none of the forecast's.
+    Shape (s, l, c), NaN unknown. Unknown too where the INS was reset in between: what built up then is none of the
+    forecast's.
     """
     when = epochs.time_s[at][:, None] + np.asarray(lead_s)[None, :]
     known = np.flatnonzero(np.isfinite(epochs.position_m).all(axis=1))
@@ -57,13 +61,16 @@ def built_up(epochs: Epochs, at: Int64Array, lead_s: FloatArray) -> FloatArray:
 
 
 def nearest_s(epochs: Epochs) -> float:
-    """How far from a start or a lead an epoch may be that is compared: one interval of GNSS, a second at least."""
+    """Return how far from a start or lead the epoch compared with it may be.
+
+    It is one interval of GNSS, a second at least.
+    """
     return max(NEAREST_S, epochs.gnss_intervals_s[0])
 
 
 @dataclass(frozen=True)
 class Path:
-    """Where forecasts lead from s starts over l leads, in steps that are carried out one by one.
+    """Forecasts from s starts over l leads, in steps carried out one by one.
 
     Parameters
     ----------
@@ -86,7 +93,7 @@ class Path:
 
     @classmethod
     def of(cls, run: FilterRun, at: Int64Array, lead_s: FloatArray, longest_step_s: float) -> "Path":
-        """From epochs ``at`` over leads in equal steps from the first."""
+        """Make a path from epochs ``at`` over leads in equal steps from the first."""
         epochs = run.epochs
         start_s, lead_step = epochs.time_s[at], float(lead_s[0]) if len(lead_s) else longest_step_s
         every = max(1, round(lead_step / longest_step_s))
@@ -98,7 +105,7 @@ class Path:
         return cls(start_s, np.asarray(lead_s), known, drag, step_s, every)
 
     def carried(self, model: ChannelModel, method: str, states: FloatArray) -> FloatArray:
-        """What a method's states (s, 6, c) at the starts build up to, shape (s, l, c)."""
+        """Return what a method's states (s, 6, c) at the starts build up to, shape (s, l, c)."""
         (count, _, channels), leads = states.shape, len(self.lead_s)
         if method == "raw_ins" or not leads:
             return np.zeros((count, leads, channels))
@@ -120,7 +127,7 @@ class Path:
 def past_mean(
     values: FloatArray, start_s: FloatArray, lead_s: float, at_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Means over those outages that were over at some times, and how many independent ones they are.
+    """Return means over the outages over at some times, and their independent number.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
-"""The error model of one horizontal channel: six states, its exact exponential, the paper's I + A T, its process noise.
+"""Error model of one horizontal channel: six states, transition, process noise.
 
-Shared by both channels: neither the transition nor the noise depends on which way is north.
+The transition is the exact exponential or the paper's I + A T. Shared by both channels: neither the transition nor the
+noise depends on which way is north.
 """
 
 import math
@@ -30,7 +31,9 @@ def normal_gravity_mps2(latitude_deg: float, altitude_m: float) -> float: ...
 @overload
 def normal_gravity_mps2(latitude_deg: FloatArray, altitude_m: FloatArray) -> FloatArray: ...
 def normal_gravity_mps2(latitude_deg: ArrayLike, altitude_m: ArrayLike) -> float | FloatArray:
-    """Normal gravity, m/s^2, at latitudes and altitudes above the ellipsoid: a number of numbers, an array of arrays.
+    """Return the normal gravity, m/s^2, at latitudes and altitudes above the ellipsoid.
+
+    Numbers give a number, arrays an array.
 
     Source: NIMA TR8350.2, 2000, equations 4-1 and 4-3 (the first two terms of the height).
 
@@ -120,7 +123,10 @@ class ChannelModel:
         return np.linalg.matrix_power(np.eye(SIZE) + self.matrix() * (seconds / steps), steps)
 
     def _exponential(self, seconds: float) -> FloatArray:
-        """exp(A t) in closed form: the Schuler oscillator driven by a start, a step, a ramp and an exponential."""
+        """Return exp(A t) in closed form.
+
+        It is the Schuler oscillator driven by a start, a step, a ramp and an exponential.
+        """
         rate, beta, g = self.schuler_rate_radps, self.beta_per_s, self.gravity_mps2
         radius, t = self.radius_m, seconds
         sine, cosine = math.sin(rate * t), math.cos(rate * t)

@@ -1,4 +1,7 @@
-"""The moment at which an INS began to navigate, and the proof of it: without it no error rate can be stated."""
+"""Moment at which an INS began to navigate, and its proof.
+
+Without it no error rate can be stated.
+"""
 
 from dataclasses import dataclass
 
@@ -33,7 +36,10 @@ EARTH_M = 6.371e6
 
 @dataclass(frozen=True)
 class Stated:
-    """A start of navigation as somebody stated it: ISO 8601 text, and who did; empty where nobody did."""
+    """Start of navigation as somebody stated it: ISO 8601 text, and who did.
+
+    Empty where nobody did.
+    """
 
     utc: str = ""
     by: str = ""
@@ -121,7 +127,10 @@ def _alignments_ended_s(flight: Flight, topic: str) -> FloatArray:
 
 
 def _by_standstill(compared: Differences, gnss: GnssNoise) -> NavigationStart:
-    """Standstill at the beginning of the INS record at which INS and GNSS agree; else what speaks against it."""
+    """Return the first standstill at which INS and GNSS agree, or what speaks against it.
+
+    It is at the beginning of the INS record.
+    """
     epochs = compared.epochs
     both = np.flatnonzero(np.isfinite(epochs.position_m).all(axis=1))
     if not len(both):
@@ -150,7 +159,10 @@ def _by_standstill(compared: Differences, gnss: GnssNoise) -> NavigationStart:
 
 
 def _moves_from_s(compared: Differences, end_s: float) -> float:
-    """Time at which the aircraft first moves, by means over some seconds; ``end_s`` where it stands until then."""
+    """Return the time at which the aircraft first moves, by means over some seconds.
+
+    ``end_s`` where it stands until then.
+    """
     rows = compared.epochs.time_s <= end_s
     time_s, velocity = compared.epochs.time_s[rows], compared.velocity_mps[rows]
     by_gnss = velocity - compared.epochs.velocity_mps[rows]
@@ -167,7 +179,10 @@ def _moves_from_s(compared: Differences, end_s: float) -> float:
 
 
 def _mean_speed(velocity_mps: FloatArray) -> FloatArray:
-    """Speed of the mean velocity over :data:`MEAN_S` epochs, shape (n,); NaN where none of them is known."""
+    """Return the speed of the mean velocity over :data:`MEAN_S` epochs, shape (n,).
+
+    NaN where none of them is known.
+    """
     known = np.asarray(np.isfinite(velocity_mps).all(axis=1))
     window = np.ones(MEAN_EPOCHS)
     count = np.convolve(known, window, "same")[: len(known)]

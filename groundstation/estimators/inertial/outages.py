@@ -1,4 +1,7 @@
-"""Intervals without GNSS in the log itself: what was missing, the forecast through each, and how it came out."""
+"""Outages in the log itself: what was missing, and the forecast through each.
+
+It is told how the forecast came out.
+"""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -25,9 +28,9 @@ PRESENT_SHARE = 0.5  # of the seconds of an outage in which a source has samples
 
 @dataclass(frozen=True)
 class Bridged:
-    """The outages, and the position error to take off the INS at every epoch, shape (n, c), forecast through them.
+    """Outages, and the position error to take off the INS at every epoch, shape (n, c).
 
-    With the coupled run, where one was made for it.
+    It is forecast through the outages. With the coupled run, where one was made for it.
     """
 
     outages: tuple[RealOutage, ...]
@@ -69,9 +72,10 @@ def bridge_outages(flight: Flight, compared: Differences, run: FilterRun, settin
 def _grown(
     run: FilterRun, last: int, back: int, coupled: CoupledRun | None, settings: InertialSettings
 ) -> tuple[FloatArray, FloatArray | None]:
-    """Position error forecast to build up since epoch ``last``, at the epochs behind it up to ``back``, (k, c).
+    """Return the forecast growth of position error since epoch ``last``, shape (k, c).
 
-    And its variance at the last of them, (c,), where the method tells one of its own.
+    It is given at the epochs behind it up to ``back``, with its variance at the last of them, (c,), where the method
+    has one of its own.
     """
     elapsed = run.epochs.time_s[last + 1 : back + 1] - run.epochs.time_s[last]
     step_s = min(settings.forecast_step_s, float(elapsed[-1]))
@@ -90,7 +94,7 @@ def _grown(
 
 
 def _at(elapsed_s: FloatArray, lead_s: FloatArray, values: FloatArray) -> FloatArray:
-    """What grows from nothing over the leads, (l, c), at other times."""
+    """Interpolate what grows from nothing over the leads, (l, c), to other times."""
     times = np.concatenate([[0.0], lead_s])
     columns = [np.interp(elapsed_s, times, np.concatenate([[0.0], column])) for column in values.T]
     return np.stack(columns, axis=1)
@@ -99,7 +103,10 @@ def _at(elapsed_s: FloatArray, lead_s: FloatArray, values: FloatArray) -> FloatA
 def _sigma(
     run: FilterRun, last: int, length_s: float, own_m2: FloatArray | None, settings: InertialSettings
 ) -> float | None:
-    """Radial sigma of the forecast at the end of an outage, what the first GNSS position errs included."""
+    """Return the radial sigma of the forecast at the end of an outage.
+
+    The error of the first GNSS position is included.
+    """
     method = settings.default_method
     if method not in WITH_SIGMA:
         return None
@@ -120,7 +127,7 @@ def _sigma(
 
 
 def _empty(flight: Flight, compared: Differences, start_s: float, end_s: float) -> RealOutage:
-    """An outage of which it is not known how the forecast came out; what was missing is told by the tables."""
+    """Return an outage whose forecast could not be judged; the tables tell what was missing."""
     present = {}
     for kind, topic in (("ins", compared.ins_topic), ("gnss", compared.gnss_topic)):
         table = flight[topic]

@@ -1,4 +1,4 @@
-"""When outages are replayed: from which moment of a flight, how far ahead, and whether the log allows a calibration."""
+"""Plan of replayed outages: starts, horizons, and whether the log allows a calibration."""
 
 from dataclasses import dataclass
 
@@ -49,9 +49,10 @@ class Plan:
 
 
 def plan_replay(run: FilterRun, settings: InertialSettings) -> Plan:
-    """Choose the starts: the settings' where they show half an hour of forecast, else from 40 % of the flight on.
+    """Choose the starts of the replay.
 
-    A start counts where GNSS is there at it and at its horizon. Starts before the first one only calibrate.
+    They are the settings' where they show half an hour of forecast, else from 40 % of the flight on. A start counts
+    where GNSS is there at it and at its horizon. Starts before the first one only calibrate.
     """
     time_s = run.epochs.time_s[run.epochs.has_gnss]
     begin, end = (float(time_s[0]), float(time_s[-1])) if len(time_s) else (0.0, 0.0)
@@ -74,13 +75,16 @@ def plan_replay(run: FilterRun, settings: InertialSettings) -> Plan:
 
 
 def _judged(run: FilterRun, first_s: float, step_s: float, horizon_min: float) -> int:
-    """How many starts GNSS could judge at a horizon."""
+    """Count the starts that GNSS could judge at a horizon."""
     shown = built_up(run.epochs, start_epochs(run.epochs, first_s, step_s), np.array([60.0 * horizon_min]))
     return int(np.isfinite(shown).all(axis=2).sum())
 
 
 def map_grid(run: FilterRun, settings: InertialSettings) -> tuple[Int64Array, FloatArray]:
-    """Starts (epochs) and leads of the map of errors: the whole flight, thinned to a picture's size."""
+    """Return starts (epochs) and leads of the map of errors over the whole flight.
+
+    They are thinned to a picture's size.
+    """
     time_s = run.epochs.time_s
     span = float(time_s[-1] - time_s[0])
     step = max(settings.map_step_s, _whole(span / MOST_STEPS_OF_MAP, settings.map_step_s))

@@ -1,4 +1,4 @@
-"""What of INS and GNSS is not to be believed: frozen or jumping receivers, an INS reset in flight, numbers missing."""
+"""Screening of INS and GNSS: frozen or jumping receivers, INS resets, missing numbers."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -50,7 +50,10 @@ def unknown_values(flight: Flight, ins: Table, gnss: Table) -> Iterator[Finding]
 
 
 def ins_outliers(flight: Flight, ins: Table, settings: InertialSettings) -> tuple[BoolArray, list[Finding]]:
-    """Single samples of the INS whose position jumps and jumps back at once: no reset; mask (n,) and the finding."""
+    """Find single INS samples whose position jumps and jumps back at once: no reset.
+
+    Returns a mask (n,) and the finding.
+    """
     at = _steps(ins, settings.jump_m)
     mask, rows = np.zeros(len(ins), dtype=bool), at[:-1][np.diff(at) == 1]
     mask[rows] = True
@@ -82,7 +85,10 @@ def unbelieved(
     reset_ns: Int64Array,
     settings: InertialSettings,
 ) -> tuple[BoolArray, list[Finding]]:
-    """GNSS samples that are not compared, shape (n,), with findings that say why, where and how many."""
+    """Find the GNSS samples that are not compared, shape (n,), and the findings on them.
+
+    Findings say why, where and how many.
+    """
     checks = (
         (_without_integrity(gnss), "inertial.gnss_integrity", "GNSS reports that it has no integrity"),
         (_frozen(flight, gnss, ins_at_gnss, settings), "inertial.gnss_frozen", "GNSS position frozen while moving"),
@@ -134,7 +140,7 @@ def _without_integrity(gnss: Table) -> BoolArray:
 
 
 def _frozen(flight: Flight, gnss: Table, ins: Table, settings: InertialSettings) -> BoolArray:
-    """Where the position repeats for longer than ``frozen_s`` while the INS moves."""
+    """Find samples whose position repeats for longer than ``frozen_s`` while the INS moves."""
     out = np.zeros(len(gnss), dtype=bool)
     if len(gnss) < 2 or not gnss.has("latitude_deg", "longitude_deg"):
         return out
@@ -151,10 +157,10 @@ def _frozen(flight: Flight, gnss: Table, ins: Table, settings: InertialSettings)
 def _displaced(
     flight: Flight, gnss: Table, position_m: FloatArray, reset_ns: Int64Array, settings: InertialSettings
 ) -> BoolArray:
-    """Samples in stretches that begin or end with a jump of the difference which the INS did not make.
+    """Find samples in stretches that begin or end with a jump of the difference.
 
-    The longest stretch is believed; from there on, forwards and backwards, every other that continues the last believed
-    difference within ``jump_m`` and a slow drift.
+    The INS did not make that jump. The longest stretch is believed; from there on, forwards and backwards, every other
+    that continues the last believed difference within ``jump_m`` and a slow drift.
     """
     known = np.flatnonzero(np.isfinite(position_m).all(axis=1))
     out = np.zeros(len(gnss), dtype=bool)

@@ -1,4 +1,4 @@
-"""The return of GNSS after an outage: fixes that agree among themselves against the forecast of the filter.
+"""Return of GNSS after an outage: consistent fixes against the forecast of the filter.
 
 A forecast may be off by more than the model says: an INS of another quality, turns that the model does not know. Fixes
 that come back after an outage and agree among themselves are then used, and it is the sigma of the filter that is
@@ -52,7 +52,10 @@ class Seam:
 
 
 def returns_of(time_s: FloatArray, is_fix: BoolArray) -> Int64Array:
-    """Epochs at which GNSS comes back after an outage; the first fix of all too, where it comes so late."""
+    """Return the epochs at which GNSS comes back after an outage.
+
+    The first fix of all is one too, where it comes so late.
+    """
     fixes = np.flatnonzero(is_fix)
     if not len(fixes):
         return fixes
@@ -63,9 +66,10 @@ def returns_of(time_s: FloatArray, is_fix: BoolArray) -> Int64Array:
 
 
 def fixes_since(time_s: FloatArray, position_m: FloatArray, velocity_mps: FloatArray, back: int) -> Int64Array:
-    """Epochs of the fixes from a return on, as long as the filter has patience and is judged: positions if there are.
+    """Return the epochs of fixes from a return on, as long as the filter has patience.
 
-    A channel that is never measured does not count.
+    Positions count if there are any, else velocities; a channel that is never measured does not. The time for judging
+    them is included.
     """
     end = int(np.searchsorted(time_s, time_s[back] + PATIENCE_S + AGREEING_S))
     values = position_m if np.isfinite(position_m).any() else velocity_mps
@@ -75,7 +79,7 @@ def fixes_since(time_s: FloatArray, position_m: FloatArray, velocity_mps: FloatA
 
 @dataclass(frozen=True)
 class Fixes:
-    """Fixes since a return, k of them, and what the filter had forecast for each of them at the end of the outage.
+    """Fixes since a return, k of them, and the filter's forecast of each at the outage's end.
 
     Parameters
     ----------
@@ -95,10 +99,10 @@ class Fixes:
     believed: FloatArray
 
     def seam(self, gate: float) -> tuple[int, float] | None:
-        """Row of the first fix of those that agree, and the factor on the sigma of the forecast that explains them.
+        """Return the first row of the fixes that agree, and the factor on the forecast's sigma.
 
-        None where no fixes agree, where the filter's own gate lets them pass, where one of their means is beyond
-        :data:`REACH` gates, and where it takes more than :data:`FACTOR_MAX`.
+        It is the factor that explains the fixes. None where no fixes agree, where the filter's own gate lets them pass,
+        where one of their means is beyond :data:`REACH` gates, and where it takes more than :data:`FACTOR_MAX`.
         """
         agreeing = self.first_agreeing()
         if agreeing is None:
@@ -154,7 +158,9 @@ def _line(time_s: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def factor_of(innovation: FloatArray, predicted: FloatArray, believed: FloatArray) -> float:
-    """Smallest factor on the sigma of a forecast that explains innovations; infinite where none does.
+    """Return the smallest factor on a forecast's sigma that explains innovations.
+
+    Infinite where none does.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Settings of the INS error estimator and of the forecast. Every limit of the method stands here."""
+"""Settings of the INS error estimator and of the forecast, with every limit of the method."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -1,4 +1,7 @@
-"""How good a replayed forecast was, and how honest its sigma: tables over starts, by method and horizon."""
+"""Tables of a replayed forecast: its error and its sigma's honesty by method and horizon.
+
+They are over starts.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +28,7 @@ WITH_SIGMA = (*WITH_COVARIANCE, "noise_bank")
 
 @dataclass(frozen=True)
 class Claimed:
-    """What a method says of its own error: sigma per start, lead and channel, by the model and as scaled.
+    """Sigma that a method claims per start, lead and channel, by the model and as scaled.
 
     Parameters
     ----------
@@ -73,17 +76,21 @@ def claimed_sigma(method: str, run: FilterRun, replay: Hindcast, settings: Inert
 
 
 def scale_of(method: str, *, is_own: bool) -> ScaleName:
-    """Which scale of its class a sigma is multiplied by; ``is_own``: it is none of the two separate channels."""
+    """Name the scale of its class by which a sigma is multiplied.
+
+    ``is_own``: it is none of the two separate channels.
+    """
     if method == "noise_bank":
         return "bank"
     return "coupled" if is_own else "separate"
 
 
 def _own_scale(ratio: FloatArray, replay: Hindcast, run: FilterRun) -> FloatArray:
-    """What the past of the flight adds to the class's scale: root of the mean squared ratio of error to sigma, (s, l).
+    """Return what the past of the flight adds to the class's scale, (s, l).
 
-    Found at the class's horizons, from the shortest on: what the past of a flight shows of short outages is expected,
-    in part, of longer ones, for which it has seen fewer or none. Between them it is interpolated.
+    It is the root of the mean squared ratio of error to sigma. Found at the class's horizons, from the shortest on:
+    what the past of a flight shows of short outages is expected, in part, of longer ones, for which it has seen fewer
+    or none. Between them it is interpolated.
     """
     calibration = run.noise.calibration
     nodes = [(lead, 60.0 * horizon) for lead, horizon in _leads(replay, calibration.horizon_min)]
@@ -103,7 +110,10 @@ def _own_scale(ratio: FloatArray, replay: Hindcast, run: FilterRun) -> FloatArra
 def skill_rows(
     replay: Hindcast, claimed: dict[str, Claimed | None], horizons_min: Sequence[float], first_start_s: float = 0.0
 ) -> tuple[SkillRow, ...]:
-    """Radial error built up, per method and horizon, over the starts from ``first_start_s`` whose horizon fits."""
+    """Tabulate the radial error built up, per method and horizon.
+
+    It is over the starts from ``first_start_s`` whose horizon fits.
+    """
     rows, judged = [], replay.start_s >= first_start_s - 1e-6
     for method in replay.forecast_m:
         radial, error, sigma = replay.radial_m(method), replay.error_m(method), claimed.get(method)
@@ -131,7 +141,10 @@ def skill_rows(
 def calibration_rows(
     replay: Hindcast, claimed: dict[str, Claimed | None], horizons_min: Sequence[float], first_start_s: float = 0.0
 ) -> tuple[CalibrationRow, ...]:
-    """Coverage of the bands and NEES with chi-square limits from the number of independent starts."""
+    """Tabulate coverage of the bands and NEES.
+
+    The chi-square limits come from the number of independent starts.
+    """
     rows = []
     for method, sigma in claimed.items():
         if sigma is None:

@@ -1,9 +1,10 @@
-"""Covariance of the error of each method's start, derived for the method itself and not borrowed from the filter.
+"""Covariance of the error of each method's start, derived for the method itself.
 
-Every start but the last estimate differs from it by d, a linear function of the data. The error of the last estimate is
-independent of the data (under the model), so the covariance of the start's error is P + Cov(d); Cov(d) over all flights
-the model allows follows from E[x^(s) x^(t)'] = (Pi(s) - P(s)) Phi(t, s)' for s <= t, where Pi is the covariance of the
-true state without any data. d holds the lag of a window behind the true oscillation, which P alone knows nothing of.
+It is not borrowed from the filter. Every start but the last estimate differs from it by d, a linear function of the
+data. The error of the last estimate is independent of the data (under the model), so the covariance of the start's
+error is P + Cov(d); Cov(d) over all flights the model allows follows from E[x^(s) x^(t)'] = (Pi(s) - P(s)) Phi(t, s)'
+for s <= t, where Pi is the covariance of the true state without any data. d holds the lag of a window behind the true
+oscillation, which P alone knows nothing of.
 """
 
 from dataclasses import dataclass
@@ -99,14 +100,17 @@ def _windowed(method: str, run: FilterRun, at: Int64Array, channel: int, setting
 
 
 def _weights(lags: FloatArray, lengths_s: tuple[float, ...]) -> FloatArray:
-    """Weight of each lag in the mean of each state, shape (lags, 6); all on lag 0 for a state without window."""
+    """Return the weight of each lag in the mean of each state, shape (lags, 6).
+
+    All is on lag 0 for a state without window.
+    """
     inside = lags[:, None] < np.maximum(np.array(lengths_s)[None, :], 1e-9)
     return np.asarray(inside / inside.sum(axis=0))
 
 
 @dataclass(frozen=True)
 class LeadGrowth:
-    """What the model makes of a start at each lead: ``rows`` (l, 6) of Phi, and ``added_m2`` (l,) by noise.
+    """Growth of a start at each lead: ``rows`` (l, 6) of Phi, and ``added_m2`` (l,) by noise.
 
     ``judge_m2`` (l,) is what GNSS errs at both ends, against which the forecast is judged.
     """
@@ -116,7 +120,10 @@ class LeadGrowth:
     judge_m2: FloatArray
 
     def variance(self, covariance: FloatArray) -> FloatArray:
-        """Variance of the position error forecast to build up from starts (s, 6, 6), m^2, shape (s, l)."""
+        """Return the variance of the position error that builds up from starts (s, 6, 6).
+
+        m^2, shape (s, l).
+        """
         carried = np.einsum("la,sab,lb->sl", self.rows, covariance, self.rows, optimize=True)
         return np.asarray(np.maximum(carried, 0.0) + self.added_m2)
 

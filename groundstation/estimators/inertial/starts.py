@@ -1,4 +1,4 @@
-"""What a forecast starts from: the state of each method at the moment GNSS is lost, from nothing later than it."""
+"""Start of a forecast: each method's state when GNSS is lost, from nothing later."""
 
 from dataclasses import dataclass
 
@@ -81,7 +81,10 @@ def start_states(method: str, run: FilterRun, at: Int64Array, settings: Inertial
 
 
 def _held_velocity(run: FilterRun, at: Int64Array, length_s: float) -> FloatArray:
-    """Mean of the measured velocity error over the last seconds; of the estimate where it was not measured."""
+    """Return the mean measured velocity error over the last seconds.
+
+    It is that of the estimate where none was measured.
+    """
     time_s, measured = run.epochs.time_s, run.measured(1)
     states = np.zeros((len(at), SIZE, run.x.shape[2]))
     known = np.isfinite(measured)
@@ -95,9 +98,9 @@ def _held_velocity(run: FilterRun, at: Int64Array, length_s: float) -> FloatArra
 
 
 def _schuler_fit(run: FilterRun, at: Int64Array, length_s: float) -> FloatArray:
-    """Least squares of velocity error = bias + a cos + b sin at the Schuler rate over the last seconds.
+    """Fit velocity error = bias + a cos + b sin at the Schuler rate over the last seconds.
 
-    As a state: the bias is a constant drift of -bias / R, the slope a tilt of -slope / g.
+    By least squares. As a state: the bias is a constant drift of -bias / R, the slope a tilt of -slope / g.
     """
     time_s = run.epochs.time_s
     measured = run.measured(1) if np.isfinite(run.epochs.velocity_mps).any() else run.x[:, VELOCITY]
@@ -123,7 +126,10 @@ def _schuler_fit(run: FilterRun, at: Int64Array, length_s: float) -> FloatArray:
 
 
 def _averaged(run: FilterRun, at: Int64Array, window: Window) -> FloatArray:
-    """The paper's windows: plain means of past estimates, one length per state, over epochs that had GNSS."""
+    """Average past estimates over the paper's windows: plain means, one length per state.
+
+    Only epochs that had GNSS count.
+    """
     time_s, weight = run.epochs.time_s, run.epochs.has_gnss.astype(np.float64)
     total = _from_zero(np.cumsum(run.x * weight[:, None, None], axis=0))
     count = _from_zero(np.cumsum(weight))
@@ -138,7 +144,10 @@ def _averaged(run: FilterRun, at: Int64Array, window: Window) -> FloatArray:
 
 
 def _carried_average(run: FilterRun, at: Int64Array, window: Window) -> FloatArray:
-    """Means of past estimates, each carried to the start by the model first: nothing true is smoothed away."""
+    """Average past estimates, each carried to the start by the model first.
+
+    Nothing true is smoothed away.
+    """
     time_s = run.epochs.time_s
     states = np.array(run.x[at])
     span_s = float(np.ptp(time_s)) if len(time_s) else 0.0
@@ -156,7 +165,10 @@ def _carried_average(run: FilterRun, at: Int64Array, window: Window) -> FloatArr
 
 
 def _smoothed(run: FilterRun, at: Int64Array, lag_s: float) -> FloatArray:
-    """The state ``lag_s`` before the start, smoothed with all data up to the start, carried forward by the model."""
+    """Smooth the state ``lag_s`` before the start and carry it forward by the model.
+
+    All data up to the start are used.
+    """
     time_s = run.epochs.time_s
     states = np.empty((len(at), SIZE, run.x.shape[2]))
     first = np.maximum(np.searchsorted(time_s, time_s[at] - lag_s, side="left"), 0)
@@ -169,5 +181,5 @@ def _smoothed(run: FilterRun, at: Int64Array, lag_s: float) -> FloatArray:
 
 
 def _from_zero(sums: FloatArray) -> FloatArray:
-    """Running sums with a zero before them, so that differences of two entries are sums of a slice."""
+    """Prepend a zero to running sums: differences of two entries are then sums of a slice."""
     return np.concatenate([np.zeros_like(sums[:1]), sums])

@@ -1,4 +1,4 @@
-"""Transitions and process noise between the epochs of a flight, and what is added where an outage went wrong."""
+"""Transitions and process noise between epochs, and what is added where outages failed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ MOST_TRANSITIONS = 4096  # distinct intervals kept exactly; jittered clocks are 
 
 @dataclass(frozen=True)
 class Steps:
-    """Transitions between epochs: ``index`` (n,) into ``transitions`` and ``noises`` (m, 6, 6)."""
+    """Transitions between epochs: ``index`` (n,) into ``transitions``, ``noises`` (m, 6, 6)."""
 
     index: Int64Array
     transitions: FloatArray
@@ -36,10 +36,11 @@ class Steps:
         )
 
     def widened(self, seams: Sequence[Seam]) -> "Steps":
-        """Steps with which the covariance grows in each outage to the seam's factor squared times the model's.
+        """Return steps whose covariance in each outage grows to the seam's factor squared.
 
-        The covariance at the last fix and the noise since are both multiplied, so that the correlation between the two
-        sides of the outage, which the smoother goes back over, is the model's own.
+        It is that factor times the model's covariance. The covariance at the last fix and the noise since are both
+        multiplied, so that the correlation between the two sides of the outage, which the smoother goes back over, is
+        the model's own.
         """
         index, transitions, noises = np.array(self.index), [self.transitions], [self.noises]
         count = len(self.transitions)

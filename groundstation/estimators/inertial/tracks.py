@@ -16,7 +16,10 @@ from groundstation.tables.tracks import ins_table
 def corrected_tracks(
     compared: Differences, run: FilterRun, smoothed: Smoothed, corrected_error_m: FloatArray, start_ns: int
 ) -> Iterator[tuple[str, Table]]:
-    """The INS less its errors as filtered (forecast where GNSS was absent) and as smoothed, with the sigmas claimed."""
+    """Yield the tracks of the INS less its errors, as filtered and as smoothed, with sigmas.
+
+    Where GNSS was absent the filtered errors are forecast.
+    """
     time_ns = start_ns + np.round(run.epochs.time_s * NS_PER_S).astype(np.int64)
     variance = np.stack([np.square(run.sigma(channel)) for channel in range(2)], axis=2)
     states = {

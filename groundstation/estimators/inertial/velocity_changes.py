@@ -1,4 +1,4 @@
-"""Changes of velocity of a flight, and what a unit of each azimuth parameter does to their errors."""
+"""Changes of velocity of a flight, and what each azimuth parameter does to their errors."""
 
 from dataclasses import dataclass, replace
 
@@ -16,7 +16,7 @@ AZIMUTH, AZIMUTH_DRIFT, LATENCY, SCALE, BIAS_FORWARD, BIAS_RIGHT = range(6)
 
 @dataclass(frozen=True)
 class AzimuthLimits:
-    """What counts as a change of velocity, and how many are asked for.
+    """Limits of what counts as a change of velocity, and how many are asked for.
 
     ``average_s``: GNSS and INS are averaged so long before and after each. An epoch is in a manoeuvre where the
     acceleration over ``smooth_s`` exceeds ``acceleration_mps2``; manoeuvres longer than ``longest_s`` are cut.
@@ -71,12 +71,15 @@ class Changes:
         return len(self.before_s)
 
     def point_one_way(self, limits: AzimuthLimits) -> bool:
-        """Whether all of them have nearly the same direction: an azimuth then looks like a scale error."""
+        """Tell whether all have nearly the same direction.
+
+        An azimuth then looks like a scale error.
+        """
         unit = self.velocity_mps / np.hypot(*self.velocity_mps.T)[:, None]
         return bool(np.hypot(*unit.mean(axis=0)) > limits.opposed_share)
 
     def first(self, span_s: float) -> "Changes":
-        """Those whose middle is within some seconds of the first one's."""
+        """Return those whose middle is within some seconds of the first one's."""
         middle_s = 0.5 * (self.before_s + self.after_s)
         count = int(np.sum(middle_s <= middle_s[0] + span_s))
         columns = np.array(self.columns[:count])
@@ -98,7 +101,10 @@ class Changes:
 
 
 def changes_of(differences: Differences, known: BoolArray, limits: AzimuthLimits) -> Changes:
-    """Find the changes of velocity of a flight; ``known`` (n,) says where INS and GNSS velocities are compared."""
+    """Find the changes of velocity of a flight.
+
+    ``known`` (n,) says where INS and GNSS velocities are compared.
+    """
     pieces = [
         piece
         for piece in _manoeuvres(differences, limits)
@@ -108,7 +114,10 @@ def changes_of(differences: Differences, known: BoolArray, limits: AzimuthLimits
 
 
 def quiet_intervals(differences: Differences, known: BoolArray, limits: AzimuthLimits) -> Changes:
-    """Stretches without a manoeuvre, as long as the manoeuvres may be: nothing but noise changes across them."""
+    """Find stretches without a manoeuvre, as long as the manoeuvres may be.
+
+    Nothing but noise changes across them.
+    """
     time_s = differences.epochs.time_s
     busy = _is_manoeuvring(differences, limits)
     pieces, reach = [], limits.average_s + 0.5 * limits.longest_s
@@ -121,12 +130,12 @@ def quiet_intervals(differences: Differences, known: BoolArray, limits: AzimuthL
 
 
 def turned(vectors: FloatArray) -> FloatArray:
-    """Horizontal vectors (..., 2) turned by 90 deg clockwise: what a unit of azimuth error adds."""
+    """Turn horizontal vectors (..., 2) by 90 deg clockwise: what a unit of azimuth error adds."""
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
 
 
 def _is_manoeuvring(differences: Differences, limits: AzimuthLimits) -> BoolArray:
-    """Where the INS velocity changes, shape (n,)."""
+    """Tell where the INS velocity changes, shape (n,)."""
     time_s, velocity = differences.epochs.time_s, differences.velocity_mps
     half = 0.5 * limits.smooth_s
     early = np.maximum(np.searchsorted(time_s, time_s - half - 1e-6), 0)
@@ -137,7 +146,10 @@ def _is_manoeuvring(differences: Differences, limits: AzimuthLimits) -> BoolArra
 
 
 def _manoeuvres(differences: Differences, limits: AzimuthLimits) -> list[tuple[int, int]]:
-    """First and last epoch of each manoeuvre; those with no room for averages in between are one."""
+    """Return first and last epoch of each manoeuvre.
+
+    Those with no room for averages in between are one.
+    """
     time_s = differences.epochs.time_s
     joined: list[list[int]] = []
     for first, end in runs(_is_manoeuvring(differences, limits)):
@@ -155,7 +167,10 @@ def _manoeuvres(differences: Differences, limits: AzimuthLimits) -> list[tuple[i
 
 
 def _changes_between(differences: Differences, known: BoolArray, pieces: Int64Array, limits: AzimuthLimits) -> Changes:
-    """Changes across pieces (m, 2) of epochs; left out without GNSS for half of either average, or with a reset."""
+    """Return the changes across pieces (m, 2) of epochs.
+
+    Those without GNSS for half of either average, or with a reset, are left out.
+    """
     epochs, velocity = differences.epochs, _filled(differences.epochs.time_s, differences.velocity_mps)
     time_s = epochs.time_s
     start, end = time_s[pieces].T
@@ -185,7 +200,10 @@ def _changes_between(differences: Differences, known: BoolArray, pieces: Int64Ar
 def _turned_bias(
     time_s: FloatArray, velocity: FloatArray, before: Int64Array, after: Int64Array, known: BoolArray
 ) -> FloatArray:
-    """Change of velocity error by a unit of forward bias that was levelled away on the track before, shape (m, 2)."""
+    """Return the change of velocity error by a unit of forward bias, shape (m, 2).
+
+    The bias was levelled away on the track before.
+    """
     speed = np.hypot(*velocity.T)
     still = 1.0  # m/s; slower than this the track says nothing of the heading
     ahead = np.where((speed > still)[:, None], velocity / np.maximum(speed, still)[:, None], np.nan)

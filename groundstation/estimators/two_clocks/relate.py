@@ -126,8 +126,7 @@ def _placed(
 ) -> tuple[Place | None, str]:
     """Return the lag at which the motions fit; or None, and why the motion does not tell it.
 
-    Of several lags that fit alike the one near to the times of the files is taken, where both are in UTC. Of several
-    places that fit alike that near to the times of the files is taken, where both are in UTC.
+    If several lags fit alike, the one nearest to the times of the files is taken, where both are in UTC.
     """
     if pair is None:
         return None, "no motion that both show"
@@ -232,8 +231,7 @@ def _settled(
 def _stamps_late(log: TimedLog) -> bool:
     """Tell whether a log's GNSS messages may be stamped late, by the clock of its recorder.
 
-    That is so where the recorder also records something else. Of a log of GNSS alone no other clock matters than that
-    of its own stamps.
+    That is so where the recorder also records an INS. A log of GNSS alone has no other clock than its own stamps.
     """
     is_own = log.gnss_time is not None and log.gnss_time.is_own
     return not is_own and any(topic.startswith("ins") for topic in log.flight.topics())
