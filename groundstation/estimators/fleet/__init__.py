@@ -1,1 +1,4 @@
-"""What many flights say together: moments, an aircraft's mean with its interval, trend, outliers, calibration."""
+"""Statistics over many flights.
+
+They are moments, an aircraft's mean with its interval, trend, outliers and calibration.
+"""

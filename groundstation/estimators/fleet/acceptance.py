@@ -1,4 +1,7 @@
-"""Flights against the limits of a standard: what each INS and all of them show, and how sure that is."""
+"""Acceptance of flights by the limits of a standard, for each INS and for all.
+
+It tells what they show and how sure that is.
+"""
 
 from collections.abc import Iterable, Sequence
 
@@ -99,7 +102,10 @@ def _correlation(parts: FloatArray, units: Sequence[str], standard: Standard, *,
 
 
 def judgements(flights: Sequence[FlightError], standard: Standard) -> tuple[Judgement, ...]:
-    """Every limit against all flights, then against those of each INS that is known and that it is for."""
+    """Judge every limit against all flights, then against those of each INS.
+
+    The INS must be known, and the limit be for it.
+    """
     found = [judge(flights, limit, standard) for limit in standard.limits]
     for ins in sorted({flight.ins for flight in flights} - {UNKNOWN_INS}):
         own = [flight for flight in flights if flight.ins == ins]
@@ -109,13 +115,19 @@ def judgements(flights: Sequence[FlightError], standard: Standard) -> tuple[Judg
 
 
 def decision_of(found: Sequence[Judgement]) -> Decision:
-    """The worst of the limits for all flights; one that no flight is for does not count beside others."""
+    """Return the worst decision of the limits for all flights.
+
+    A limit that no flight is for does not count beside others.
+    """
     decisions = {one.decision for one in found if one.ins == ENSEMBLE}
     return next((one for one in WORST_FIRST if one in decisions), "no limit")
 
 
 def ins_rows(flights: Sequence[FlightError], growth: Growth) -> tuple[InsRow, ...]:
-    """What all flights show, then those of each INS; ``growth`` has a row for each flight."""
+    """Return what all flights show, then those of each INS.
+
+    ``growth`` has a row for each flight.
+    """
     units = np.array([flight.ins for flight in flights])
     groups = {ENSEMBLE: np.arange(len(flights))}
     groups |= {name: np.flatnonzero(units == name) for name in sorted(set(units.tolist()))}
@@ -159,7 +171,10 @@ def _quantile(values: FloatArray, share: float) -> float | None:
 
 
 def growth_figure(growth: Growth, flights: Sequence[FlightError], standard: Standard) -> AcceptanceGrowth:
-    """Errors of all flights by hours of navigation, with the order statistic that bounds 95 % of them."""
+    """Return the errors of all flights by hours of navigation.
+
+    With them comes the order statistic that bounds 95 % of them.
+    """
     fits = np.log([max(flight.values["radial_rate_fit_nmiph"], 1e-12) for flight in flights])
     units = [flight.ins for flight in flights]
     correlation = _correlation(fits, units, standard, is_one=False)

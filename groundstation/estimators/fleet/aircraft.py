@@ -1,4 +1,4 @@
-"""The mean error of an aircraft over its flights, with an interval that the spread between flights decides."""
+"""Mean error of an aircraft over its flights, with an interval by the spread of flights."""
 
 import math
 from dataclasses import dataclass
@@ -14,10 +14,11 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MeanOverFlights:
-    """Mean of a quantity over flights, in its unit; all but ``flights`` and ``mean`` are NaN for a single flight.
+    """Mean of a quantity over flights, in its unit.
 
-    ``low``, ``high`` bound its interval, ``sigma_between`` is the spread of the flights' true values, and
-    ``heterogeneity`` the share of the variance of their values that the flights' own sigmas do not explain.
+    All but ``flights`` and ``mean`` are NaN for a single flight. ``low``, ``high`` bound its interval,
+    ``sigma_between`` is the spread of the flights' true values, and ``heterogeneity`` the share of the variance of
+    their values that the flights' own sigmas do not explain.
     """
 
     flights: int

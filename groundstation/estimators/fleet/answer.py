@@ -1,4 +1,4 @@
-"""From the table of flights to what they say together: by aircraft, trend, outliers, calibration."""
+"""Statistics from the table of flights: by aircraft, trend, outliers, calibration."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -93,7 +93,7 @@ def by_aircraft(flights: FigureData) -> tuple[AircraftRow, ...]:
 
 
 def _aircraft_row(name: str, flights: FigureData, rows: NDArray[np.intp]) -> AircraftRow:
-    """What the flights of an aircraft say together; those with the verdict reject enter no statistic."""
+    """Return the statistics of an aircraft's flights without those with the verdict reject."""
     kept = rows[flights["verdict"][rows] != "reject"]
     error = flights["error_deg"][kept]
     over = mean_over_flights(error, flights["standard_error_deg"][kept])
@@ -133,7 +133,10 @@ def _unscaled(quantity: str, value: FloatArray) -> FloatArray:
 
 
 def trends(flights: FigureData, settings: ChangeSettings) -> tuple[FleetTrend, tuple[ChangePoint, ...]]:
-    """Control charts of every aircraft and quantity with enough flights that have a time, and their changes."""
+    """Return control charts and changes of every aircraft and quantity.
+
+    Those with enough flights that have a time are charted.
+    """
     charted = [FleetTrend.empty()]
     changes: list[ChangePoint] = []
     for name, rows in groups_of(flights).items():
@@ -180,7 +183,10 @@ def _change_points(name: str, quantity: TrendQuantity, own: FleetTrend, chart: C
 
 
 def outliers(flights: FigureData) -> tuple[OutlierRow, ...]:
-    """Flights with a figure far from those of the same aircraft, by flight id; one test over the whole fleet."""
+    """Find flights with a figure far from those of the same aircraft, by flight id.
+
+    It is one test over the whole fleet.
+    """
     aircraft = groups_of(flights)
     keys = [(quantity, name) for quantity in LOOKED_AT for name in aircraft]
     groups = {"\n".join(key): _scaled(key[0], flights[key[0]][aircraft[key[1]]]) for key in keys}

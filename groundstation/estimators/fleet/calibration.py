@@ -1,4 +1,7 @@
-"""How honest stated sigmas are: residuals of independent checks over the sigmas claimed for them."""
+"""Calibration of stated sigmas by the residuals of independent checks.
+
+The residuals are over the sigmas claimed for them.
+"""
 
 import math
 

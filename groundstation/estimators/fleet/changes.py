@@ -44,7 +44,10 @@ class ChangeSettings:
 
 @dataclass(frozen=True)
 class Change:
-    """The series has another level from ``index`` on; ``p_value``: chance of such a step in a steady series."""
+    """Change of level of a series from ``index`` on.
+
+    ``p_value`` is the chance of such a step in a steady series.
+    """
 
     index: int
     p_value: float
@@ -52,7 +55,10 @@ class Change:
 
 @dataclass(frozen=True)
 class Chart:
-    """Control chart of a series, shapes (n,): level (median between changes) and limits (NaN where there are none)."""
+    """Control chart of a series, shapes (n,).
+
+    Level (median between changes) and limits, NaN where there are none.
+    """
 
     changes: tuple[Change, ...]
     level: FloatArray
@@ -60,7 +66,7 @@ class Chart:
     high: FloatArray
 
     def is_outside(self, value: FloatArray) -> NDArray[np.bool_]:
-        """Whether values are outside the limits."""
+        """Tell whether values are outside the limits."""
         return np.asarray((value < self.low) | (value > self.high))
 
 

@@ -1,4 +1,7 @@
-"""How sure a share of flights is: exact binomial limits, order statistics, and what flights of one INS are worth."""
+"""Confidence in a share of flights: exact binomial limits, order statistics, correlation.
+
+The last says what flights of one INS are worth.
+"""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +16,9 @@ MOST_FLIGHTS = 1_000_000
 
 
 def share_low(flights: float, over: float, confidence: float) -> float:
-    """Lower limit of the share within, from so many flights of which ``over`` are not; both may be effective numbers.
+    """Return the lower limit of the share within, from ``flights`` of which ``over`` are not.
+
+    Both may be effective numbers.
 
     Source: Clopper, Pearson, Biometrika 26 (1934), 404-413, one-sided.
 
@@ -57,7 +62,7 @@ def flights_needed(over: float, share: float, confidence: float) -> int:
 
 
 def flights_needed_at_share(share_over: float, share: float, confidence: float) -> int | None:
-    """Fewest flights with which the share is shown, if a fixed part of them is over; None where that never shows it.
+    """Return the fewest flights that show the share, if a fixed part is over; None if never.
 
     Examples
     --------
@@ -82,9 +87,10 @@ def flights_needed_at_share(share_over: float, share: float, confidence: float) 
 
 
 def order_bound(values: FloatArray, effective: float, share: float, confidence: float) -> float | None:
-    """Upper limit of what ``share`` of the flights stay below: the largest value but so many as may lie above it.
+    """Return the upper limit of what ``share`` of the flights stay below.
 
-    ``effective`` <= n is the number of independent flights that the values are worth. None with too few.
+    It is the largest value but as many as may lie above it. ``effective`` <= n is the number of independent flights
+    that the values are worth. None with too few.
 
     Examples
     --------
@@ -102,9 +108,10 @@ def order_bound(values: FloatArray, effective: float, share: float, confidence: 
 
 
 def correlation_within(values: FloatArray, groups: Sequence[str], confidence: float) -> float:
-    """Upper limit of the correlation of two values of one group, 0 to 1, by a one-way analysis of variance.
+    """Return an upper limit of the correlation of two values of one group, 0 to 1.
 
-    With one group nothing tells it: 1. With no group of two, 0: nothing is shared.
+    It is by a one-way analysis of variance. With one group nothing tells it: 1. With no group of two, 0: nothing is
+    shared.
 
     Source: Searle, Biometrics 27 (1971), 1-76, for the interval; groups of unequal size by their effective size.
     """

@@ -1,4 +1,4 @@
-"""Densities of many flights on one grid, from histograms on a lattice fine enough to be merged into any grid."""
+"""Densities of many flights on one grid, merged from histograms on a fine lattice."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -20,14 +20,17 @@ AT_ONCE = 1000  # flights
 
 @dataclass(frozen=True)
 class SampleHistogram:
-    """Counts of samples in cells of the lattice: cell k holds [k, k + 1) * ``LATTICE_DEG``; empty ones are left out."""
+    """Counts of samples in cells of the lattice; empty ones are left out.
+
+    Cell k holds [k, k + 1) * ``LATTICE_DEG``.
+    """
 
     cell: NDArray[np.int32]
     count: NDArray[np.int32]
 
 
 def histogram_of(value_deg: FloatArray) -> SampleHistogram:
-    """Count samples, degrees, in the cells of the lattice; those that are not finite are left out."""
+    """Count samples, degrees, in the cells of the lattice; non-finite ones are left out."""
     known = value_deg[np.isfinite(value_deg)]
     cell, count = np.unique(np.floor(known / LATTICE_DEG).astype(np.int32), return_counts=True)
     return SampleHistogram(cell, count.astype(np.int32))

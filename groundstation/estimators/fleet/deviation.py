@@ -1,4 +1,4 @@
-"""Magnetic deviation of the flights of one aircraft beside each other: did a load or a repair change it?"""
+"""Magnetic deviation of an aircraft over its flights, to show changes by load or repair."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ NOT_COMPARED = "reject"
 
 
 def deviations(flights: FigureData) -> tuple[DeviationRow, ...]:
-    """Every flight that found its deviation, beside the mean of the other flights of its aircraft.
+    """Compare each flight that found its deviation with the mean of its aircraft's others.
 
     The difference of two curves A + B sin c + C cos c + D sin 2c + E cos 2c is told as its RMS over the circle, with
     the RMS that the sigmas of both lead to expect where nothing changed. Flights with the verdict reject are not

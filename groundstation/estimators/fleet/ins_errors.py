@@ -1,4 +1,4 @@
-"""Errors of an INS over the hours it navigates: what one flight shows, and the errors of many flights together."""
+"""Errors of an INS over the hours it navigates, of one flight and of many together."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ S_PER_H = 3600.0
 
 @dataclass(frozen=True)
 class InsErrors:
-    """Position errors of one flight, INS minus reference, at the moments when both are known, shapes (n,).
+    """Position errors of one flight, INS minus reference, at moments both are known, (n,).
 
     ``hours`` count from the start of navigation; ``along_nmi``, ``cross_nmi`` are NaN where the aircraft hardly moves.
     """
@@ -36,7 +36,10 @@ class InsErrors:
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     def values(self) -> dict[str, float]:
-        """The figures of the flight that a limit may bound, by name; those that cannot be had are left out."""
+        """Return the figures of the flight that a limit may bound, by name.
+
+        Those that cannot be had are left out.
+        """
         hours, radial = self.hours, self.radial_nmi
         found = {
             "radial_rate_fit_nmiph": slope_through_origin(hours, radial, np.ones(len(hours))),
@@ -88,7 +91,10 @@ def ins_errors(
 def _direction(
     time_s: FloatArray, latitude_deg: FloatArray, longitude_deg: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Unit vector along the track, north and east; NaN where the aircraft hardly moves or its place is not known."""
+    """Return the unit vector along the track, north and east.
+
+    NaN where the aircraft hardly moves or its place is not known.
+    """
     meridian, prime_vertical = curvature_radii_m(latitude_deg)
     north = np.gradient(np.deg2rad(latitude_deg), time_s) * meridian
     turned_rad = np.deg2rad(continuous_longitude_deg(longitude_deg))
@@ -122,7 +128,7 @@ class Growth:
         return Growth(self.hours, self.radial_nmi[rows])
 
     def within(self, share: float) -> FloatArray:
-        """What so many of the flights stay within, NaN where there are fewer than three."""
+        """Return the radial error that a share of flights stay within; NaN with fewer than three."""
         found = np.full(len(self.hours), np.nan)
         enough = self.flights >= FEWEST
         found[enough] = np.nanquantile(self.radial_nmi[:, enough], share, axis=0) if enough.any() else np.nan
@@ -135,7 +141,10 @@ class Growth:
         return np.where(count >= FEWEST, 2.0 * np.sqrt(squares), np.nan)
 
     def rate(self, error_nmi: FloatArray) -> float | None:
-        """Time-position fit of a curve of these hours, every flight of each counting; None where it has no point."""
+        """Fit a line through the origin to a curve of these hours; None where it has no point.
+
+        Every flight of each hour counts.
+        """
         known = np.isfinite(error_nmi)
         if not known.any():
             return None
@@ -143,7 +152,10 @@ class Growth:
 
 
 def growth_of(flights: Sequence[InsErrors]) -> Growth:
-    """Radial errors at every five minutes, between moments that are no more than ten minutes apart."""
+    """Return radial errors at every five minutes.
+
+    They are between moments no more than ten minutes apart.
+    """
     longest = max((float(flight.hours[-1]) for flight in flights), default=0.0)
     hours = STEP_H * np.arange(1, int(longest / STEP_H + 1e-9) + 1, dtype=np.float64)
     radial = np.full((len(flights), len(hours)), np.nan)

@@ -44,7 +44,7 @@ def _named(flights: Sequence[str], probability: Sequence[float]) -> str:
 
 
 def installation_flights(installations: Sequence[Installation]) -> FleetInstallationFlights:
-    """One row for each flight: what the flights before it had taught, its answers, its residual."""
+    """Return one row for each flight: what earlier flights taught, its answers, its residual."""
     rows = [_flight(place, one, flight) for place, one in enumerate(installations, 1) for flight in one.flights]
     names = [one.name for one in fields(FleetInstallationFlights)]
     return FleetInstallationFlights(**{name: np.array([row[name] for row in rows]) for name in names})

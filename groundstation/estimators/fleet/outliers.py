@@ -15,7 +15,7 @@ FALSE_OUTLIERS = 0.05
 
 @dataclass(frozen=True)
 class Outlier:
-    """Value number ``index`` of a group is ``z`` robust sigmas from the group's median ``typical``."""
+    """Value number ``index`` of a group, ``z`` robust sigmas from its median ``typical``."""
 
     group: str
     index: int

@@ -1,4 +1,7 @@
-"""Centre and spread that single wild flights do not move, and how far from them chance alone goes."""
+"""Robust centre and spread of flights, and the distance from them by chance alone.
+
+Single wild flights do not move them.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +29,9 @@ def sigma_of_spread(value: FloatArray) -> float:
 
 
 def sigma_of_steps(step: FloatArray) -> float:
-    """Standard deviation of a normal from the median of successive differences; a change of level hardly moves it.
+    """Return a normal's standard deviation from the median of successive differences.
+
+    A change of level hardly moves it.
 
     Examples
     --------
@@ -37,9 +42,9 @@ def sigma_of_steps(step: FloatArray) -> float:
 
 
 def limit_in_sigmas(values: int, chance: float, values_per_freedom: float) -> float:
-    """How many robust sigmas a value may be away before chance alone, two-sided, is below ``chance``.
+    """Return the robust sigmas a value may be away before chance alone is below ``chance``.
 
-    Student's quantile: a spread from few values is itself uncertain.
+    Two-sided. Student's quantile: a spread from few values is itself uncertain.
 
     Examples
     --------

@@ -15,9 +15,10 @@ from groundstation.results.forecast import METHODS
 
 @dataclass(frozen=True)
 class SkillOfFlight:
-    """Forecast skill of one method at one horizon on one flight; ``coverage95`` NaN where there is no band.
+    """Forecast skill of one method at one horizon on one flight.
 
-    ``is_within`` says whether NEES of the flight is within its 95 % limits, None where it has too few starts to judge.
+    ``coverage95`` is NaN where there is no band. ``is_within`` says whether NEES of the flight is within its 95 %
+    limits, None where it has too few starts to judge.
     """
 
     method: str
@@ -65,7 +66,10 @@ class SkillMerger:
         self.add_columns({**columns, "method": np.array([row.method], dtype=object), "is_within": np.array([within])})
 
     def add_columns(self, rows: Mapping[str, NDArray[Any]]) -> None:
-        """Add rows of flights: the fields of :class:`SkillOfFlight` as columns, ``is_within`` -1 where it is None."""
+        """Add rows of flights: the fields of :class:`SkillOfFlight` as columns.
+
+        ``is_within`` is -1 where it is None.
+        """
         for key, own in _groups(rows["method"], rows["horizon_min"]).items():
             sums = self._sums.setdefault(key, _Sums())
             starts, rms_m, coverage = (rows[name][own] for name in ("starts", "rms_m", "coverage95"))
@@ -79,7 +83,7 @@ class SkillMerger:
             sums.coverage_starts += int(starts[known].sum())
 
     def rows(self) -> tuple[FleetSkill, ...]:
-        """What was added, by method in the order of ``METHODS``, then by horizon."""
+        """Return what was added, by method in the order of ``METHODS``, then by horizon."""
         order = {name: place for place, name in enumerate(METHODS)}
         keys = sorted(self._sums, key=lambda key: (order.get(key[0], len(order)), *key))
         return tuple(_row(method, horizon_min, self._sums) for method, horizon_min in keys)
