@@ -1,4 +1,7 @@
-"""The analyses of a flight and of a session, and the plans, in the order they are shown. A new one is a line here."""
+"""Analyses of a flight and of a session, and plans, in the order they are shown.
+
+A new one is a line here.
+"""
 
 from collections.abc import Mapping
 from types import MappingProxyType

@@ -1,4 +1,4 @@
-"""One analysis as one object: what it needs, its settings and answer, how it runs, what it says in a line."""
+"""One analysis as one object: needs, settings, answer, run, and its line for the terminal."""
 
 import dataclasses
 from collections.abc import Callable, Mapping
@@ -18,7 +18,7 @@ AnswerT = TypeVar("AnswerT", bound=Answer)
 
 @dataclass(frozen=True)
 class Found(Generic[AnswerT]):
-    """What a run of an analysis gives: its answer, its findings, and workings that later analyses build on."""
+    """Result of a run: answer, findings, and workings that later analyses build on."""
 
     answer: AnswerT
     findings: tuple[Finding, ...] = ()
@@ -26,13 +26,19 @@ class Found(Generic[AnswerT]):
 
 
 class Run(Protocol[Data, KnownT, SettingsT, AnswerT]):  # type: ignore[misc]
-    """The run of an analysis. It raises NotAssessableError, with the reason, for what the data lack."""
+    """Run of an analysis.
+
+    It raises NotAssessableError, with the reason, for what the data lack.
+    """
 
     def __call__(self, data: Data, known: KnownT, settings: SettingsT, /) -> Found[AnswerT]: ...
 
 
 class RestsOn(NamedTuple):
-    """The samples an answer rests on: topics, fields and spans of flight seconds; damage in them is a finding."""
+    """Samples an answer rests on: topics, fields and spans of flight seconds.
+
+    Damage in them is a finding.
+    """
 
     topics: tuple[str, ...]
     fields: tuple[str, ...]
@@ -40,14 +46,17 @@ class RestsOn(NamedTuple):
 
 
 class Shortfall(NamedTuple):
-    """What keeps an answer from being a full one, and where: spans of flight seconds."""
+    """Reason why an answer is not a full one, and where: spans of flight seconds."""
 
     text: str
     spans_s: tuple[tuple[float, float], ...] = ()
 
 
 class Examine(Protocol[Data, KnownT, SettingsT]):  # type: ignore[misc]
-    """Tells what data lack for a full answer, without estimating; NotAssessableError where none would come."""
+    """Check of what data lack for a full answer, without estimating.
+
+    NotAssessableError where none would come.
+    """
 
     def __call__(self, data: Data, known: KnownT, settings: SettingsT, /) -> tuple[Shortfall, ...]: ...
 
@@ -70,10 +79,10 @@ def _no_samples(_data: Any, _answer: Any) -> None:
 
 @dataclass(frozen=True)
 class Rules:
-    """How the gates of an answer are judged again under other limits, without the log.
+    """Rules to judge the gates of an answer again under other limits, without the log.
 
-    ``limits`` are the settings that bound gates and choose no data; a change of any other one needs the log.
-    ``rejudge(answer, settings)`` gives each verdict before and after.
+    ``limits`` are the settings that bound gates and choose no data; a change of any other one
+    needs the log. ``rejudge(answer, settings)`` gives each verdict before and after.
     """
 
     limits: frozenset[str]
@@ -82,7 +91,7 @@ class Rules:
 
 @dataclass(frozen=True)
 class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
-    """An analysis of a flight or a session. What runs, lists or saves analyses loops over them.
+    """One analysis of a flight or a session; all that run, list or save loop over them.
 
     Parameters
     ----------
@@ -168,7 +177,9 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
 
 
 def in_order_of_need(analyses: tuple[Analysis, ...]) -> tuple[Analysis, ...]:
-    """The analyses so that each stands behind those of them it builds on, else in the order given.
+    """Order the analyses so that each stands behind those it builds on.
+
+    Otherwise the order given is kept.
 
     Raises
     ------

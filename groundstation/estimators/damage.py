@@ -1,4 +1,7 @@
-"""Results that lean on damage: the samples an answer rests on, held against the ledger's damaged spans and gaps."""
+"""Results that lean on damage: samples of an answer against damaged spans and gaps.
+
+The spans and gaps are the ledger's.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -18,9 +21,10 @@ Spans = Sequence[tuple[float, float]]
 def damage_finding(
     code: str, subject: str, use: RestsOn, ledger: Ledger, flight: Flight, gaps_of: Mapping[str, Gaps]
 ) -> Finding | None:
-    """The finding on an answer whose samples overlap damage: a warning; gaps alone are for information.
+    """Make the finding on an answer whose samples overlap damage or gaps.
 
-    ``gaps_of`` has the gaps of every topic in use. Damage without a place in time is in the ledger, in no such finding.
+    Damage is a warning; gaps alone are for information. ``gaps_of`` has the gaps of every topic in use. Damage without
+    a place in time is in the ledger, in no such finding.
     """
     damaged = [span for span in ledger.spans if _concerns(span, use)]
     gaps = _gaps(use, flight, gaps_of)
@@ -37,14 +41,14 @@ def damage_finding(
 
 
 def _concerns(span: DamagedSpan, use: RestsOn) -> bool:
-    """Whether a span is of what the answer uses, and when it does."""
+    """Tell whether a damaged span is of what the answer uses, and when it does."""
     if (span.topic and span.topic not in use.topics) or (span.field and span.field not in use.fields):
         return False
     return _overlaps(span.start_s, span.start_s + span.length_s, use.spans_s)
 
 
 def _overlaps(start_s: float, end_s: float, spans_s: Spans) -> bool:
-    """Whether a span overlaps others; what touches the end of one alone took nothing from it."""
+    """Tell whether a span overlaps others; touching the end of one alone does not count."""
     return any(start_s < high and end_s >= low for low, high in spans_s)
 
 

@@ -1,4 +1,7 @@
-"""What is known of a flight besides its tables: aircraft, airfield, the user's intervals, earlier answers."""
+"""Knowledge of a flight besides its tables.
+
+It holds aircraft, airfield, the user's intervals and earlier answers.
+"""
 
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -21,7 +24,7 @@ LEAST_ENTRY_STEP_DEG = 1e-6  # the places an answer is shown with
 
 @dataclass(frozen=True)
 class AircraftData:
-    """What is known of the aircraft.
+    """Knowledge of the aircraft.
 
     Parameters
     ----------
@@ -101,7 +104,7 @@ class Stand:
 
 @dataclass(frozen=True)
 class Ground:
-    """Height of the ground at a place on the extended centre line, above that of the threshold."""
+    """Height of the ground on the extended centre line, above that of the threshold."""
 
     before_threshold_m: float = required_number(-10_000.0, 100_000.0)
     height_m: float = required_number(-5_000.0, 5_000.0)
@@ -112,11 +115,11 @@ class Ground:
 
 @dataclass(frozen=True)
 class Runway:
-    """Runway with its true bearing (in the direction of take-off), the position of its threshold and its approach aids.
+    """Runway with true bearing, position of its threshold and approach aids.
 
-    ``localizer_width_m`` is the full width of the course sector
-    at the threshold, ``localizer_distance_m`` from the threshold to its antenna behind the far end.
-    ``ground`` is the profile under the approach, straight between its places; none: level.
+    The bearing is that in the direction of take-off. ``localizer_width_m`` is the full width of the course sector at
+    the threshold, ``localizer_distance_m`` from the threshold to its antenna behind the far end. ``ground`` is the
+    profile under the approach, straight between its places; none: level.
     """
 
     name: str
@@ -149,7 +152,10 @@ class Runway:
 
 @dataclass(frozen=True)
 class Beacon:
-    """A non-directional beacon: where it stands against the threshold of a runway, the only one where none is named."""
+    """A non-directional beacon by its place from the threshold of a runway.
+
+    Where no runway is named it is the only one.
+    """
 
     name: str
     before_threshold_m: float = required_number(-20_000.0, 100_000.0)
@@ -162,7 +168,7 @@ class Beacon:
 
 @dataclass(frozen=True)
 class SiteData:
-    """What is known of the airfield. ``stand`` names the stand the aircraft was parked on.
+    """Knowledge of the airfield; ``stand`` names the stand the aircraft was parked on.
 
     ``station`` is the field's four letters in METAR lines: the wind is then that of no other.
     """
@@ -196,7 +202,7 @@ class SiteData:
 
 @dataclass(frozen=True)
 class Known:
-    """What an analysis may use besides the tables of a flight.
+    """Inputs of an analysis besides the tables of a flight.
 
     Parameters
     ----------
@@ -253,5 +259,5 @@ class Known:
         return None if make is None else make(self)
 
     def workings_of(self, kind: type[S]) -> S | None:
-        """What an earlier analysis computed on the way, None where there is none."""
+        """Return what an earlier analysis computed on the way, None where there is none."""
         return next((found for found in self.workings.values() if isinstance(found, kind)), None)

@@ -1,4 +1,7 @@
-"""Arrays of the overview and data-quality figures: the flight thinned, its phases and states, GNSS, the ledger."""
+"""Arrays of the overview and data-quality figures: thinned flight, states, GNSS, ledger.
+
+The states include the flight phases.
+"""
 
 from collections.abc import Iterable, Mapping
 
@@ -39,7 +42,10 @@ def first_of_kind(flight: Flight, kind: str, *fields: str) -> str | None:
 
 
 def runs_of(states: NDArray[np.str_], time_s: NDArray[np.float64], end_s: float) -> GnssLanes:
-    """Run-length form of a state per sample: ``start_s``, ``end_s``, ``state``; each run lasts until the next one."""
+    """Return the run-length form of a state per sample: ``start_s``, ``end_s``, ``state``.
+
+    Each run lasts until the next one.
+    """
     change = np.flatnonzero(np.r_[True, states[1:] != states[:-1]]) if len(states) else np.array([], dtype=int)
     starts = time_s[change]
     ends = np.r_[starts[1:], end_s] if len(starts) else starts
@@ -47,7 +53,10 @@ def runs_of(states: NDArray[np.str_], time_s: NDArray[np.float64], end_s: float)
 
 
 def gnss_lanes(flight: Flight, geometry_limit: float) -> GnssLanes | None:
-    """State of GNSS over the flight: good, geometry above the limit, integrity lost, no geometry factor, no GNSS."""
+    """Return the state of GNSS over the flight.
+
+    Good, geometry above the limit, integrity lost, no geometry factor, no GNSS.
+    """
     topic = first_of_kind(flight, "gnss", "velocity_north_mps") or first_of_kind(flight, "gnss", "latitude_deg")
     if topic is None:
         return None
@@ -78,10 +87,10 @@ def gnss_lanes(flight: Flight, geometry_limit: float) -> GnssLanes | None:
 
 
 def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_topic: str | None) -> Overview | None:
-    """Thinned flight for the map and profiles, on the times of GNSS, else of INS, else of the barometer; NaN at gaps.
+    """Thin the flight for the map and profiles, on the times of GNSS; NaN at gaps.
 
-    Position, altitude, ground speed, climb, heading and track are always there; the columns of :data:`ALSO` where they
-    are known.
+    The times are of INS or of the barometer where there is no GNSS. Position, altitude, ground speed, climb, heading
+    and track are always there; the columns of :data:`ALSO` where they are known.
     """
     gnss = first_of_kind(flight, "gnss", "latitude_deg", "longitude_deg")
     base = gnss or first_of_kind(flight, "ins", "latitude_deg", "longitude_deg") or ins_topic
@@ -112,7 +121,10 @@ def overview(flight: Flight, true_heading_deg: NDArray[np.float64] | None, ins_t
 
 
 def _rows_with_motion(table: Table) -> NDArray[np.intp]:
-    """Rows to draw: with a position, else with a velocity, else all. A row may have the fields of one source alone."""
+    """Return the rows to draw: with a position, else with a velocity, else all.
+
+    A row may have the fields of one source alone.
+    """
     for names in (("latitude_deg", "longitude_deg"), ("velocity_north_mps", "velocity_east_mps")):
         if table.has(*names):
             return np.flatnonzero(table.columns[names[0]].mask & table.columns[names[1]].mask)
@@ -120,7 +132,7 @@ def _rows_with_motion(table: Table) -> NDArray[np.intp]:
 
 
 def _at(table: Table, values: NDArray[np.float64], rows: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Values of rows; where not one of these rows has any, they come from another source: the nearest in time."""
+    """Return the values of rows; if none has any, the nearest in time of another source."""
     own = values[rows]
     return own if np.isfinite(own).any() else _nearest(table.time_ns, values, table.time_ns[rows])
 
@@ -184,10 +196,11 @@ def phase_figure(phases: Phases) -> PhaseSpans:
 
 
 def state_lanes(flight: Flight) -> StateLanes | None:
-    """What the log says of flight mode, arming and ground contact: spans, ``lane``, ``start_s``, ``end_s``, ``state``.
+    """Return what the log says of flight mode, arming and ground contact, as spans.
 
-    Mode and arming are read off the events (``mode LOITER``, ``armed``, ``disarmed``), each holds until the next one.
-    The lane of ground contact is named after its source, a landed flag or weight on wheels.
+    Columns ``lane``, ``start_s``, ``end_s``, ``state``. Mode and arming are read off the events (``mode LOITER``,
+    ``armed``, ``disarmed``), each holds until the next one. The lane of ground contact is named after its source, a
+    landed flag or weight on wheels.
     """
     events = [flight[topic] for topic in topics_of_kind("event", flight.topics()) if flight[topic].has("name")]
     time_ns = np.concatenate([np.zeros(0, dtype=np.int64), *(table.time_ns for table in events)])

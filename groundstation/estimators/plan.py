@@ -13,7 +13,7 @@ ScenarioT = TypeVar("ScenarioT")
 
 @dataclass(frozen=True)
 class Planned:
-    """What a plan gives.
+    """Result of a plan.
 
     Parameters
     ----------
