@@ -70,11 +70,11 @@ def _nothing(_answers: Answers) -> str:
 
 
 def _any_settings(_settings: Any, _known: Any) -> None:
-    """Settings whose values are in range are fit to run with."""
+    """Accept any settings: values in range are fit to run with."""
 
 
 def _no_samples(_data: Any, _answer: Any) -> None:
-    """No damage is held against the answer."""
+    """Return no samples: no damage counts against the answer."""
 
 
 @dataclass(frozen=True)

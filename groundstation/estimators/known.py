@@ -170,7 +170,7 @@ class Beacon:
 class SiteData:
     """Knowledge of the airfield; ``stand`` names the stand the aircraft was parked on.
 
-    ``station`` is the field's four letters in METAR lines: the wind is then that of no other.
+    ``station`` is the field's four letters in METAR lines: the wind is then taken from its lines alone.
     """
 
     stands: tuple[Stand, ...] = ()

@@ -1,4 +1,4 @@
-"""One plan as one object: its scenario, how it is made, what it says in a line."""
+"""Plan as one object: its scenario, how it is made, its line for the terminal."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ class Planned:
 
 @dataclass(frozen=True)
 class Plan(Generic[ScenarioT]):
-    """A kind of plan. What runs, lists or saves plans loops over them.
+    """Kind of plan; all that run, list or save plans loop over these objects.
 
     Parameters
     ----------

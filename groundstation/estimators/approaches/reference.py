@@ -72,7 +72,8 @@ def sensitivity_of(
 ) -> Sensitivity:
     """Regress positions across the course on the localizer's deviation, with a steady drift.
 
-    Only where the needle is not at its stop; told where the aircraft moved enough across the course.
+    Samples with the needle at its stop are left out. There is a result where the aircraft moved enough across the
+    course.
     """
     shown_m = dots * metres_per_dot(distance_m, runway)
     useful = np.isfinite(shown_m) & np.isfinite(across_m) & (np.abs(dots) < SATURATED_DOTS)

@@ -97,7 +97,7 @@ class AccuracyModel:
         self._transition = Transition.sparse(self.size, rows, columns, values, noisy_rows, noisy_columns, noise)
 
     def first_of(self, aircraft: int) -> int:
-        """Place of the first state of an aircraft; -1 for an exact one and for a ground point."""
+        """Index of the first state of an aircraft; -1 for an exact one and for a ground point."""
         return STATES * self.estimated.index(aircraft) if aircraft in self.estimated else -1
 
     def _models(self) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -52,7 +52,7 @@ class Law:
 
 
 class Session:
-    """A session with its motion and its accuracy: what the criteria ask."""
+    """Session with the motion and accuracy that the criteria ask for."""
 
     def __init__(self, plan: SessionPlan) -> None:
         self.plan, self.motion, self.model = plan, Motion(plan), AccuracyModel(plan)

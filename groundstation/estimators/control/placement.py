@@ -49,7 +49,7 @@ def plan_placement(plan: SessionPlan) -> tuple[PlacementPlan, tuple[Finding, ...
 
 
 def _asked(plan: SessionPlan) -> list[tuple[Criterion, Over]]:
-    """The designs that every plan holds against each other, and the one asked for."""
+    """Return the designs that every plan compares, and the one asked for."""
     usual: list[tuple[Criterion, Over]] = [("determinant", "fixed"), ("covariance", "fixed")]
     usual += [("determinant", "way"), ("covariance", "way")]
     if len(plan.points) > 1:

@@ -102,7 +102,7 @@ class Site:
 
 
 class PlaceLoss:
-    """The smooth largest loss over epochs and, where one point may be lost, over whichever is.
+    """Smooth maximum of the loss over epochs and, where a point may be lost, over that point.
 
     Parameters
     ----------
@@ -188,9 +188,9 @@ class PlaceLoss:
 
 
 def place(wanted: PlaceLoss, starts: Sequence[FloatArray]) -> tuple[Minimum, list[float]]:
-    """Places of the least loss, and where each start ended.
+    """Return the places of the least loss, and where each start ended.
 
-    Of several terms the largest counts: a smooth one is made less, and less smooth in each of a few descents.
+    Of several terms the largest counts: a smooth maximum of them is minimised, less smooth in each of a few descents.
     """
     site, asked = wanted.site, wanted.site.plan.placement
     found: list[Minimum] = []

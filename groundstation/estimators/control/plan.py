@@ -1,4 +1,4 @@
-"""The plan of a session: every law of control side by side, and what to say of them."""
+"""Plan of a session: every law of control side by side, with findings."""
 
 from dataclasses import asdict, dataclass
 
@@ -81,7 +81,7 @@ def _flown(session: Session, name: str, law: Law) -> Flown:
 
 
 def _require_distance(session: Session) -> None:
-    """Refuse ways on which without control anybody meets a source."""
+    """Refuse a session in which an aircraft without control meets a source."""
     plan, links = session.plan, session.model.links(session.motion.paths(session.motion.uncontrolled).position_m)
     epoch, link = (int(place) for place in np.unravel_index(np.argmin(links.range_m), links.range_m.shape))
     if links.range_m[epoch, link] < NEAREST_M:

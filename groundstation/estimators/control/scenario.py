@@ -267,7 +267,7 @@ class Control:
 
 
 def check_criterion(axes: tuple[Axis, ...], weights: tuple[float, ...]) -> None:
-    """Refuse no axes, an axis that stands twice, and weights that are all zero."""
+    """Refuse a criterion without axes, with an axis twice, or with all weights zero."""
     if not axes or len(set(axes)) < len(axes):
         raise SettingsError("axes", "none, or one given twice", 'some of "north", "east", "up", "clock"')
     if sum(weights) <= 0.0:

@@ -88,12 +88,12 @@ class Aircraft:
         return float(self.epochs[-1, TIME])
 
     def at(self, state: str) -> int:
-        """Place of a state, -1 without."""
+        """Index of a state, -1 without it."""
         return self.states.index(state) if state in self.states else -1
 
     @property
     def clock(self) -> int:
-        """Place of the clock offset of the link."""
+        """Index of the clock offset of the link."""
         return self.at("clock_m")
 
     @property
@@ -106,17 +106,17 @@ class Aircraft:
 
     @property
     def bias(self) -> int:
-        """Place of the range bias."""
+        """Index of the range bias."""
         return self.at("range_bias_m")
 
     @property
     def height(self) -> int:
-        """Place of the error of height."""
+        """Index of the error of height."""
         return self.at("height_m")
 
     @property
     def heading(self) -> int:
-        """No state: it takes no bearings."""
+        """Index of the heading: none, for it takes no bearings."""
         return -1
 
     @property
@@ -125,7 +125,7 @@ class Aircraft:
         return {self.clock: LEAP_M**2, self.receiver_clock: LEAP_M**2}
 
     def start(self) -> tuple[FloatArray, FloatArray]:
-        """No error known, with the sigmas of the belief."""
+        """Return the start: zero errors with the assumed sigmas."""
         return np.zeros(self.size), np.diag(np.square(self.start_sigma))
 
     def step(self, x: FloatArray, from_s: float, to_s: float) -> Step:
@@ -150,7 +150,7 @@ class Aircraft:
         return View(place_m, derivative, float("nan"), np.zeros(self.size))
 
     def range_error(self, x: FloatArray, distance_m: float, *, is_peer: bool) -> tuple[float, FloatArray, float]:
-        """Bias of the receiver."""
+        """Return the error of a range: the bias of the receiver."""
         h = np.zeros(self.size)
         if self.bias < 0:
             return 0.0, h, 0.0
@@ -167,7 +167,7 @@ class Aircraft:
 
 
 def fleet_of(vehicles: Sequence[Aircraft]) -> Fleet:
-    """Aircraft as the compiled loops want them; shorter states are filled up."""
+    """Return aircraft as the compiled loops want them; shorter states are filled up."""
     most = max(vehicle.size for vehicle in vehicles)
 
     def places(*names: str) -> np.ndarray:

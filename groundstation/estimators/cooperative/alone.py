@@ -110,7 +110,7 @@ def _keep(fleet: Fleet, own: Own, who: int, log: Log) -> None:
 
 @in_place
 def _move(fleet: Fleet, own: Own, who: int, to_s: float, room: Room) -> None:
-    """A vehicle's filter at another time."""
+    """Move a vehicle's filter to another time."""
     if abs(to_s - own.time_s[who]) < SAME_TIME_S:
         return
     n, w = fleet.size[who], room.step[0]
@@ -152,7 +152,7 @@ def _copy(
 
 @in_place
 def _remember(fleet: Fleet, own: Own, past: Past, slot: int) -> None:
-    """A new slot begins: keep what all filters are now, over the oldest of those kept."""
+    """Keep the state of all filters at the begin of a slot, over the oldest of those kept."""
     at = past.begun[0] % len(past.slot)
     past.slot[at] = slot
     past.begun[0] += 1
@@ -278,7 +278,7 @@ def _tell(
 
 @in_place
 def _is_used(events: Events, event: int, method: Method, log: Log) -> bool:
-    """Ranked filters hear those of a higher rank alone."""
+    """Tell whether a measurement is used: ranked filters hear only vehicles of higher rank."""
     if events.kind[event] != PEER or (method.algorithm != RANKED and method.algorithm != MODIFIED):
         return True
     if method.ranks[events.source[event]] < method.ranks[events.receiver[event]]:
@@ -306,7 +306,7 @@ def _use(
     rows: Rows,
     log: Log,
 ) -> None:
-    """One receiver's measurements of a group, those from ``start`` on, in one update."""
+    """Use one receiver's measurements of a group, from ``start`` on, in one update."""
     who, count, is_moved = events.receiver[start], 0, False
     for event in range(start, last):
         if events.receiver[event] != who or not _is_used(events, event, method, log):

@@ -74,7 +74,7 @@ class Batch(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Room of the loop."""
+    """Work arrays of the loop."""
 
     phi: FloatArray  # (n, n)
     noise: FloatArray

@@ -87,7 +87,7 @@ def _mix(
 
 @in_place
 def _correct_map(n: int, count: int, gain: FloatArray, mixed: FloatArray, map_rows: FloatArray) -> None:
-    """Rows of the map after an update; gain (count, n)."""
+    """Correct the rows of the error map after an update; gain (count, n)."""
     for row in range(count):
         for i in range(n):
             if gain[row, i] != 0.0:
@@ -161,7 +161,7 @@ def update(
 
 @in_place
 def _told_shared(row: int, c: int, heard: Heard, batch: Batch) -> float:
-    """Covariance of what a row's source told with the error c of the points."""
+    """Return the covariance of what a row's source told with the error c of the points."""
     total = 0.0
     if batch.heard[row] != NOBODY:
         for a in range(4):
@@ -255,7 +255,7 @@ def _correct_shared(
     batch: Batch,
     brought: FloatArray,
 ) -> None:
-    """Covariance with the errors of the points after an update."""
+    """Correct the covariance with the errors of the points after an update."""
     for c in range(shared.shape[1]):
         for row in range(count):  # all of them before the first correction
             brought[row] = batch.by_shared[row, c] * method.point_variance[c] + _told_shared(row, c, heard, batch)

@@ -33,7 +33,7 @@ class Numbers(NamedTuple):
 class Fleet(NamedTuple):
     """k aircraft, at most n states each; the tables of their epochs stand one below the other.
 
-    Places of states: clock offset of the link and of the satellite receiver, range bias, height, lever arm (forward,
+    Indices of states: clock offset of the link and of the satellite receiver, range bias, height, lever arm (forward,
     then right); -1 where an aircraft has no such state.
     """
 
@@ -107,7 +107,7 @@ class Rules(NamedTuple):
 class Rows(NamedTuple):
     """One event linearised, a range or a height; row 0 holds it.
 
-    innovation = receiver + place + clock + noise. ``line`` is room.
+    innovation = receiver + place + clock + noise. ``line`` is a work array.
     """
 
     innovation: FloatArray  # (1,)
@@ -119,7 +119,7 @@ class Rows(NamedTuple):
 
 
 def rows_for(n: int) -> Rows:
-    """Room for the row of an event."""
+    """Make empty rows for one event."""
     return Rows(np.zeros(1), np.zeros((1, n)), np.zeros((1, 3)), np.zeros(1), np.zeros(1), np.zeros((3, 3)))
 
 

@@ -30,7 +30,7 @@ SINGULAR = 1e-12
 
 @dataclass(frozen=True)
 class Geometry:
-    """Geometry of one vehicle, a row a frame in which it hears anything.
+    """Geometry of one vehicle, one row for each frame in which it hears anything.
 
     Parameters
     ----------

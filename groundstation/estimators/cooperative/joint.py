@@ -39,7 +39,7 @@ class Joint(NamedTuple):
     Changed in place.
     """
 
-    first: Int64Array  # (k + 1,) places of the vehicles in x
+    first: Int64Array  # (k + 1,) indices of the vehicles in x
     x: FloatArray  # (N,)
     P: FloatArray  # (N, N)
     time_s: FloatArray  # (k,) of each vehicle's states
@@ -48,7 +48,7 @@ class Joint(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Room of the loop: N states in all, n of a vehicle at most."""
+    """Work arrays of the loop: N states in all, n of a vehicle at most."""
 
     x: FloatArray  # (2, n) receiver and source at the time of an event
     phi: FloatArray  # (2, n, n)
@@ -361,7 +361,7 @@ def _judge(
 
 @inlined
 def _correct(joint: Joint, room: Room, lines: Lines, at: int, innovation: float) -> None:
-    """One scalar measurement with the optimal gain, in the symmetric form of the Kalman core."""
+    """Use one scalar measurement with the optimal gain, in the core's symmetric form."""
     size = len(joint.x)
     update_covariance(
         room.states,

@@ -283,7 +283,7 @@ def positions(
 ) -> None:
     """Fill the positions (m, 3) at some times from the states there (m, n).
 
-    ``derivative`` (3, n) is room.
+    ``derivative`` (3, n) is a work array.
     """
     for row in range(len(time_s)):
         place(fleet, who, time_s[row], out[row], derivative)

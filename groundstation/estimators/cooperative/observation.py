@@ -27,9 +27,9 @@ def observe(
     is_about: bool,
     rows: Rows,
 ) -> int:
-    """Linearise one event about the receiver's state and the source; return its rows' number.
+    """Linearise one event about the receiver's state and what is known of the source.
 
-    One; none where the source is on top of the receiver.
+    Returns the number of its rows: one, none where the source is on top of the receiver.
 
     Parameters
     ----------

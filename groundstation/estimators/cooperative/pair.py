@@ -43,7 +43,7 @@ class Members(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Room of the loop."""
+    """Work arrays of the loop."""
 
     phi: FloatArray  # (n, n)
     noise: FloatArray
@@ -60,7 +60,7 @@ class Room(NamedTuple):
 
 
 def room_for(n: int, width: int) -> Room:
-    """Room for vehicles of n states and an error map of so many columns."""
+    """Make work arrays for vehicles of n states and an error map of so many columns."""
     return Room(
         np.zeros((n, n)),
         np.zeros((n, n)),
@@ -123,7 +123,7 @@ def _advance(fleet: Fleet, members: Members, who: int, to_s: float, room: Room) 
 
 @in_place
 def _scale_factors(n: int, who: int, but: int, by: FloatArray, members: Members, room: Room) -> None:
-    """Factors of a vehicle towards all others but one, times a matrix."""
+    """Multiply the factors of a vehicle towards all others but one by a matrix."""
     for other in range(len(members.time_s)):
         if other != but and members.has_factor[who, other]:
             turn_rows(n, by, members.factor[who, other], room.wide)
@@ -141,7 +141,7 @@ def _use(
     rows: Rows,
     log: Log,
 ) -> None:
-    """One measurement."""
+    """Use one measurement."""
     who, source, at_s = events.receiver[event], events.source[event], events.time_s[event]
     is_peer = events.kind[event] == PEER
     _advance(fleet, members, who, at_s, room)
@@ -206,7 +206,7 @@ def _private(
     rows: Rows,
     log: Log,
 ) -> None:
-    """A range to a point or satellite: nobody is told."""
+    """Use a range to a point or satellite; no other vehicle is told."""
     who, source, variance = events.receiver[event], events.source[event], rows.variance[0]
     n, P, h, shared, gain = fleet.size[who], members.P[who], rows.receiver[0], room.shared, room.gain
     if events.kind[event] == POINT:
@@ -247,7 +247,7 @@ def _relative(
     rows: Rows,
     log: Log,
 ) -> None:
-    """A range between two: both are updated as one filter."""
+    """Use a range between two vehicles: both are updated as one filter."""
     one, two = events.receiver[event], events.source[event]
     n, m = fleet.size[one], fleet.size[two]
     both, h, shared = room.both, room.h, room.shared
@@ -279,7 +279,7 @@ def _relative(
 
 @in_place
 def _join(fleet: Fleet, one: int, two: int, members: Members, both: FloatArray) -> None:
-    """Covariance of two vehicles together."""
+    """Fill the joint covariance of two vehicles."""
     n, m = fleet.size[one], fleet.size[two]
     for i in range(n):
         for j in range(n):

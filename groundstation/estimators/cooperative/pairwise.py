@@ -54,7 +54,7 @@ def run_pairwise(prepared: Prepared, settings: CooperativeSettings) -> Algorithm
 
 
 def _messages(prepared: Prepared) -> dict[str, tuple[int, int]]:
-    """Two messages a range between two: the source's state, and the receiver's answer."""
+    """Count the messages: with each range the source sends its state, the receiver answers."""
     events, vehicles = prepared.events, prepared.vehicles
     is_peer = events.kind == PEER
     pairs, counts = np.unique(np.stack([events.receiver[is_peer], events.source[is_peer]]), axis=1, return_counts=True)

@@ -34,7 +34,7 @@ class Track:
     state : ndarray, shape (n, m)
     covariance : ndarray, shape (n, m, m)
     height : int
-        Place of the height in the state; -1 where there is none.
+        Index of the height in the state; -1 where there is none.
     """
 
     name: str
@@ -127,7 +127,7 @@ class AlgorithmRun:
 
 
 def log_for(prepared: Prepared, items: Items) -> Log:
-    """Room for what a run writes down."""
+    """Make an empty log for a run."""
     k, n = prepared.fleet.density.shape
     outputs, rows = int((items.vehicle >= 0).sum()), len(prepared.events.time_s)
     return Log(
@@ -151,7 +151,10 @@ def finished(
     messages: dict[str, tuple[int, int]],
     radius: tuple[list[float], list[float]] = ([], []),
 ) -> AlgorithmRun:
-    """Everything as one frozen answer; ``radius``: times, and spectral radii of the error map."""
+    """Return everything as one frozen answer.
+
+    ``radius``: times, and spectral radii of the error map.
+    """
     rows = int(log.counts[JUDGED])
     mark = log.mark[:rows]
     counts = {

@@ -37,7 +37,7 @@ class View:
 
 
 class Vehicle(Protocol):
-    """One vehicle as the filters see it; places of states are -1 where there is no such state."""
+    """One vehicle as the filters see it; the index of a state it does not have is -1."""
 
     @property
     def name(self) -> str:
@@ -49,23 +49,23 @@ class Vehicle(Protocol):
 
     @property
     def clock(self) -> int:
-        """Place of the clock offset of the link."""
+        """Index of the clock offset of the link."""
 
     @property
     def receiver_clock(self) -> int:
-        """Place of the clock offset of the satellite receiver."""
+        """Index of the clock offset of the satellite receiver."""
 
     @property
     def bias(self) -> int:
-        """Place of the range bias."""
+        """Index of the range bias."""
 
     @property
     def heading(self) -> int:
-        """Place of the heading (rad)."""
+        """Index of the heading (rad)."""
 
     @property
     def height(self) -> int:
-        """Place of the error of height."""
+        """Index of the error of height."""
 
     @property
     def doubts(self) -> Mapping[int, float]:

@@ -29,7 +29,7 @@ def _squares(track: Odometry) -> tuple[float, float]:
 
 
 class WheeledVehicle:
-    """North, east, heading, and the errors of odometry and camera that are believed."""
+    """Wheeled vehicle: north, east, heading, and the assumed errors of odometry and camera."""
 
     clock: int = -1
     receiver_clock: int = -1

@@ -48,7 +48,7 @@ def accuracy_ratio(flight: FlightError, limit: Limit) -> float | None:
 
 
 def judge(flights: Sequence[FlightError], limit: Limit, standard: Standard, ins: str = ENSEMBLE) -> Judgement:
-    """One limit against the flights that it is for: of all INS, or of one.
+    """Judge one limit by the flights that it is for: of all INS, or of one.
 
     Flights of one INS are taken as independent given the INS; a claim on all of a type counts them by their
     correlation. The exact binomial limit of the share from effective numbers decides (Korn and Graubard, 1998).

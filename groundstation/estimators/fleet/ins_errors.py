@@ -120,11 +120,11 @@ class Growth:
 
     @property
     def flights(self) -> FloatArray:
-        """Flights that there are at each of the hours."""
+        """Number of flights that last to each of the hours."""
         return np.asarray(np.isfinite(self.radial_nmi).sum(axis=0), dtype=np.float64)
 
     def of(self, rows: NDArray[np.intp]) -> "Growth":
-        """The same of some flights."""
+        """Return the errors of some of the flights."""
         return Growth(self.hours, self.radial_nmi[rows])
 
     def within(self, share: float) -> FloatArray:

@@ -1,6 +1,6 @@
-"""Channels with a common covariance, filtered together over the outages.
+"""Channels with a common covariance, filtered together.
 
-Outages at whose end GNSS is beyond the gate are widened.
+The sigma is widened through outages at whose end GNSS is beyond the gate.
 """
 
 from dataclasses import dataclass
@@ -81,9 +81,9 @@ class ChannelGroup:
     start: kalman.Start
 
     def run_over_seams(self, steps: Steps) -> Part:
-        """Run the filter, and widen outages after which GNSS is beyond the gate but consistent.
+        """Run the filter, and widen outages after which GNSS is beyond the gate yet consistent.
 
-        Such an outage is widened where GNSS comes back and agrees with itself. Each seam is judged by what was known at
+        Each seam is judged by what was known at
         it; the run is made again before the next one is looked for.
         """
         part = self._part(steps, ())

@@ -178,7 +178,7 @@ def drag_per_s(latitude_deg: FloatArray, altitude_m: FloatArray, velocity_mps: F
 
 
 def only_used(epochs: Epochs, settings: InertialSettings) -> Epochs:
-    """The epochs with what the settings keep from the filter left out."""
+    """Return the epochs without what the settings keep from the filter."""
     position = epochs.position_m if settings.use_position else np.full_like(epochs.position_m, np.nan)
     velocity = epochs.velocity_mps if settings.use_velocity else np.full_like(epochs.velocity_mps, np.nan)
     return replace(epochs, position_m=position, velocity_mps=velocity)

@@ -263,7 +263,7 @@ def run_filter(
 
 
 def _shared(values: NDArray[Any], count: int) -> NDArray[Any]:
-    """A figure that channels share, 2 n numbers, as one of each, shape (n, 2, c); read-only."""
+    """Repeat a figure that channels share, 2 n numbers, for each: shape (n, 2, c), read-only."""
     return np.broadcast_to(values.reshape(-1, 2, 1), (values.size // 2, 2, count))
 
 

@@ -127,7 +127,9 @@ class Path:
 def past_mean(
     values: FloatArray, start_s: FloatArray, lead_s: float, at_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return means over the outages over at some times, and their independent number.
+    """Average over the outages that had ended by some times.
+
+    Also returns how many independent outages they are.
 
     Parameters
     ----------

@@ -150,7 +150,7 @@ def over_known_ground(found: Deviations, rise_m: FloatArray, most_m: float) -> D
     """Drop the glide path deviations over ground that rises or falls by more than ``most_m``.
 
     Those whose rise is unknown, beyond the ends of the profile, go too, where an altitude tells the rise of the rest.
-    Nor those whose rise is unknown, beyond the ends of the profile, where an altitude tells it for the rest.
+
     """
     is_kept = (np.abs(rise_m) <= most_m) | ~np.isfinite(rise_m).any()
     return replace(found, glide_path_m=np.where(is_kept, found.glide_path_m, np.nan))

@@ -174,8 +174,7 @@ class _Run:
     def to(self, until: int, reference_m: FloatArray, reference_p: FloatArray, *, is_curved: bool = True) -> None:
         """Filter from the start to an epoch (not included).
 
-        Only the places beyond the end of the last pass are kept; earlier ones stay. Results that earlier passes kept
-        beyond it stay.
+        Only the places beyond the end of the last pass are kept; earlier ones stay.
         """
         from groundstation.estimators.landing_ranges.loop import filter_approach
 

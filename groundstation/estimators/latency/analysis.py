@@ -40,7 +40,7 @@ def _findings(found: Latencies) -> tuple[Finding, ...]:
 
 
 def _is_expected(_flight: "Flight", _known: Known) -> bool:
-    """Nobody looks for a latency first."""
+    """Tell whether a finding says why there is no latency: never, nobody looks for it first."""
     return False
 
 

@@ -102,7 +102,7 @@ def compare(flight: Flight, pair: tuple[str, str, Quantity], settings: LatencySe
 
 
 def _columns(unit: Table, sensor: Table, quantity: Quantity) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Fields that are compared, of the reference and of the other."""
+    """Return the fields that are compared, of the reference and of the other sensor."""
     if quantity == "velocity":
         return VELOCITY, VELOCITY
     if quantity == "altitude":
@@ -211,7 +211,7 @@ def _attitude(flight: Flight, unit: Table, sensor: Table, settings: LatencySetti
 
 
 def _compared_part(unit: Table) -> Table:
-    """Rows of an INS that it trusts itself; of its columns what is compared."""
+    """Return the rows that an INS trusts itself, with the columns that are compared."""
     names = (*VELOCITY, "velocity_down_mps", *ALTITUDES, *ATTITUDE, *HEADINGS)
     unit = unit.trusted()
     return replace(unit, columns={name: unit.columns[name] for name in names if name in unit})

@@ -36,7 +36,7 @@ NAME = "truth.source_name"  # of the flight's metadata: the file that was laid b
 
 
 def judged(flight: "Flight", known: Known, settings: ReferenceSettings) -> Found[ReferenceResult]:
-    """Hold what the log recorded, and the answers, against the topic ``truth``.
+    """Compare what the log recorded, and the answers, with the topic ``truth``.
 
     Raises
     ------

@@ -80,7 +80,7 @@ def axes_of(errors: Errors, settings: ReferenceSettings) -> Iterator[Axis]:
 
 
 def _about_its_mean(angle_deg: FloatArray) -> FloatArray:
-    """Angles near each other, cut opposite to where they are."""
+    """Return the angles without a jump at 0 or 180 deg, within 180 deg of their mean."""
     known = angle_deg[np.isfinite(angle_deg)]
     middle = float(np.rad2deg(np.angle(np.mean(np.exp(1j * np.deg2rad(known))))))
     return middle + np.where(np.isfinite(angle_deg), wrap_180(np.nan_to_num(angle_deg) - middle), np.nan)

@@ -32,7 +32,7 @@ class Standing:
 def standing_of(
     listed: Sequence[Errors], rows: Sequence[ErrorRow], gross_s: float, settings: ReferenceSettings
 ) -> Standing:
-    """Find what takes from a reference the right to judge."""
+    """Decide whether a reference may judge, and why not."""
     subjects = [errors.subject for errors in listed]
     first = [next((one for one in subjects if kind_of(one) == kind), "") for kind in ("gnss", "ins")]
     for errors in listed:

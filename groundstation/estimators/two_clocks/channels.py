@@ -116,7 +116,7 @@ class _Channels:
     attitude_deg: FloatArray | None
 
     def side(self, names: tuple[str, ...]) -> Side:
-        """Rows that have all of them."""
+        """Return the rows that have all of the named signals."""
         values = np.column_stack([self.values[name] for name in names])
         known = np.isfinite(values).all(axis=1)
         if self.attitude_deg is None:

@@ -21,7 +21,6 @@ class Place:
     """Lag between two logs: ``lag_s`` added to seconds of the other gives those of the first.
 
     ``correlation`` is that of the two motions at this lag, ``rival`` the next best fit as a share of the best.
-    ``correlation``: of the two motions there; ``rival``: share of the best fit that the next best place has.
     """
 
     lag_s: float

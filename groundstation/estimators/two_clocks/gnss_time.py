@@ -1,4 +1,4 @@
-"""The clock of a log by GNSS time: what the log itself tells of it."""
+"""Clock of a log against GNSS time, as far as the log itself tells it."""
 
 from dataclasses import dataclass
 
@@ -33,7 +33,7 @@ class GnssStretch:
         return self.offset_s - self.drift * (time_ns - self.middle_ns) / NS_PER_S
 
     def sigma_at(self, time_ns: int) -> float:
-        """One sigma of it."""
+        """Return one sigma of :meth:`offset_at`, seconds."""
         return float(np.hypot(self.sigma_s, self.drift_sigma * (time_ns - self.middle_ns) / NS_PER_S))
 
 

@@ -63,13 +63,13 @@ class Stretch:
         return np.asarray(self.lag_s - self.drift * (np.asarray(other_s) - self.middle_s))
 
     def sigma_at(self, other_s: FloatArray | float) -> FloatArray:
-        """One sigma of it."""
+        """Return one sigma of :meth:`lag_at`, seconds."""
         return np.asarray(np.hypot(self.lag_sigma_s, self.drift_sigma * (np.asarray(other_s) - self.middle_s)))
 
 
 @dataclass(frozen=True)
 class LogRelation:
-    """The clock of the other log by that of the first.
+    """Relation of the clock of the other log to that of the first.
 
     Parameters
     ----------

@@ -121,7 +121,7 @@ class _Joint:
         return moved, phi
 
     def update(self, h: FloatArray, innovation: float, variance: float) -> None:
-        """One scalar measurement with the optimal gain, in the symmetric form of the Kalman core."""
+        """Use one scalar measurement with the optimal gain, in the core's symmetric form."""
         columns = np.flatnonzero(h)
         update_covariance(
             self._states, columns, h[columns], 0, len(columns), variance, self._held, self.P, self._g, self._gain
@@ -129,7 +129,7 @@ class _Joint:
         self.x += self._gain * innovation
 
     def update_together(self, H: FloatArray, innovation: FloatArray, variance: FloatArray) -> None:
-        """Several measurements in one step."""
+        """Use several measurements in one step."""
         shared = self.P @ H.T
         S = H @ shared + np.diag(variance)
         gain = np.linalg.solve(S, shared.T).T

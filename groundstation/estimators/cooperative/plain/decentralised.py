@@ -141,7 +141,7 @@ class Decentralised:
         self._heard.clear()
 
     def _moved(self, who: int, own: Own, to_s: float) -> Own:
-        """A vehicle's filter at another time."""
+        """Return a vehicle's filter at another time."""
         if abs(to_s - own.time_s) < 1e-12:
             return own
         x, phi, noise = self._prepared.vehicles[who].step(own.x, own.time_s, to_s)

@@ -109,7 +109,7 @@ class Pairwise:
         return passes
 
     def _private(self, event: Event, row: Row) -> bool:
-        """A range to a point or satellite: nobody is told."""
+        """Use a range to a point or satellite; no other vehicle is told."""
         one, variance = self._members[event.receiver], row.variance
         if event.kind == POINT:
             sigma = self._prepared.session.points[event.source].position_sigma_m
@@ -127,7 +127,7 @@ class Pairwise:
         return True
 
     def _relative(self, event: Event, row: Row) -> bool:
-        """A range between two: both are updated as one filter."""
+        """Use a range between two vehicles: both are updated as one filter."""
         i, j = event.receiver, event.source
         one, other = self._members[i], self._members[j]
         vehicle = self._prepared.vehicles[j]
@@ -157,7 +157,10 @@ class Pairwise:
 
 
 def _over(after: FloatArray, before: FloatArray) -> FloatArray:
-    """after @ inverse(before), scaled by the sigmas: states differ by eight powers of ten."""
+    """Return after @ inverse(before), scaled by the sigmas.
+
+    States differ by eight powers of ten.
+    """
     sigma = np.sqrt(np.diag(before))
     normal = before / np.outer(sigma, sigma)
     return np.asarray(np.linalg.solve(normal, (after / sigma).T).T / sigma)

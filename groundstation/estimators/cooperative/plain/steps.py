@@ -82,7 +82,7 @@ class Recorder:
         self.messages[name] = (messages + 1, total + size)
 
     def finish(self, algorithm: str, update: str) -> AlgorithmRun:
-        """Everything as one frozen answer."""
+        """Return everything as one frozen answer."""
         tracks = []
         for vehicle, rows in zip(self.vehicles, self._rows, strict=True):
             n, m = len(rows), vehicle.size
