@@ -190,7 +190,7 @@ class PlaceLoss:
 def place(wanted: PlaceLoss, starts: Sequence[FloatArray]) -> tuple[Minimum, list[float]]:
     """Return the places of the least loss, and where each start ended.
 
-    Of several terms the largest counts: a smooth maximum of them is minimised, less smooth in each of a few descents.
+    The largest of several terms counts: a smooth maximum of them is minimised, less smooth in each of a few descents.
     """
     site, asked = wanted.site, wanted.site.plan.placement
     found: list[Minimum] = []

@@ -93,7 +93,7 @@ def _rests_on(flight: "Flight", result: InertialResult) -> RestsOn:
 def _is_forecast_expected(_flight: "Flight", known: Known) -> bool:
     """Tell whether a forecast is expected.
 
-    Of an INS that GNSS corrects, or may correct, a finding says already that a forecast means nothing.
+    For an INS that GNSS corrects, or may correct, a finding says already that a forecast means nothing.
     """
     inertial = known.answer(InertialResult)
     return inertial is None or inertial.kind == "unaided"

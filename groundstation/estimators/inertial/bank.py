@@ -125,7 +125,7 @@ class NoiseBank:
 def run_bank(run: FilterRun, settings: InertialSettings) -> NoiseBank:
     """Filter a flight with every set of its class's bank.
 
-    What the flight's own filter rejected is used by none.
+    None of them uses what the flight's own filter rejected.
     """
     coarse, runs = Coarse.of(run), []
     for noise in run.noise.bank.sets(run.noise):

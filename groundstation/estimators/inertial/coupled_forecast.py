@@ -64,7 +64,8 @@ def hindcast_coupled(run: CoupledRun, at: Int64Array, lead_s: FloatArray, settin
 def coupled_variance(run: CoupledRun, at: Int64Array, lead_s: FloatArray) -> FloatArray:
     """Variance of what :func:`hindcast_coupled` forecasts by the model, m^2, shape (s, l, 2).
 
-    That of the states at the start (last epoch whose covariance was kept), position known, and of the noise since.
+    It is the variance of the states at the start (last epoch whose covariance was kept), position known, plus that of
+    the noise since.
     """
     out = np.zeros((len(at), len(lead_s), 2))
     if not len(lead_s):

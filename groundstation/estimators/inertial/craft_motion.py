@@ -40,7 +40,7 @@ class CraftMotion:
     def between(cls, differences: Differences, time_s: FloatArray, *, is_strapdown: bool = True) -> "CraftMotion":
         """The motion between neighbouring times, m of them, from the INS alone; m - 1 intervals.
 
-        Held where the INS is silent, at rest on the equator where it never spoke.
+        It is held where the INS has no samples; without any it is at rest on the equator.
         """
         n = len(time_s)
         latitude, altitude, north, east = (

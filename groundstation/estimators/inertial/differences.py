@@ -84,8 +84,8 @@ class Differences:
     def unwrapped_heading_rad(self) -> FloatArray:
         """Heading at every epoch without wrap, shape (n,).
 
-        Of the INS, of its track where that is unknown. Held where the INS tells neither and the aircraft is slower than
-        :data:`TRACK_MPS`; zero if it never moved.
+        It is the heading of the INS, or its track where the heading is unknown. It is held where the INS gives neither
+        and the aircraft is slower than :data:`TRACK_MPS`; zero if it never moved.
         """
         north, east = self.velocity_mps.T
         track = np.where(np.hypot(north, east) > TRACK_MPS, np.arctan2(east, north), np.nan)

@@ -34,8 +34,8 @@ def kind_of(compared: Differences, settings: InertialSettings, stated: tuple[str
     """Say whether GNSS corrects the INS, and why it is thought so.
 
     It is stated, its own mode says so, or it never drifts: 95 % of the minute means of the position difference lie
-    nearer to their median than ``aided_radial_m``, and than an INS of 0.01 nmi/h would drift in the time. Of an INS at
-    rest, and of a few minutes, nothing can be said.
+    nearer to their median than ``aided_radial_m``, and than an INS of 0.01 nmi/h would drift in the time. An INS at
+    rest, or a few minutes, cannot tell.
     """
     if stated[0]:
         return stated

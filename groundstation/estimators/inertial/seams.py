@@ -6,7 +6,8 @@ widened: by the factor that explains the innovations, no more, and from the last
 
 Fixes of a receiver that is wrong or misled agree among themselves too. Without an outage they are never used in this
 way. After one, position and velocity together must be off as the model errs: within :data:`REACH` gates each, and by no
-more than a factor of :data:`FACTOR_MAX` together. What is further off waits for :data:`PATIENCE_S` and is told.
+more than a factor of :data:`FACTOR_MAX` together. Fixes further off wait for :data:`PATIENCE_S`, and a finding reports
+them.
 """
 
 from dataclasses import dataclass

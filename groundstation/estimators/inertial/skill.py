@@ -51,7 +51,7 @@ class Claimed:
 def claimed_sigma(method: str, run: FilterRun, replay: Hindcast, settings: InertialSettings) -> Claimed | None:
     """Sigma of a method's forecast, None for a method that has none.
 
-    That of ``replay`` itself where it holds one: of the bank, and of the last estimate of the coupled model.
+    Where ``replay`` itself holds one, that is taken: for the bank, and for the last estimate of the coupled model.
 
     The scale of a start comes from the class (so many flights' worth) and from those replayed outages that were over
     before the start: nothing later is used.

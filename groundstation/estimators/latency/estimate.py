@@ -53,8 +53,8 @@ def estimate_latencies(
     GNSS velocity is compared with INS velocity, pressure altitude with INS vertical speed added up, the magnetic field
     with a constant one turned by the attitude, a second INS with the first. See :func:`fit_delay` for the method.
     A sensor that filters its output shows its filter's delay too. An INS that GNSS corrects follows GNSS slowly; motion
-    of seconds is its gyros' and accelerometers' own. What its filter may hide of the latency of GNSS widens the
-    interval by ``aided_sigma_s``.
+    of seconds is its gyros' and accelerometers' own. The interval is widened by ``aided_sigma_s``, because the filter
+    may hide part of the latency of GNSS.
     """
     settings = settings or LatencySettings()
     pairs = pairs_of(flight)

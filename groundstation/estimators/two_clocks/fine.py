@@ -129,7 +129,7 @@ def _slow(interval_s: float) -> float:
 def _is_reference(first: Side, other: Side) -> bool:
     """Tell whether the first side is to be the reference.
 
-    An INS goes before GNSS, whose noise would draw the fit to its samples. Else the faster one.
+    An INS goes before GNSS, whose noise would draw the fit to its samples. Between two of a kind it is the faster one.
     """
     first_is_ins, other_is_ins = _is_quiet(first), _is_quiet(other)
     return first_is_ins > other_is_ins or (first_is_ins == other_is_ins and first.interval_s <= other.interval_s)
