@@ -1,1 +1,4 @@
-"""System 1: INS heading error from straight taxi before take-off (Markelov, Kostishin, Shukalov, 2015)."""
+"""INS heading error from straight taxi before take-off: system 1.
+
+Source: Markelov, Kostishin, Shukalov, 2015.
+"""

@@ -1,4 +1,7 @@
-"""System 1 as an analysis: the heading correction, with the user's intervals and the proof of ground contact."""
+"""System 1 as an analysis: the heading correction.
+
+It uses the user's intervals and the proof of ground contact.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -66,7 +69,10 @@ def _steps(result: HeadingResult) -> tuple[Finding, ...]:
 
 
 def _findings_of_what_was_set(flight: "Flight", heading: HeadingResult, known: Known) -> tuple[Finding, ...]:
-    """Findings on the user's references and intervals: what contradicts the log, or touches none of its samples."""
+    """Return findings on the user's references and intervals.
+
+    They tell what contradicts the log, or touches none of its samples.
+    """
     from groundstation.estimators.heading.references import reference_findings
     from groundstation.methods.taxi.gating import intervals_without_epoch
 
