@@ -1,1 +1,4 @@
-"""In-flight magnetic deviation (system 3): found from turns of opposite bank, compensated, judged."""
+"""Magnetic deviation in flight: found from turns of opposite bank, compensated, judged.
+
+This is system 3.
+"""
