@@ -254,7 +254,10 @@ class Known:
         return next((found for found in self.settings.values() if isinstance(found, kind)), None) or kind()
 
     def role(self, kind: type[S]) -> S | None:
-        """What an analysis offers under that type (:mod:`groundstation.methods.roles`), None where none does."""
+        """Return what an analysis offers under a type, None where none does.
+
+        The types stand in :mod:`groundstation.methods.roles`.
+        """
         make = self.roles.get(kind)
         return None if make is None else make(self)
 

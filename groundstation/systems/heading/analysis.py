@@ -1,4 +1,7 @@
-"""System 1 as an analysis: the heading correction, with the user's intervals and the proof of ground contact."""
+"""System 1 as an analysis: the heading correction.
+
+It uses the user's intervals and the proof of ground contact.
+"""
 
 from typing import TYPE_CHECKING
 

@@ -31,7 +31,7 @@ LARGEST_SINE = 0.5  # sideways speed of the antenna over its speed: beyond, the 
 
 @dataclass(frozen=True)
 class ArmKnowledge:
-    """What is known of arm and time offset before the straight samples are looked at.
+    """Knowledge of lever arm and time offset before the straight samples are used.
 
     Parameters
     ----------
@@ -81,7 +81,10 @@ def know_arm(samples: Samples, aircraft: AircraftData, settings: HeadingSettings
 
 
 def _turning(samples: Samples, settings: HeadingSettings) -> NDArray[np.bool_]:
-    """Moving epochs outside the straight samples whose antenna moves sideways no faster than the method holds."""
+    """Find moving epochs outside the straight samples that turn slowly enough.
+
+    Their antenna moves sideways no faster than the method holds.
+    """
     speed = np.maximum(samples.speed_mps, 1e-3)
     with np.errstate(invalid="ignore"):
         sine = np.abs(np.deg2rad(samples.arm_rate_dps)) * settings.arm_prior_m / speed
@@ -131,9 +134,9 @@ def _from_turns(
 
 
 def straight_regressors(samples: Samples, knowledge: ArmKnowledge) -> tuple[Regressor, ...]:
-    """Regressors of the straight samples: what arm and time offset may still do inside the gates.
+    """Return regressors of the straight samples for the rest of arm and time offset.
 
-    ``samples`` are the used ones, with ``applied_arm_m`` taken out.
+    They tell what both may still do inside the gates. ``samples`` are the used ones, with ``applied_arm_m`` taken out.
     """
     rate = np.nan_to_num(samples.arm_rate_dps)
     per_metre = -rate / samples.speed_mps

@@ -40,9 +40,10 @@ class VarianceRatio:
 def about_running_line(
     time_s: FloatArray, heading_deg: FloatArray, segment: NDArray[np.int64], line_s: float
 ) -> FloatArray:
-    """INS heading less a straight line fitted over ``line_s`` centred at each sample, degrees, shape (n,).
+    """Return the INS heading less a straight line fitted around each sample, degrees, (n,).
 
-    Windows stay inside the segment. NaN where a window has fewer than four samples.
+    The line is fitted over ``line_s`` centred at the sample. Windows stay inside the segment. NaN where a window has
+    fewer than four samples.
     """
     residual = np.full(len(time_s), np.nan)
     for number in np.unique(segment[segment > 0]):
@@ -55,7 +56,10 @@ def about_running_line(
 
 
 def _variance_log_sigma(values: FloatArray) -> float:
-    """Standard deviation of the logarithm of the sample variance, from the effective number of squares."""
+    """Return the standard deviation of the logarithm of the sample variance.
+
+    It comes from the effective number of squares.
+    """
     squares = (values - np.mean(values)) ** 2
     mean = float(np.mean(squares))
     if mean <= 0.0:
@@ -66,7 +70,9 @@ def _variance_log_sigma(values: FloatArray) -> float:
 def variance_ratio(
     used: Samples, difference_deg: FloatArray, standstill: Standstill | None, line_s: float
 ) -> VarianceRatio | None:
-    """Compare the variance of the differences with that of the track plus that of the heading about its line.
+    """Compare the variance of the differences with that of track plus heading.
+
+    The heading's is that about its running line.
 
     Parameters
     ----------
@@ -112,7 +118,10 @@ def variance_ratio(
 
 @dataclass(frozen=True)
 class Disagreement:
-    """Chi-square per degree of freedom of the errors of parts, its limit, and in words which part is farthest off."""
+    """Chi-square per degree of freedom of the errors of parts, its limit, and the worst part.
+
+    ``told`` says in words which part is farthest off.
+    """
 
     chi2: float
     limit: float
@@ -120,7 +129,7 @@ class Disagreement:
 
 
 def disagreement(parts: tuple[TaxiSegment, ...], probability: float, wind_deg: FloatArray) -> Disagreement | None:
-    """What the parts of a taxi say against each other; None for fewer than two.
+    """Test whether the parts of a taxi agree with each other; None for fewer than two.
 
     The limit is what chance exceeds with the probability given, were the sigmas of the parts all there is beside
     ``wind_deg``, shape (parts, terms): what the sideslip of the wind, one sigma of it, makes of each part. A taxi there
@@ -140,9 +149,10 @@ def disagreement(parts: tuple[TaxiSegment, ...], probability: float, wind_deg: F
 
 
 def held_seconds(samples: Samples) -> float | None:
-    """Seconds in which the INS turns and the receiver's track does not; None where the taxi has no turn.
+    """Return the time the INS turns while the receiver's track does not.
 
-    A receiver that holds its velocity goes on straight: what follows the turn is off by all of it.
+    None where the taxi has no turn. A receiver that holds its velocity goes on straight: what follows the turn is off
+    by all of it.
     """
     moving = np.flatnonzero((samples.speed_mps > TURNING_MPS) & np.isfinite(samples.heading_deg))
     if len(moving) < LEAST_SAMPLES or samples.interval_s <= 0.0:

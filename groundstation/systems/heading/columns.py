@@ -1,4 +1,4 @@
-"""What the heading correction gives to the tables of flights."""
+"""Columns that the heading correction gives to the tables of flights."""
 
 from collections.abc import Callable
 
@@ -15,7 +15,7 @@ def _standstill(value: Callable[[Standstill], float | None]) -> Callable[[Headin
 
 
 def _of_the_samples(_heading: HeadingResult) -> None:
-    """The fleet fills it from the samples, which the answer does not hold."""
+    """Return None: the fleet fills it from the samples, which the answer does not hold."""
 
 
 COLUMNS: tuple[AnswerColumn[HeadingResult], ...] = (

@@ -1,4 +1,4 @@
-"""What a flight lacks for a heading correction, told by the gates that need no estimate."""
+"""Shortfalls of a flight for a heading correction, by the gates that need no estimate."""
 
 from itertools import groupby
 
@@ -25,7 +25,9 @@ Spans = tuple[tuple[float, float], ...]
 
 
 def examine_heading(flight: Flight, known: Known, settings: HeadingSettings) -> tuple[Shortfall, ...]:
-    """Judge the straight taxi of a flight by the gates of the data alone; precision and steadiness are not looked at.
+    """Judge the straight taxi of a flight by the gates of the data alone.
+
+    Precision and steadiness are not looked at.
 
     Raises
     ------

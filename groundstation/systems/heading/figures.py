@@ -1,4 +1,7 @@
-"""Arrays behind the figures of the heading tab and the report; names and columns are fixed, times flight seconds."""
+"""Arrays behind the figures of the heading tab and the report.
+
+Names and columns are fixed, times are flight seconds.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +44,10 @@ def _pauses(time_s: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
 
 
 def samples_figure(samples: Samples, error_deg: float, weight: FloatArray) -> HeadingSamples:
-    """Every epoch from first motion to lift-off, used or not and why. ``weight`` has mean 1 over the used samples."""
+    """Return every epoch from first motion to lift-off, used or not and why.
+
+    ``weight`` has mean 1 over the used samples.
+    """
     part = _moving_part(samples)
     difference = samples.difference_deg
     # Below walking pace the direction of a velocity is noise.
@@ -77,7 +83,10 @@ def lanes_figure(samples: Samples) -> HeadingLanes:
 def running_figure(
     time_s: FloatArray, running: Running, growth_samples: NDArray[np.int64], growth_half_width_deg: FloatArray
 ) -> HeadingRunning:
-    """The paper's running figures, and the honest half width held between the steps it was computed at."""
+    """Return the paper's running figures and the half width of the honest interval.
+
+    The half width is held between the steps it was computed at.
+    """
     count = np.arange(1, len(time_s) + 1)
     held = np.searchsorted(growth_samples, count, side="right") - 1
     half_width = np.where(held >= 0, growth_half_width_deg[np.maximum(held, 0)], np.nan)
@@ -104,7 +113,10 @@ def _bin_edges(difference_deg: FloatArray) -> FloatArray:
 
 
 def distribution_figures(time_s: FloatArray, difference_deg: FloatArray, steps: int) -> tuple[FigureData, ...]:
-    """Final histogram, fitted normal, and the histogram as it grows (density over the same bins)."""
+    """Return the final histogram, the fitted normal, and the histogram as it grows.
+
+    The growing one is a density over the same bins.
+    """
     edges = _bin_edges(difference_deg)
     width = float(edges[1] - edges[0])
     count = len(difference_deg)
@@ -132,7 +144,10 @@ def distribution_figures(time_s: FloatArray, difference_deg: FloatArray, steps: 
 
 
 def standstill_figures(samples: Samples, standstill: StandstillData) -> tuple[FigureData, ...]:
-    """Velocity at standstill, and the density of the speed of the mean over 10 s and 30 s of it."""
+    """Return the velocity at standstill, and the density of the speed of its mean.
+
+    The mean is over 10 s and 30 s.
+    """
     still = standstill.is_still
     if not still.any():
         return ()
@@ -146,7 +161,10 @@ def standstill_figures(samples: Samples, standstill: StandstillData) -> tuple[Fi
 
 
 def _mean_speed_density(samples: Samples, standstill: StandstillData, window_s: float) -> StandstillMeanSpeed:
-    """Histogram of the length of the mean velocity over windows that overlap by three quarters."""
+    """Return the histogram of the length of the mean velocity over windows.
+
+    Windows overlap by three quarters.
+    """
     lengths: list[float] = []
     for first, end in standstill.stretches:
         time_s = samples.time_s[first:end]
@@ -168,10 +186,10 @@ def _mean_speed_density(samples: Samples, standstill: StandstillData, window_s: 
 def spectrum_figure(
     time_s: FloatArray, residual_deg: FloatArray, speed_mps: FloatArray, parameters: FloatArray
 ) -> HeadingSpectrum | None:
-    """Spectral density of the residuals beside that of the fitted noise model, one-sided, deg^2/Hz.
+    """Return the spectral density of the residuals and of the fitted noise model.
 
-    The periodogram is that of unevenly kept samples, smoothed over neighbouring frequencies; the model is given at the
-    root-mean-square inverse speed.
+    Both are one-sided, deg^2/Hz. The periodogram is that of unevenly kept samples, smoothed over neighbouring
+    frequencies; the model is given at the root-mean-square inverse speed.
     """
     count = len(time_s)
     span = float(time_s[-1] - time_s[0]) if count > 1 else 0.0
@@ -190,7 +208,10 @@ def spectrum_figure(
 
 
 def model_density(frequency_hz: FloatArray, parameters: FloatArray, inverse_speed: float, step_s: float) -> FloatArray:
-    """One-sided spectral density of the noise model, deg^2/Hz, at parameters as in ``noise.PARAMETER_NAMES``."""
+    """Return the one-sided spectral density of the noise model, deg^2/Hz.
+
+    Parameters are as in ``noise.PARAMETER_NAMES``.
+    """
     white, correlated, tau, sway, natural, damping, heading_white, motion, _segment, wander, wander_s = np.exp(
         parameters
     )

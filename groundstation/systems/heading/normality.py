@@ -1,4 +1,4 @@
-"""How normal the differences are: sizes of the deviation, gated, and p-values, shown."""
+"""Normality of the differences: sizes of the deviation, gated, and p-values, shown."""
 
 import math
 from dataclasses import dataclass
@@ -17,9 +17,10 @@ LEAST_SPREAD_DEG = 1e-6  # below it there is nothing to fit a normal to
 
 @dataclass(frozen=True)
 class Normality:
-    """Sizes of the deviation from a normal distribution, and p-values that take the samples as independent.
+    """Sizes of the deviation from a normal distribution, with p-values.
 
-    The p-values are shown and not gated: with hundreds of samples they reject good runs.
+    The p-values take the samples as independent. The p-values are shown and not gated: with hundreds of samples they
+    reject good runs.
     """
 
     skewness: float
@@ -31,9 +32,10 @@ class Normality:
 
 
 def normality(difference_deg: FloatArray) -> Normality | None:
-    """Skewness, excess kurtosis and largest distance between the sample and fitted normal distribution functions.
+    """Return skewness, excess kurtosis and largest distance to the fitted normal distribution.
 
-    None for fewer than 20 samples or differences without spread.
+    The distance is that between the distribution functions of sample and fit. None for fewer than 20 samples or
+    differences without spread.
 
     Source: moments as in Pearson; distance as in Lilliefors, On the Kolmogorov-Smirnov test for normality with mean and
     variance unknown, 1967. Its p-value is that of a known normal (too large, and said so), by the approximation of
@@ -60,7 +62,9 @@ def normality(difference_deg: FloatArray) -> Normality | None:
 
 
 def skewness_z(skewness: float, count: int) -> float:
-    """Skewness of a sample as a standard normal value, were the samples normal and independent.
+    """Return the skewness of a sample as a standard normal value.
+
+    That holds if the samples are normal and independent.
 
     Source: D'Agostino, Biometrika 57 (1970), 679-681.
     """

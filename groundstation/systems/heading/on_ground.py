@@ -1,4 +1,7 @@
-"""The heading estimator as others use it: on a part of the ground before lift-off, between other speeds."""
+"""Heading estimator as others use it: on a part of the ground before lift-off.
+
+The limits of speed may differ from those of taxi.
+"""
 
 from dataclasses import dataclass, field, replace
 
@@ -14,9 +17,10 @@ from groundstation.tables.table import Flight
 
 @dataclass(frozen=True)
 class Estimator:
-    """What the estimate needs besides the flight: settings, aircraft, the user's intervals, latencies, airfield, METAR.
+    """Inputs of the estimate besides the flight.
 
-    It meets :class:`groundstation.methods.roles.FindHeadingError`.
+    They are settings, aircraft, the user's intervals, latencies, airfield and METAR. It meets
+    :class:`groundstation.methods.roles.FindHeadingError`.
     """
 
     settings: HeadingSettings = field(default_factory=HeadingSettings)
@@ -45,7 +49,10 @@ class Estimator:
 
 
 def offered(known: Known) -> HeadingOnGround:
-    """The role as the heading analysis offers it; intervals that have no place on the flight are left out."""
+    """Return the role as the heading analysis offers it.
+
+    Intervals that have no place on the flight are left out.
+    """
     return HeadingOnGround(
         Estimator(
             settings=known.settings_of(HeadingSettings),

@@ -31,10 +31,11 @@ from groundstation.tables.table import Flight
 
 @dataclass(frozen=True)
 class _Error:
-    """The error with the sigma of what all samples share (declination, sideslip in every direction), wrapped.
+    """Heading error, wrapped, with the sigma of what all samples share.
 
-    ``whole_deg`` and ``measured_deg`` are the intervals with and without steady sideslip; ``platform_deg`` is the
-    former less the mounting, with its sigma. ``common_sigma_deg``: what declination and installation add to it.
+    That is the declination, and the sideslip in every direction. ``whole_deg`` and ``measured_deg`` are the intervals
+    with and without steady sideslip; ``platform_deg`` is the former less the mounting, with its sigma.
+    ``common_sigma_deg``: what declination and installation add to it.
     """
 
     error_deg: float
@@ -228,7 +229,7 @@ def _with_references(
 
 
 def _stepped_deg(solution: Solution, standstill: StandstillData) -> float:
-    """What the steps after the standstill added to the error."""
+    """Return what the steps after the standstill added to the error."""
     if not standstill.in_interval.any():
         return 0.0
     parked_s = float(solution.samples.time_s[standstill.in_interval][-1])

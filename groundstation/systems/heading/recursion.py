@@ -1,4 +1,4 @@
-"""The paper's running figures: mean, variance, precision e and quality, after every sample."""
+"""Running figures of the paper after every sample: mean, variance, precision e, quality."""
 
 from dataclasses import dataclass
 
@@ -32,7 +32,10 @@ class Running:
 
 
 def _running_moments(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Running mean and standard deviation (divisor i) of values, shape (n,), about a shift that keeps them exact."""
+    """Return running mean and standard deviation (divisor i) of values, shape (n,).
+
+    They are about a shift that keeps them exact.
+    """
     count = np.arange(1, len(values) + 1)
     shift = float(np.median(values)) if len(values) else 0.0
     centred = values - shift
@@ -44,10 +47,11 @@ def _running_moments(values: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def run_recursion(difference_deg: FloatArray) -> Running:
-    """Run the paper's recursion over differences d = INS heading - track, shape (n,), wrapped about their centre.
+    """Run the paper's recursion over differences d = INS heading - track, shape (n,).
 
-    m_i = m_(i-1) - (m_(i-1) - d_i) / i;  s2_i = (1/i) sum (d - m_i)^2, in the one-pass form of Welford (1962);
-    e_i = 1.96 sqrt(s2_i / (i - 1)); quality: the same standard deviation of the running mean about its own mean.
+    The differences are wrapped about their centre. m_i = m_(i-1) - (m_(i-1) - d_i) / i; s2_i = (1/i) sum (d - m_i)^2,
+    in the one-pass form of Welford (1962); e_i = 1.96 sqrt(s2_i / (i - 1)); quality: the same standard deviation of the
+    running mean about its own mean.
 
     Source: Markelov, Kostishin, Shukalov, 2015 (the variance recursion is only partly legible in print).
 

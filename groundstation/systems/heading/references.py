@@ -1,4 +1,4 @@
-"""What the estimate is compared with: parking heading, runway bearing, the aircraft's own figures."""
+"""References of the estimate: parking heading, runway bearing, the aircraft's own figures."""
 
 import math
 from collections.abc import Mapping
@@ -44,7 +44,10 @@ class Reference:
 
 @dataclass(frozen=True)
 class Parking:
-    """Heading at the last standstill, as shown and corrected, and its reference; None where not known."""
+    """Heading at the last standstill, as shown and corrected, and its reference.
+
+    None where not known.
+    """
 
     ins_heading_deg: float | None = None
     heading_deg: float | None = None
@@ -54,10 +57,10 @@ class Parking:
 
 
 def drift_prior(ins_class: str, logged_class: str) -> float:
-    """Sigma of the azimuth drift of an INS, deg/h: three times the gyro drift of its class, at least 0.1.
+    """Return the sigma of the azimuth drift of an INS, deg/h.
 
-    The class is that of the aircraft file, else the log's where it is a shipped one; an INS of no known class may be a
-    tactical one.
+    It is three times the gyro drift of its class, at least 0.1. The class is that of the aircraft file, else the log's
+    where it is a shipped one; an INS of no known class may be a tactical one.
 
     Examples
     --------
@@ -69,7 +72,10 @@ def drift_prior(ins_class: str, logged_class: str) -> float:
 
 
 def standstill_drift(time_s: FloatArray, heading_deg: FloatArray) -> tuple[float, float] | None:
-    """Slope of the INS heading while the aircraft stands, deg/h, and its sigma; None where the INS holds it."""
+    """Return the slope of the INS heading while the aircraft stands, deg/h, and its sigma.
+
+    None where the INS holds its heading.
+    """
     known = np.isfinite(heading_deg)
     time_s, heading = time_s[known], unwrap(heading_deg[known])
     span_s = float(np.ptp(time_s)) if len(time_s) > LEAST_STANDING else 0.0
@@ -135,7 +141,9 @@ def parking_reference(flight_metadata: Mapping[str, str], site: SiteData) -> Ref
 
 
 def reference_conflict(flight_metadata: Mapping[str, str], site: SiteData) -> str | None:
-    """One line where site file and log disagree by more than three of their combined sigma (at least 0.05 deg).
+    """Return one line where site file and log disagree.
+
+    They do by more than three of their combined sigma (at least 0.05 deg).
 
     Examples
     --------
@@ -156,7 +164,10 @@ def reference_conflict(flight_metadata: Mapping[str, str], site: SiteData) -> st
 
 
 def reference_findings(result: HeadingResult, flight_metadata: Mapping[str, str], site: SiteData) -> tuple[str, ...]:
-    """Lines to warn with: references that disagree, and a reference too far from the estimate to be the right one."""
+    """Return warnings on references that disagree or are too far from the estimate.
+
+    The latter are unlikely to be the right ones.
+    """
     conflict = reference_conflict(flight_metadata, site)
     lines = [conflict] if conflict else []
     used, residual = parking_reference(flight_metadata, site), result.reference_residual_arcmin
@@ -209,11 +220,11 @@ def parking_heading(
 def runway_checks(
     samples: Samples, site: SiteData, error_deg: float, sigma_deg: float, settings: HeadingSettings
 ) -> tuple[RunwayCheck, ...]:
-    """INS heading on the take-off run against the true bearing of the runway: a second, independent reference.
+    """Compare the INS heading on the take-off run with the true bearing of the runway.
 
-    The run is the part of the ground samples faster than taxi with the heading steady. The runway is the one whose
-    bearing is nearest the corrected heading, within 10 deg. Crosswind and the pilot's feet enter its sigma only as
-    far as they show in the heading.
+    It is a second, independent reference. The run is the part of the ground samples faster than taxi with the heading
+    steady. The runway is the one whose bearing is nearest the corrected heading, within 10 deg. Crosswind and the
+    pilot's feet enter its sigma only as far as they show in the heading.
     """
     with np.errstate(invalid="ignore"):
         run = (samples.speed_mps > settings.taxi_speed_max_mps) & (

@@ -23,7 +23,9 @@ LIMITS = frozenset(  # settings that bound a gate and choose no data: a change o
 
 @dataclass(frozen=True)
 class HeadingSettings:
-    """Thresholds and gates of the heading estimator; the defaults are the paper's where it gives a figure.
+    """Thresholds and gates of the heading estimator.
+
+    The defaults are the paper's where it gives a figure.
 
     Source: Markelov, Kostishin, Shukalov, Heading correction of an INS before take-off by satellite navigation, 2015.
     """
@@ -125,7 +127,10 @@ class HeadingSettings:
 
 @dataclass(frozen=True)
 class HeadingRequest:
-    """Choices for one flight: topics and intervals (empty: the first suitable pair, all of the taxi)."""
+    """Choices for one flight: topics and intervals.
+
+    Empty ones are the first suitable pair, and all of the taxi.
+    """
 
     ins_topic: str = ""
     gnss_topic: str = ""

@@ -1,4 +1,7 @@
-"""The estimate itself: from gated samples to the error, its posterior, drift, segments and directions."""
+"""Estimate of the heading error: posterior, drift, segments and directions.
+
+It starts from gated samples.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -118,10 +121,11 @@ def _differences(
 
 
 def _before(used: Samples, steps: tuple[HeadingStep, ...]) -> tuple[Regressor, ...]:
-    """What the differences before each step have less than those after it: the error is that after the last.
+    """Return regressors of the steps in the heading, 1 before each step.
 
-    Of more than ``MOST_STEPS`` the largest have a coefficient each, the others one that scales all of them, with the
-    variance that they would have one by one where each counts as much as it is large.
+    The error is that after the last step; differences before a step are smaller by its size. Of more than
+    ``MOST_STEPS`` the largest have a coefficient each, the others one that scales all of them, with the variance that
+    they would have one by one where each counts as much as it is large.
     """
     by_size = sorted(steps, key=lambda step: -abs(step.size_deg))
     before = [(used.time_s < step.time_s).astype(np.float64) for step in by_size]
@@ -205,9 +209,10 @@ def _part(differences: Differences, index: slice | BoolArray) -> Differences:
 def _velocities(
     antenna: Samples, standstill: StandstillData, taxi_start_s: float, settings: HeadingSettings
 ) -> StandstillVelocities:
-    """Standstill velocities for the noise model: at most ``spectrum_max_s`` of them, those before taxi at the end.
+    """Return the standstill velocities for the noise model.
 
-    Stretches during or after taxi stand first, not linked to it.
+    At most ``spectrum_max_s`` of them are taken, those before taxi at the end. Stretches during or after taxi stand
+    first, not linked to it.
     """
     if not standstill.is_informative:
         return StandstillVelocities(np.zeros(0), np.zeros(0), np.zeros(0))
@@ -269,7 +274,10 @@ def _parts(
 
 
 def _wind_found(differences: Differences, posterior: ErrorPosterior) -> FloatArray:
-    """What the terms told apart are found to make of each difference, degrees; zero where one direction hides them."""
+    """Return the part of each difference by the terms told apart, degrees.
+
+    Zero where one direction hides them.
+    """
     known = 1 + len(without_apart(differences).regressors)
     terms = differences.apart
     found = [posterior.coefficient(place)[0] for place in range(known, posterior.coefficients.shape[1])]
@@ -279,7 +287,10 @@ def _wind_found(differences: Differences, posterior: ErrorPosterior) -> FloatArr
 
 
 def _wind_of(parts: tuple[TaxiSegment, ...], differences: Differences) -> FloatArray:
-    """One sigma of each term told apart, averaged over each part, degrees, shape (parts, terms)."""
+    """Return one sigma of each term told apart, averaged over each part, (parts, terms).
+
+    Degrees.
+    """
     terms, time_s = differences.apart, differences.time_s
     inside = [(time_s >= part.start_s) & (time_s <= part.end_s) for part in parts]
     means = [[one.prior_sigma * float(np.mean(one.values[mask])) for one in terms] for mask in inside]
@@ -289,7 +300,10 @@ def _wind_of(parts: tuple[TaxiSegment, ...], differences: Differences) -> FloatA
 def _directions(
     differences: Differences, used: Samples, segments: tuple[TaxiSegment, ...], draws: FloatArray
 ) -> tuple[TaxiSegment, ...]:
-    """Estimates out and back (a back-taxi tells what turns with the aircraft from what does not); empty if one way."""
+    """Estimate the error out and back; empty if the taxi went one way.
+
+    A back-taxi tells what turns with the aircraft from what does not.
+    """
     away = np.abs(wrap_180(used.track_deg - segments[0].mean_track_deg))
     groups = [away <= 45.0, away >= 135.0]
     if not all(int(group.sum()) >= LEAST_IN_DIRECTION for group in groups):

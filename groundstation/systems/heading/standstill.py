@@ -109,7 +109,7 @@ def _last_long(
 
 
 def _is_heading_still(heading_deg: FloatArray, settings: HeadingSettings) -> bool:
-    """Whether a heading is known and ranges over no more than that of an aircraft that stands."""
+    """Tell whether a heading is known and as steady as that of an aircraft that stands."""
     known = heading_deg[np.isfinite(heading_deg)]
     return bool(len(known)) and float(np.ptp(unwrap(known))) <= settings.standstill_still_deg
 
@@ -134,7 +134,10 @@ def _stretches(samples: Samples, still: BoolArray, settings: HeadingSettings) ->
 
 
 def _is_informative(samples: Samples, still: BoolArray) -> bool:
-    """A receiver that holds its velocity repeats itself; one with coarse steps has few distinct values."""
+    """Tell whether the velocity says anything at standstill.
+
+    A receiver that holds its velocity repeats itself; one with coarse steps has few distinct values.
+    """
     if still.sum() < 5:
         return False
     north, east = samples.north_mps[still], samples.east_mps[still]
@@ -143,9 +146,10 @@ def _is_informative(samples: Samples, still: BoolArray) -> bool:
 
 
 def speed_bound_mps(length_mps: float, sigma_mps: float) -> float:
-    """The 0.97 bound of the length of the true mean velocity: a Rice distribution about the measured length.
+    """Return the 0.97 bound of the length of the true mean velocity.
 
-    Both components of the mean have the standard error ``sigma_mps``.
+    A Rice distribution about the measured length is taken. Both components of the mean have the standard error
+    ``sigma_mps``.
     """
     if sigma_mps <= 0.0:
         return length_mps
@@ -153,7 +157,10 @@ def speed_bound_mps(length_mps: float, sigma_mps: float) -> float:
 
 
 def assess_standstill(samples: Samples, part: slice, settings: HeadingSettings) -> Standstill:
-    """Mean and spread of the velocity over one interval, with both readings of the paper's mean speed."""
+    """Return mean and spread of the velocity over one interval.
+
+    Both readings of the paper's mean speed are given.
+    """
     north, east = samples.north_mps[part], samples.east_mps[part]
     time_s, speed = samples.time_s[part], np.hypot(samples.north_mps[part], samples.east_mps[part])
     length = float(np.hypot(np.mean(north), np.mean(east)))

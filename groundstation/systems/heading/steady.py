@@ -1,4 +1,4 @@
-"""Steady sideslip and mounting: what one direction of taxi cannot show, and what is known of it beforehand.
+"""Steady sideslip and mounting, which one direction of taxi cannot show, and their priors.
 
 Sideslip of an aircraft on its wheels comes from the side force of the wind across its path. Wind from the left pushes
 the aircraft to the right; the tyres hold against it with the nose to the left of the path, into the wind:
@@ -42,7 +42,7 @@ FACTORS: Mapping[AircraftClass, tuple[float, float]] = {
 
 @dataclass(frozen=True)
 class SteadyPrior:
-    """What is known beforehand of the steady terms, degrees.
+    """Prior knowledge of the steady terms, degrees.
 
     Parameters
     ----------
@@ -82,7 +82,10 @@ class SteadyPrior:
         return -self.factor * self.from_left_mps(direction_deg)
 
     def regressors(self, direction_deg: FloatArray) -> tuple[Regressor, ...]:
-        """What remains of the sideslip of a crosswind in these directions of motion, shape (n,)."""
+        """Return the regressors of the sideslip by crosswind in these directions of motion, (n,).
+
+        They hold what remains unknown of it.
+        """
         north, east = np.cos(np.deg2rad(direction_deg)), np.sin(np.deg2rad(direction_deg))
         wind = (0.0, 0.0) if self.wind is None else (self.wind.east_mps, -self.wind.north_mps)
         speed_mps = float(np.hypot(*wind))
@@ -107,7 +110,10 @@ def steady_prior(
     site: SiteData | None = None,
     weather: Iterable[str] = (),
 ) -> SteadyPrior:
-    """What is known beforehand: stated sigmas, else those of the class; the wind of the log, else of a METAR line."""
+    """Return the prior of the steady terms: stated sigmas, else those of the class.
+
+    The wind is that of the log, else of a METAR line.
+    """
     kind = aircraft_class_of(flight, aircraft)
     factor, factor_sigma = FACTORS[kind]
     stated = settings.sideslip_sigma_deg if aircraft.sideslip_sigma_deg is None else aircraft.sideslip_sigma_deg
@@ -133,7 +139,10 @@ def steady_prior(
 
 
 def aircraft_class_of(flight: Flight, aircraft: AircraftData) -> AircraftClass:
-    """The class stated; that of a car where the log or the aircraft file says that it only rolls."""
+    """Return the class stated, or that of a car.
+
+    It is a car where the log or the aircraft file says that it only rolls.
+    """
     if aircraft.aircraft_class:
         return aircraft.aircraft_class
     rolls = flight.metadata.get("vehicle") == "rolls" or flight.metadata.get("always_on_ground") == "true"
@@ -162,7 +171,10 @@ def _reported_wind(
     site: SiteData | None,
     weather: tuple[str, ...],
 ) -> TaxiWind | None:
-    """Wind of the METAR line nearest to the middle of a span; None where there is none, or the log has no UTC."""
+    """Return the wind of the METAR line nearest to the middle of a span.
+
+    None where there is none, or the log has no UTC.
+    """
     if not weather or not flight.has_utc:
         return None
     at_ns = flight.start_ns + round(0.5 * (span_s[0] + span_s[1]) * NS_PER_S)

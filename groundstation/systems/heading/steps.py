@@ -67,7 +67,10 @@ def _sigma(values: FloatArray) -> float:
 
 
 def _fitted_steps(heading: FloatArray) -> FloatArray:
-    """Step in each interval beside a quintic of time, by least squares, degrees, shape (n - 1,); 0 near the ends."""
+    """Fit a step in each interval beside a quintic of time, degrees, shape (n - 1,).
+
+    By least squares; 0 near the ends.
+    """
     weight = np.linalg.pinv(np.column_stack([_SMOOTH, 0.5 * np.sign(_PLACE)]))[-1]
     out = np.zeros(len(heading) - 1)
     out[FITTED - 1 : len(heading) - FITTED] = np.lib.stride_tricks.sliding_window_view(heading, 2 * FITTED) @ weight
@@ -75,7 +78,7 @@ def _fitted_steps(heading: FloatArray) -> FloatArray:
 
 
 def _breaks(heading: FloatArray, place: int) -> bool:
-    """Whether the heading breaks in an interval, and does not bend in or near it."""
+    """Tell whether the heading breaks in an interval and does not bend in or near it."""
     window = heading[place - FITTED + 1 : place + FITTED + 1] - heading[place]
     bends = np.arange(-FITTED + 1.0, FITTED, 0.25)
     bent = min(_left_over(np.maximum(_PLACE - at, 0.0), window) for at in bends)

@@ -25,7 +25,9 @@ def straight_taxi(
     phases: Phases | None = None,
     gnss_latency_s: float = 0.0,
 ) -> Samples:
-    """Pair GNSS epochs with the INS heading and say which are used: those before take-off, all where these are too few.
+    """Pair GNSS epochs with the INS heading and say which are used.
+
+    Used are those before take-off, all where these are too few.
 
     Raises
     ------
@@ -58,13 +60,16 @@ def straight_taxi(
 def delay_of(
     pair: tuple[str, str], latencies: Latencies | None, aircraft: AircraftData, settings: HeadingSettings
 ) -> KnownDelay | None:
-    """Latency of GNSS behind the INS to take out; None where nothing is known, or the estimate not wanted."""
+    """Return the latency of GNSS behind the INS to take out.
+
+    None where nothing is known, or the estimate is not wanted.
+    """
     found = latencies if settings.use_latency == "when_observed" else None
     return known_delay(pair, found, aircraft.gnss_latency_s, aircraft.gnss_latency_sigma_s)
 
 
 def _refuse_too_little(samples: Samples, settings: HeadingSettings) -> None:
-    """Refuse an estimate where what was taxied straight before take-off is next to nothing, or nothing."""
+    """Refuse an estimate with next to no straight taxi before take-off."""
     is_wanted = samples.is_used if settings.runs == "all_ground" else samples.is_used & ~samples.is_after_lift_off
     seconds, later = (float(np.sum(mask)) * samples.interval_s for mask in (is_wanted, samples.is_used & ~is_wanted))
     if seconds >= settings.taxi_least_s - 0.5 * samples.interval_s:

@@ -29,7 +29,7 @@ Bounds = Mapping[str, Bound]
 
 @dataclass(frozen=True)
 class Figures:
-    """What the gates judge. None: could not be measured."""
+    """Figures that the gates judge. None: could not be measured."""
 
     precision_deg: float
     quality_deg: float
@@ -48,9 +48,10 @@ class Figures:
 
 
 def gate_bounds(settings: HeadingSettings, samples: int, rate_hz: float = PAPER_RATE_HZ) -> dict[str, Bound]:
-    """Lowest and highest value with which each gate passes, of those whose limits are settings.
+    """Return the lowest and highest value with which each gate passes.
 
-    The limit of e is for the paper's 10 Hz: fewer epochs of the same taxi give a larger e and no larger error.
+    It holds for those whose limits are settings. The limit of e is for the paper's 10 Hz: fewer epochs of the same taxi
+    give a larger e and no larger error.
     """
     slower = float(np.sqrt(max(PAPER_RATE_HZ / max(rate_hz, LEAST_RATE_HZ), 1.0)))
     skewness, kurtosis, distance = normality_limits(settings, max(samples, 1))
@@ -75,7 +76,10 @@ def gate_bounds(settings: HeadingSettings, samples: int, rate_hz: float = PAPER_
 
 
 def rejudge(answer: HeadingResult, settings: HeadingSettings) -> tuple[Rejudged, ...]:
-    """The gates and the verdict of an answer under other limits, from the values that it was judged by."""
+    """Apply other limits to the gates and the verdict of an answer.
+
+    The values are those that it was judged by.
+    """
     rate_hz = next((gate.value for gate in answer.gates if gate.name == "gnss_rate"), None) or PAPER_RATE_HZ
     bounds = gate_bounds(settings, answer.samples, rate_hz)
     after = tuple(gate.under(bounds[gate.name]) if gate.name in bounds else gate for gate in answer.gates)
@@ -86,7 +90,7 @@ def rejudge(answer: HeadingResult, settings: HeadingSettings) -> tuple[Rejudged,
 
 
 def _required_by(settings: HeadingSettings) -> dict[str, bool]:
-    """Whether the gates of which that is a setting are required."""
+    """Tell for the gates that a setting decides whether they are required."""
     return {
         "precision": settings.precision_decides,
         TAXI_ALONE: settings.half_width_decides,
@@ -97,7 +101,10 @@ def _required_by(settings: HeadingSettings) -> dict[str, bool]:
 def build_gates(
     samples: Samples, standstill: Standstill | None, figures: Figures, settings: HeadingSettings
 ) -> tuple[Gate, ...]:
-    """Every gate of the method in the order of the paper: throughout, standstill, taxi, acceptance."""
+    """Build every gate of the method in the order of the paper.
+
+    Throughout, standstill, taxi, acceptance.
+    """
     rate_hz = 1.0 / samples.interval_s if samples.interval_s > 0.0 else PAPER_RATE_HZ
     bounds = gate_bounds(settings, int(samples.is_used.sum()), rate_hz)
     return (
@@ -345,7 +352,7 @@ def _is_curable(gate: Gate, standstill: Standstill | None, settings: HeadingSett
 
 
 def is_mostly_steady(whole_deg: float, alone_deg: float) -> bool:
-    """Whether wind and installation are a larger part of the whole interval than this taxi.
+    """Tell whether wind and installation make more of the interval than this taxi.
 
     Examples
     --------
@@ -356,7 +363,10 @@ def is_mostly_steady(whole_deg: float, alone_deg: float) -> bool:
 
 
 def _lacks_steady_parts(gates: tuple[Gate, ...]) -> bool:
-    """Whether what the whole interval lacks is no more taxi; also where its parts are not known."""
+    """Tell whether more taxi would not mend the whole interval.
+
+    True also where its parts are not known.
+    """
     whole, alone = (next((gate.value for gate in gates if gate.name == name), None) for name in (WHOLE, TAXI_ALONE))
     return whole is None or alone is None or is_mostly_steady(whole, alone)
 
@@ -399,7 +409,10 @@ def round_to_step(value: float, step: float) -> float:
 def explain(
     verdict: Verdict, gates: tuple[Gate, ...], error_deg: float, step_deg: float, half_width_deg: float = float("nan")
 ) -> str:
-    """One line for people: every gate the verdict rests on, the plainest first; a number not to be entered says so."""
+    """Tell in one line the gates the verdict rests on, the plainest first.
+
+    A number not to be entered says so.
+    """
     if verdict == "accept":
         return f"every required gate passed: enter {round_to_step(-error_deg, step_deg):+g} deg"
     if verdict == "advisory":

@@ -1,4 +1,7 @@
-"""Gates in the words of a crew: what was found and what is needed, what people can see for themselves first."""
+"""Gates in the words of a crew: what was found and what is needed.
+
+What people can see for themselves comes first.
+"""
 
 from groundstation.results.gates import Gate
 

@@ -32,7 +32,10 @@ def compared_with_kind(flight: Flight, known: Known, settings: InertialSettings)
 
 
 def offered(known: Known) -> InsKinds:
-    """Kind of the INS that the inertial analysis compares with GNSS, none where it compares none."""
+    """Return the kind of the INS that the inertial analysis compares with GNSS.
+
+    None where it compares none.
+    """
 
     def find(flight: Flight) -> dict[str, str]:
         try:

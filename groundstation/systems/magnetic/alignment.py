@@ -1,4 +1,4 @@
-"""INS heading aligned by what the flight shows of it, and how sure it still is when the figure is flown.
+"""Alignment of the INS heading by what the flight shows, and its sigma at the figure.
 
 A compass swing is about the axis of the airframe, so what is taken off is the error of the *airframe's* heading: the
 answer of the heading analysis as it stands, whose interval needs no mounting. The platform's number would need the
@@ -26,7 +26,7 @@ BELIEVED_SIGMAS = 3.0  # of gyro drift and prior together: further off the rates
 
 @dataclass(frozen=True)
 class _Carried:
-    """A source carried to the figure: its error there, sigma without and with the drift until then."""
+    """Source carried to the figure: its error there, sigma with and without drift until then."""
 
     source: AlignmentSource
     aligned_error_deg: float
@@ -101,9 +101,10 @@ def align(
 
 
 def against_heading(alignment: Alignment) -> float | None:
-    """By how many sigma the alignment, hence A, contradicts the heading analysis; None where there is none.
+    """Return by how many sigma the alignment, hence A, contradicts the heading analysis.
 
-    Where that analysis aligned, it is compared with the turns that had a say; where it was refused, with what was used.
+    None where there is none. Where that analysis aligned, it is compared with the turns that had a say; where it was
+    refused, with what was used.
     """
     taxi = alignment.source("taxi")
     if taxi is None or taxi.error_deg is None or taxi.sigma_deg is None:
@@ -124,7 +125,10 @@ def _from_ground(
     aircraft: AircraftData,
     settings: MagneticSettings,
 ) -> tuple[AlignmentSource, HeadingResult | None]:
-    """An answer of system 1 as a source, its error that of the airframe less the mounting that is stated."""
+    """Return an answer of system 1 as a source.
+
+    Its error is that of the airframe less the mounting that is stated.
+    """
     if found is None or found.ins_topic != ins_topic:
         reason = missing or (
             "no heading error from taxi" if found is None else f"the heading error is that of {found.ins_topic}"
@@ -140,7 +144,10 @@ def _from_ground(
 
 
 def refused(found: HeadingResult) -> str:
-    """Why an answer of system 1 does not align: something failed that its interval does not hold."""
+    """Return why an answer of system 1 does not align; empty where it does.
+
+    Something failed that its interval does not hold.
+    """
     failed = {gate.name for gate in found.gates if gate.required and gate.state == "failed"}
     if not failed & NOT_IN_INTERVAL and not (found.verdict == "reject" and not failed):
         return ""
@@ -171,7 +178,10 @@ def _carry(source: AlignmentSource, figure_at_s: float, drift: tuple[float, floa
 
 
 def _chosen(ground: _Carried | None, turns: _Carried | None) -> list[_Carried]:
-    """What aligns: both where they agree, else the ground, which shows the airframe itself."""
+    """Choose what aligns: both where they agree, else the ground.
+
+    The ground shows the airframe itself.
+    """
     if ground is None or turns is None:
         return [one for one in (ground, turns) if one is not None]
     apart = abs(ground.error_deg - turns.error_deg) / math.hypot(ground.sigma_deg, turns.sigma_deg)

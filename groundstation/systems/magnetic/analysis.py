@@ -1,4 +1,4 @@
-"""System 3 as analyses: the deviation from opposite turns in flight, and the heading sensor on ground runs."""
+"""System 3 as analyses: deviation from opposite turns, and heading sensor on ground runs."""
 
 from typing import TYPE_CHECKING
 

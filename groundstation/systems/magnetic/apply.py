@@ -13,7 +13,9 @@ from groundstation.systems.magnetic.iron import iron_of
 
 
 def corrected_by_table(reading_deg: FloatArray, deviation_deg: Sequence[float] | FloatArray) -> FloatArray:
-    """Magnetic heading = reading + deviation, in [0, 360); the table is interpolated between the middles of its bins.
+    """Correct headings by a table: magnetic heading = reading + deviation, in [0, 360).
+
+    The table is interpolated between the middles of its bins.
 
     Parameters
     ----------
@@ -34,7 +36,9 @@ def corrected_by_table(reading_deg: FloatArray, deviation_deg: Sequence[float] |
 
 
 def corrected_by_coefficients(reading_deg: FloatArray, coefficients_deg: Mapping[str, float]) -> FloatArray:
-    """Magnetic heading = reading - (A + B sin c + C cos c + D sin 2c + E cos 2c), c the reading, in [0, 360).
+    """Correct headings by A to E, c being the reading, in [0, 360).
+
+    Magnetic heading = reading - (A + B sin c + C cos c + D sin 2c + E cos 2c).
 
     Examples
     --------
@@ -53,7 +57,7 @@ def corrected_by_iron(
     parameters: PoissonParameters,
     current_a: FloatArray | None = None,
 ) -> FloatArray:
-    """Magnetic heading in [0, 360) from readings of the field freed of the iron, and the attitude.
+    """Return magnetic headings in [0, 360) from readings freed of the iron, and the attitude.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The field along the axes of the body: levelled to a heading, and turned there from the earth's."""
+"""Magnetic field along body axes: levelled to a heading, and turned from the earth's."""
 
 import numpy as np
 
@@ -6,10 +6,10 @@ from groundstation.base.angles import FloatArray, direction_of
 
 
 def levelled_heading_deg(field_nt: FloatArray, roll_deg: FloatArray, pitch_deg: FloatArray) -> FloatArray:
-    """Magnetic heading in [0, 360), shape (n,), from a three-axis magnetometer and the attitude.
+    """Return the magnetic heading in [0, 360), shape (n,), of a levelled magnetometer.
 
-    The field, shape (n, 3), forward-right-down, is turned back by roll and pitch; north lies where its horizontal part
-    points.
+    It is a three-axis magnetometer, levelled by the attitude. The field, shape (n, 3), forward-right-down, is turned
+    back by roll and pitch; north lies where its horizontal part points.
 
     Examples
     --------
@@ -28,7 +28,9 @@ def levelled_heading_deg(field_nt: FloatArray, roll_deg: FloatArray, pitch_deg: 
 def field_in_body(
     horizontal_nt: float, down_nt: float, heading_deg: FloatArray, roll_deg: FloatArray, pitch_deg: FloatArray
 ) -> FloatArray:
-    """The earth's field along forward, right, down, shape (n, 3), of an aircraft at a magnetic heading.
+    """Return the earth's field along body axes, shape (n, 3), at a magnetic heading.
+
+    The axes are forward, right, down.
 
     Source: Titterton and Weston, Strapdown Inertial Navigation Technology, 2nd ed. 2004, equation 3.47, transposed.
 

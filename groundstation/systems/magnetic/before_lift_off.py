@@ -1,4 +1,7 @@
-"""The ground before lift-off: where the INS heading may be aligned by the track, and system 1 run there once more."""
+"""Ground before lift-off: where the INS heading may be aligned by the track.
+
+System 1 is run there once more.
+"""
 
 import math
 from collections.abc import Callable
@@ -50,7 +53,10 @@ class GroundRuns:
 
 @dataclass(frozen=True)
 class Window:
-    """Flight seconds between which the alignment may look, whether an event bounds them, and since what they run."""
+    """Window of flight seconds in which the alignment may look.
+
+    It tells whether an event bounds it, and since what it runs.
+    """
 
     start_s: float
     end_s: float
@@ -59,9 +65,9 @@ class Window:
 
 
 def least_speed_mps(velocity_error_mps: float, track_error_deg: float) -> float:
-    """Speed from which on a velocity error across the track turns the track angle by no more than is allowed.
+    """Return the speed from which on a velocity error turns the track by no more than allowed.
 
-    tan(track error) = velocity error / speed.
+    The velocity error is across the track. tan(track error) = velocity error / speed.
 
     Examples
     --------
@@ -83,11 +89,12 @@ def find_ground_runs(
     *,
     is_enough: Callable[[HeadingResult], bool] = lambda _found: False,
 ) -> GroundRuns:
-    """Find what aligns the INS heading on the ground: system 1's own answer ``heading``, else the run to lift-off.
+    """Find what aligns the INS heading on the ground.
 
-    Where events of the operator bound the alignment, or a correction was entered after the taxi had begun, taxi is
-    judged again between them. The run counts where it is straight and fast enough for the track error allowed; with
-    ``uses_slower_taxi`` it is not looked for where the answer from taxi ``is_enough``.
+    It is system 1's own answer ``heading``, else the run to lift-off. Where events of the operator bound the alignment,
+    or a correction was entered after the taxi had begun, taxi is judged again between them. The run counts where it is
+    straight and fast enough for the track error allowed; with ``uses_slower_taxi`` it is not looked for where the
+    answer from taxi ``is_enough``.
     """
     try:
         window = alignment_window(flight, phases, settings)
@@ -111,12 +118,15 @@ def find_ground_runs(
 
 
 def _begins_before(heading: HeadingResult | None, window: Window) -> bool:
-    """Whether an answer rests on data before a window."""
+    """Tell whether an answer rests on data before a window."""
     return heading is None or not heading.segments or heading.segments[0].start_s < window.start_s
 
 
 def gyros_at_standstill(flight: Flight, ins_topic: str, phases: Phases, settings: MagneticSettings) -> GyroDrift | None:
-    """Drift of the gyros at the standstill before lift-off, in the window of the alignment; None where not known."""
+    """Return the gyro drift at the standstill before lift-off, in the window of the alignment.
+
+    None where not known.
+    """
     try:
         window = alignment_window(flight, phases, settings)
     except NotAssessableError:
@@ -125,9 +135,10 @@ def gyros_at_standstill(flight: Flight, ins_topic: str, phases: Phases, settings
 
 
 def alignment_window(flight: Flight, phases: Phases, settings: MagneticSettings) -> Window:
-    """Up to the first lift-off less a margin, from the last ``alignment_event`` on, to the ``release_event`` after it.
+    """Return the window up to the first lift-off less a margin.
 
-    A correction entered on board may move the INS heading: what lies before the last one is left out.
+    It begins with the last ``alignment_event`` and ends with the ``release_event`` after it. A correction entered on
+    board may move the INS heading: what lies before the last one is left out.
 
     Raises
     ------
@@ -172,7 +183,10 @@ def _gnss_within(flight: Flight, window: Window) -> Flight:
 
 
 def _speed_min_mps(part: Flight, ins_topic: str, settings: MagneticSettings) -> float:
-    """Least speed by the velocity error allowed for, or by that which the receiver states where it is larger."""
+    """Return the least speed by the velocity error allowed for.
+
+    Where the receiver states a larger one, that counts.
+    """
     stated = np.zeros(0)
     with suppress(NotAssessableError):  # said when system 1 is run
         _ins, gnss = choose_pair(part, HEADING_AND_VELOCITY, ins_topic)
@@ -197,7 +211,10 @@ def _estimated(
     ins_topic: str,
     speeds_mps: tuple[float, float] | None = None,
 ) -> tuple[HeadingResult | None, str]:
-    """System 1's answer, or the reason. Ground contact is judged by the whole flight, not by the part."""
+    """Return system 1's answer, or the reason.
+
+    Ground contact is judged by the whole flight, not by the part.
+    """
     if on_ground is None:
         return None, "no analysis estimates the heading error on the ground"
     try:

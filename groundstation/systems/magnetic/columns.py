@@ -1,4 +1,4 @@
-"""What the magnetic deviation gives to the tables of flights."""
+"""Columns that the magnetic deviation gives to the tables of flights."""
 
 from collections.abc import Callable, Mapping
 

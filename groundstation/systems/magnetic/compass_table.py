@@ -1,4 +1,7 @@
-"""The table of the patent: compass error for each degree of magnetic heading, opposite banks averaged."""
+"""Table of the patent: compass error for each degree of magnetic heading.
+
+Opposite banks are averaged.
+"""
 
 from dataclasses import dataclass
 
@@ -16,11 +19,11 @@ fit_to_circle = harmonics.fit_to(CENTRES_DEG)
 
 @dataclass(frozen=True)
 class CompassTable:
-    """Magnetic minus true heading in bins [k, k + 1) of magnetic heading; arrays of shape (360,).
+    """Compass error, magnetic minus true heading, in bins [k, k + 1) of magnetic heading.
 
-    ``right_deg``, ``left_deg``: branches, NaN where empty. ``average_deg`` is known everywhere: where a branch is empty
-    (``is_measured`` False) that branch is interpolated on the circle. ``curve_deg`` is the fit of A to E, whose
-    ``coefficients_deg`` (5,) have declination in A; ``covariance`` (5, 5) is statistical.
+    Arrays have shape (360,). ``right_deg``, ``left_deg``: branches, NaN where empty. ``average_deg`` is known
+    everywhere: where a branch is empty (``is_measured`` False) that branch is interpolated on the circle. ``curve_deg``
+    is the fit of A to E, whose ``coefficients_deg`` (5,) have declination in A; ``covariance`` (5, 5) is statistical.
     """
 
     right_deg: FloatArray
@@ -34,7 +37,7 @@ class CompassTable:
 
     @property
     def fit_rms_deg(self) -> float:
-        """How far A to E are from the table, RMS over the measured bins."""
+        """RMS distance of A to E from the table over the measured bins."""
         left = wrap_180(self.average_deg - self.curve_deg)[self.is_measured]
         return float(np.sqrt(np.mean(left**2))) if left.size else float("nan")
 
@@ -99,7 +102,10 @@ def _binned(heading_deg: FloatArray, values: FloatArray) -> FloatArray:
 def _fit(
     heading_deg: FloatArray, about_deg: FloatArray, right: NDArray[np.intp], left: NDArray[np.intp]
 ) -> tuple[FloatArray, FloatArray]:
-    """A to E of the average: half the sum of those of the branches, each bin counting alike as in the table."""
+    """Fit A to E of the average: half the sum of those of the branches.
+
+    Each bin counts alike as in the table.
+    """
     parts = []
     for rows in (right, left):
         bins = bin_of(heading_deg[rows])

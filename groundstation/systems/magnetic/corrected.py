@@ -1,4 +1,4 @@
-"""The magnetic heading of a whole flight with a deviation added to it, and how much better it is than without."""
+"""Magnetic heading of a whole flight with a deviation added, and how much better it is."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -82,7 +82,7 @@ class CorrectedHeading:
 
     @property
     def deviation_deg(self) -> FloatArray:
-        """What was added to the uncorrected heading, in [-180, 180)."""
+        """Deviation added to the uncorrected heading, in [-180, 180)."""
         return wrap_180(self.magnetic_heading_deg - self.uncorrected_deg)
 
     @property
@@ -142,7 +142,10 @@ def _magnetometer(flight: Flight, deviation: Deviation) -> str:
 
 
 def _with_attitude(flight: Flight) -> str:
-    """The first INS with roll and pitch, one that has a true heading too before others, as the estimator chooses."""
+    """Return the first INS with roll and pitch.
+
+    One that has a true heading too comes before others, as the estimator chooses.
+    """
     units = [topic for topic in topics_of_kind("ins", flight.topics()) if flight[topic].has(*LEVELS)]
     return next((topic for topic in units if flight[topic].has("true_heading_deg")), units[0] if units else "")
 
@@ -196,7 +199,10 @@ def _by_curve(reading_deg: FloatArray, deviation: Deviation) -> tuple[FloatArray
 
 
 def _declination(flight: Flight, unit: Table, at_ns: Int64Array, settings: MagneticSettings) -> tuple[FloatArray, str]:
-    """Declination at given times and what it is of: stated, or that of the model of the date; NaN where unknown."""
+    """Return the declination at given times and its source; NaN where unknown.
+
+    It is stated, or that of the model of the date.
+    """
     if settings.declination_deg is not None:
         return np.full(len(at_ns), settings.declination_deg), "as stated"
     unknown = np.full(len(at_ns), np.nan)
@@ -220,7 +226,9 @@ def judge(
     aircraft: AircraftData | None = None,
     settings: MagneticSettings | None = None,
 ) -> tuple[Residual, int] | None:
-    """RMS of magnetic heading - (INS true heading - declination) in level flight, before and after, and the readings.
+    """Return the RMS heading error in level flight before and after, and the reading count.
+
+    It is of magnetic heading - (INS true heading - declination).
 
     Parameters
     ----------
@@ -255,7 +263,7 @@ def judge(
 
 
 def thinned(corrected: CorrectedHeading, most: int) -> CorrectedHeading:
-    """At most so many samples: of more, every k-th."""
+    """Return at most ``most`` samples: of more, every k-th."""
     kept = slice(None, None, max(1, -(-len(corrected) // most)))
     names = ("rows", "at_ns", "uncorrected_deg", "magnetic_heading_deg", "declination_deg", "roll_deg")
     return replace(corrected, **{name: getattr(corrected, name)[kept] for name in names})

@@ -18,7 +18,9 @@ from groundstation.tables.table import Flight
 def earth_field(
     flight: Flight, readings: Readings, rows: NDArray[np.intp], settings: MagneticSettings
 ) -> tuple[FloatArray, DeclinationUsed, EarthField]:
-    """Declination at every reading, shape (n,), and declination and field in the middle of the figure, ``rows``.
+    """Return declination at every reading, and declination and field of the figure.
+
+    The first has shape (n,), the others are those in the middle of the figure, ``rows``.
 
     Raises
     ------
@@ -57,7 +59,10 @@ def _modelled(flight: Flight, readings: Readings, rows: NDArray[np.intp]) -> Dec
 def _without_model(
     readings: Readings, rows: NDArray[np.intp], stated: float, settings: MagneticSettings
 ) -> tuple[FloatArray, DeclinationUsed, EarthField]:
-    """Strength from the readings: their median, which matters to nothing but the unit of the iron."""
+    """Take the strength from the readings: their median.
+
+    It matters to nothing but the unit of the iron.
+    """
     strength = float(np.median(np.linalg.norm(readings.field_nt[rows], axis=1)))
     used = DeclinationUsed(stated, settings.declination_sigma_deg, "as stated")
     return np.full(len(readings), stated), used, EarthField(stated, strength, 0.0, is_modelled=False)

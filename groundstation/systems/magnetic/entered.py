@@ -9,7 +9,7 @@ from groundstation.tables.table import Flight
 
 
 class Entered(NamedTuple):
-    """A correction entered or changed: flight seconds, its value, by how much it differs from the one before."""
+    """A correction entered or changed: flight seconds, its value, change from the one before."""
 
     time_s: float
     correction_deg: float
@@ -17,7 +17,10 @@ class Entered(NamedTuple):
 
 
 def corrections_entered(flight: Flight) -> list[Entered]:
-    """Every entry after the first row of its topic, in order of time; where none stood before, the change is all."""
+    """Return every entry after the first row of its topic, in order of time.
+
+    Where none stood before, the change is all.
+    """
     found: list[Entered] = []
     for topic in topics_of_kind("onboard", flight.topics()):
         entered, time_s = flight[topic].values("correction_entered_deg"), flight.time_s(topic)

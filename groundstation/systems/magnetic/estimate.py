@@ -1,4 +1,4 @@
-"""The magnetic estimator: from the tables of a flight to a deviation, a verdict and a card."""
+"""Magnetic estimator: from the tables of a flight to a deviation, a verdict and a card."""
 
 import math
 from collections.abc import Mapping
@@ -199,7 +199,10 @@ def _answer(
 
 
 def _gain_of_iron(unseen: Unseen | None, fits: Fits, deviation_deg: FloatArray) -> float:
-    """By how many sigma the iron leaves less than the table on level flight; 0 where that cannot be told."""
+    """Return by how many sigma the iron leaves less than the table on level flight.
+
+    0 where that cannot be told.
+    """
     if unseen is None or fits.attitude.reason:
         return 0.0
     by_table = corrected_by_table(unseen.readings.magnetic_heading_deg, deviation_deg)
@@ -219,7 +222,10 @@ def _parameters(fit: IronFit, azimuth_sigma_deg: float) -> PoissonParameters | N
 
 
 def _aligned(readings: Readings, alignment: Alignment, mounting_deg: float) -> Readings:
-    """Readings with the INS heading put right: corrected = reading - estimated error, drift included."""
+    """Return readings with the INS heading corrected, drift included.
+
+    corrected = reading - estimated error.
+    """
     hours = (readings.time_s - alignment.figure_at_s) / S_PER_H
     error = alignment.error_deg + alignment.drift_deg_per_h * hours
     return replace(readings, true_heading_deg=wrap_360(readings.true_heading_deg - mounting_deg - error))

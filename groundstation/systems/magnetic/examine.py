@@ -1,4 +1,4 @@
-"""What a flight lacks for the magnetic deviation, told from what was flown."""
+"""Shortfalls of a flight for the magnetic deviation, from what was flown."""
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from groundstation.tables.table import Flight
 
 
 def examine_magnetic(flight: Flight, known: Known, settings: MagneticSettings) -> tuple[Shortfall, ...]:
-    """Judge the turns of a flight: do they cover the circle, is level flight there to judge by.
+    """Judge the turns of a flight.
+
+    They must cover the circle, and level flight be there to judge by.
 
     Raises
     ------
@@ -38,7 +40,7 @@ def examine_magnetic(flight: Flight, known: Known, settings: MagneticSettings) -
 
 
 def _kinds(flight: Flight, known: Known) -> dict[str, str]:
-    """Whether GNSS corrects the INS, as far as an analysis can tell."""
+    """Tell whether GNSS corrects the INS, as the inertial analysis would say."""
     kinds = known.role(InsKinds)
     return {} if kinds is None else kinds.find(flight)
 

@@ -39,9 +39,10 @@ def draw(
     methods: Sequence[Method],
     recommended: tuple[MethodName, FloatArray],
 ) -> tuple[FigureData, ...]:
-    """Readings with their errors, the table, the deviation by each method, the modulus and the field.
+    """Return readings with their errors, the table, deviations, modulus and field.
 
-    ``recommended``: the method to correct by, and its deviation in each bin, shape (360,).
+    The deviation is by each method. ``recommended``: the method to correct by, and its deviation in each bin, shape
+    (360,).
     """
     return (
         _samples(readings, declination_deg, part, fits, deviation_deg),
@@ -104,9 +105,9 @@ def _table(fits: Fits, deviation_deg: FloatArray) -> MagneticTable:
 
 
 def _curves(methods: Sequence[Method], recommended: MethodName, recommended_deg: FloatArray) -> MagneticCurves:
-    """Deviation in level flight and its sigma by A to E of each method, and by the recommended one as it is applied.
+    """Return the deviation in level flight and its sigma, by each method's A to E.
 
-    The modulus is drawn without A.
+    The recommended one is given as it is applied, too. The modulus is drawn without A.
     """
     deviation_deg, sigma_deg = dict[str, FloatArray](), dict[str, FloatArray]()
     design = harmonics.design(CENTRES_DEG)
@@ -142,7 +143,10 @@ def _modulus(readings: Readings, figures: list[Figure], fits: Fits) -> MagneticM
 
 
 def _field(readings: Readings, part: NDArray[np.str_], fits: Fits) -> MagneticField:
-    """The field along the body axes in flight, as read and freed of the fitted iron (NaN where none is)."""
+    """Return the field along the body axes in flight, as read and freed of the fitted iron.
+
+    NaN where none is fitted.
+    """
     rows = np.flatnonzero(part != "ground")
     rows = rows[:: max(1, -(-len(rows) // MOST_VECTORS))]
     shown, fit = readings.take(rows), fits.attitude

@@ -1,4 +1,7 @@
-"""What was flown for the deviation: readings with attitude, turns of steady bank, and the figures that they make."""
+"""Flight data for the deviation: readings with attitude, turns of steady bank, figures.
+
+The turns make the figures.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +22,7 @@ IN_THE_AIR = ("airborne", "unknown")  # ground contact is a phase of its own whe
 
 @dataclass(frozen=True)
 class Flown:
-    """Readings, in which of them the aircraft flies, and the figures and turns found; the latency taken off."""
+    """Readings, those in the air, figures and turns found, and the latency taken off."""
 
     readings: Readings
     is_airborne: BoolArray
@@ -55,7 +58,7 @@ def find_flown(
 
 
 def _why_no_figure(turns: list[FoundTurn]) -> str:
-    """What was found instead of a figure, the longest turns first."""
+    """Tell what was found instead of a figure, the longest turns first."""
     if not turns:
         return "no turn of steady bank in flight: opposite turns over the whole circle are needed"
     longest = sorted(turns, key=lambda one: -abs(one.turn.turned_deg))[:3]

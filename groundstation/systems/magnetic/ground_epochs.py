@@ -47,7 +47,7 @@ WHY_LEFT_OUT = {
 
 @dataclass(frozen=True)
 class Epochs:
-    """The epochs of the straight runs with what was looked at, shapes (n,); ``run`` counts from 0."""
+    """Epochs of the straight runs with what was looked at, shapes (n,); ``run`` counts from 0."""
 
     samples: Samples
     declination_deg: FloatArray
@@ -68,7 +68,10 @@ def gated(
     latencies: Latencies | None,
     excluded_s: Sequence[tuple[float, float]],
 ) -> Samples:
-    """Epochs on the ground with the magnetic heading in the place of the true one, gated as system 1 gates taxi."""
+    """Return the epochs on the ground, gated as system 1 gates taxi.
+
+    The magnetic heading stands in the place of the true one.
+    """
     limits = GroundLimits(
         taxi_speed_min_mps=settings.speed_min_mps,
         taxi_speed_max_mps=settings.speed_max_mps,
@@ -93,7 +96,10 @@ def gated(
 
 
 def _settled(samples: Samples, settings: MagneticGroundSettings) -> Samples:
-    """Samples without those just after a turn at any speed: a heading that lags has not caught up yet."""
+    """Leave out the samples just after a turn at any speed.
+
+    A heading that lags has not caught up yet.
+    """
     with np.errstate(invalid="ignore"):
         turning = np.flatnonzero(np.abs(samples.rate_dps) > settings.turn_rate_max_dps)
     last = np.searchsorted(turning, np.arange(len(samples)), side="right") - 1
@@ -107,7 +113,7 @@ def _settled(samples: Samples, settings: MagneticGroundSettings) -> Samples:
 
 
 def count_left_out(flight: Flight, topics: tuple[str, str], samples: Samples) -> tuple[LeftOut, ...]:
-    """How many GNSS epochs belong to no run, by reason, most first."""
+    """Count the GNSS epochs that belong to no run, by reason, most first."""
     counts = Counter(WHY_LEFT_OUT.get(str(gate), str(gate)) for gate in samples.gate[~samples.is_used])
     counts[WHY_LEFT_OUT[NOT_GROUND]] += len(distinct_epochs(flight[topics[1]])) - len(samples)
     return tuple(LeftOut(reason, count) for reason, count in counts.most_common() if count)

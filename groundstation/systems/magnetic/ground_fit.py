@@ -18,7 +18,7 @@ TANGLED = 0.3  # correlation beyond which two coefficients are not told from eac
 
 @dataclass(frozen=True)
 class CurveFit:
-    """A to E, shape (5,), their covariance without that of declination, (5, 5), and the spread between runs."""
+    """Coefficients A to E, shape (5,), covariance without declination, (5, 5), run spread."""
 
     values_deg: FloatArray
     covariance: FloatArray
@@ -114,9 +114,10 @@ def with_declination(covariance: FloatArray, declination_sigma_deg: float) -> Fl
 def along_axis(
     fit: CurveFit, coefficients: Sequence[GroundCoefficient], settings: MagneticGroundSettings
 ) -> AlongAxis | None:
-    """The best seen axis of the semicircular error where B or C alone is not seen; None where no axis is either.
+    """Return the best seen axis of the semicircular error where B or C alone is not seen.
 
-    B sin c + C cos c on the axis a is (B sin a + C cos a) cos(c - a), and another part across it.
+    None where no axis is either. B sin c + C cos c on the axis a is (B sin a + C cos a) cos(c - a), and another part
+    across it.
     """
     if all(item.state == "found" for item in coefficients if item.letter in "BC"):
         return None
@@ -132,7 +133,10 @@ def along_axis(
 def curve(
     fit: CurveFit, heading_deg: FloatArray, declination_sigma_deg: float, settings: MagneticGroundSettings
 ) -> tuple[FloatArray, FloatArray]:
-    """Error and its sigma at magnetic headings, shapes (n,); NaN where it is known no better than B alone need be."""
+    """Return the error and its sigma at magnetic headings, shapes (n,).
+
+    NaN where it is known no better than B alone need be.
+    """
     columns = harmonics.design(heading_deg)
     covariance = with_declination(fit.covariance, declination_sigma_deg)
     sigma = np.sqrt(np.einsum("ni,ij,nj->n", columns, covariance, columns))
@@ -141,7 +145,9 @@ def curve(
 
 
 def directions_of(heading_deg: FloatArray, within_deg: float) -> list[list[int]]:
-    """Rows of headings no farther apart than ``within_deg`` from the first of their group, in order of heading.
+    """Group headings by direction, in order of heading; rows of each group.
+
+    Those of a group are no farther than ``within_deg`` from its first.
 
     Examples
     --------
@@ -176,7 +182,7 @@ def widest_gap_deg(heading_deg: FloatArray) -> float:
 
 
 def repeats_of(runs: Sequence[GroundRun], slip_sigma_deg: float, within_deg: float) -> tuple[Repeat, ...]:
-    """Runs on about one heading beside each other: their spread, and what noise and slip would make."""
+    """Compare runs on about one heading: their spread, and that by noise and slip."""
     heading = np.array([run.magnetic_heading_deg for run in runs])
     rows = []
     for group in directions_of(heading, within_deg):

@@ -1,7 +1,8 @@
-"""Deviation of an installed heading sensor from straight ground runs: on the wheels the track is where the nose points.
+"""Deviation of an installed heading sensor from straight ground runs.
 
-For logs without a three-axis magnetometer and without an INS that is independent of it: a magnetic heading and GNSS
-velocity are enough. The runs are found as system 1 finds straight taxi, slower and faster ones too.
+On the wheels the track is where the nose points. For logs without a three-axis magnetometer and without an INS that is
+independent of it: a magnetic heading and GNSS velocity are enough. The runs are found as system 1 finds straight taxi,
+slower and faster ones too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -66,7 +67,9 @@ def estimate_ground_deviation(
     ins_topic: str = "",
     gnss_topic: str = "",
 ) -> GroundDeviation:
-    """Find the error of the magnetic heading on every straight ground run, and A to E as far as the runs show them.
+    """Find the error of the magnetic heading on every straight ground run, and A to E.
+
+    A to E are found as far as the runs show them.
 
     Parameters
     ----------
@@ -179,7 +182,10 @@ def _change_deg(time_s: FloatArray, direction_deg: FloatArray) -> float:
 def _why_rejected(
     samples: int, seconds: float, changes_deg: Mapping[str, float], settings: MagneticGroundSettings
 ) -> str:
-    """Empty where a run counts. The track is looked at too: a heading that is stuck is no straight run."""
+    """Return why a run does not count; empty where it does.
+
+    The track is looked at too: a heading that is stuck is no straight run.
+    """
     if seconds < settings.run_min_s or samples < settings.samples_min:
         return f"short: {seconds:.1f} s, {samples} epoch{'s' * (samples != 1)}"
     name, change = max(changes_deg.items(), key=lambda item: item[1])
@@ -187,7 +193,10 @@ def _why_rejected(
 
 
 def _step_deg(table: Table, name: str) -> float | None:
-    """The step an angle is logged in: of those it may be rounded to, the largest that holds every value; None: none."""
+    """Return the step an angle is logged in; None: none.
+
+    It is the largest of those it may be rounded to that holds every value.
+    """
     values = table.values(name)
     known = np.unique(values[np.isfinite(values)])
     if len(known) < LEAST_VALUES:
@@ -276,7 +285,10 @@ def _answer(
 
 
 def _logged_variation_deg(flight: Flight, ins_topic: str, epochs: Epochs) -> float | None:
-    """Mean of true minus magnetic heading where the reader made the one from the other with the log's variation."""
+    """Return the mean of true minus magnetic heading that the log's variation makes.
+
+    It is known where the reader made the one from the other with that variation.
+    """
     names = ("true_heading_deg", "magnetic_heading_deg")
     derived = flight.metadata.get(f"derived.{ins_topic}.true_heading_deg", "")
     if "magnetic" not in derived or not flight[ins_topic].has(*names):
@@ -311,7 +323,7 @@ def _figures(
 
 
 def _remarks(result: GroundDeviation, interval_s: float, settings: MagneticGroundSettings) -> tuple[str, ...]:
-    """What must be told beside the figures, one line each."""
+    """Return what must be told beside the figures, one line each."""
     declination = result.declination
     told = [
         "the level of all errors (A) cannot be separated from an error of the declination "

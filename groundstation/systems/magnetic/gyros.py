@@ -1,4 +1,7 @@
-"""Drift of the three gyros from the standstill before flight: what they show beyond the rotation of the earth."""
+"""Drift of the three gyros from the standstill before flight.
+
+It is what they show beyond the rotation of the earth.
+"""
 
 from dataclasses import dataclass
 
@@ -24,7 +27,10 @@ SURE_SHARE = 0.5  # of the earth's rate: what is left must be smaller to tell wh
 
 @dataclass(frozen=True)
 class GyroDrift:
-    """Drift along forward, right, down and about the vertical (clockwise positive) with their sigmas."""
+    """Drift along forward, right, down and about the vertical, with sigmas.
+
+    Clockwise is positive.
+    """
 
     drift_deg_per_h: Vector
     sigma_deg_per_h: Vector
@@ -33,12 +39,12 @@ class GyroDrift:
 
 
 def gyro_drift(flight: Flight, ins_topic: str, phases: Phases, start_s: float, end_s: float) -> GyroDrift | None:
-    """Mean rates at standstill within a window of flight seconds, less the earth's rotation; None where not logged.
+    """Return mean rates at standstill within a window, less the earth's rotation.
 
-    The earth's rotation along the body follows from attitude and latitude. Some systems log rates free of it: it is
-    taken off where less is left with it than without. Where gyros are too poor to tell, it is taken off and counts in
-    full in the sigma. The sigma holds noise correlated in time and the rounding of the log. Rates that never change
-    say nothing.
+    The window is in flight seconds; None where not logged. The earth's rotation along the body follows from attitude
+    and latitude. Some systems log rates free of it: it is taken off where less is left with it than without. Where
+    gyros are too poor to tell, it is taken off and counts in full in the sigma. The sigma holds noise correlated in
+    time and the rounding of the log. Rates that never change say nothing.
     """
     table = flight[ins_topic]
     if not table.has(*RATES, *ATTITUDE, "latitude_deg"):
@@ -71,7 +77,10 @@ def _still(time_s: FloatArray, phases: Phases, start_s: float, end_s: float) -> 
 
 
 def _earth_along_body(table: Table) -> FloatArray:
-    """Mean rotation of the earth along forward, right, down, deg/h, shape (3,): cos latitude north, -sin down."""
+    """Return the mean rotation of the earth along forward, right, down, deg/h, shape (3,).
+
+    It is cos latitude north, -sin latitude down.
+    """
     latitude_rad = np.deg2rad(float(np.mean(table.values("latitude_deg"))))
     north, down = EARTH_DEG_PER_H * np.cos(latitude_rad), -EARTH_DEG_PER_H * np.sin(latitude_rad)
     heading, roll, pitch = (table.values(name) for name in ATTITUDE)
@@ -88,7 +97,10 @@ def _without_earth(mean: FloatArray, earth: FloatArray) -> tuple[FloatArray, Flo
 
 
 def _variance_of_mean(rates: FloatArray) -> FloatArray:
-    """Variance of the mean of each axis, shape (n, 3) -> (3,), noise correlated from sample to sample."""
+    """Return the variance of the mean of each axis, shape (n, 3) -> (3,).
+
+    Noise is correlated from sample to sample.
+    """
     variances = []
     for axis in rates.T:
         centred = axis - np.mean(axis)

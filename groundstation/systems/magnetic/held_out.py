@@ -1,4 +1,4 @@
-"""What each correction leaves on the part of the flight that no fit has seen."""
+"""Residual of each correction on the part of the flight that no fit has seen."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,10 @@ STRETCH_S, SHORTEST_S = 30.0, 10.0  # level flight is compared by means over str
 
 @dataclass(frozen=True)
 class Unseen:
-    """Held-out readings, the magnetic heading they should show, and the sigma of the INS drift since the figure."""
+    """Held-out readings with the magnetic heading they should show.
+
+    ``drift_sigma_deg`` is the sigma of the INS drift since the figure.
+    """
 
     readings: Readings
     expected_deg: FloatArray
@@ -59,7 +62,7 @@ def find_unseen(
 
 
 def is_level(readings: Readings, settings: MagneticSettings) -> BoolArray:
-    """Readings at small bank: what corrections are judged by."""
+    """Tell which readings are at small bank; corrections are judged by these."""
     return np.asarray(np.abs(readings.roll_deg) <= settings.held_out_bank_max_deg)
 
 
@@ -97,7 +100,10 @@ def left_by_nothing(unseen: Unseen) -> Left:
 
 
 def left_by_table(unseen: Unseen, table: CompassTable, deviation_deg: FloatArray, bias_deg: FloatArray) -> Left:
-    """What the table leaves; the forecast bank bias, shape (360,), is part of the sigma."""
+    """Return what the table leaves.
+
+    The forecast bank bias, shape (360,), is part of the sigma.
+    """
     shown = unseen.readings.magnetic_heading_deg
     mean_columns = np.mean(harmonics.design(shown), axis=0)
     bias = float(np.sqrt(np.mean(bias_deg[bin_of(shown)] ** 2)))
@@ -106,9 +112,10 @@ def left_by_table(unseen: Unseen, table: CompassTable, deviation_deg: FloatArray
 
 
 def left_by_iron(unseen: Unseen, fit: IronFit, azimuth_sigma_deg: float) -> Left:
-    """What freeing the readings of an iron leaves; the covariance of the fit is part of the sigma.
+    """Return what freeing the readings of an iron leaves.
 
-    An error of the reference heading is in the fit and in the heading expected: what does not cancel counts.
+    The covariance of the fit is part of the sigma. An error of the reference heading is in the fit and in the heading
+    expected: what does not cancel counts.
     """
 
     def mean_of(iron: Iron) -> FloatArray:
@@ -121,19 +128,19 @@ def left_by_iron(unseen: Unseen, fit: IronFit, azimuth_sigma_deg: float) -> Left
 
 
 def seen_wander(unseen: Unseen, fit: IronFit) -> tuple[float, int]:
-    """Sigma by which what the iron leaves differs from stretch to stretch, deg, and the degrees of freedom of that.
+    """Return the sigma of the iron's residual from stretch to stretch, deg.
 
-    It is what roll and pitch of the INS wander by times Z / H, or whatever else changes as slowly: the field along the
-    way, a load that is switched.
+    Also returns its degrees of freedom. It is what roll and pitch of the INS wander by times Z / H, or
+    whatever else changes as slowly: the field along the way, a load that is switched.
     """
     left = _of_stretches(unseen, unseen.error_deg(corrected_heading_deg(fit.iron, unseen.readings)))
     return (float(np.std(left, ddof=1)), len(left) - 1) if len(left) > 1 else (0.0, 0)
 
 
 def advantage(unseen: Unseen, of_first_deg: FloatArray, of_second_deg: FloatArray) -> float:
-    """By how many sigma the mean square of a second error is smaller than that of a first, stretch by stretch.
+    """Return by how many sigma a second error's mean square is smaller than that of a first.
 
-    0 where fewer than three stretches tell.
+    It is judged stretch by stretch. 0 where fewer than three stretches tell.
     """
     gain = _of_stretches(unseen, of_first_deg**2 - of_second_deg**2)
     spread = float(np.std(gain, ddof=1)) if len(gain) > 2 else 0.0
@@ -141,7 +148,10 @@ def advantage(unseen: Unseen, of_first_deg: FloatArray, of_second_deg: FloatArra
 
 
 def _of_stretches(unseen: Unseen, values: FloatArray) -> FloatArray:
-    """Means of values (n,) over stretches of level flight, each ``STRETCH_S`` long or what there is of it."""
+    """Average values (n,) over stretches of level flight.
+
+    Each is ``STRETCH_S`` long or what there is of it.
+    """
     time_s = unseen.readings.time_s
     is_first = np.diff(time_s, prepend=-np.inf) > LONGEST_STEP_S
     since_s = time_s - time_s[is_first][np.cumsum(is_first) - 1]

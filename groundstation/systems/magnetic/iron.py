@@ -1,4 +1,4 @@
-"""Iron of the aircraft: what it does to the field, to the heading, and to the average of opposite banks."""
+"""Iron of the aircraft: its effect on the field, the heading, and opposite banks' average."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +18,10 @@ PART_STEP = 1e-4  # of the earth's field, or of a soft-iron element, in numerica
 
 @dataclass(frozen=True)
 class Iron:
-    """reading = soft @ field + hard_nt + current_nt_per_a x (current - reference); shapes (3, 3), (3,), (3,)."""
+    """Iron model: reading = soft @ field + hard_nt + current_nt_per_a x (current - reference).
+
+    Shapes (3, 3), (3,), (3,).
+    """
 
     soft: FloatArray
     hard_nt: FloatArray
@@ -26,7 +29,10 @@ class Iron:
     current_reference_a: float = 0.0
 
     def field_nt(self, reading_nt: FloatArray, current_a: FloatArray | None = None) -> FloatArray:
-        """The earth's field along the body axes, shape (n, 3), from readings; unknown currents count as reference."""
+        """Return the earth's field along the body axes, shape (n, 3), from readings.
+
+        Unknown currents count as the reference.
+        """
         free = reading_nt - self.hard_nt
         if self.current_nt_per_a is not None and current_a is not None:
             excess = np.nan_to_num(current_a - self.current_reference_a)
@@ -73,7 +79,12 @@ def parameters_of(iron: Iron, covariance: FloatArray) -> PoissonParameters:
 def heading_errors(
     iron: Iron, horizontal_nt: float, down_nt: float, bank_deg: float = 0.0, pitch_deg: float = 0.0
 ) -> FloatArray:
-    """Error of the uncorrected magnetic heading in the middle of each bin of it, shape (360,), at a bank."""
+    """Return the error of the uncorrected heading in each bin of it, shape (360,), at a bank.
+
+    The heading is magnetic.
+
+    It is that in the middle of the bin.
+    """
     field = _fields_nt(horizontal_nt, down_nt, bank_deg, pitch_deg)
     level = np.full(1, bank_deg), np.full(1, pitch_deg)
     shown = levelled_heading_deg(field @ iron.soft.T + iron.hard_nt, *level)
@@ -84,13 +95,19 @@ def heading_errors(
 
 @lru_cache(maxsize=16)
 def _fields_nt(horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg: float) -> FloatArray:
-    """The earth's field in the body on every heading, shape (720, 3): the same for the hundreds of irons of a fit."""
+    """Return the earth's field in the body on every heading, shape (720, 3).
+
+    It is the same for the hundreds of irons of a fit.
+    """
     level = np.full(len(HEADINGS_DEG), bank_deg), np.full(len(HEADINGS_DEG), pitch_deg)
     return frozen(field_in_body(horizontal_nt, down_nt, HEADINGS_DEG, *level))
 
 
 def bank_bias(iron: Iron, horizontal_nt: float, down_nt: float, bank_deg: float, pitch_deg: float = 0.0) -> FloatArray:
-    """What the average of opposite banks has more than level flight, shape (360,): it grows as bank squared."""
+    """Return the bias of the average of opposite banks against level flight, shape (360,).
+
+    It grows as bank squared.
+    """
     at = [heading_errors(iron, horizontal_nt, down_nt, bank, pitch_deg) for bank in (bank_deg, -bank_deg, 0.0)]
     return wrap_180(0.5 * (at[0] + at[1]) - at[2])
 
@@ -98,7 +115,10 @@ def bank_bias(iron: Iron, horizontal_nt: float, down_nt: float, bank_deg: float,
 def level_coefficients(
     iron: Iron, covariance: FloatArray, horizontal_nt: float, down_nt: float, pitch_deg: float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
-    """A to E of level flight that an iron makes, shape (5,), and their covariance, shape (5, 5)."""
+    """Return A to E of level flight that an iron makes, with covariance.
+
+    Shapes (5,) and (5, 5).
+    """
 
     def coefficients(other: Iron) -> FloatArray:
         return fit_to_circle(heading_errors(other, horizontal_nt, down_nt, 0.0, pitch_deg))

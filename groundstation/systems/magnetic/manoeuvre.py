@@ -1,4 +1,4 @@
-"""The figure in the log: turns of steady bank, and opposite ones that cover the circle together."""
+"""Figure in the log: turns of steady bank, opposite ones covering the circle together."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -34,7 +34,10 @@ class FoundTurn:
 
 @dataclass(frozen=True)
 class Figure:
-    """Opposite turns of equal bank; ``covered_share`` is that of the circle which both branches cover."""
+    """Opposite turns of equal bank.
+
+    ``covered_share`` is that of the circle which both branches cover.
+    """
 
     turns: tuple[FoundTurn, ...]
     covered_share: float
@@ -58,7 +61,10 @@ class Figure:
 
 
 def find_turns(readings: Readings, is_airborne: BoolArray, settings: MagneticSettings) -> list[FoundTurn]:
-    """Turns of about constant bank in order of time, each with the reason where it is of no use."""
+    """Find turns of about constant bank in order of time.
+
+    Each has the reason where it is of no use.
+    """
     roll = _smoothed(readings)
     together = np.concatenate([[0], np.cumsum(np.diff(readings.time_s) > BREAK_S)])
     found = []
@@ -99,7 +105,10 @@ def find_figures(
 
 
 def covered_bins(heading_deg: FloatArray, gap_deg: float) -> BoolArray:
-    """Bins of 1 deg on the circle, shape (360,), that hold a heading or lie in a gap no wider than that."""
+    """Tell which bins of 1 deg on the circle, shape (360,), hold a heading.
+
+    A gap no wider than ``gap_deg`` counts as covered.
+    """
     held = np.zeros(BINS, dtype=bool)
     held[np.minimum(wrap_360(heading_deg).astype(np.intp), BINS - 1)] = True
     return ~_in_wide_gap(held, gap_deg)
@@ -158,7 +167,7 @@ def _turn(readings: Readings, is_airborne: BoolArray, first: int, last: int, set
 
 
 def _objection(turn: Turn, is_airborne: bool, settings: MagneticSettings) -> str:
-    """Why a turn is of no use; empty when it is."""
+    """Return why a turn is of no use; empty when it is."""
     if not is_airborne:
         return "on the ground"
     if turn.turned_deg * turn.bank_deg < 0.0:

@@ -37,10 +37,11 @@ FORECAST_BANKS_DEG = (10.0, 20.0, 30.0)
 
 @dataclass(frozen=True)
 class Fits:
-    """The table with its forecast bank bias, shape (360,), and two irons; ``pitch_deg`` is the mean of the figure.
+    """Table with its forecast bank bias, shape (360,), and two irons.
 
-    ``attitude_wander_deg`` is what roll and pitch of the INS are wrong by in the mean of the figure as they wander,
-    ``wander`` (5, 5) what that adds to the covariance of A to E: no residual of the figure shows it.
+    ``pitch_deg`` is the mean of the figure. ``attitude_wander_deg`` is what roll and pitch of the INS are wrong by in
+    the mean of the figure as they wander, ``wander`` (5, 5) what that adds to the covariance of A to E: no residual of
+    the figure shows it.
     """
 
     table: CompassTable
@@ -79,12 +80,17 @@ def fit_all(
 
 
 def _per_attitude(earth: EarthField) -> float:
-    """A small error of roll turns the vertical field Z into the horizontal: angle x Z / H in C; one of pitch in B."""
+    """Return how much heading error a small error of roll makes: Z / H.
+
+    Roll turns the vertical field Z into the horizontal, angle x Z / H in C; pitch does in B.
+    """
     return abs(earth.down_nt) / earth.horizontal_nt if earth.horizontal_nt > 0.0 else 0.0
 
 
 def _wander_deg(fit: IronFit, unseen: Unseen | None, settings: MagneticSettings) -> float:
-    """Wander of roll and pitch over minutes: the settings' and what level flight beside the figure shows, by weight.
+    """Return the wander of roll and pitch over minutes.
+
+    It is weighed from the settings' and from what level flight beside the figure shows.
 
     Source: Gelman et al., Bayesian Data Analysis, 3rd ed. 2013, section 2.6 (scaled inverse chi-square).
     """
@@ -103,7 +109,10 @@ def method_rows(
     declination_deg: float,
     a_sigma_deg: float,
 ) -> tuple[Method, ...]:
-    """A row for each method; ``a_sigma_deg`` is what alignment and declination add to the sigma of A."""
+    """Return a row for each method.
+
+    ``a_sigma_deg`` is what alignment and declination add to the sigma of A.
+    """
     table = fits.table
     values = table.coefficients_deg + np.array([declination_deg, 0.0, 0.0, 0.0, 0.0])
     values[0] = wrap_180(values[0])
@@ -121,9 +130,10 @@ def method_rows(
 
 
 def bias_coefficients(fits: Fits, azimuth_sigma_deg: float) -> tuple[FloatArray, FloatArray]:
-    """A to E of the forecast bank bias, shape (5,), and their covariance: how far the table's may be from level flight.
+    """Return A to E of the forecast bank bias, shape (5,), and their covariance.
 
-    The covariance is that of the iron, with the error of the reference heading.
+    They tell how far the table's may be from level flight. The covariance is that of the iron, with the error of the
+    reference heading.
     """
     fit = fits.forecast
     if fit is None:

@@ -1,4 +1,7 @@
-"""Prior art: iron from the constancy of the field's modulus, without any heading. Nearly blind at small banks."""
+"""Prior art: iron from the constancy of the field's modulus, without any heading.
+
+It is nearly blind at small banks.
+"""
 
 import numpy as np
 
@@ -16,7 +19,7 @@ LARGEST = 0.45  # of the field: what is larger is no iron, and the soft iron sta
 
 
 def fit_modulus(reading_nt: FloatArray, earth: EarthField, settings: MagneticSettings) -> IronFit:
-    """Fit hard iron p, q, r and horizontal soft iron a, e, b = d so that the modulus is constant.
+    """Fit hard iron p, q, r and horizontal soft iron a, e, b = d to a constant modulus.
 
     Gauss-Newton: sensitivities are differences by a small increment of each coefficient; the residual is the modulus
     of the freed readings minus its mean over the manoeuvre. It cannot see a turn of the magnetometer about the vertical
@@ -87,7 +90,10 @@ def _sensitivity(scaled: FloatArray, parameters: FloatArray) -> FloatArray:
 
 
 def _spread(covariance: FloatArray, unit: float) -> FloatArray:
-    """Covariance of the six coefficients as that of an :class:`Iron` in nanotesla, shape (12, 12)."""
+    """Convert the covariance of the six coefficients to that of an :class:`Iron`, (12, 12).
+
+    In nanotesla.
+    """
     spread = np.zeros((12, PARAMETERS))
     spread[[9, 10, 11], [0, 1, 2]] = unit
     for row, column, place in SOFT_PLACES:

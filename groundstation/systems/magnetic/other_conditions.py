@@ -1,4 +1,4 @@
-"""Conditions other than those of the figure, and by how much the deviation is then another.
+"""Deviation under conditions other than those of the figure.
 
 Pitch, a current that flows only in the air or only on the ground, and gains that drift, with temperature for instance.
 """
@@ -33,7 +33,10 @@ PITCH_STEP_DEG = 1.0
 
 @dataclass(frozen=True)
 class FlownConditions:
-    """What was flown: readings with the aligned heading, which are in the air, those of the figures and level ones."""
+    """Flown conditions: readings with the aligned heading, and masks of them.
+
+    The masks tell which are in the air, in the figures and level.
+    """
 
     readings: Readings
     is_airborne: BoolArray
@@ -45,7 +48,7 @@ class FlownConditions:
 def other_conditions(
     flight: Flight, flown: FlownConditions, fit: IronFit, method: MethodName, *, wander_deg: float
 ) -> tuple[OtherCondition, ...]:
-    """Say how far the deviation is another at another pitch, on the ground and as the gains drift.
+    """Tell how far the deviation differs at another pitch, on the ground and as gains drift.
 
     ``wander_deg``: how far roll and pitch of the INS wander over minutes.
     """
@@ -61,7 +64,10 @@ def _levelling_deg(earth: EarthField) -> float:
 
 
 def _pitch_flown(flown: FlownConditions) -> tuple[float, str]:
-    """The pitch farthest from the figure's that was flown level or stood at, and where pitch was, in words."""
+    """Return the pitch farthest from the figure's that was flown level or stood at.
+
+    It also tells where pitch was, in words.
+    """
     parts = {"in level flight": flown.is_level & ~flown.in_figure, "on the ground": ~flown.is_airborne}
     seen = {name: flown.readings.pitch_deg[rows] for name, rows in parts.items() if np.count_nonzero(rows) > 1}
     ends = {name: np.quantile(values, (0.05, 0.95)) for name, values in seen.items()}
@@ -108,7 +114,10 @@ def _pitch(flown: FlownConditions, fit: IronFit) -> OtherCondition:
 
 
 def _on_ground(flight: Flight, flown: FlownConditions, fit: IronFit) -> OtherCondition | None:
-    """What the readings on the ground have more than the iron of the figure makes: a steady vector in the body."""
+    """Return what the readings on the ground have more than the figure's iron makes.
+
+    It is a steady vector in the body.
+    """
     rows = np.flatnonzero(~flown.is_airborne)
     left = flown.readings.take(rows)
     if not len(left):
@@ -151,9 +160,10 @@ def _current(flown: FlownConditions) -> str:
 def _gains(
     flight: Flight, flown: FlownConditions, fit: IronFit, method: MethodName, wander_deg: float
 ) -> OtherCondition | None:
-    """Gains of the axes that change with time, from all that was flown, and what that makes farthest from the figure.
+    """Return how the axis gains change with time, from all that was flown, and the effect.
 
-    Roll and pitch that wander over minutes move the axes forward and right as a gain does that changes: in the sigma.
+    The effect is that at the time farthest from the figure. Roll and pitch that wander over minutes move the axes
+    forward and right as a gain does that changes: in the sigma.
     """
     rows = np.flatnonzero(flown.is_airborne)
     flying = flown.readings.take(rows)
@@ -183,9 +193,10 @@ def _gains(
 
 
 def _of_gain(fit: IronFit, pitch_deg: float, gain: FloatArray, method: MethodName) -> FloatArray:
-    """Error of the corrected heading on every heading when the axes read ``gain`` (3,) of themselves more, degrees.
+    """Return the corrected heading's error on every heading when gains have grown, degrees.
 
-    A table sees what the axes differ by; the iron fit, which takes off a hard iron that grew with them, all of it.
+    The axes read ``gain`` (3,) of themselves more. A table sees what the axes differ by; the iron fit, which takes off
+    a hard iron that grew with them, all of it.
     """
     level = np.zeros(len(HEADINGS_DEG)), np.full(len(HEADINGS_DEG), pitch_deg)
     field = field_in_body(fit.earth.horizontal_nt, fit.earth.down_nt, HEADINGS_DEG, *level)
@@ -197,9 +208,10 @@ def _of_gain(fit: IronFit, pitch_deg: float, gain: FloatArray, method: MethodNam
 
 
 def _rate(hours: FloatArray, expected_nt: FloatArray, reading_nt: FloatArray) -> tuple[float, float]:
-    """Change of the gain of one axis per hour, and its sigma: reading - expected = constant + rate x hours x expected.
+    """Return the change of one axis' gain per hour, and its sigma.
 
-    Residuals are correlated; the constant and a steady drift of the offset are fitted with it.
+    reading - expected = constant + rate x hours x expected. Residuals are correlated; the constant and a steady drift
+    of the offset are fitted with it.
     """
     columns = np.stack([hours * expected_nt, np.ones_like(hours), hours, expected_nt], axis=1)
     scale = np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-12)
@@ -215,7 +227,7 @@ def _rate(hours: FloatArray, expected_nt: FloatArray, reading_nt: FloatArray) ->
 
 
 def _of_current(iron: Iron, readings: Readings) -> FloatArray:
-    """What the logged current adds, shape (n, 3)."""
+    """Return what the logged current adds, shape (n, 3)."""
     if iron.current_nt_per_a is None:
         return np.zeros((len(readings), 3))
     return np.nan_to_num(readings.current_a - iron.current_reference_a)[:, None] * iron.current_nt_per_a
@@ -238,7 +250,10 @@ def _expected_nt(flight: Flight, flown: FlownConditions, rows: NDArray[np.intp],
 def _along(
     flight: Flight, flown: FlownConditions, rows: NDArray[np.intp], fit: IronFit
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Declination, H and Z that the model has more at some rows than in the figures, shapes (n,); zero without one."""
+    """Return what the model has more of declination, H and Z at some rows than in the figures.
+
+    Shapes (n,); zero without a model.
+    """
     none = np.zeros(len(rows))
     if not (flight.has_utc and fit.earth.is_modelled):
         return none, none, none

@@ -1,4 +1,4 @@
-"""Hard and soft iron from the readings and the attitude: twelve parameters, and three of the current."""
+"""Hard and soft iron from readings and attitude: twelve parameters, three of the current."""
 
 from dataclasses import dataclass, replace
 
@@ -22,7 +22,7 @@ LEAST_BANK_DEG = 1.0
 
 @dataclass(frozen=True)
 class EarthField:
-    """The earth's field at the figure: declination, east positive, horizontal and downward intensity.
+    """Earth's field at the figure: declination, east positive, horizontal and down intensity.
 
     ``is_modelled`` False: no model said the intensities; they are those of the readings, the dip is fitted.
     """
@@ -35,7 +35,10 @@ class EarthField:
 
 @dataclass(frozen=True)
 class DipShift:
-    """Vertical field that the readings show more than the model's at its H, and the sigma that this should have."""
+    """Vertical field that the readings show more than the model at its H, and its sigma.
+
+    The sigma is what this shift should have.
+    """
 
     down_nt: float
     sigma_nt: float
@@ -47,11 +50,12 @@ class DipShift:
 
 @dataclass(frozen=True)
 class IronFit:
-    """An iron with its covariance, shape (k, k), in the order of :meth:`Iron.vector`: of the readings and of the dip.
+    """Iron with its covariance, shape (k, k), in the order of :meth:`Iron.vector`.
 
-    ``residual_nt`` (n, 3) or, of the modulus, (n,). ``reason`` where it is refused. ``per_azimuth_deg`` (k,): change of
-    the parameters when the reference heading is 1 deg larger. ``strength_covariance`` (k, k) is what an error of the
-    field's strength adds: the soft iron is larger for it, and no heading changes. ``dip_shift``: None without a model.
+    The covariance is that of the readings and of the dip. ``residual_nt`` (n, 3) or, of the modulus, (n,). ``reason``
+    where it is refused. ``per_azimuth_deg`` (k,): change of the parameters when the reference heading is 1 deg larger.
+    ``strength_covariance`` (k, k) is what an error of the field's strength adds: the soft iron is larger for it, and no
+    heading changes. ``dip_shift``: None without a model.
     """
 
     iron: Iron
@@ -69,7 +73,7 @@ class IronFit:
         return self.covariance + azimuth_sigma_deg**2 * np.outer(self.per_azimuth_deg, self.per_azimuth_deg)
 
     def stated_covariance(self, azimuth_sigma_deg: float) -> FloatArray:
-        """That of the parameters themselves, the strength of the field included."""
+        """Return the covariance of the parameters themselves, the field's strength included."""
         covariance = self.covariance_with(azimuth_sigma_deg)
         return covariance if self.strength_covariance is None else covariance + self.strength_covariance
 
@@ -80,7 +84,10 @@ class IronFit:
 
 @dataclass(frozen=True)
 class _Solved:
-    """Least squares against one field. ``influence`` (n, k): what each reading does to the parameters."""
+    """Least squares against one field.
+
+    ``influence`` (n, k) is what each reading does to the parameters.
+    """
 
     iron: Iron
     earth: EarthField
@@ -91,7 +98,10 @@ class _Solved:
     correlation: float
 
     def variance(self, influence: FloatArray) -> FloatArray:
-        """Covariance of what has an influence (n, m), residuals being correlated in time, shape (m, m)."""
+        """Return the covariance of what has an influence (n, m), shape (m, m).
+
+        Residuals are correlated in time.
+        """
         width = self.influence.shape[1] // AXES
         return harmonics.long_run(influence, self.correlation) * harmonics.inflation(
             len(influence), width, self.correlation
@@ -100,7 +110,7 @@ class _Solved:
 
 @dataclass(frozen=True)
 class _Field:
-    """What is known of the field after the readings, relative to one solution.
+    """Knowledge of the field after the readings, relative to one solution.
 
     ``down_nt``: what they show more of Z at the H of the solution, with its variance; ``shift_nt``, of H and Z, what is
     believed of it; ``gain`` of it the share believed. ``prior_variance`` of Z at a given H, ``per_strength`` the
@@ -160,7 +170,10 @@ def _raised(earth: EarthField, horizontal_nt: float, down_nt: float) -> EarthFie
 
 
 def _moved(solved: _Solved, seen: FloatArray) -> FloatArray:
-    """What each reading does to Z at a given H, shape (n,); ``seen`` (n, 3) is the residual per nT of it."""
+    """Return what each reading does to Z at a given H, shape (n,).
+
+    ``seen`` (n, 3) is the residual per nT of it.
+    """
     power = max(float(np.sum(solved.weight[:, None] * seen**2)), 1e-12)
     return np.asarray(-solved.weight * np.sum(seen * solved.residual_nt, axis=1) / power)
 
@@ -168,10 +181,10 @@ def _moved(solved: _Solved, seen: FloatArray) -> FloatArray:
 def _field(
     readings: Readings, model: EarthField, solved: _Solved, seen: FloatArray, settings: MagneticSettings
 ) -> _Field:
-    """Z at a given H as the readings show it, in whose field ``solved`` is, and as the model has it.
+    """Return Z at a given H as the readings show it, and as the model has it.
 
-    Strength s = dH / H and d = dZ - Z s have the covariance of the model's H and Z; d is measured. Roll that wanders by
-    w between the banks looks like Z w / tan(bank) of it.
+    ``solved`` is in the field of the readings. Strength s = dH / H and d = dZ - Z s have the covariance of the model's
+    H and Z; d is measured. Roll that wanders by w between the banks looks like Z w / tan(bank) of it.
 
     Source: Gelb, Applied Optimal Estimation, 1974, section 4.2.
     """
@@ -201,7 +214,10 @@ def _field(
 
 
 def _strength_covariance(iron: Iron, per_down: FloatArray, field: _Field) -> FloatArray:
-    """What the error of the strength adds to the covariance of the iron, through Z at a given H and by itself."""
+    """Return what the error of the strength adds to the covariance of the iron.
+
+    It does so through Z at a given H and by itself.
+    """
     per_strength = np.zeros(len(per_down))
     per_strength[: AXES * AXES] = -iron.soft.ravel()
     left = (1.0 - field.gain) ** 2 * field.prior_variance + field.gain**2 * field.variance
@@ -265,7 +281,10 @@ def _solved(readings: Readings, earth: EarthField, settings: MagneticSettings) -
 
 
 def _influence(scaled: FloatArray, scale: FloatArray, residual: FloatArray, weight: FloatArray) -> FloatArray:
-    """What each reading does to the parameters in the order of :meth:`Iron.vector`, shape (n, k)."""
+    """Return what each reading does to the parameters, shape (n, k).
+
+    They are in the order of :meth:`Iron.vector`.
+    """
     bread = np.linalg.pinv(scaled.T @ (scaled * weight[:, None]))
     of_unit = (scaled * weight[:, None]) @ bread / scale
     whole = np.concatenate([of_unit * residual[:, axis, None] for axis in range(AXES)], axis=1)
@@ -273,7 +292,10 @@ def _influence(scaled: FloatArray, scale: FloatArray, residual: FloatArray, weig
 
 
 def _columns(readings: Readings, earth: EarthField, settings: MagneticSettings) -> tuple[FloatArray, float]:
-    """What multiplies the parameters of an axis: the field along the body, 1, and the current where it varies."""
+    """Return what multiplies the parameters of an axis.
+
+    It is the field along the body, 1, and the current where it varies.
+    """
     heading = wrap_180(readings.true_heading_deg - earth.declination_deg)
     field = field_in_body(earth.horizontal_nt, earth.down_nt, heading, readings.roll_deg, readings.pitch_deg)
     parts, current = [field, np.ones((len(field), 1))], readings.current_a
@@ -291,7 +313,10 @@ def _lengths(residual: FloatArray) -> FloatArray:
 
 
 def _order(width: int) -> list[int]:
-    """Places of soft iron by rows, hard iron and current effect among the parameters axis by axis."""
+    """Return the indices of soft iron, hard iron and current effect among the parameters.
+
+    The parameters stand axis by axis; soft iron is given by rows.
+    """
     soft = [axis * width + column for axis in range(AXES) for column in range(AXES)]
     return soft + [axis * width + column for column in range(AXES, width) for axis in range(AXES)]
 

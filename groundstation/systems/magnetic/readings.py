@@ -1,4 +1,4 @@
-"""What the method looks at: the magnetometer with the attitude of the INS at the same times."""
+"""Readings that the method uses: the magnetometer with the INS attitude at the same times."""
 
 from dataclasses import dataclass, fields
 
@@ -32,10 +32,11 @@ PLACE_WANTED = "a position, or declination_deg stated"
 
 @dataclass(frozen=True)
 class Readings:
-    """Magnetometer readings with known attitude, in order of time; arrays of shape (n,), ``field_nt`` (n, 3).
+    """Magnetometer readings with known attitude, in order of time.
 
-    ``true_heading_deg`` is the INS heading (mounting and alignment taken off where that is known), ``altitude_m``,
-    ``latitude_deg``, ``longitude_deg`` and ``current_a`` are NaN where unknown.
+    Arrays have shape (n,), ``field_nt`` (n, 3). ``true_heading_deg`` is the INS heading (mounting and alignment taken
+    off where that is known), ``altitude_m``, ``latitude_deg``, ``longitude_deg`` and ``current_a`` are NaN where
+    unknown.
     """
 
     time_s: FloatArray
@@ -67,7 +68,9 @@ class Readings:
 
 
 def choose_topics(flight: Flight, ins_topic: str = "", magnetometer_topic: str = "") -> tuple[str, str]:
-    """The first INS with attitude and true heading, and the first three-axis magnetometer, unless named.
+    """Return the first INS with attitude and true heading, and the first magnetometer.
+
+    Named topics come before; the magnetometer has three axes.
 
     Raises
     ------
@@ -79,7 +82,10 @@ def choose_topics(flight: Flight, ins_topic: str = "", magnetometer_topic: str =
 
 
 def why_not_independent(flight: Flight, ins_topic: str, kinds: dict[str, str], settings: MagneticSettings) -> str:
-    """Why the heading of an INS may itself come from a magnetometer; empty when nothing says so."""
+    """Return why the heading of an INS may itself come from a magnetometer.
+
+    Empty when nothing says so.
+    """
     derived = flight.metadata.get(f"derived.{ins_topic}.true_heading_deg", "")
     if "magnetic" in derived:
         return f"the reader derived the true heading of {ins_topic} from {derived}: it is no independent reference"
@@ -96,7 +102,9 @@ def why_not_independent(flight: Flight, ins_topic: str, kinds: dict[str, str], s
 def gather(
     flight: Flight, topics: tuple[str, str], latencies: Latencies | None, settings: MagneticSettings
 ) -> tuple[Readings, float]:
-    """Readings at the times of the magnetometer, put back by its latency where that is observed, and that latency.
+    """Return readings at the times of the magnetometer, and its latency.
+
+    They are put back by the latency where that is observed.
 
     Raises
     ------

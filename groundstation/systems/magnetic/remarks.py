@@ -1,4 +1,4 @@
-"""What a reader of the magnetic chapter must be told beside the figures."""
+"""Remarks that a reader of the magnetic chapter needs beside the figures."""
 
 from collections.abc import Mapping
 

@@ -48,7 +48,9 @@ def compare_swings(readings: Readings, declination_deg: float, figures: list[Fig
 def steer_card(
     deviation_deg: FloatArray, sigma_deg: dict[str, float], is_measured: BoolArray, step_deg: int
 ) -> tuple[CardRow, ...]:
-    """Readings to steer for magnetic headings every ``step_deg``: reading + deviation = heading.
+    """Return readings to steer for magnetic headings every ``step_deg``.
+
+    reading + deviation = heading.
 
     Examples
     --------

@@ -30,9 +30,10 @@ def build_gates(
     dip_sigmas: float | None,
     settings: MagneticSettings,
 ) -> tuple[Gate, ...]:
-    """Every gate with its figure. ``turns`` are those used, ``bias`` is that of the bank flown.
+    """Build every gate with its figure.
 
-    ``dip_sigmas``: by how many sigma the vertical field of the readings differs from the model's.
+    ``turns`` are those used, ``bias`` is that of the bank flown. ``dip_sigmas``: by how many sigma the vertical field
+    of the readings differs from the model's.
     """
     altitude = min((turn.altitude_m for turn in turns if turn.altitude_m is not None), default=None)
     unequal = max(abs(abs(swing.right_bank_deg) - abs(swing.left_bank_deg)) for swing in swings)
@@ -117,14 +118,20 @@ def gate_bounds(settings: MagneticSettings) -> dict[str, Bound]:
 
 
 def rejudge(answer: MagneticResult, settings: MagneticSettings) -> tuple[Rejudged, ...]:
-    """The gates and the verdict of an answer under other limits, from the values that it was judged by."""
+    """Apply other limits to the gates and the verdict of an answer.
+
+    The values are those that it was judged by.
+    """
     bounds = gate_bounds(settings)
     after = tuple(_told(gate.under(bounds[gate.name])) if gate.name in bounds else gate for gate in answer.gates)
     return (Rejudged("magnetic", answer.verdict, decide(after)[0], answer.gates, after),)
 
 
 def decide(gates: tuple[Gate, ...]) -> tuple[MagneticVerdict, str]:
-    """Reject on a required gate failed, undecided on one not measured, else accept; and the reason."""
+    """Decide the verdict and its reason from the gates.
+
+    Reject on a required gate failed, undecided on one not measured, else accept.
+    """
     outcomes: tuple[tuple[GateState, MagneticVerdict], ...] = (("failed", "reject"), ("not_measured", "undecided"))
     for state, verdict in outcomes:
         telling = [gate for gate in gates if gate.required and gate.state == state]
@@ -147,7 +154,7 @@ def _gate(
 
 
 def _told(gate: Gate) -> Gate:
-    """The gate with figure and limit for its reason where it failed, with none where it passed."""
+    """Return the gate with its reason: figure and limit where it failed, none where it passed."""
     if gate.value is None:
         return gate
     wanted = "at least" if gate.sense == "at_least" else "at most"

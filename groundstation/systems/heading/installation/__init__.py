@@ -1,1 +1,1 @@
-"""How an INS sits in its aircraft and how the aircraft crabs: learned from its earlier flights."""
+"""Installation of an INS in its aircraft and sideslip, learned from its earlier flights."""

@@ -1,4 +1,7 @@
-"""The learned installation as an analysis: the heading error of one log by what a file of earlier flights says."""
+"""Learned installation as an analysis: the heading error of one log by earlier flights.
+
+A file tells what those say.
+"""
 
 from typing import TYPE_CHECKING
 

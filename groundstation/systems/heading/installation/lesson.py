@@ -1,4 +1,4 @@
-"""From the stored answers of one flight to what it teaches of its installation."""
+"""Lesson of one flight: what its stored answers teach of its installation."""
 
 import math
 from collections.abc import Mapping
@@ -34,7 +34,7 @@ STILL_TEACHES = CURED_BY_MORE_DATA | {STANDSTILL_GATE, "skewness", "kurtosis", "
 
 @dataclass(frozen=True)
 class Stored:
-    """What a lesson is made of: the answers of a flight, as they are stored, and who flew when.
+    """Source of a lesson: the answers of a flight as stored, and who flew when.
 
     ``stated`` is the user's ``[aircraft]``: its ``ins_serial`` and ``ins_alignment`` stand above those of the log.
     """
@@ -49,12 +49,12 @@ class Stored:
     findings: frozenset[str] = frozenset()
 
     def said(self, key: str) -> str:
-        """What is stated under a key, else what the log says."""
+        """Return what is stated under a key, else what the log says."""
         return str(self.stated.get(key) or self.metadata.get(key, "")).strip()
 
 
 def lesson_of_flight(results: FlightResults, stated: Mapping[str, Any], flight_id: str) -> Lesson:
-    """What a flight teaches, from its folder: see :func:`lesson_of`."""
+    """Return the lesson of a flight from its folder; see :func:`lesson_of`."""
     return lesson_of(
         Stored(
             flight_id,
@@ -70,7 +70,10 @@ def lesson_of_flight(results: FlightResults, stated: Mapping[str, Any], flight_i
 
 
 def lesson_of(stored: Stored) -> Lesson:
-    """What a flight teaches, its numbers rounded as files have them; ``not_taught`` says why it teaches nothing."""
+    """Return the lesson of a flight, its numbers rounded as files have them.
+
+    ``not_taught`` says why it teaches nothing.
+    """
     heading, alignment = stored.heading, stored.said("ins_alignment")
     plain = Lesson(
         flight_id=stored.flight_id,
@@ -88,7 +91,7 @@ def lesson_of(stored: Stored) -> Lesson:
 
 
 def _measured(stored: Stored) -> tuple[Measured, ...]:
-    """What a flight says of compass, antenna and GNSS, as far as it observed them."""
+    """Return what a flight says of compass, antenna and GNSS, as far as it observed them."""
     found: list[tuple[str, float | None, float | None]] = []
     magnetic, latencies = answer_of(stored.others, MagneticResult), answer_of(stored.others, Latencies)
     heading = stored.heading
@@ -125,12 +128,15 @@ def _why_not(plain: Lesson, heading: HeadingResult | None) -> str:
 
 
 def _is_sound(*values: float | None) -> bool:
-    """Whether stored numbers can be computed with: a damaged summary has none, or absurd ones."""
+    """Tell whether stored numbers can be computed with.
+
+    A damaged summary has none, or absurd ones.
+    """
     return all(value is None or (math.isfinite(value) and abs(value) <= LARGEST) for value in values)
 
 
 def _of_heading(heading: HeadingResult) -> dict[str, Any]:
-    """What the heading correction says, and what was known before it."""
+    """Return what the heading correction says, and what was known before it."""
     settings = heading.settings
 
     def number(name: str) -> float | None:
@@ -188,7 +194,10 @@ def _of_heading(heading: HeadingResult) -> dict[str, Any]:
 
 
 def _azimuth(stored: Stored, heading: HeadingResult) -> dict[str, float]:
-    """Azimuth error in flight, carried back to the taxi; nothing where the INS was another then."""
+    """Return the azimuth error in flight, carried back to the taxi.
+
+    Nothing where the INS was another then.
+    """
     inertial = stored.inertial
     early = None if inertial is None or inertial.azimuth is None else inertial.azimuth.early
     if inertial is None or early is None or inertial.ins_topic != heading.ins_topic:
@@ -203,7 +212,10 @@ def _azimuth(stored: Stored, heading: HeadingResult) -> dict[str, float]:
 
 
 def _reference(metadata: Mapping[str, str], heading: HeadingResult) -> dict[str, float]:
-    """Heading error against the stand, else the runway: mounting in it, but no sideslip of taxi."""
+    """Return the heading error against the stand, else the runway.
+
+    It has the mounting in it, but no sideslip of taxi.
+    """
     shown, reference = heading.parking_ins_heading_deg, heading.reference_parking_heading_deg
     if shown is not None and reference is not None and not heading.steps:
         logged = logged_reference(metadata)

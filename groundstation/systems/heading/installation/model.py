@@ -1,6 +1,6 @@
-"""The belief in an installation: exact sums over histories, crosswind factors and rates of oddity.
+"""Belief about an installation: sums over histories, crosswind factors, rates of oddity.
 
-One flight shows, on taxi, in flight and at a reference (theodolite, runway):
+The sums are exact. One flight shows, on taxi, in flight and at a reference (theodolite, runway):
 
     taxi      = alignment error + own + steady + factor x crosswind + noise
     azimuth   = alignment error + noise
@@ -36,7 +36,7 @@ LEAST_WEIGHT = 1e-9  # of a history, against the likeliest
 
 @dataclass(frozen=True)
 class Belief:
-    """What the flights so far say; ``weight`` sums to one.
+    """Belief by the flights so far; ``weight`` sums to one.
 
     Parameters
     ----------
@@ -82,7 +82,10 @@ class Mixture:
 
 @dataclass(frozen=True)
 class _Branches:
-    """States (mounting, steady, own, alignment error) of a flight for b branches and h histories, before it is seen."""
+    """States of a flight for b branches and h histories, before it is seen.
+
+    They are (mounting, steady, own, alignment error).
+    """
 
     letters: tuple[str, ...]
     weight: FloatArray  # (b, h, r, k)
@@ -91,7 +94,7 @@ class _Branches:
 
 
 def first_belief(lesson: Lesson, settings: InstallationSettings) -> Belief:
-    """What is known before any flight: two histories, the unit sits as usual, or anyhow."""
+    """Return the belief before any flight: the unit sits as usual, or anyhow (two histories)."""
     factor, factor_weight = factor_nodes(lesson.factor, lesson.factor_sigma, settings)
     rates = np.array(settings.odd_weights)
     sits = np.array([1.0 - settings.gross_share, settings.gross_share]) * np.array([1.0, settings.hazard])
@@ -106,7 +109,9 @@ def first_belief(lesson: Lesson, settings: InstallationSettings) -> Belief:
 
 
 def factor_nodes(mean: float, sigma: float, settings: InstallationSettings) -> tuple[FloatArray, FloatArray]:
-    """Values of a positive factor, lognormal with this mean and sigma, and their weights (sum 1), shapes (k,).
+    """Return values of a positive, lognormal factor and their weights (sum 1), shapes (k,).
+
+    The factor has this mean and sigma.
 
     Examples
     --------
@@ -175,7 +180,10 @@ def predict(belief: Belief, lesson: Lesson, settings: InstallationSettings) -> M
 
 
 def installed(belief: Belief) -> Installed:
-    """The belief in figures: means and standard deviations of mounting, steady sideslip, their sum and the factor."""
+    """Return the belief in figures: means and standard deviations.
+
+    They are of mounting, steady sideslip, their sum and the factor.
+    """
     weight = belief.weight.sum(axis=1)
 
     def moments(row: FloatArray) -> tuple[float, float]:
@@ -197,7 +205,10 @@ def installed(belief: Belief) -> Installed:
 
 
 def doubts(belief: Belief) -> tuple[FloatArray, FloatArray]:
-    """Probability of each flight that taught: it is odd; from it on the unit sits otherwise. Shapes (f,)."""
+    """Return for each flight that taught the chances that it is odd or changed, shapes (f,).
+
+    Changed: from it on the unit sits otherwise.
+    """
     share = belief.weight.sum(axis=(1, 2))
     letters = np.array([list(history) for history in belief.histories]).reshape(len(share), belief.flights)
     odd = np.isin(letters, [ODD, ODD_GROSSLY])
@@ -206,7 +217,10 @@ def doubts(belief: Belief) -> tuple[FloatArray, FloatArray]:
 
 
 def _branched(belief: Belief, lesson: Lesson, settings: InstallationSettings) -> _Branches:
-    """Every branch of every history, before the flight is seen; the first flight can change nothing."""
+    """Return every branch of every history, before the flight is seen.
+
+    The first flight can change nothing.
+    """
     letters = BRANCHES if belief.flights else (SAME, ODD, ODD_GROSSLY)
     rates = np.array(settings.odd_rates)
     hazard = settings.hazard if belief.flights else 0.0
@@ -242,12 +256,18 @@ def _branched(belief: Belief, lesson: Lesson, settings: InstallationSettings) ->
 
 
 def _taxi_variance(lesson: Lesson, factor: FloatArray) -> FloatArray:
-    """Variance of the taxi's number by the taxi itself and by what is not known of its wind, shape (k,)."""
+    """Return the variance of the taxi's number, shape (k,).
+
+    It is by the taxi itself and by what is not known of its wind.
+    """
     return np.asarray(lesson.taxi_sigma_deg**2 + (factor * lesson.crosswind_sigma_mps) ** 2)
 
 
 def _seen(lesson: Lesson, factor: FloatArray) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
-    """What a flight shows: row of the state, value and variance, shapes (4,), (k,), (k,)."""
+    """Return the observations of a flight: row of the state, value and variance.
+
+    Shapes (4,), (k,), (k,).
+    """
     k = len(factor)
     found = []
     for row, value, sigma in (

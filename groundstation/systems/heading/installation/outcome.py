@@ -1,4 +1,4 @@
-"""The learned answer of a flight: both numbers, their intervals in parts, and the verdict that follows."""
+"""Learned answer of a flight: both numbers, their intervals in parts, and the verdict."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +22,10 @@ AIRFRAME, PLATFORM = 0, 1
 
 @dataclass(frozen=True)
 class LearnedNumber:
-    """One heading error with its interval, deg; ``half_width_deg`` reaches from the number to the farther end."""
+    """One heading error with its interval, deg.
+
+    ``half_width_deg`` reaches from the number to the farther end.
+    """
 
     error_deg: float
     sigma_deg: float
@@ -32,7 +35,10 @@ class LearnedNumber:
 
 
 def learned_number(mixture: Mixture, lesson: Lesson, which: int) -> LearnedNumber:
-    """The airframe's error or the platform's from its mixture; angles are kept together about their middle."""
+    """Return the airframe's or the platform's error from its mixture.
+
+    Angles are kept together about their middle.
+    """
     weight, sigma, share = mixture.weight, mixture.sigma[:, which], mixture.taxi_share[:, which]
     middle = float(mixture.mean[np.argmax(weight), which])
     mean = middle + np.asarray(wrap_180(mixture.mean[:, which] - middle))
@@ -57,7 +63,10 @@ def learned_number(mixture: Mixture, lesson: Lesson, which: int) -> LearnedNumbe
 def learned_answer(
     lesson: Lesson, belief: Belief, taught_by: tuple[str, ...], settings: InstallationSettings
 ) -> InstallationResult:
-    """The answer of a flight with what earlier ones taught; that of its taxi alone where nothing was."""
+    """Return the answer of a flight with what earlier ones taught.
+
+    It is that of its taxi alone where nothing was taught.
+    """
     assert lesson.number_deg is not None and lesson.error_deg is not None
     mixture = predict(belief, lesson, settings)
     airframe, platform = (learned_number(mixture, lesson, which) for which in (AIRFRAME, PLATFORM))
@@ -93,7 +102,7 @@ def learned_answer(
 
 
 def _residual(lesson: Lesson, platform: LearnedNumber) -> tuple[float | None, float | None]:
-    """The platform's number against the azimuth of the same flight, and the sigma of the difference."""
+    """Return the platform's number less the azimuth of the same flight, and its sigma."""
     if lesson.azimuth_deg is None or lesson.azimuth_sigma_deg is None:
         return None, None
     residual = float(wrap_180(platform.error_deg - lesson.azimuth_deg))
@@ -101,7 +110,9 @@ def _residual(lesson: Lesson, platform: LearnedNumber) -> tuple[float | None, fl
 
 
 def verdict_of(lesson: Lesson, half_width_deg: float) -> str:
-    """The verdict on a learned number: the gates of this taxi, and the whole half width with what was learned.
+    """Return the verdict on a learned number.
+
+    It rests on the gates of this taxi, and on the whole half width with what was learned.
 
     Examples
     --------

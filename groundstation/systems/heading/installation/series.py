@@ -67,7 +67,10 @@ def _answered(series: Series, teacher: "_Teacher") -> Iterator[tuple[Lesson, Ins
 
 
 def answer_from(lesson: Lesson, earlier: Sequence[Lesson], settings: InstallationSettings) -> InstallationResult:
-    """The learned answer of a flight with a taxi, from those of its unit in its aircraft; later ones are left out."""
+    """Return the learned answer of a flight with a taxi.
+
+    It is from the earlier flights of its unit in its aircraft; later ones are left out.
+    """
     if lesson.number_deg is None or not (lesson.ins_serial and lesson.aircraft and lesson.start_utc):
         return alone_answer(lesson, lesson.not_taught)
     others = [one for one in earlier if one.place[0] < lesson.place[0] and one.flight_id != lesson.flight_id]
@@ -79,7 +82,7 @@ def answer_from(lesson: Lesson, earlier: Sequence[Lesson], settings: Installatio
 
 
 def installation_of(series: Series, settings: InstallationSettings) -> Installation:
-    """An installation with the answer of each flight, and what all of them say for the next one."""
+    """Return an installation with the answer of each flight, and the outlook for the next one."""
     teacher = _Teacher(settings)
     flights = tuple(InstalledFlight(*one) for one in _answered(series, teacher))
     belief = teacher.belief
@@ -97,9 +100,10 @@ def installation_of(series: Series, settings: InstallationSettings) -> Installat
 
 
 def pooled_of(series: Series, settings: InstallationSettings) -> tuple[Pooled, ...]:
-    """Figures of other sensors from all flights of an installation, by the rule of the mounting.
+    """Return figures of other sensors from all flights of an installation.
 
-    Each is a mounting that every flight sees as a reference does: changes and odd flights are doubted alike.
+    They follow the rule of the mounting. Each is a mounting that every flight sees as a reference does: changes and odd
+    flights are doubted alike.
     """
     found = []
     for name, sigma in POOLED_SIGMA.items():
@@ -132,7 +136,10 @@ def pooled_of(series: Series, settings: InstallationSettings) -> tuple[Pooled, .
 
 
 class _Teacher:
-    """The belief as flights are added, made anew where what is known beforehand is another (class, stated sigmas)."""
+    """Belief as flights are added, made anew where the prior is another.
+
+    The prior is that of class and stated sigmas.
+    """
 
     def __init__(self, settings: InstallationSettings) -> None:
         self.settings = settings

@@ -1,4 +1,4 @@
-"""What is known of an installation before its first flight, and how often it changes unsaid."""
+"""Prior of an installation before its first flight, and how often it changes unsaid."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ POOLED_SIGMA: Mapping[str, float] = {"compass_a_deg": 5.0, "antenna_arm_m": 5.0,
 
 @dataclass(frozen=True)
 class InstallationSettings:
-    """How the model doubts what it is told.
+    """Settings of how far the model doubts what it is told.
 
     Parameters
     ----------
