@@ -43,14 +43,16 @@ def write_index_of(
             saved = load(folder, ANSWER_TYPES)
             rows.append(index_row(saved, kind, answer_values(saved.results)))
         except Exception as error:
-            problems.append(told_beside(folder, "failed", *reason_of(folder.name, error)))
+            problems.append(outcome_beside(folder, "failed", *reason_of(folder.name, error)))
     logs = [one for one in outcomes if not one.is_beside]
     without_flight = [one for one in logs if not one.flight_id and not (one.is_session and one.state == "skipped")]
     rows += [failed_row(one.source, one.state, one.text) for one in (*_listed(without_flight), *problems)]
     try:
         write_index(out, rows, INDEXED, elsewhere=f"{len(found)} flights: {FLIGHTS}/" if is_large else "")
     except OSError as error:
-        problems.append(told_beside(out, "failed", f"{out}: the index cannot be written ({error.strerror or error})"))
+        problems.append(
+            outcome_beside(out, "failed", f"{out}: the index cannot be written ({error.strerror or error})")
+        )
     return tuple(problems)
 
 
@@ -86,6 +88,6 @@ def rows_without_flight(out: Path) -> list[IndexRow]:
     return [row for row in rows if row.kind in ("failed", "skipped") and row.source not in folders]
 
 
-def told_beside(place: Path, state: State, text: str, trace: str = "") -> Outcome:
+def outcome_beside(place: Path, state: State, text: str, trace: str = "") -> Outcome:
     """Outcome of something beside the flights, or of a flight folder that was there before."""
     return Outcome(str(place), state, text, trace=trace, is_beside=True)

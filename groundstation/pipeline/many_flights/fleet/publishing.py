@@ -8,7 +8,7 @@ from typing import NamedTuple
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
 from groundstation.base.failures import attempt, failures, gathered_failures
 from groundstation.estimators.analyses import ANSWER_TYPES
-from groundstation.pipeline.many_flights.fleet.index import rows_without_flight, told_beside, write_index_of
+from groundstation.pipeline.many_flights.fleet.index import outcome_beside, rows_without_flight, write_index_of
 from groundstation.pipeline.many_flights.fleet.installations import refresh_installations, show_installation
 from groundstation.pipeline.many_flights.fleet.refresh import forget_month, refresh, restamp
 from groundstation.pipeline.many_flights.fleet.samples import SAMPLES
@@ -71,7 +71,7 @@ def write_beside(
                     shown = attempt("installations", "fleet", learn, unless=(OSError, GroundstationError))
                     restamp(out, shown or ())
                     problems += _write_beside(out, outcomes, kept_rows, found, with_pdf, only_results)
-                    problems += [told_beside(out, "failed", f"{out}: {one.text}", one.trace) for one in failures()]
+                    problems += [outcome_beside(out, "failed", f"{out}: {one.text}", one.trace) for one in failures()]
                     break
                 except DamagedMonthError as error:
                     if error.month in again:  # making it again did not help
@@ -79,10 +79,10 @@ def write_beside(
                     again.add(error.month)
                     forget_month(out, error.month)
                     text = f"{error.where}: damaged ({error.found}), made again from the flight folders"
-                    problems.append(told_beside(out, "skipped", text))
+                    problems.append(outcome_beside(out, "skipped", text))
                     found = None
     except Exception as error:  # the flights are done, and told of in any case
-        problems.append(told_beside(out, "failed", *reason_of(str(out), error)))
+        problems.append(outcome_beside(out, "failed", *reason_of(str(out), error)))
     return tuple({(one.source, one.text): one for one in problems}.values())
 
 
@@ -110,7 +110,7 @@ def _write_beside(
     recording = out / FLEET_RECORDING
     attempt("recording", "fleet", write_fleet_recording, recording, fleet, unless=(OSError, GroundstationError))
     problem = write_fleet_report(out, fleet, with_pdf=with_pdf).problem
-    return [*problems, told_beside(out, "skipped", f"{out}: {problem}")] if problem else problems
+    return [*problems, outcome_beside(out, "skipped", f"{out}: {problem}")] if problem else problems
 
 
 class ReportedAgain(NamedTuple):
@@ -157,13 +157,13 @@ def report_again(out: Path, *, with_pdf: bool = False) -> ReportedAgain:
         except GroundstationError as error:
             if is_flight:
                 raise
-            problems.append(told_beside(folder, "failed", str(error)))
+            problems.append(outcome_beside(folder, "failed", str(error)))
             continue
         paths += written.paths
         if written.problem:
-            problems.append(told_beside(folder, "done", f"{folder.name}: {written.problem}"))
+            problems.append(outcome_beside(folder, "done", f"{folder.name}: {written.problem}"))
         problems += [
-            told_beside(folder, "incomplete", f"{folder.name}: {one.text}", one.trace) for one in written.failures
+            outcome_beside(folder, "incomplete", f"{folder.name}: {one.text}", one.trace) for one in written.failures
         ]
     if is_flight:
         show_installation(out.absolute())
