@@ -69,7 +69,10 @@ def _steps(result: HeadingResult) -> tuple[Finding, ...]:
 
 
 def _findings_of_what_was_set(flight: "Flight", heading: HeadingResult, known: Known) -> tuple[Finding, ...]:
-    """Findings on the user's references and intervals: what contradicts the log, or touches none of its samples."""
+    """Return findings on the user's references and intervals.
+
+    They tell what contradicts the log, or touches none of its samples.
+    """
     from groundstation.methods.taxi.gating import intervals_without_epoch
     from groundstation.systems.heading.references import reference_findings
 
