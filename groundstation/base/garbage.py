@@ -1,4 +1,4 @@
-"""What a process imports is no garbage: it need not be searched for any, neither meanwhile, nor later, nor at the end.
+"""Imports kept out of the garbage collector's searches.
 
 A run imports some 1800 modules, and Python's search for garbage went through them again and again as they came, then at
 the end of the process: a seventh of the processor time of `run` on a short log.
@@ -11,7 +11,9 @@ from contextlib import contextmanager
 
 @contextmanager
 def importing() -> Iterator[None]:
-    """Search for no garbage meanwhile; what there is then is left out of every later search (``gc.freeze``).
+    """Switch garbage collection off while modules are imported.
+
+    Objects that exist at its end are left out of every later search (``gc.freeze``).
 
     For processes of the command line alone: in a notebook, garbage of others would stay with it.
 

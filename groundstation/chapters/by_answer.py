@@ -11,7 +11,7 @@ from groundstation.results.flight import FlightResults
 
 
 def answer_chapters(results: FlightResults, chapters: Chapters) -> tuple[Section, ...]:
-    """Build the chapters of a flight that have an answer, the best first: the order of a report."""
+    """Build the chapters of a flight that have an answer, the best first."""
     listed = [chapter for chapter in chapters.flight if any(map(results.answer, chapter.answers))]
     every = (one for one in (*_built(listed, results), *_generic(results, chapters)) if one is not None)
     return tuple(sorted(every, key=lambda one: Rank.OTHER if one.claim is None else one.claim.rank))

@@ -11,7 +11,9 @@ Pairs = tuple[tuple[str, Cell], ...]
 
 
 class Chapter(NamedTuple):
-    """A chapter of its own: the answers it tells, and what builds it; None where it has nothing to say.
+    """Chapter of a system: the answers it tells, and its builder.
+
+    ``build(results)`` returns None where there is nothing to say.
 
     ``front(results, pairs)`` is the top of the report of a session, made of its first chapter.
     """
@@ -27,7 +29,10 @@ class Chapter(NamedTuple):
 
 
 class Chapters(NamedTuple):
-    """Chapters in the order of the report. An answer that none of them tells has the generic chapter."""
+    """Chapters of flights, sessions and plans, in the order of the report.
+
+    An answer that none of them tells has the generic chapter.
+    """
 
     flight: tuple[Chapter, ...] = ()
     session: tuple[Chapter, ...] = ()

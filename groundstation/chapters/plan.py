@@ -17,7 +17,10 @@ MARKS = {
 
 
 def plan_front(results: FlightResults, pairs: Pairs, chapters: Sequence[Chapter]) -> Front:
-    """The top of a plan's report: headline of its first chapter, and what every chapter has above its parts."""
+    """Build the top of a plan's report.
+
+    It has the headline of the first chapter, and the parts that each chapter puts above its own.
+    """
     built = (attempt("chapter", chapter.name, chapter.build, results) for chapter in chapters)
     sections = [section for section in built if section is not None]
     above = [part for section in sections for part in section.above]

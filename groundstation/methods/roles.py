@@ -1,4 +1,4 @@
-"""Roles: what one system needs of another and asks by type, without importing the system that meets it.
+"""Roles that one system asks of another by type, without importing it.
 
 An analysis offers a role (``Analysis.offers``); another one finds it with ``known.role(kind)``, None where nobody
 offers it.
@@ -38,14 +38,19 @@ class FindHeadingError(Protocol):
 
 @dataclass(frozen=True)
 class HeadingOnGround:
-    """Role of whoever estimates INS heading errors on the ground, by the user's settings and intervals."""
+    """Role of an estimator of INS heading errors on the ground.
+
+    It works with the user's settings and intervals.
+    """
 
     find: FindHeadingError
 
 
 @dataclass(frozen=True)
 class InsKinds:
-    """Role of whoever tells an INS that GNSS corrects from one left alone, by the log and what the user states.
+    """Role of an analysis that tells INSs corrected by GNSS from others.
+
+    It goes by the log and by the user's statement.
 
     ``find(flight)`` gives the kind (:mod:`groundstation.tables.ins_kind`) of each INS topic that can be judged.
     """

@@ -195,7 +195,10 @@ class OpenFlight(ABC):
         return plots_of(self._saved(), systems())
 
     def recording(self, path: AnyPath) -> Path:
-        """Write the Rerun recording to a file and return its path; `groundstation view` and Rerun open it."""
+        """Write the Rerun recording to a file and return its path.
+
+        ``groundstation view`` and Rerun open it.
+        """
         from groundstation.systems import systems
         from groundstation.viewer.recording import write_recording
 

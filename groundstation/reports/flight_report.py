@@ -42,7 +42,7 @@ class Written:
 
 
 def write_flight_report(folder: Path, systems: Systems, *, with_pdf: bool = False) -> Written:
-    """Write report.html into a flight folder; with a magnetic deviation its table and steer card too.
+    """Write report.html into a flight folder, and its exports.
 
     The exports are its table and steer card. A part that fails by a defect is left out; summary.json and the report
     name it, and those that failed before.
@@ -79,7 +79,9 @@ def write_flight_report(folder: Path, systems: Systems, *, with_pdf: bool = Fals
 
 
 def add_pdf(folder: Path, systems: Systems) -> Written:
-    """Write report.pdf beside the page of a flight folder, parameters as of :func:`write_flight_report`.
+    """Write report.pdf beside the page of a flight folder.
+
+    Parameters are those of :func:`write_flight_report`.
 
     The page and all else stay as they are, unless a part fails by a defect now: then both are written and tell it.
     """
@@ -129,7 +131,7 @@ def _put_pdf(document: Document, pdf: Path) -> str:
 
 
 def flight_document(saved: SavedFlight, systems: Systems) -> Document:
-    """Put the report of one saved flight, a session of several or a plan, together, its figures drawn."""
+    """Return the report of a saved flight, session or plan, its figures drawn."""
     kind = PLAN if saved.results.is_plan else SESSION if saved.results.is_session else "Flight report"
     top = attempt("chapter", "front", front, saved.results, systems.chapters) or Front(saved.results.flight_id)
     return Document(kind, saved.results.flight_id, top, flight_sections(saved, systems))

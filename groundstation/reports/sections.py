@@ -29,7 +29,7 @@ APPENDICES: dict[str, Build] = {"provenance": provenance, "sources": sources}
 
 
 def flight_sections(saved: SavedFlight, systems: Systems) -> tuple[Section, ...]:
-    """The chapters of a flight: the flight itself, what to do next, its answers, the best first, its data; appendices.
+    """Return the chapters and appendices of a flight's report.
 
     The flight itself, what to do next, its answers, the best first, its data. Of a session of several aircraft, and of
     a plan: those on its answers, its findings, its source.
@@ -42,7 +42,7 @@ def flight_sections(saved: SavedFlight, systems: Systems) -> tuple[Section, ...]
 
 
 def told_sections(saved: SavedFlight, systems: Systems) -> tuple[list[Section], list[Section]]:
-    """The chapters of :func:`flight_sections` and their appendices as they are told, no figure drawn."""
+    """Return the chapters and appendices of a report, no figure drawn."""
     results = saved.results
     is_flight = not (results.is_session or results.is_plan)
     told = (
@@ -97,7 +97,10 @@ def _as_set(part: Part, configuration: Mapping[str, Any]) -> Part | None:
 
 
 def on_a_page(section: Section, saved: SavedFlight, systems: Systems) -> Section:
-    """The section as a report shows it: its figures drawn, of the files beside the report those that are there."""
+    """Return a section as a report shows it.
+
+    Its figures are drawn; of the files beside the report it names those that exist.
+    """
     drawn = drawn_by(systems.plots, section, saved.results)
     parts = (
         _of_files_there(part, saved.folder) if isinstance(part, Note) and part.files else part for part in drawn.parts

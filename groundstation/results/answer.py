@@ -19,7 +19,7 @@ class Answer(Tabular):
 
 
 class PlanAnswer(Answer):
-    """Base of the answers of ``groundstation plan``: they tell of something that has not been flown."""
+    """Base of the answers of ``groundstation plan``: nothing of it has been flown."""
 
 
 class SessionAnswer(Answer):

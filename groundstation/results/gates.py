@@ -14,7 +14,9 @@ STORED_STEP = 1e-6  # limits in summary.json are rounded to it
 
 @dataclass(frozen=True)
 class Gate:
-    """One acceptance gate: figure, limit, unit, state. ``value`` is None when it could not be measured.
+    """One acceptance gate: figure, limit, unit, state.
+
+    ``value`` is None when it could not be measured.
 
     ``limit`` is a number that the figure must reach or not exceed, as ``sense`` says, or a pair [low, high];
     ``required`` gates decide the verdict, others inform.
@@ -56,7 +58,10 @@ def judged_gate(
     reason: str = "",
     required: bool = True,
 ) -> Gate:
-    """A gate that passes where low <= value <= high; its limit is the one bound given, or both."""
+    """Make a gate that passes where low <= value <= high.
+
+    Its limit is the one bound given, or both.
+    """
     low, high = bound
     bounds = tuple(end for end in bound if end is not None)
     limit = bounds[0] if len(bounds) == 1 else (bounds[0], bounds[1])

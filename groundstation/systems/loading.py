@@ -7,7 +7,7 @@ from groundstation.systems.system import System, Systems
 
 
 def load_systems(ours: Sequence[str], group: str) -> Systems:
-    """Load the systems at paths of modules, each its ``SYSTEM``, and those of a group of entry points.
+    """Load our systems by their modules' paths and others by entry points.
 
     Returns
     -------

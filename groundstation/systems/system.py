@@ -1,4 +1,4 @@
-"""One system as one object: its analyses and plans, and all that pages, recordings and verbs show of it.
+"""One system as one object: its analyses, plans, pages, recordings and studies.
 
 Every part is optional. What costs an import is given as a function that imports inside: a run loads the analyses, a
 page the chapters and plots, a recording the tabs, a study its own simulation.
@@ -67,7 +67,9 @@ def _no_tabs() -> tuple[Tab, ...]:
 
 @dataclass(frozen=True)
 class System:
-    """A system of the ground station. Whatever runs, lists, tells or draws systems loops over them.
+    """System of the ground station.
+
+    Whatever runs, lists, tells or draws systems loops over them.
 
     Parameters
     ----------
@@ -100,7 +102,9 @@ class System:
 
 @dataclass(frozen=True)
 class Systems:
-    """Systems in the order they are shown, and a line for each of a stranger's that could not be loaded.
+    """Systems in the order they are shown.
+
+    ``failures`` has a line for each stranger's system that could not be loaded.
 
     Examples
     --------
@@ -155,7 +159,10 @@ class Systems:
 
     @cached_property
     def plots(self) -> "Mapping[str, Describe]":
-        """Descriptions of figures, by the name that a chapter gives: those of all flights and of the systems."""
+        """Descriptions of figures, of all flights and of the systems, by name.
+
+        The name is the one that a chapter gives.
+        """
         from groundstation.chapters.plots import PLOTS
 
         return {**PLOTS, **{name: describe for one in self.every for name, describe in one.plots().items()}}

@@ -1,4 +1,4 @@
-"""The source of a kind to use: the order where several logs of a flight have one, and the choice by what is needed."""
+"""Choice of a source: by the order of several logs, and by what a method needs."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -25,7 +25,7 @@ LONGEST_STEP_S = 10.0  # between samples for a source to count as there
 
 @dataclass(frozen=True)
 class Need:
-    """What a method needs of the source it works with.
+    """Needs of a method from the source it works with.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ GNSS_VELOCITY = Need("gnss", "GNSS velocity", ("velocity_north_mps", "velocity_e
 
 @dataclass(frozen=True)
 class PairNeed:
-    """What an analysis needs of an INS and of the GNSS that it compares with it."""
+    """Needs of an analysis from an INS and the GNSS compared with it."""
 
     analysis: str
     ins: Need
@@ -110,7 +110,9 @@ def sources_of_kind(flight: Flight, kind: str) -> tuple[str, ...]:
 
 
 def choose_pair(flight: Flight, need: PairNeed, ins_topic: str = "", gnss_topic: str = "") -> Pair:
-    """The INS and the GNSS that an analysis works with: those named, else the first that have what it needs.
+    """Return the INS and GNSS topics that an analysis works with.
+
+    They are those named, else the first that have what it needs.
 
     Raises
     ------
@@ -126,7 +128,9 @@ def choose_pair(flight: Flight, need: PairNeed, ins_topic: str = "", gnss_topic:
 
 
 def choose_source(flight: Flight, need: Need, analysis: str, named: str = "") -> str:
-    """The topic that an analysis works with: the one named, else the first that has what it needs.
+    """Return the topic that an analysis works with.
+
+    It is the one named, else the first that has what it needs.
 
     Raises
     ------
@@ -155,7 +159,10 @@ def _having(flight: Flight, need: Need) -> tuple[str, ...]:
 
 
 def _is_track(flight: Flight, topic: str) -> bool:
-    """Whether its heading is a receiver's own track: no measurement of where the nose points."""
+    """Tell whether a topic's heading is a receiver's own track.
+
+    A track does not measure where the nose points.
+    """
     return f"{HEADING_IS_TRACK}.{topic}.true_heading_deg" in flight.metadata
 
 

@@ -302,7 +302,7 @@ class Flight:
         return tuple(sorted(self.tables))
 
     def once(self, key: Hashable, make: Callable[["Flight"], T]) -> T:
-        """What a function makes of the flight, made when it is first asked for under the key."""
+        """Return a function's result for the flight, computed once for each key."""
         if key not in self._made:
             self._made[key] = make(self)
         return cast(T, self._made[key])

@@ -1,4 +1,4 @@
-"""Two saved flights in one recording: the plots of their page, the clock of B moved onto that of A."""
+"""Recording of two saved flights: the plots of their page, B on the clock of A."""
 
 from collections.abc import Callable, Sequence
 from functools import partial

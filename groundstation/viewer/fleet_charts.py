@@ -1,4 +1,4 @@
-"""Charts of a fleet by the numbers of its flights: the plots of its page, and lanes of the verdicts."""
+"""Charts of a fleet by flight number: the plots of its page, and verdict lanes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

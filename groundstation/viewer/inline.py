@@ -23,7 +23,7 @@ def is_notebook() -> bool:
 def inline_viewer(
     flight: Flight, results: FlightResults, systems: Systems, *, width: int | str, height: int | str
 ) -> Any:
-    """A viewer for a notebook cell with the recording of one flight in it: the same logging as into a file.
+    """Return a viewer for a notebook cell with the recording of one flight.
 
     The recording is logged as into a file. The viewer's own files come from this machine, not from the Internet, unless
     the environment (``NOTEBOOK_ASSET``) says otherwise.

@@ -17,7 +17,9 @@ from groundstation.viewer.recording import answer_tabs, logged, save_stream, sen
 
 
 def write_plan_recording(path: Path, results: FlightResults, systems: Systems) -> None:
-    """Write the recording of a plan, blueprint embedded; see :func:`recording.write_recording`.
+    """Write the recording of a plan, blueprint embedded.
+
+    See :func:`recording.write_recording`.
 
     Raises
     ------

@@ -220,7 +220,7 @@ def _cells(chart: Chart, name: str, several: list[marks.Cells], _: float) -> Non
 
 
 def _told(chart: Chart, name: str, several: list[marks.Told], _: float) -> None:
-    """Log a mark that is where the aircraft is at the cursor, where the description tells flight time."""
+    """Log marks at the aircraft's place at the cursor, where time is described."""
     for place, mark in enumerate(several):
         if mark.is_time:
             chart.moving(f"{name}/{place}", mark.value, mark.x, mark.y, _line(replace(mark, name=""), HERE))

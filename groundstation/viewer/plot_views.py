@@ -298,7 +298,9 @@ def _title(title: str, named: Sequence[Line]) -> str:
 
 
 def _lanes(recorder: Recorder, panels: Sequence[tuple[str, str, Panel]]) -> rrb.View:
-    """Log states over time in one view of the panels, which follow each other; it has the title of the first.
+    """Log states over time in one view of panels that follow each other.
+
+    It has the title of the first.
 
     Each mark is a lane that says every state, those that the page leaves out too.
     """

@@ -120,7 +120,10 @@ def _expect_viewer(url: str) -> None:
 
 
 def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResults, systems: Systems) -> rrb.Blueprint:
-    """Log everything to a stream that has its sink, send the layout, wait until it is out; returns the layout."""
+    """Log everything to a stream that has its sink, and return the layout.
+
+    The layout is sent, and the call returns when all is out.
+    """
     recorder = Recorder(stream, flight.start_ns, flight.has_utc, systems)
     stream.send_recording_name(clean_text(results.flight_id))
     attempt("properties", "results", send_properties, stream, results)
@@ -146,7 +149,10 @@ def logged(tabs: Iterable[NamedTab], recorder: Recorder, flight: Flight, results
 
 
 def answer_tabs(kind: type[Answer] | None, recorder: Recorder, results: FlightResults) -> Iterator[NamedTab]:
-    """Return the tabs of the systems that show answers of a kind, then a generic one for each answer without any."""
+    """Return the tabs of answers of a kind.
+
+    They are those of the systems, then a generic one for each answer without any.
+    """
     tabs = tuple(recorder.systems.tabs_of(kind))
     for tab in tabs:
         if tab.log is not None:

@@ -18,7 +18,9 @@ from groundstation.viewer.recording import answer_tabs, logged, save_stream, sen
 
 
 def write_session_recording(path: Path, assembled: AssembledSession, results: FlightResults, systems: Systems) -> None:
-    """Write the recording of a session, blueprint embedded; see :func:`recording.write_recording`.
+    """Write the recording of a session, blueprint embedded.
+
+    See :func:`recording.write_recording`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the straight taxi of an aircraft needs of its INS and GNSS."""
+"""Needs of a straight taxi: an INS heading and GNSS velocities."""
 
 from groundstation.tables.sources import GNSS_VELOCITY, Need, PairNeed
 

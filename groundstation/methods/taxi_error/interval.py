@@ -158,7 +158,10 @@ class _Target:
         return found._replace(density=found.density - 0.5 * np.sum(scaled**2, axis=1))
 
     def likelihood(self, thetas: FloatArray, checkpoints: NDArray[np.int64], room: noise.Room) -> _Found:
-        """The same with the log likelihood alone as density; ``room`` then holds what the loops came to."""
+        """Return the same with the log likelihood alone as density.
+
+        ``room`` then holds the results of the loops.
+        """
         count, rest = len(thetas), self.width - 1
         log_likelihood, estimate = np.empty(count), np.empty((count, rest))
         variance, alone = np.empty((count, len(checkpoints), rest)), np.empty((count, 2))

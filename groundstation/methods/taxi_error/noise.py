@@ -84,7 +84,10 @@ class Room(NamedTuple):
 
 
 def room_for(width: int, checkpoints: int = 1, *, lanes: int = LANES, history: int = 0) -> Room:
-    """Room for ``width`` columns, data and regressors; with ``history``, for that of so many samples."""
+    """Return working arrays for ``width`` columns, data and regressors.
+
+    With ``history``, they hold the states of so many samples too.
+    """
     rest = width - 1
     return Room(
         q=np.zeros((STATES, lanes)),
@@ -115,7 +118,9 @@ def room_for(width: int, checkpoints: int = 1, *, lanes: int = LANES, history: i
 def standstill_filter(
     time_s: FloatArray, north: FloatArray, east: FloatArray, restart: int, thetas: FloatArray, room: Room
 ) -> None:
-    """Find the log likelihood of standstill velocities, and the last state: mean north, mean east, variance.
+    """Compute the log likelihood of standstill velocities and the last state.
+
+    The state is mean north, mean east and their variance.
 
     ``thetas``, shape (k, 11), are as many draws as the room has lanes, or fewer; ``restart`` is the index at which the
     filter starts afresh (a second, unconnected stretch).
@@ -157,7 +162,10 @@ def standstill_filter(
 
 @inlined
 def _oscillator(theta: FloatArray, step_s: float, F: FloatArray, lane: int) -> None:
-    """Transition of sway and sway rate over a step, exact, into a lane of F of shape (2, 2, lanes)."""
+    """Write the exact transition of sway and its rate over a step.
+
+    It goes into a lane of F, shape (2, 2, lanes).
+    """
     natural = 2.0 * math.pi * math.exp(theta[FREQUENCY])
     zeta = min(math.exp(theta[DAMPING]), DAMPING_MAX)
     decay, damped = zeta * natural, natural * math.sqrt(1.0 - zeta * zeta)
@@ -168,7 +176,10 @@ def _oscillator(theta: FloatArray, step_s: float, F: FloatArray, lane: int) -> N
 
 @in_place
 def _turn(F: FloatArray, sway: FloatArray, rate: FloatArray, turned: FloatArray, lanes: int) -> None:
-    """Sway and sway rate, each of shape (lanes,), a step later; ``turned`` is room for one of them."""
+    """Carry sway and sway rate, each of shape (lanes,), over a step.
+
+    ``turned`` is working space for one of them.
+    """
     for k in range(lanes):
         turned[k] = F[0, 0, k] * sway[k] + F[0, 1, k] * rate[k]
     for k in range(lanes):
@@ -189,7 +200,9 @@ def taxi_filter(
     checkpoints: NDArray[np.int64],
     room: Room,
 ) -> None:
-    """Filter the differences and the regressors; leaves the sum of log innovation variances and the information.
+    """Filter the differences and the regressors.
+
+    It leaves the sum of the logarithms of innovation variances, and the information.
 
     The information, in a lane's part of shape (m, c, c), is the sums of products of whitened columns after so many
     samples as ``checkpoints`` say.

@@ -296,7 +296,10 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
 
 
 def report_finished(folder: Path, *, with_page: bool, with_pdf: bool) -> str:
-    """Make the report of a finished folder again, or its PDF alone, and take it down; returns what went wrong."""
+    """Write the report of a finished folder again, or its PDF alone.
+
+    The manifest is brought up to date. Returns the problem, empty where there is none.
+    """
     every = systems()
     written = write_flight_report(folder, every, with_pdf=with_pdf) if with_page else add_pdf(folder, every)
     note(folder, written.paths, removed=REPORT_FILES)
@@ -342,7 +345,7 @@ def state_of(findings: tuple[Finding, ...], has_lost_data: bool, fail_on: str) -
 
 
 def sentence(results: FlightResults) -> str:
-    """What was found, in one line."""
+    """Return the results of a flight in one line."""
     told = (attempt("line", one.name, one.sentence, results.answers) for one in systems().analyses)
     found = [text for text in told if text]
     if found:

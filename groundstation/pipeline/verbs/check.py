@@ -176,7 +176,10 @@ def _for_purpose(
 def _for_session(
     found: Sequence[Checked], purpose: str, flights: Mapping[int, "Flight"], configuration: Configuration, fail_on: str
 ) -> list[Checked]:
-    """The checks with what their logs can be used for together, with the stations beside the first of them."""
+    """Return the checks with the usability of their logs together.
+
+    The stations are those beside the first log.
+    """
     from groundstation.pipeline.many_flights.sessions.found import STATIONS_TOML
     from groundstation.pipeline.many_flights.sessions.job import load_stations
     from groundstation.pipeline.verbs.usable import usability_of_session

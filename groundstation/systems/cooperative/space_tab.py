@@ -27,7 +27,10 @@ VIEW_NAME = "East, north, up; true 2σ ellipsoids; links: residual below 1σ gre
 
 
 def space(recorder: Recorder, answer: CooperativeResult, results: FlightResults) -> list[rrb.View]:
-    """Log the aircraft, their tracks, the ground points and the links; the view, none without a position."""
+    """Log aircraft, tracks, ground points and links, and return the view.
+
+    There is none without a position.
+    """
     tracks = results.rows_of(CooperativeTracks)
     if tracks is None:
         return []

@@ -1,1 +1,1 @@
-"""INS heading error from GNSS on straight taxi, and what earlier flights teach of the installation."""
+"""Heading error of the INS from GNSS on straight taxi, and the installation learned."""

@@ -1,1 +1,1 @@
-"""Magnetic deviation: in flight, on ground runs, as a steer card, and applied to other flights."""
+"""Magnetic deviation in flight and on ground runs, steer card, corrected headings."""

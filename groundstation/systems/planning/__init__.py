@@ -1,1 +1,1 @@
-"""Plans: control of a session, placement of ground points, landing by ranges to reference points."""
+"""Plans of a session's control and ground points, and of a landing by ranges."""

@@ -1,1 +1,1 @@
-"""Answers judged by a reference in the log: the truth of a simulation, or a better system on board."""
+"""Answers judged by a reference in the log: a simulation's truth or a better system."""

@@ -54,7 +54,10 @@ def flights(fleet: FleetResults) -> Plot:
 
 
 def by_horizon(fleet: FleetResults, x: Axis, places: Places) -> Panel | None:
-    """The shipped method on every flight, a series for each horizon; None where there is no number."""
+    """Describe the shipped method on every flight, a series a horizon.
+
+    None where there is no number.
+    """
     table = fleet.skill_flights
     known, at = np.isfinite(table.rms_m), places(table.flight_id)
     marks = []

@@ -61,7 +61,9 @@ def charts(fleet: FleetResults, quantity: str) -> Plot | None:
 def chart(
     fleet: FleetResults, quantity: str, name: str, x: Axis, places: Places, title: str = "flight", role: Role = "ins"
 ) -> Panel | None:
-    """Flights of an aircraft by a quantity, with their intervals, level and limits; None without a number.
+    """Describe the control chart of one quantity of an aircraft.
+
+    It has the flights with their intervals, the level and the limits. None without a number.
 
     Parameters
     ----------
@@ -121,7 +123,10 @@ def _dates_of(fleet: FleetResults) -> Places:
 
 
 def _intervals(time: Floats, ends: tuple[Floats, Floats], firsts: Floats, title: str, role: Role) -> list[AnyMark]:
-    """Bands of the intervals of flights; one ends where the level changes, at the places ``firsts``."""
+    """Return bands of the intervals of flights.
+
+    A band ends where the level changes, at the places ``firsts``.
+    """
     low, high = ends
     known = np.isfinite(low) & np.isfinite(high)
     stretch = np.searchsorted(firsts, time, side="right")

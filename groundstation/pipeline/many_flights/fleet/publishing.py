@@ -7,9 +7,7 @@ from typing import NamedTuple
 
 from groundstation.base.errors import GroundstationError, UsageError, told_in_a_line
 from groundstation.base.failures import attempt, failures, gathered_failures
-from groundstation.pipeline.many_flights.fleet.index import outcome_beside
-from groundstation.pipeline.many_flights.fleet.index import rows_without_flight
-from groundstation.pipeline.many_flights.fleet.index import write_index_of
+from groundstation.pipeline.many_flights.fleet.index import outcome_beside, rows_without_flight, write_index_of
 from groundstation.pipeline.many_flights.fleet.installations import refresh_installations, show_installation
 from groundstation.pipeline.many_flights.fleet.refresh import forget_month, refresh, restamp
 from groundstation.pipeline.many_flights.fleet.samples import SAMPLES
