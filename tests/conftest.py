@@ -5,10 +5,9 @@ import os
 # Before numpy comes: threads that wait for small matrices take a third of the processor time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import gc
 import hashlib
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from filelock import FileLock
 from rerun.experimental import ViewerClient
 
 from groundstation.base import compile as compiling
+from groundstation.base.garbage import importing
 from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
@@ -29,9 +29,11 @@ compiling.PLAIN_S = (
 )
 
 
-def pytest_collection_finish() -> None:
-    """Leave what stands for thousands of tests to no further look of the garbage collector."""
-    gc.freeze()
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Collect without a search for garbage, and leave what stands for thousands of tests to no later one."""
+    with importing():
+        return (yield)
 
 
 @pytest.fixture(scope="module")
