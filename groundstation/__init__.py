@@ -37,3 +37,13 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     return sorted(__all__)
+
+
+def _answer_old_paths() -> None:
+    """Let modules be imported by their old paths, for one release."""
+    from groundstation.base.old_paths import answer_old_paths
+
+    answer_old_paths()
+
+
+_answer_old_paths()

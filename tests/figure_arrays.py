@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-import groundstation.results.arrays as package
+import groundstation.results.arrays as shared
+from groundstation import systems
 from groundstation.results.arrays.typed import Arrays, MissingColumnError
 from groundstation.results.figures import FigureData
 
@@ -21,10 +22,11 @@ FILLERS: dict[type, Any] = {
 
 def kinds() -> dict[str, type[Arrays]]:
     """Every class of arrays by the name of its figure."""
-    for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
-        importlib.import_module(module.name)
-    listed = (kind for kind in Arrays.__subclasses__() if kind.__module__.startswith(package.__name__))
-    return {kind.figure: kind for kind in listed}
+    for room in (shared, systems):
+        for module in pkgutil.walk_packages(room.__path__, f"{room.__name__}."):
+            if room is shared or module.name.endswith("arrays"):
+                importlib.import_module(module.name)
+    return {kind.figure: kind for kind in Arrays.__subclasses__() if kind.__module__.startswith("groundstation.")}
 
 
 def figure(name: str, **columns: Any) -> FigureData:

@@ -43,7 +43,7 @@ BY_TEXT = {"numbers", "flags", "texts", "figure_with_rows"}
 # Arrays of anybody's analysis; the fleet's table of flights, whose columns the analyses list; UTC beside any figure.
 MAY_ASK_BY_TEXT = {
     *("chapters/generic.py", "chapters/plots/generic.py"),
-    "viewer/fleet_charts.py",
+    "chapters/plots/fleet/trend.py",
     *("pipeline/verbs/export_figures.py", "results/figures.py", "results/flight.py"),
 }
 

@@ -21,7 +21,7 @@ from tests.recording_contents import Contents
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
 RECIPES = dict(
-    re.findall(r"^## ((?:An analysis|A tab|A signal|A reader))\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE | re.DOTALL)
+    re.findall(r"^## ((?:A system|A tab|A signal|A reader))\n(.*?)(?=^## |\Z)", PAGE, re.MULTILINE | re.DOTALL)
 )
 FILE_BLOCKS = re.compile(r"^`([\w/]+\.(?:py|proto))`\n\n```(python|diff|proto)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 TOML_BLOCK = re.compile(r"^```toml\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -95,6 +95,16 @@ def copy_of_the_package(folder: Path) -> None:
         shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("*.pyc.*", "*.tmp.*"))
 
 
+def installed(folder: Path, package: str, entry_points: str) -> None:
+    """Let a package in a folder be found as if it were installed, with its entry points."""
+    ((group, points),) = tomllib.loads(entry_points)["project"]["entry-points"].items()
+    about = folder / f"{package}-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n", encoding="utf-8")
+    lines = [f"[{group}]", *(f"{name} = {module}" for name, module in points.items())]
+    (about / "entry_points.txt").write_text("\n".join(lines), encoding="utf-8")
+
+
 def rotor(folder: Path) -> None:
     """Carry out the recipes of the signal and the reader in a copy of the package, and write three logs."""
     carry_out("A signal", folder)
@@ -104,12 +114,7 @@ def rotor(folder: Path) -> None:
     out = "--descriptor_set_out=groundstation/store/descriptors.binpb"
     subprocess.run([*command, out, *schemas], cwd=folder, check=True, capture_output=True)
     (entry_points,) = TOML_BLOCK.findall(RECIPES["A reader"])
-    ((group, points),) = tomllib.loads(entry_points)["project"]["entry-points"].items()
-    about = folder / "rotor_log-1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: rotor-log\nVersion: 1.0\n", encoding="utf-8")
-    lines = [f"[{group}]", *(f"{name} = {module}" for name, module in points.items())]
-    (about / "entry_points.txt").write_text("\n".join(lines), encoding="utf-8")
+    installed(folder, "rotor_log", entry_points)
     records = b"".join(struct.pack("<If", 100 * at, 300.0 + at % 3) for at in range(200))
     (folder / "whole.rotor").write_bytes(b"ROTORLOG" + records)
     (folder / "cut.rotor").write_bytes(b"ROTORLOG" + records[:-3])
@@ -121,9 +126,10 @@ def rotor(folder: Path) -> None:
 def scratch(tmp_path_factory: pytest.TempPathFactory) -> Scratch:
     folder = tmp_path_factory.mktemp("scratch")
     copy_of_the_package(folder)
-    carry_out("An analysis", folder)
+    carry_out("A system", folder)
     rotor(folder)
-    (settings,) = TOML_BLOCK.findall(RECIPES["An analysis"])
+    entry_points, settings = TOML_BLOCK.findall(RECIPES["A system"])
+    installed(folder, "gnss_noise", entry_points)
     (folder / "c.toml").write_text(settings, encoding="utf-8")
     log = ROOT / "sample_logs" / "taxi-good.csv"
     run = groundstation(folder, "run", str(log), "-o", "out", "--no-pdf", "-j", "1", "--config", "c.toml")
@@ -232,11 +238,7 @@ def test_records_of_a_reader_are_those_of_the_log(scratch: Scratch) -> None:
 def test_a_tab_of_its_own_takes_the_place_of_the_generic_one(scratch: Scratch) -> None:
     generic = Contents(next(scratch.flight.glob("*.rrd"))).text("/gnss_noise/answer")
     carry_out("A tab", scratch.folder)  # the last test: the copy has another tab from here on
-    scratch.python(
-        "from pathlib import Path; import groundstation; from groundstation.viewer.recording import write_recording;"
-        f"flight = groundstation.open({str(scratch.flight)!r});"
-        "write_recording(Path('own.rrd'), flight.flight, flight.results)"
-    )
+    scratch.python(f"import groundstation;groundstation.open({str(scratch.flight)!r}).recording('own.rrd')")
     contents = Contents(scratch.folder / "own.rrd")
     assert contents.text("/gnss_noise/answer") == generic
     speed_mps = contents.scalars("/gnss_noise/speed")[1]

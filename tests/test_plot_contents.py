@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.chapters.plots import PLOTS
 from groundstation.chapters.plots.comparison import COMPARED
 from groundstation.chapters.plots.fleet import FLEET_PLOTS
 from groundstation.pipeline.one_flight.outcome import Outcome
 from tests.plot_contents import CASES, KEPT, RUN, Contents, differences, of_flight
 from tests.saved import load
+from tests.told import PLOTS
 
 MOST_BYTES = 150_000
 ANEW = "reviewed and wanted? make golden"

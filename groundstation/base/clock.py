@@ -6,6 +6,8 @@ Times are text for people. Fields stand in alphabetical order, as the JSON of th
 from dataclasses import dataclass, field
 from typing import Literal
 
+NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
+
 Start = Literal["utc", "unset", "own_zero"]
 
 

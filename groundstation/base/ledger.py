@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 
 from groundstation.base.serial import LEFT_OUT_WHEN_DEFAULT
 
+NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
+
 
 @dataclass(frozen=True, kw_only=True)
 class ThresholdsUsed:

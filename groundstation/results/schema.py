@@ -6,7 +6,9 @@ negative, whole numbers are counts.
 """
 
 import dataclasses
+import itertools
 import re
+import sys
 import types
 import typing
 from collections.abc import Mapping
@@ -20,11 +22,6 @@ TITLE = "summary.json of one flight"
 ABOUT = (
     "Answers of groundstation about one flight. Numbers are rounded to the digits stated for each field; NaN is null. "
     "Units stand last in the names. Times are flight seconds."
-)
-# Modules whose numbers are always known where they are not optional: NaN would be a mistake there.
-KNOWN_NUMBERS = tuple(
-    f"groundstation.{module}"
-    for module in ("base.ledger", "base.clock", "results.latency", "results.magnetic", "results.magnetic_ground")
 )
 SHARES = re.compile(r"(share|coverage|observability|inside)\d*(_.*)?|.*_share")
 NOT_NEGATIVE = re.compile(r".*sigma.*|(length|longest|total|span|nominal_period|residual|resolution)_s|completeness")
@@ -105,6 +102,14 @@ def definition_name(cls: type) -> str:
     return NAMES.get(cls.__name__, re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower())
 
 
+def _has_known_numbers(cls: type) -> bool:
+    """Tell whether the floats of a dataclass are never NaN.
+
+    Its module says so by ``NUMBERS_ARE_KNOWN``.
+    """
+    return bool(getattr(sys.modules[cls.__module__], "NUMBERS_ARE_KNOWN", False))
+
+
 def _object(cls: type, definitions: dict[str, Schema]) -> Schema:
     """Return the schema of a dataclass: its fields in order.
 
@@ -117,14 +122,14 @@ def _object(cls: type, definitions: dict[str, Schema]) -> Schema:
         hint = hints[field.name]
         if is_kept_apart(hint):
             continue
-        found = _narrowed(_of(hint, definitions, cls.__module__ in KNOWN_NUMBERS), field.metadata)
+        found = _narrowed(_of(hint, definitions, _has_known_numbers(cls)), field.metadata)
         if field.name in told:
             found = {"description": told[field.name], **found}
         properties[field.name] = _bounded(found, field.name)
         if "left_out_when_default" not in field.metadata:
             required.append(field.name)
     return {
-        "description": " ".join((cls.__doc__ or "").split("\n\n")[0].split()),
+        "description": _about(cls),
         "type": "object",
         "properties": properties,
         "required": required,
@@ -219,6 +224,12 @@ def _bounded(schema: Schema, name: str) -> Schema:
     if SHARES.fullmatch(name):
         return {**schema, "minimum": 0, "maximum": 1}
     return {**schema, "minimum": 0} if NOT_NEGATIVE.fullmatch(name) else schema
+
+
+def _about(cls: type) -> str:
+    """Return the text of a class's docstring above its first section."""
+    paragraphs = (" ".join(one.split()) for one in (cls.__doc__ or "").split("\n\n"))
+    return " ".join(itertools.takewhile(lambda one: "----" not in one, paragraphs)).strip()
 
 
 def _told(cls: type) -> dict[str, str]:

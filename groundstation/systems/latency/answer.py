@@ -6,6 +6,8 @@ from typing import Any, ClassVar, Literal
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 
+NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
+
 Quantity = Literal["velocity", "altitude", "field", "attitude"]
 LatencyState = Literal["observed", "not_observable"]
 

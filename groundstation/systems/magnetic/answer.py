@@ -10,6 +10,8 @@ from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
 
+NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
+
 MagneticVerdict = Literal["accept", "reject", "undecided"]
 MethodName = Literal["compass_table", "poisson_attitude", "constant_modulus"]
 ConditionName = Literal["pitch", "ground", "gain"]

@@ -10,6 +10,8 @@ from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.systems.magnetic.answer import LETTERS, DeclinationUsed
 
+NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
+
 RunState = Literal["used", "rejected"]
 CoefficientState = Literal["found", "not observable"]
 

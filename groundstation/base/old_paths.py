@@ -1,0 +1,214 @@
+"""Old paths of modules that moved into the folders of the systems.
+
+They answer for one release.
+
+``from groundstation.results.heading import HeadingResult`` gives the module at its new path, with a warning that names
+it. Remove this file, its test and the call in groundstation/__init__.py with the release after 0.9.
+"""
+
+import importlib
+import sys
+import warnings
+from types import ModuleType
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from importlib.machinery import ModuleSpec
+    from typing import Any
+
+PACKAGE = "groundstation."
+EMPTY = ("estimators", "studies")  # rooms that are no more
+FILES = {
+    "chapters.aided_ins": "systems.inertial.aided_chapter",
+    "chapters.control": "systems.planning.session.chapter",
+    "chapters.cooperative": "systems.cooperative.chapter",
+    "chapters.forecast": "systems.inertial.forecast_chapter",
+    "chapters.forecast_conclusions": "systems.inertial.conclusions_chapter",
+    "chapters.heading": "systems.heading.chapter",
+    "chapters.inertial": "systems.inertial.chapter",
+    "chapters.inertial_claim": "systems.inertial.claim_chapter",
+    "chapters.installation": "systems.heading.installation.chapter",
+    "chapters.landing": "systems.landing.chapter",
+    "chapters.landing_beacons": "systems.landing.beacons.chapter",
+    "chapters.landing_ranges": "systems.planning.landing.chapter",
+    "chapters.latency": "systems.latency.chapter",
+    "chapters.magnetic": "systems.magnetic.chapter",
+    "chapters.magnetic_ground": "systems.magnetic.ground_chapter",
+    "chapters.placement": "systems.planning.session.placement_chapter",
+    "chapters.plots.control": "systems.planning.session.plots",
+    "chapters.plots.cooperative": "systems.cooperative.plots",
+    "chapters.plots.forecast": "systems.inertial.forecast_plots",
+    "chapters.plots.heading": "systems.heading.plots",
+    "chapters.plots.inertial": "systems.inertial.plots",
+    "chapters.plots.landing": "systems.landing.plots",
+    "chapters.plots.landing_beacons": "systems.landing.beacons.plots",
+    "chapters.plots.landing_ranges": "systems.planning.landing.plots",
+    "chapters.plots.latency": "systems.latency.plots",
+    "chapters.plots.magnetic": "systems.magnetic.plots",
+    "chapters.plots.placement": "systems.planning.session.placement_plots",
+    "chapters.plots.reference": "systems.reference.plots",
+    "chapters.plots.standstill": "systems.heading.standstill_plots",
+    "chapters.plots.together": "systems.several_logs.plots",
+    "chapters.reference": "systems.reference.chapter",
+    "chapters.together": "systems.several_logs.chapter",
+    "estimators.analysis": "systems.analysis",
+    "estimators.heading.answer": "systems.heading.outcome",
+    "estimators.installation.answer": "systems.heading.installation.outcome",
+    "estimators.known": "systems.known",
+    "estimators.landing_beacons.answer": "systems.landing.beacons.outcome",
+    "estimators.landing_ranges.answer": "systems.planning.landing.outcome",
+    "estimators.overview": "methods.overview",
+    "estimators.plan": "systems.plan",
+    "results.arrays.forecast": "systems.inertial.forecast_arrays",
+    "results.arrays.heading": "systems.heading.arrays",
+    "results.arrays.inertial": "systems.inertial.arrays",
+    "results.arrays.landing": "systems.landing.arrays",
+    "results.arrays.magnetic": "systems.magnetic.arrays",
+    "results.arrays.reference": "systems.reference.arrays",
+    "results.arrays.together": "systems.several_logs.arrays",
+    "results.control": "systems.planning.session.answer",
+    "results.cooperative": "systems.cooperative.answer",
+    "results.deviation": "systems.magnetic.deviation_answer",
+    "results.forecast": "systems.inertial.forecast_answer",
+    "results.heading": "systems.heading.answer",
+    "results.inertial": "systems.inertial.answer",
+    "results.installation": "systems.heading.installation.answer",
+    "results.landing": "systems.landing.answer",
+    "results.landing_beacons": "systems.landing.beacons.answer",
+    "results.landing_ranges": "systems.planning.landing.answer",
+    "results.latency": "systems.latency.answer",
+    "results.magnetic": "systems.magnetic.answer",
+    "results.magnetic_ground": "systems.magnetic.ground_answer",
+    "results.placement": "systems.planning.session.placement_answer",
+    "results.plan": "results.answer",
+    "results.reference": "systems.reference.answer",
+    "results.together": "systems.several_logs.answer",
+    "studies.approach": "systems.landing.study",
+    "studies.control": "systems.planning.session.study.control",
+    "studies.control_cases": "systems.planning.session.study.cases",
+    "studies.control_flown": "systems.planning.session.study.flown",
+    "studies.cooperative": "systems.cooperative.study.cooperative",
+    "studies.cooperative_cases": "systems.cooperative.study.cases",
+    "studies.cooperative_page": "systems.cooperative.study.page",
+    "studies.cooperative_runs": "systems.cooperative.study.runs",
+    "studies.forecast": "systems.inertial.study.forecast",
+    "studies.forecast_cases": "systems.inertial.study.cases",
+    "studies.forecast_consistency": "systems.inertial.study.consistency",
+    "studies.forecast_coupled_bank": "systems.inertial.study.coupled_bank",
+    "studies.forecast_outages": "systems.inertial.study.outages",
+    "studies.forecast_page": "systems.inertial.study.page",
+    "studies.forecast_runs": "systems.inertial.study.runs",
+    "studies.forecast_tables": "systems.inertial.study.tables",
+    "studies.heading": "systems.heading.study.heading",
+    "studies.heading_crew": "systems.heading.study.crew",
+    "studies.heading_family": "systems.heading.study.family",
+    "studies.heading_paper": "systems.heading.study.paper",
+    "studies.installation": "systems.heading.study.installation",
+    "studies.installation_family": "systems.heading.study.installation_family",
+    "studies.installation_pool": "systems.heading.study.installation_pool",
+    "studies.landing": "systems.planning.landing.study.landing",
+    "studies.landing_bearings": "systems.planning.landing.study.bearings",
+    "studies.landing_cases": "systems.planning.landing.study.cases",
+    "studies.landing_runs": "systems.planning.landing.study.runs",
+    "studies.landing_tables": "systems.planning.landing.study.tables",
+    "studies.magnetic": "systems.magnetic.study.magnetic",
+    "studies.magnetic_bias": "systems.magnetic.study.bias",
+    "studies.magnetic_cases": "systems.magnetic.study.cases",
+    "studies.magnetic_coverage": "systems.magnetic.study.coverage",
+    "studies.magnetic_flights": "systems.magnetic.study.flights",
+    "studies.magnetic_judge": "systems.magnetic.study.judge",
+    "studies.magnetic_page": "systems.magnetic.study.page",
+    "studies.magnetic_runs": "systems.magnetic.study.runs",
+    "studies.magnetic_tables": "systems.magnetic.study.tables",
+    "studies.magnetic_taxis": "systems.magnetic.study.taxis",
+    "studies.page": "systems.study",
+    "studies.recorded": "systems.cooperative.study.recorded",
+    "studies.shipped_plans": "systems.shipped_plans",
+    "viewer.tabs.control": "systems.planning.session.tab",
+    "viewer.tabs.cooperative": "systems.cooperative.tab",
+    "viewer.tabs.distribution": "systems.heading.distribution_tab",
+    "viewer.tabs.forecast": "systems.inertial.forecast_tab",
+    "viewer.tabs.heading": "systems.heading.tab",
+    "viewer.tabs.inertial": "systems.inertial.tab",
+    "viewer.tabs.installation": "systems.heading.installation.tab",
+    "viewer.tabs.landing": "systems.landing.tab",
+    "viewer.tabs.landing_beacons": "systems.landing.beacons.tab",
+    "viewer.tabs.landing_ranges": "systems.planning.landing.tab",
+    "viewer.tabs.magnetic": "systems.magnetic.tab",
+    "viewer.tabs.magnetic_field": "systems.magnetic.field_tab",
+    "viewer.tabs.placement": "systems.planning.session.placement_tab",
+    "viewer.tabs.reference": "systems.reference.tab",
+    "viewer.tabs.session_space": "systems.cooperative.space_tab",
+    "viewer.tabs.together": "systems.several_logs.tab",
+}
+FOLDERS = {
+    "estimators.approaches": "systems.landing",
+    "estimators.control": "systems.planning.session",
+    "estimators.cooperative": "systems.cooperative",
+    "estimators.fleet": "methods.fleet",
+    "estimators.heading": "systems.heading",
+    "estimators.inertial": "systems.inertial",
+    "estimators.installation": "systems.heading.installation",
+    "estimators.landing_beacons": "systems.landing.beacons",
+    "estimators.landing_ranges": "systems.planning.landing",
+    "estimators.latency": "systems.latency",
+    "estimators.magnetic": "systems.magnetic",
+    "estimators.reference": "systems.reference",
+    "estimators.together": "systems.several_logs",
+    "estimators.two_clocks": "systems.several_logs",
+}
+
+
+def new_path(old: str) -> str:
+    """Return the path of a moved module below the package; empty for one that did not move.
+
+    Examples
+    --------
+    >>> new_path("results.heading"), new_path("estimators.inertial.filter"), new_path("base.angles")
+    ('systems.heading.answer', 'systems.inertial.filter', '')
+    """
+    if old in FILES or old in FOLDERS:
+        return FILES.get(old) or FOLDERS[old]
+    folder, _, name = old.rpartition(".")
+    return f"{FOLDERS[folder]}.{name}" if folder in FOLDERS else ""
+
+
+class OldPaths:
+    """Finder of modules by the paths they had; asked where no file is found."""
+
+    def find_spec(self, fullname: str, _path: "Any" = None, _target: "Any" = None) -> "ModuleSpec | None":
+        """Return a spec for a path that moved, None for any other."""
+        old = fullname.removeprefix(PACKAGE)
+        if not fullname.startswith(PACKAGE) or not (old in EMPTY or new_path(old)):
+            return None
+        from importlib.machinery import ModuleSpec
+
+        return ModuleSpec(fullname, self, is_package=old in EMPTY or old in FOLDERS)  # type: ignore[arg-type]
+
+    def create_module(self, spec: "ModuleSpec") -> ModuleType | None:
+        """Return the module at its new path; for a folder None, a new empty module."""
+        old = spec.name.removeprefix(PACKAGE)
+        if old in EMPTY or old in FOLDERS:
+            return None
+        new = PACKAGE + new_path(old)
+        warnings.warn(f"{spec.name} is now {new}", DeprecationWarning, stacklevel=2)
+        return _alias(importlib.import_module(new))
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Run nothing, as the module at the new path has run."""
+
+
+def _alias(module: ModuleType) -> ModuleType:
+    """Return a module with the contents of another.
+
+    The import system names it anew and leaves the other alone.
+    """
+    alias = ModuleType(module.__name__, module.__doc__)
+    alias.__dict__.update({name: value for name, value in vars(module).items() if not name.startswith("__")})
+    return alias
+
+
+def answer_old_paths() -> None:
+    """Let old paths be found where no file is."""
+    if not any(isinstance(finder, OldPaths) for finder in sys.meta_path):
+        sys.meta_path.append(OldPaths())  # importlib.abc takes 30 ms to import
