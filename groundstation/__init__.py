@@ -39,11 +39,24 @@ def __dir__() -> list[str]:
     return sorted(__all__)
 
 
-def _answer_old_paths() -> None:
-    """Let modules be imported by their old paths, for one release."""
-    from groundstation.base.old_paths import answer_old_paths
+class _OldPaths:
+    """Finder of modules by the paths they had before the systems were folders, for one release."""
 
-    answer_old_paths()
+    @staticmethod
+    def find_spec(name: str, _path: object = None, _target: object = None) -> object:
+        """Return a spec for a path that moved, None for any other."""
+        if not name.startswith("groundstation.") or name == "groundstation.base.old_paths":
+            return None
+        from groundstation.base.old_paths import spec_of
+
+        return spec_of(name)
+
+    @classmethod
+    def ask(cls) -> None:
+        """Let it be asked where no file is found."""
+        import sys
+
+        sys.meta_path.append(cls)  # type: ignore[arg-type]  # importlib.abc takes 30 ms to import
 
 
-_answer_old_paths()
+_OldPaths.ask()

@@ -10,7 +10,7 @@ from groundstation.systems.planning.landing.plan import LANDING_PLAN
 from groundstation.systems.planning.landing.study import cases as landing_cases
 from groundstation.systems.planning.landing.study.bearings import bearing_spans, bearing_table
 from groundstation.systems.planning.landing.study.cases import CLAIMS, FLOWN, PUBLISHED, SIGMAS, approach, variations
-from groundstation.systems.planning.landing.study.runs import run_approaches
+from groundstation.systems.planning.landing.study.landing import run_approaches
 from groundstation.systems.planning.landing.study.tables import (
     category_table,
     holds,

@@ -7,14 +7,12 @@ it. Remove this file, its test and the call in groundstation/__init__.py with th
 """
 
 import importlib
-import sys
 import warnings
 from types import ModuleType
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from importlib.machinery import ModuleSpec
-    from typing import Any
 
 PACKAGE = "groundstation."
 EMPTY = ("estimators", "studies")  # rooms that are no more
@@ -109,7 +107,7 @@ FILES = {
     "studies.landing": "systems.planning.landing.study.landing",
     "studies.landing_bearings": "systems.planning.landing.study.bearings",
     "studies.landing_cases": "systems.planning.landing.study.cases",
-    "studies.landing_runs": "systems.planning.landing.study.runs",
+    "studies.landing_runs": "systems.planning.landing.study.landing",
     "studies.landing_tables": "systems.planning.landing.study.tables",
     "studies.magnetic": "systems.magnetic.study.magnetic",
     "studies.magnetic_bias": "systems.magnetic.study.bias",
@@ -173,17 +171,18 @@ def new_path(old: str) -> str:
     return f"{FOLDERS[folder]}.{name}" if folder in FOLDERS else ""
 
 
-class OldPaths:
-    """Finder of modules by the paths they had; asked where no file is found."""
+def spec_of(name: str) -> "ModuleSpec | None":
+    """Return a spec for a path that moved, None for any other."""
+    old = name.removeprefix(PACKAGE)
+    if not (old in EMPTY or new_path(old)):
+        return None
+    from importlib.machinery import ModuleSpec
 
-    def find_spec(self, fullname: str, _path: "Any" = None, _target: "Any" = None) -> "ModuleSpec | None":
-        """Return a spec for a path that moved, None for any other."""
-        old = fullname.removeprefix(PACKAGE)
-        if not fullname.startswith(PACKAGE) or not (old in EMPTY or new_path(old)):
-            return None
-        from importlib.machinery import ModuleSpec
+    return ModuleSpec(name, _Loader(), is_package=old in EMPTY or old in FOLDERS)  # type: ignore[arg-type]
 
-        return ModuleSpec(fullname, self, is_package=old in EMPTY or old in FOLDERS)  # type: ignore[arg-type]
+
+class _Loader:
+    """Loader of a module from its new path."""
 
     def create_module(self, spec: "ModuleSpec") -> ModuleType | None:
         """Return the module at its new path; for a folder None, a new empty module."""
@@ -206,9 +205,3 @@ def _alias(module: ModuleType) -> ModuleType:
     alias = ModuleType(module.__name__, module.__doc__)
     alias.__dict__.update({name: value for name, value in vars(module).items() if not name.startswith("__")})
     return alias
-
-
-def answer_old_paths() -> None:
-    """Let old paths be found where no file is."""
-    if not any(isinstance(finder, OldPaths) for finder in sys.meta_path):
-        sys.meta_path.append(OldPaths())  # importlib.abc takes 30 ms to import

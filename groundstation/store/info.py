@@ -12,7 +12,6 @@ from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.salvage import salvaged
 from groundstation.base.serial import to_json_exactly
-from groundstation.store.shape import sound_damages, sound_remarks
 
 COPY_NAME = "groundstation_copy"  # the same record before the end of data: one flip cannot take both
 FORMAT_VERSION = "1"
@@ -20,6 +19,10 @@ MAX_START_NS = 1 << 62  # first sample in the year 2116: later ones are damage
 _TYPED = ("clock", "ledger", "findings")
 _TEXTS = {"versions", "metadata"}  # mappings whose values are text
 _CHECKSUM, _FORMAT, _DEFINITIONS = "crc32", "format", "definitions_crc32"
+_MAX_INTEGER = 1 << 62
+_TEXT, _COUNT, _FLAG = "text", "count", "flag"
+_DAMAGE = {"kind": _TEXT, "place": _TEXT, "count": _COUNT, "what": _TEXT, "topic": _TEXT, "loses_data": _FLAG}
+_REMARK = {"code": _TEXT, "text": _TEXT, "topic": _TEXT}
 
 
 @dataclass(frozen=True)
@@ -201,3 +204,36 @@ def definition_checksums(strings: Mapping[str, str]) -> dict[str, int]:
     if not isinstance(found, dict):
         return {}
     return {str(key): value for key, value in found.items() if isinstance(value, int)}
+
+
+def _is_a(value: Any, kind: str) -> bool:
+    if kind == _TEXT:
+        return isinstance(value, str)
+    if kind == _FLAG:
+        return isinstance(value, bool)
+    return type(value) is int and 0 <= value < _MAX_INTEGER
+
+
+def _agrees(entry: Any, shape: Mapping[str, str]) -> bool:
+    """Tell whether the keys that an entry has agree with a shape; all may be absent."""
+    return isinstance(entry, dict) and all(_is_a(entry[key], kind) for key, kind in shape.items() if key in entry)
+
+
+def sound_damages(entries: Any) -> list[Any]:
+    """Return the entries that may be damage.
+
+    Examples
+    --------
+    >>> sound_damages([{"kind": "cut"}, {"kind": []}, 7])
+    [{'kind': 'cut'}]
+    """
+    return [entry for entry in _listed(entries) if _agrees(entry, _DAMAGE)]
+
+
+def sound_remarks(entries: Any) -> list[Any]:
+    """Return the entries that may be remarks."""
+    return [entry for entry in _listed(entries) if _agrees(entry, _REMARK)]
+
+
+def _listed(entries: Any) -> list[Any]:
+    return list(entries) if isinstance(entries, list | tuple) else []

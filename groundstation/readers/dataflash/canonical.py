@@ -5,8 +5,10 @@ These are ins, gnss, magnetometer, baro, air, electric and discrete.
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.atmosphere import REFUSED, pressure_altitude_m
@@ -14,9 +16,8 @@ from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Column, Damage, RecordBatch, Remark, frozen
 from groundstation.readers.dataflash import rules
 from groundstation.readers.dataflash.choices import Choices
-from groundstation.readers.dataflash.events import event_names
 from groundstation.readers.dataflash.overview import Overview, Unit
-from groundstation.readers.dataflash.rules import FIX_2D, FIX_3D, Rule, UnknownUnits
+from groundstation.readers.dataflash.rules import EVENTS, FIX_2D, FIX_3D, MODES, Rule, UnknownUnits
 from groundstation.readers.dataflash.values import Rows, as_double
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.parts import Part, bounded, merged, occupied
@@ -258,3 +259,35 @@ class Mapper:
     def _event(self, topic: str, rows: Rows) -> dict[str, Column]:
         names = event_names(rows, self._choices.vehicle)
         return {} if names is None else {"name": Column(names)}
+
+
+def event_names(rows: Rows, vehicle: str) -> NDArray[np.str_] | None:
+    """Return a name for each record of EV, ARM, MODE, MSG or ERR.
+
+    None when the type lacks the fields.
+    """
+    definition = rows.definition
+    match definition.name:
+        case "MSG" if definition.has_texts("Message"):
+            return rows.values("Message")
+        case "EV" if definition.has_integers("Id"):
+            return _named(rows.values("Id"), lambda number: EVENTS.get(number, f"event {number}"))
+        case "ARM" if definition.has_integers("ArmState"):
+            return _named(rows.values("ArmState"), lambda state: "armed" if state else "disarmed")
+        case "MODE" if definition.has_integers("Mode"):
+            known = MODES.get(vehicle, ())
+            return _named(rows.values("Mode"), lambda number: _mode(number, known))
+        case "ERR" if definition.has_integers("Subsys", "ECode"):
+            subsystem, code = (rows.values(name).astype(np.int64) for name in ("Subsys", "ECode"))
+            return _named(subsystem * 1000 + code, lambda pair: f"error: subsystem {pair // 1000}, code {pair % 1000}")
+    return None
+
+
+def _mode(number: int, known: tuple[str, ...]) -> str:
+    name = known[number] if 0 <= number < len(known) else ""
+    return f"mode {name or number}"
+
+
+def _named(values: NDArray[Any], name_of: Callable[[int], str]) -> NDArray[np.str_]:
+    distinct, which = np.unique(values, return_inverse=True)
+    return np.array([name_of(value) for value in distinct.tolist()], dtype=np.str_)[which]

@@ -1,22 +1,35 @@
 """Relation of the clocks of two logs of the same flight, by GNSS time and by motion."""
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from groundstation.base.geodesy import north_east_m
+from groundstation.base.records import Int64Array
+from groundstation.base.signals import topics_of_kind
 from groundstation.base.timescales import duration_text, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.several_logs.channels import Pair, Side, pair_of
 from groundstation.systems.several_logs.coarse import Place, grids_of, place_of, steps_of
 from groundstation.systems.several_logs.fine import MotionFit, fit_motion
-from groundstation.systems.several_logs.places import apart_m
 from groundstation.systems.several_logs.relation import LogRelation, NotOneFlightError, Stretch, TimedLog
 from groundstation.systems.several_logs.settings import TwoClocksSettings
+from groundstation.tables.resample import join
+from groundstation.tables.table import Flight, Table
 
 LEAPS_S = range(13, 21)  # GPS time less UTC
 NEAR_WHOLE_S = 0.35
 LEAST_DRIFT_SIGMA = 1e-9
 FILES_APART_S = 1.0
+_SAYS = {
+    "gnss_time": "GNSS time of both",
+    "motion": "the motion that both show",
+    "gnss_time_and_motion": "GNSS time of both and the motion that both show",
+    "file_time": "the times of the files as they are, without an interval",
+}
+POSITION = ("latitude_deg", "longitude_deg")
+LARGEST_GAP_S = 10.0
 
 
 def relate(first: TimedLog, other: TimedLog, *, settings: TwoClocksSettings | None = None) -> LogRelation:
@@ -74,14 +87,6 @@ def relate(first: TimedLog, other: TimedLog, *, settings: TwoClocksSettings | No
     _require_overlap(first, other, found.stretches)
     _require_near(first, other, found, settings)
     return found
-
-
-_SAYS = {
-    "gnss_time": "GNSS time of both",
-    "motion": "the motion that both show",
-    "gnss_time_and_motion": "GNSS time of both and the motion that both show",
-    "file_time": "the times of the files as they are, without an interval",
-}
 
 
 def _both_utc(first: TimedLog, other: TimedLog) -> bool:
@@ -332,3 +337,46 @@ def _require_near(first: TimedLog, other: TimedLog, found: LogRelation, settings
             f"{first.name} and {other.name}",
             f"not of one flight: {apart.distance_m / 1e3:.1f} km apart at one time, limit {limit_m / 1e3:g} km",
         )
+
+
+@dataclass(frozen=True)
+class Apart:
+    """Median distance over the ground; ``is_inertial``: one position is that of an INS.
+
+    An INS may drift.
+    """
+
+    distance_m: float
+    is_inertial: bool
+
+
+def apart_m(first: Flight, other: Flight, first_time_ns: Callable[[Int64Array], Int64Array]) -> Apart | None:
+    """Return the distance between the positions of two logs at one time.
+
+    None where one has no position or they never overlap.
+    """
+    a, b = _positions(first), _positions(other)
+    if a is None or b is None:
+        return None
+    moved = join(a, first_time_ns(b.time_ns), POSITION, largest_gap_s=LARGEST_GAP_S)
+    latitude, longitude = (moved.values(name) for name in POSITION)
+    known = np.isfinite(latitude) & np.isfinite(longitude)
+    if not known.any():
+        return None
+    distance = []
+    for row in np.flatnonzero(known)[:: max(int(known.sum()) // 200, 1)]:
+        north, east = north_east_m(
+            b.values("latitude_deg")[row], b.values("longitude_deg")[row], float(latitude[row]), float(longitude[row])
+        )
+        distance.append(float(np.hypot(north, east)))
+    return Apart(float(np.median(distance)), any(one.topic.startswith("ins") for one in (a, b)))
+
+
+def _positions(flight: Flight) -> Table | None:
+    topics = [*topics_of_kind("gnss", flight.topics()), *topics_of_kind("ins", flight.topics())]
+    found = next((flight[topic] for topic in topics if flight[topic].has(*POSITION)), None)
+    if found is None:
+        return None
+    known = found.unique_times()
+    known = known.take(known.valid(*POSITION))
+    return known if len(known) > 1 else None

@@ -1,8 +1,16 @@
 """Study of landing by ranges and by NDBs: every published figure with ours beside it."""
 
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from multiprocessing import get_context
+
+from groundstation.systems.planning.landing.answer import RangeLanding
+from groundstation.systems.planning.landing.outcome import range_landing
+from groundstation.systems.planning.landing.scenario import RangeApproach
 from groundstation.systems.planning.landing.study.bearings import BEACONS_M, bearing_spans, bearing_table
 from groundstation.systems.planning.landing.study.cases import FIRST_SEED, FLOWN, PUBLISHED, approach, variations
-from groundstation.systems.planning.landing.study.runs import Progress, run_approaches
 from groundstation.systems.planning.landing.study.tables import (
     category_table,
     order_table,
@@ -13,6 +21,8 @@ from groundstation.systems.planning.landing.study.tables import (
 from groundstation.systems.study import StudyResult, section, table
 
 DRAWS_A_RUN = 100  # of bearings, which cost next to nothing
+Progress = Callable[[str], None]
+WORKERS = 2
 
 
 def study_landing(runs: int = 100, seed: int = 0, progress: Progress | None = None) -> StudyResult:
@@ -61,3 +71,30 @@ def study_landing(runs: int = 100, seed: int = 0, progress: Progress | None = No
     )
     told = (section(title, table(one)) for title, one in zip(titles, tables, strict=True))
     return StudyResult("landing", tables, (head, *told))
+
+
+def run_approaches(
+    approaches: Mapping[str, RangeApproach], trials: Mapping[str, int], seed: int, progress: Progress | None = None
+) -> dict[str, RangeLanding]:
+    """Return the answer of every approach, by name.
+
+    ``trials`` is the number of simulated approaches by name, 0 for a name that it lacks.
+    """
+    wanted = {name: replace(one, trials=trials.get(name, 0), seed=seed) for name, one in approaches.items()}
+    found: dict[str, RangeLanding] = {}
+    if not any(one.trials for one in wanted.values()):
+        return {name: _answer(one) for name, one in wanted.items()}
+    with ProcessPoolExecutor(min(WORKERS, os.cpu_count() or 1), mp_context=get_context("spawn")) as pool:
+        for name, answer in zip(wanted, pool.map(_answer, wanted.values()), strict=True):
+            found[name] = answer
+            if progress:
+                progress(f"{name}: {wanted[name].trials} approaches")
+    return found
+
+
+def _answer(scenario: RangeApproach) -> RangeLanding:
+    """Return the answer without its arrays.
+
+    No table of the study needs them, and no process can hand them over.
+    """
+    return replace(range_landing(scenario), figures=())
