@@ -40,7 +40,7 @@ def __dir__() -> list[str]:
 
 
 class _OldPaths:
-    """Finder of modules by the paths they had before the systems were folders, for one release."""
+    """Finder of modules by their old paths, for one release."""
 
     @staticmethod
     def find_spec(name: str, _path: object = None, _target: object = None) -> object:
