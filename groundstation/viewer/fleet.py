@@ -13,6 +13,7 @@ from groundstation.base.failures import attempt
 from groundstation.chapters.plots.fleet.skill import growth
 from groundstation.chapters.plots.fleet.trend import HEADING
 from groundstation.results.fleet import FleetResults
+from groundstation.systems.system import Systems
 from groundstation.viewer.fleet_charts import (
     MOST_AIRCRAFT,
     Aircraft,
@@ -34,7 +35,7 @@ FLEET = "fleet"
 FLIGHTS_TEXT = "flights"  # entity of the table of flights
 
 
-def write_fleet_recording(path: Path, fleet: FleetResults) -> None:
+def write_fleet_recording(path: Path, fleet: FleetResults, systems: Systems) -> None:
     """Write the recording of a fleet, blueprint embedded.
 
     Parameters
@@ -42,21 +43,22 @@ def write_fleet_recording(path: Path, fleet: FleetResults) -> None:
     path : Path
         The .rrd file; its folder holds the flight folders that its links name. Moved into place when complete.
     fleet : FleetResults
+    systems : Systems
 
     Raises
     ------
     GroundstationError
         When Rerun refused the data or the file could not be written.
     """
-    save_stream(path, FLEET, lambda stream: send_fleet(stream, fleet))
+    save_stream(path, FLEET, lambda stream: send_fleet(stream, fleet, systems))
 
 
-def send_fleet(stream: rr.RecordingStream, fleet: FleetResults) -> rrb.Blueprint:
+def send_fleet(stream: rr.RecordingStream, fleet: FleetResults, systems: Systems) -> rrb.Blueprint:
     """Log a fleet to a stream that has its sink, and send the layout.
 
     Waits until all is out; returns the layout.
     """
-    recorder = FleetRecorder(stream, fleet)
+    recorder = FleetRecorder(stream, fleet, systems)
     stream.send_recording_name("Fleet")
     logged = (attempt("aircraft", one.name, _logged, recorder, fleet, one) for one in aircraft_of(fleet))
     found = [one for one in logged if one is not None]
@@ -71,7 +73,7 @@ def _logged(recorder: FleetRecorder, fleet: FleetResults, one: Aircraft) -> Logg
 
 def _fleet(recorder: FleetRecorder, fleet: FleetResults, found: list[Logged]) -> rrb.Container:
     aircraft = [one for one, _ in found]
-    recorder.document("by_aircraft", aircraft_text(fleet, {one.name: one.entity for one in aircraft}))
+    recorder.document("by_aircraft", aircraft_text(fleet, {one.name: one.entity for one in aircraft}, recorder.systems))
     errors = by_aircraft([one for one, views in found if HEADING in views], HEADING)
     plots = [*errors, *([verdicts(aircraft)] if aircraft else [])]
     answer = [document("By aircraft", "by_aircraft"), *heading_error_density(recorder, fleet)]

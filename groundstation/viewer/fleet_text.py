@@ -9,12 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from groundstation.chapters.fleet import aircraft, calibration, flights, rest, sessions, skill, trend
+from groundstation.base.failures import attempt
+from groundstation.chapters.fleet import flights, rest, skill
 from groundstation.chapters.fleet.common import aircraft_name, plural
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Note, Section
 from groundstation.chapters.shortened import shortened
 from groundstation.results.fleet import FleetResults
+from groundstation.systems.system import Systems
 from groundstation.viewer.fleet_recorder import FleetRecorder
 
 MOST_ROWS = 500  # of a table: the viewer lays out the whole text again and again
@@ -27,22 +29,24 @@ LINKS = (
 )
 
 
-def aircraft_text(fleet: FleetResults, entities: Mapping[str, str]) -> str:
-    """Return the heading error by aircraft, each a link to its entity.
-
-    Then changes of level, outliers and calibration.
-    """
+def aircraft_text(fleet: FleetResults, entities: Mapping[str, str], systems: Systems) -> str:
+    """Return what is told by aircraft, each a link to its entity."""
     names = {aircraft_name(name): f"recording://{entity}" for name, entity in entities.items() if name}
     links = {name: link for name, link in names.items() if link.isascii()}
-    told = [aircraft.heading(fleet)]
-    told += [trend.build(fleet)] if fleet.change_points else []
-    told += [rest.outliers(fleet)] if fleet.outliers else []
-    told += [calibration.build(fleet)] if fleet.calibration else []
-    return "\n\n".join(_text(section, links) for section in told)
+    return "\n\n".join(_text(section, links) for section in _of_panel("aircraft", fleet, systems))
+
+
+def _of_panel(panel: str, fleet: FleetResults, systems: Systems) -> Iterator[Section]:
+    """Chapters of a text panel."""
+    for chapter in systems.fleet_chapters:
+        if chapter.panel == panel and chapter.is_in_panel(fleet):
+            section = attempt("chapter", chapter.key, chapter.build, fleet)
+            if section is not None:
+                yield section
 
 
 def flights_text(recorder: FleetRecorder, fleet: FleetResults) -> str:
-    """Return the table of the flights in order, then the sessions.
+    """Return the table of the flights in order, then what stands below it: the sessions.
 
     Each name is a link to its recording.
     """
@@ -52,9 +56,8 @@ def flights_text(recorder: FleetRecorder, fleet: FleetResults) -> str:
     ids, recordings = (fleet.flights[name][rows].tolist() for name in ("flight_id", "recording"))
     links = _recordings(zip(ids, recordings, strict=True))
     parts = [_text(replace(told, above=(*_notes(recorder, fleet), *told.above)), links)]
-    of_several = sessions.build(fleet)
-    if of_several is not None:
-        parts.append(_text(of_several, _recordings((one.session_id, one.recording) for one in fleet.sessions)))
+    of_sessions = _recordings((one.session_id, one.recording) for one in fleet.sessions)
+    parts += [_text(section, of_sessions) for section in _of_panel("flights", fleet, recorder.systems)]
     return "\n\n".join(parts)
 
 

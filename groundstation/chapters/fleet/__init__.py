@@ -1,37 +1,41 @@
-"""Chapters of the fleet report.
-
-``build(fleet)`` returns a Section, or None when there is nothing to say.
-"""
-
-from collections.abc import Callable
+"""Chapters of the fleet report that speak of all flights; those of one system stand in its folder."""
 
 from groundstation.chapters.fleet import (
     aircraft,
     calibration,
     densities,
-    deviation,
     flights,
     installations,
     rest,
-    sessions,
     skill,
     trend,
 )
-from groundstation.chapters.parts import Section
+from groundstation.chapters.fleet.chapter import FleetChapter
 from groundstation.results.fleet import FleetResults
 
-CHAPTERS: dict[str, Callable[[FleetResults], Section | None]] = {
-    "flights": flights.build,
-    "sessions": sessions.build,
-    "densities": densities.build,
-    "heading": aircraft.heading,
-    "installations": installations.build,
-    "trend": trend.build,
-    "ins": aircraft.ins,
-    "skill": skill.build,
-    "calibration": calibration.build,
-    "deviation": deviation.build,
-    "outliers": rest.outliers,
-    "not_in_fleet": rest.not_in_fleet,
-    "method": rest.method,
-}
+
+def _has_changes(fleet: FleetResults) -> bool:
+    return bool(fleet.change_points)
+
+
+def _has_outliers(fleet: FleetResults) -> bool:
+    return bool(fleet.outliers)
+
+
+def _has_checks(fleet: FleetResults) -> bool:
+    return bool(fleet.calibration)
+
+
+CHAPTERS = (
+    FleetChapter("flights", 0, flights.build),
+    FleetChapter("densities", 200, densities.build),
+    FleetChapter("heading", 300, aircraft.heading, "aircraft", figures=aircraft.heading_figures),
+    FleetChapter("installations", 400, installations.build),
+    FleetChapter("trend", 500, trend.build, "aircraft", _has_changes),
+    FleetChapter("ins", 600, aircraft.ins, figures=aircraft.ins_figures),
+    FleetChapter("skill", 650, skill.build, figures=skill.figures),
+    FleetChapter("calibration", 700, calibration.build, "aircraft", _has_checks, calibration.figures),
+    FleetChapter("outliers", 900, rest.outliers, "aircraft", _has_outliers),
+    FleetChapter("not_in_fleet", 910, rest.not_in_fleet),
+    FleetChapter("method", 920, rest.method),
+)

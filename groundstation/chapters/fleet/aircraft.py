@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.chapters.fleet.chapter import KeyFigure
 from groundstation.chapters.fleet.common import (
     aircraft_name,
     bounded,
@@ -33,6 +34,17 @@ def heading(fleet: FleetResults) -> Section:
         text = "No flight of a named aircraft has a heading error."
         return Section("aircraft", title, HEADING_LEAD, (Note(text, "unknown"),))
     return Section("aircraft", title, HEADING_LEAD, (Figure("fleet.forest"), _table(fleet)))
+
+
+def heading_figures(fleet: FleetResults) -> tuple[KeyFigure, ...]:
+    """Return the mean error of the whole fleet."""
+    whole = fleet.by_aircraft[0] if fleet.by_aircraft else None
+    if whole is None or whole.mean_deg is None:
+        return ()
+    rejected = whole.assessed - whole.averaged
+    remark = f"mean over {plural(whole.averaged, 'flight')}"
+    remark += f"; {number(rejected, 0)} rejected left out" if rejected else ""
+    return (("Heading error", bounded(whole.mean_deg, 3, "°", signed=True), remark),)
 
 
 def assessed(fleet: FleetResults) -> list[AircraftRow]:
@@ -81,6 +93,14 @@ def ins(fleet: FleetResults) -> Section | None:
         return Section("ins", title, RATE_LEAD, parts)
     rates = unaided_figures(fleet, RATE)
     return Section("ins", title, RATE_LEAD, (*parts, Figure("fleet.rates"), _rate_table(rates)))
+
+
+def ins_figures(fleet: FleetResults) -> tuple[KeyFigure, ...]:
+    """Return the median rate of the unaided flights."""
+    rate, flights = median_rate(fleet)
+    if rate is None:
+        return ()
+    return (("INS drift", bounded(rate, 2, "nmi/h"), f"median of {plural(flights, 'unaided flight')}"),)
 
 
 def _has_rate(fleet: FleetResults) -> NDArray[np.bool_]:

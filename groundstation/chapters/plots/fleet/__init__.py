@@ -1,8 +1,8 @@
-"""Plots of the fleet report, described beside the chapters that mention them."""
+"""Plots of the fleet report that show all flights; those of one system stand in its folder."""
 
 from collections.abc import Callable
 
-from groundstation.chapters.plots.fleet import aircraft, calibration, densities, deviation, installations, skill, trend
+from groundstation.chapters.plots.fleet import aircraft, calibration, densities, installations, skill, trend
 from groundstation.plots.plot import Plot
 from groundstation.results.fleet import FleetResults
 
@@ -16,6 +16,5 @@ FLEET_PLOTS: dict[str, Callable[[FleetResults], Plot] | Callable[[FleetResults, 
     "fleet.calibration": calibration.checks,
     "fleet.densities": densities.overlay,
     "fleet.densities_by_aircraft": densities.by_aircraft,
-    "fleet.deviation": deviation.curves,
     "fleet.installation": installations.over_time,
 }
