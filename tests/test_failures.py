@@ -315,7 +315,11 @@ def test_a_tab_of_a_flight_that_fails_leaves_the_others(
 
 @pytest.mark.parametrize(
     ("tabs", "name"),
-    [(one, name) for one in (viewer_fleet.TABS, viewer_comparison.TABS, OF_PLANS) for name in one],
+    [
+        (one, name)
+        for one in (viewer_fleet.TABS, viewer_fleet.TABS_BEHIND, viewer_comparison.TABS, OF_PLANS)
+        for name in one
+    ],
     ids=lambda one: one if isinstance(one, str) else "",
 )
 def test_a_tab_of_another_recording_that_fails_leaves_the_others(
@@ -327,7 +331,7 @@ def test_a_tab_of_another_recording_that_fails_leaves_the_others(
             monkeypatch.setitem(tabs, one, tab)
     path = tmp_path / "a.rrd"
     with gathered_failures():
-        if tabs is viewer_fleet.TABS:
+        if tabs in (viewer_fleet.TABS, viewer_fleet.TABS_BEHIND):
             viewer_fleet.write_fleet_recording(path, fleet, systems())
         elif tabs is OF_PLANS:
             planned = shipped_but(tabs=lambda: tuple(Tab((one,), tab) for one, tab in made.items()))
@@ -489,7 +493,7 @@ def test_publishing_that_fails_is_no_log_and_leaves_the_rest(
     for number, log in enumerate(logs):
         log.write_text(f"time_s,baro.pressure_altitude_m\n0,{number}\n1,{number}\n2,3\n", encoding="utf-8")
     _break_fleet_chapter("method", monkeypatch)
-    monkeypatch.setitem(viewer_fleet.TABS, "flights", fails)
+    monkeypatch.setitem(viewer_fleet.TABS_BEHIND, "flights", fails)
     with pytest.raises(SystemExit) as ended:
         main(["run", *map(str, logs), "-o", str(tmp_path / "out"), "-j", "1", "--no-pdf"])
     printed = capsys.readouterr().err

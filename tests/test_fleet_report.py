@@ -19,7 +19,6 @@ from pypdf import PdfReader
 
 from groundstation.base.timescales import utc_ns_to_stamp
 from groundstation.chapters.fleet import flights
-from groundstation.chapters.plots.fleet import densities
 from groundstation.methods.fleet import answer
 from groundstation.methods.fleet.changes import ChangeSettings
 from groundstation.methods.fleet.density import densities_of, histogram_of
@@ -33,6 +32,7 @@ from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import FleetResults, NotInFleet
 from groundstation.systems import systems
+from groundstation.systems.heading import fleet_densities_plots as densities
 from tests.browser import Browser
 from tests.fleet_example import DAY_NS, START_NS, flights_table, save_flight, skill
 from tests.test_fleet_statistics import EMPTY

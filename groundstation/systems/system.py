@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter, Chapters
     from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.plots.plot import Describe
+    from groundstation.results.fleet import FleetResults
     from groundstation.results.flight import FlightResults
     from groundstation.systems.study import StudyResult
 
@@ -30,6 +31,16 @@ class Tab(NamedTuple):
 
     shows: tuple[str, ...]
     log: Callable[[Any, "FlightResults"], Any] | None
+
+
+class FleetTab(NamedTuple):
+    """A tab of the recording of all flights.
+
+    ``log(recorder, fleet)`` logs it and returns its layout, None where there is nothing to show.
+    """
+
+    name: str
+    log: Callable[[Any, "FleetResults"], Any]
 
 
 @dataclass(frozen=True)
@@ -70,6 +81,10 @@ def _no_tabs() -> tuple[Tab, ...]:
     return ()
 
 
+def _no_fleet_tabs() -> tuple[FleetTab, ...]:
+    return ()
+
+
 @dataclass(frozen=True)
 class System:
     """System of the ground station.
@@ -97,6 +112,8 @@ class System:
         Chapters of the report of all flights, each with its place among those of the others.
     fleet_plots : callable
         Descriptions of their figures, by the name that a chapter gives.
+    fleet_tabs : callable
+        Tabs of the recording of all flights.
     """
 
     name: str
@@ -109,6 +126,7 @@ class System:
     tabs: Callable[[], tuple[Tab, ...]] = _no_tabs
     fleet_chapters: "Callable[[], tuple[FleetChapter, ...]]" = _no_fleet_chapters
     fleet_plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
+    fleet_tabs: Callable[[], tuple[FleetTab, ...]] = _no_fleet_tabs
 
 
 @dataclass(frozen=True)
@@ -193,6 +211,11 @@ class Systems:
 
         own = (told for one in self.every for told in one.fleet_plots().items())
         return {**FLEET_PLOTS, **dict(own)}
+
+    @cached_property
+    def fleet_tabs(self) -> tuple[FleetTab, ...]:
+        """Tabs of the recording of all flights."""
+        return tuple(tab for one in self.every for tab in one.fleet_tabs())
 
     @cached_property
     def tabs(self) -> tuple[Tab, ...]:

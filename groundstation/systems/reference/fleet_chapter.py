@@ -26,6 +26,11 @@ def figures(fleet: FleetResults) -> tuple[KeyFigure, ...]:
     return (("Calibration", f"{first.inside} of {first.checks}", f"{remark} ({percent(first.share_inside, 0)})"),)
 
 
+def has_checks(fleet: FleetResults) -> bool:
+    """Tell whether any answer was checked."""
+    return bool(fleet.calibration)
+
+
 def judged(row: FleetCalibration) -> Mark:
     """Tell whether the stated share lies in the interval of the share found."""
     low, high = row.confidence95
