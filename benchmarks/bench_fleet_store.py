@@ -35,6 +35,7 @@ from groundstation.pipeline.many_flights.runs.out_folder import clear_unfinished
 from groundstation.pipeline.many_flights.sessions.search import members_of
 from groundstation.reports.fleet_report import write_fleet_report
 from groundstation.results.file_names import ARRAYS, MANIFEST, SUMMARY
+from groundstation.systems import systems
 from groundstation.viewer.fleet import write_fleet_recording
 from tests.fleet_example import save_flight, skill
 
@@ -172,8 +173,8 @@ def one_flight(out: Path, templates: list[Path], flights: int) -> None:
 def together(out: Path, found: Scan) -> None:
     """What a run, ``report`` and users do with all flights."""
     fleet, _problems = timed("fleet put together", lambda: write_fleet(out, found))
-    timed("summary.html", lambda: write_fleet_report(out, fleet, with_pdf=False))
-    timed("fleet.rrd", lambda: write_fleet_recording(out / "fleet.rrd", fleet))
+    timed("summary.html", lambda: write_fleet_report(out, fleet, systems(), with_pdf=False))
+    timed("fleet.rrd", lambda: write_fleet_recording(out / "fleet.rrd", fleet, systems()))
     for name in ("summary.html", "fleet.rrd"):
         print(f"{name:<50}{(out / name).stat().st_size / 1e6:8.1f} MB")
     files = list((out / "flights.parquet").iterdir())

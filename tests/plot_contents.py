@@ -17,17 +17,16 @@ import numpy as np
 
 from groundstation.chapters.parts import Figure
 from groundstation.chapters.plots.comparison import COMPARED, sides_of
-from groundstation.chapters.plots.fleet import FLEET_PLOTS
 from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.verbs.compare import compare
 from groundstation.plots.marks import AnyMark
 from groundstation.plots.plot import Axis, Panel, Plot
 from groundstation.reports.drawing import plot_of
-from groundstation.reports.fleet_report import CHAPTERS
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import Manifest
+from groundstation.systems import systems
 from tests import plot_cases, viewer_example
 from tests.saved import load
 from tests.told import PLOTS
@@ -70,11 +69,11 @@ def of_fleet() -> Contents:
     from tests.test_fleet_report import fleet_of
 
     fleet = fleet_of(60)
-    sections = (build(fleet) for build in CHAPTERS.values())
+    sections = (one.build(fleet) for one in systems().fleet_chapters)
     figures = [part for section in sections if section is not None for part in section.parts]
     told: Contents = {}
     for one in figures:
-        if isinstance(one, Figure) and (plot := plot_of(FLEET_PLOTS, one, fleet)) is not None:
+        if isinstance(one, Figure) and (plot := plot_of(systems().fleet_plots, one, fleet)) is not None:
             told[".".join(filter(None, (one.name, one.of)))] = _panels(plot)
     return told
 

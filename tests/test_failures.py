@@ -14,11 +14,9 @@ from groundstation.base.failures import Failure, attempt, failures, gathered_fai
 from groundstation.base.ledger import Ledger
 from groundstation.chapters import by_answer
 from groundstation.chapters.chapter import Chapters
-from groundstation.chapters.fleet import CHAPTERS as FLEET_CHAPTERS
 from groundstation.chapters.parts import Figure, Note, Section
 from groundstation.chapters.plots.acceptance import JUDGED
 from groundstation.chapters.plots.comparison import COMPARED
-from groundstation.chapters.plots.fleet import FLEET_PLOTS
 from groundstation.cli.main import main
 from groundstation.pipeline.many_flights.fleet import publishing
 from groundstation.pipeline.many_flights.runs.batch import run_many
@@ -174,7 +172,7 @@ def test_damage_checks_lines_and_columns_that_fail_leave_the_rest(name: str, mon
 
 @pytest.mark.parametrize(
     ("plots", "name"),
-    [(one, name) for one in (PLOTS, FLEET_PLOTS, JUDGED) for name in one],
+    [(one, name) for one in (PLOTS, systems().fleet_plots, JUDGED) for name in one],
     ids=lambda one: one if isinstance(one, str) else "",
 )
 def test_a_figure_that_cannot_be_drawn_leaves_the_rest_of_its_chapter(plots: dict[str, Any], name: str) -> None:
@@ -254,16 +252,21 @@ def test_a_generic_chapter_a_front_and_a_page_that_fail_leave_the_rest(
         assert codes() == ["internal.chapter.front", "internal.report.report.html"] and not page.exists()
 
 
-@pytest.mark.parametrize("name", FLEET_CHAPTERS)
+@pytest.mark.parametrize("name", [one.key for one in systems().fleet_chapters])
 def test_a_chapter_on_a_fleet_that_fails_leaves_the_others(
     name: str, fleet: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = fleet_report.fleet_document(fleet)
-    monkeypatch.setitem(FLEET_CHAPTERS, name, fails)
+    whole = fleet_report.fleet_document(fleet, systems())
+    _break_fleet_chapter(name, monkeypatch)
     with gathered_failures():
-        found = fleet_report.fleet_document(fleet)
+        found = fleet_report.fleet_document(fleet, systems())
         assert codes() == [f"internal.chapter.{name}"]
     assert len(whole.sections) - len(found.sections) in (0, 1) and len(found.sections) > 2
+
+
+def _break_fleet_chapter(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    told = (one._replace(build=fails) if one.key == name else one for one in systems().fleet_chapters)
+    monkeypatch.setitem(vars(systems()), "fleet_chapters", tuple(told))  # a cached property
 
 
 @pytest.fixture(scope="module")
@@ -312,7 +315,11 @@ def test_a_tab_of_a_flight_that_fails_leaves_the_others(
 
 @pytest.mark.parametrize(
     ("tabs", "name"),
-    [(one, name) for one in (viewer_fleet.TABS, viewer_comparison.TABS, OF_PLANS) for name in one],
+    [
+        (one, name)
+        for one in (viewer_fleet.TABS, viewer_fleet.TABS_BEHIND, viewer_comparison.TABS, OF_PLANS)
+        for name in one
+    ],
     ids=lambda one: one if isinstance(one, str) else "",
 )
 def test_a_tab_of_another_recording_that_fails_leaves_the_others(
@@ -324,8 +331,8 @@ def test_a_tab_of_another_recording_that_fails_leaves_the_others(
             monkeypatch.setitem(tabs, one, tab)
     path = tmp_path / "a.rrd"
     with gathered_failures():
-        if tabs is viewer_fleet.TABS:
-            viewer_fleet.write_fleet_recording(path, fleet)
+        if tabs in (viewer_fleet.TABS, viewer_fleet.TABS_BEHIND):
+            viewer_fleet.write_fleet_recording(path, fleet, systems())
         elif tabs is OF_PLANS:
             planned = shipped_but(tabs=lambda: tuple(Tab((one,), tab) for one, tab in made.items()))
             viewer_plan.write_plan_recording(path, replace(ANSWERED, answers={}, figures=()), planned)
@@ -485,8 +492,8 @@ def test_publishing_that_fails_is_no_log_and_leaves_the_rest(
     logs = [tmp_path / f"{name}.csv" for name in "ab"]
     for number, log in enumerate(logs):
         log.write_text(f"time_s,baro.pressure_altitude_m\n0,{number}\n1,{number}\n2,3\n", encoding="utf-8")
-    monkeypatch.setitem(FLEET_CHAPTERS, "method", fails)
-    monkeypatch.setitem(viewer_fleet.TABS, "flights", fails)
+    _break_fleet_chapter("method", monkeypatch)
+    monkeypatch.setitem(viewer_fleet.TABS_BEHIND, "flights", fails)
     with pytest.raises(SystemExit) as ended:
         main(["run", *map(str, logs), "-o", str(tmp_path / "out"), "-j", "1", "--no-pdf"])
     printed = capsys.readouterr().err

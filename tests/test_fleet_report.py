@@ -19,7 +19,6 @@ from pypdf import PdfReader
 
 from groundstation.base.timescales import utc_ns_to_stamp
 from groundstation.chapters.fleet import flights
-from groundstation.chapters.plots.fleet import densities
 from groundstation.methods.fleet import answer
 from groundstation.methods.fleet.changes import ChangeSettings
 from groundstation.methods.fleet.density import densities_of, histogram_of
@@ -32,6 +31,8 @@ from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_f
 from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import FleetResults, NotInFleet
+from groundstation.systems import systems
+from groundstation.systems.heading import fleet_densities_plots as densities
 from tests.browser import Browser
 from tests.fleet_example import DAY_NS, START_NS, flights_table, save_flight, skill
 from tests.test_fleet_statistics import EMPTY
@@ -142,13 +143,13 @@ def checks_of(flights: FigureData, rng: Any) -> FleetChecks:
 
 
 def page_of(out: Path, fleet: FleetResults) -> Page:
-    written = write_fleet_report(out, fleet, with_pdf=False)
+    written = write_fleet_report(out, fleet, systems(), with_pdf=False)
     assert written.paths == (out / PAGE,)
     return Page((out / PAGE).read_text(encoding="utf-8"))
 
 
 def page_and_paper_of(out: Path, fleet: FleetResults) -> tuple[Page, str]:
-    written = write_fleet_report(out, fleet, with_pdf=True)
+    written = write_fleet_report(out, fleet, systems(), with_pdf=True)
     assert not written.problem
     paper = " ".join(" ".join(page.extract_text() for page in PdfReader(written.paths[1]).pages).split())
     return Page((out / PAGE).read_text(encoding="utf-8")), paper
@@ -250,10 +251,11 @@ def test_nothing_from_a_log_is_markup(tmp_path: Path) -> None:
 
 def test_the_same_fleet_gives_the_same_bytes_wherever_it_is_made(tmp_path: Path) -> None:
     fleet = fleet_of(12, samples=50, not_in_fleet=MISSING)
-    first = [path.read_bytes() for path in write_fleet_report(tmp_path, fleet, with_pdf=True).paths]
+    first = [path.read_bytes() for path in write_fleet_report(tmp_path, fleet, systems(), with_pdf=True).paths]
     code = (
         "import sys; from pathlib import Path; from tests.test_fleet_report import *;"
-        "write_fleet_report(Path(sys.argv[1]), fleet_of(12, samples=50, not_in_fleet=MISSING), with_pdf=True)"
+        "fleet = fleet_of(12, samples=50, not_in_fleet=MISSING);"
+        "write_fleet_report(Path(sys.argv[1]), fleet, systems(), with_pdf=True)"
     )
     (tmp_path / "again").mkdir()
     environment = os.environ | {"TZ": "Asia/Tokyo", "PYTHONHASHSEED": "7", "LC_ALL": "C"}
@@ -344,7 +346,7 @@ def test_the_table_sorts_by_number_and_missing_stays_last(tmp_path: Path, chromi
 def test_without_typst_the_page_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "summary.pdf").write_bytes(b"old")
     monkeypatch.setitem(sys.modules, "typst", None)
-    written = write_fleet_report(tmp_path, fleet_of(1), with_pdf=True)
+    written = write_fleet_report(tmp_path, fleet_of(1), systems(), with_pdf=True)
     assert [path.name for path in written.paths] == [PAGE] and "summary.pdf: not written" in written.problem
     assert not (tmp_path / "summary.pdf").exists()
 

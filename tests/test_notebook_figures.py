@@ -17,7 +17,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import StepPatch
 from matplotlib.text import Text
 
-from groundstation.chapters.plots.fleet import FLEET_PLOTS
 from groundstation.plots import marks
 from groundstation.plots.extents import edges
 from groundstation.plots.marks import AnyMark, Floats, Points
@@ -25,6 +24,7 @@ from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
 from groundstation.reports.notebook.figure import COLOUR_BAR, figure_of
 from groundstation.reports.svg.colours import COLOURS, PAPER
 from groundstation.reports.svg.legend import entries_of
+from groundstation.systems import systems
 from tests.every_mark import DRAWN, X, Y, empty, plot_of
 from tests.plot_cases import CASES, names_of
 from tests.test_fleet_report import fleet_of
@@ -47,9 +47,9 @@ def of_case(case: str) -> Iterator[Plot]:
 
 def of_fleet() -> Iterator[Plot]:
     fleet = fleet_of(60)
-    for name in FLEET_PLOTS:
+    for name in systems().fleet_plots:
         if name not in ("fleet.trend", "fleet.deviation", "fleet.installation"):
-            describe: Any = FLEET_PLOTS[name]
+            describe: Any = systems().fleet_plots[name]
             plot = describe(fleet)
             assert plot is not None
             yield plot

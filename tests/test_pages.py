@@ -12,6 +12,7 @@ from groundstation.reports.acceptance import write_acceptance_report
 from groundstation.reports.comparison import comparison_html
 from groundstation.reports.fleet_report import write_fleet_report
 from groundstation.results.files import save
+from groundstation.systems import systems
 from tests.acceptance_example import save_fleet
 from tests.browser import Browser
 from tests.plot_cases import CASES
@@ -67,7 +68,7 @@ def flight(case: str) -> Callable[[Path], Path]:
 
 def fleet(folder: Path) -> Path:
     """Write the report of many flights."""
-    write_fleet_report(folder, fleet_of(30, ("A12", "B7"), samples=200))
+    write_fleet_report(folder, fleet_of(30, ("A12", "B7"), samples=200), systems())
     return folder / "summary.html"
 
 

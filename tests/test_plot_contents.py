@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from groundstation.chapters.plots.comparison import COMPARED
-from groundstation.chapters.plots.fleet import FLEET_PLOTS
 from groundstation.pipeline.one_flight.outcome import Outcome
+from groundstation.systems import systems
 from tests.plot_contents import CASES, KEPT, RUN, Contents, differences, of_flight
 from tests.saved import load
 from tests.told import PLOTS
@@ -65,7 +65,7 @@ def test_a_lost_series_a_changed_band_and_a_lost_limit_are_told(kept: dict[str, 
 
 def test_what_is_kept_is_small_and_of_nearly_every_plot(kept: dict[str, Contents]) -> None:
     assert KEPT.stat().st_size < MOST_BYTES and set(kept) == {*CASES, *RUN}
-    known = {*PLOTS, *FLEET_PLOTS, *COMPARED}
+    known = {*PLOTS, *systems().fleet_plots, *COMPARED}
     told = {
         name
         for plots in kept.values()

@@ -472,7 +472,7 @@ def test_the_fleet_lists_the_session_with_its_report(out: Path) -> None:
     assert '<section id="sessions"' in page
     assert f'href="{IDENTITY}/report.html"' in page
     with open_stream("fleet") as stream:
-        text = flights_text(FleetRecorder(stream, fleet), fleet)
+        text = flights_text(FleetRecorder(stream, fleet, systems()), fleet)
     assert f"({IDENTITY}/{IDENTITY}.rrd)" in text
     assert fleet.to_frame("sessions")["session_id"].tolist() == [IDENTITY]
 

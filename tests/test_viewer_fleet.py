@@ -10,17 +10,19 @@ import pyarrow as pa
 import pytest
 from rerun.experimental import ViewerClient
 
-from groundstation.chapters.fleet import aircraft, flights, rest, sessions, trend
-from groundstation.chapters.fleet import skill as forecast
+from groundstation.chapters.fleet import flights, rest, trend
 from groundstation.chapters.markdown import escaped
 from groundstation.chapters.parts import Grid
 from groundstation.pipeline.many_flights.fleet.statistics import gather
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import Densities, FleetResults, NotInFleet
-from groundstation.viewer.fleet import write_fleet_recording
+from groundstation.systems.cooperative.fleet_chapter import build as sessions
+from groundstation.systems.heading import fleet_chapter as aircraft
+from groundstation.systems.inertial import fleet_chapter as forecast
 from groundstation.viewer.fleet_density import MOST_STEPS, PATH, steps
 from tests.fleet_example import save_flight, skill
 from tests.recording_contents import Contents
+from tests.told import write_fleet_recording
 from tests.viewer_shots import ALL_OR_SOME, chosen, colourful, pages, picture
 
 STEADY, STEPPING, HOSTILE = "A12", "B3", "![x](http://127.0.0.1/x)|<b>/../"
@@ -197,10 +199,10 @@ def test_names_from_logs_are_neither_paths_nor_markup(contents: Contents) -> Non
 
 
 def test_the_panels_tell_what_the_page_tells(contents: Contents, fleet: FleetResults) -> None:
-    skill_told, sessions_told = forecast.build(fleet), sessions.build(fleet)
+    skill_told, sessions_told = forecast.build(fleet), sessions(fleet)
     assert skill_told is not None and sessions_told is None
     for document, section in (
-        ("/by_aircraft", aircraft.heading(fleet)),
+        ("/by_aircraft", aircraft.build(fleet)),
         ("/by_aircraft", trend.build(fleet)),
         ("/forecast/skill", skill_told),
         ("/failed", rest.not_in_fleet(fleet)),

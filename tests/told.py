@@ -13,10 +13,12 @@ from groundstation.chapters.parts import Document, Front, Section
 from groundstation.reports import flight_report, sections
 from groundstation.results.answer import Answer
 from groundstation.results.files import SavedFlight
+from groundstation.results.fleet import FleetResults
 from groundstation.results.flight import FlightResults
 from groundstation.systems import systems
 from groundstation.systems.system import System, Systems
 from groundstation.tables.table import Flight
+from groundstation.viewer import fleet as viewer_fleet
 from groundstation.viewer import recording
 from groundstation.viewer.recorder import Recorder
 
@@ -66,6 +68,11 @@ def recorder_of(stream: rr.RecordingStream, start_ns: int, has_utc: bool) -> Rec
 def write_recording(path: Path, flight: Flight, results: FlightResults) -> None:
     """Write the recording of a flight."""
     recording.write_recording(path, flight, results, systems())
+
+
+def write_fleet_recording(path: Path, fleet: FleetResults) -> None:
+    """Write the recording of a fleet."""
+    viewer_fleet.write_fleet_recording(path, fleet, systems())
 
 
 def stream_recording(flight: Flight, results: FlightResults, *, connect_url: str) -> None:

@@ -7,20 +7,20 @@ from dataclasses import replace
 from pathlib import Path
 
 from groundstation.base.failures import attempt, gathered_failures
-from groundstation.chapters.fleet import CHAPTERS, flights, front
+from groundstation.chapters.fleet import flights, front
 from groundstation.chapters.parts import Document, Front
-from groundstation.chapters.plots.fleet import FLEET_PLOTS
 from groundstation.chapters.shortened import shortened
 from groundstation.reports.drawing import drawn_by
 from groundstation.reports.flight_report import Written, write_pages
 from groundstation.reports.page import TEMPLATES, digest_of, render
 from groundstation.results.fleet import FleetResults
+from groundstation.systems.system import Systems
 
 PAGE, PDF = "summary.html", "summary.pdf"
 MOST_ROWS_ON_PAPER = 60
 
 
-def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = False) -> Written:
+def write_fleet_report(out: Path, fleet: FleetResults, systems: Systems, *, with_pdf: bool = False) -> Written:
     """Write summary.html into a folder of flights.
 
     Parameters
@@ -29,6 +29,7 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = False
         Holds the flight folders: links are relative to it.
     fleet : FleetResults
         Equal results give equal bytes, whatever the time, the host or the order of the logs.
+    systems : Systems
     with_pdf : bool
         Write summary.pdf too. Without it one that is there stays if the page is as it was.
 
@@ -44,7 +45,7 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = False
         When a file cannot be written.
     """
     with gathered_failures():
-        document = fleet_document(fleet)
+        document = fleet_document(fleet, systems)
         return write_pages(
             out / PAGE,
             lambda shown: fleet_report_html(shown, fleet),
@@ -55,12 +56,13 @@ def write_fleet_report(out: Path, fleet: FleetResults, *, with_pdf: bool = False
         )
 
 
-def fleet_document(fleet: FleetResults) -> Document:
+def fleet_document(fleet: FleetResults, systems: Systems) -> Document:
     """Put the report of a fleet together, its tables at full length."""
-    told = [attempt("chapter", name, build, fleet) for name, build in CHAPTERS.items()]
-    drawn = (attempt("chapter", one.key, drawn_by, FLEET_PLOTS, one, fleet) for one in told if one is not None)
+    chapters, plots = systems.fleet_chapters, systems.fleet_plots
+    told = [attempt("chapter", one.key, one.build, fleet) for one in chapters]
+    drawn = (attempt("chapter", one.key, drawn_by, plots, one, fleet) for one in told if one is not None)
     sections = tuple(section for section in drawn if section is not None)
-    top = attempt("chapter", "front", front.build, fleet) or Front("Fleet")
+    top = attempt("chapter", "front", front.build, fleet, chapters) or Front("Fleet")
     return Document("Fleet report", top.title, top, sections)
 
 

@@ -15,7 +15,9 @@ from groundstation.systems.plan import Plan
 
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter, Chapters
+    from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.plots.plot import Describe
+    from groundstation.results.fleet import FleetResults
     from groundstation.results.flight import FlightResults
     from groundstation.systems.study import StudyResult
 
@@ -29,6 +31,16 @@ class Tab(NamedTuple):
 
     shows: tuple[str, ...]
     log: Callable[[Any, "FlightResults"], Any] | None
+
+
+class FleetTab(NamedTuple):
+    """A tab of the recording of all flights.
+
+    ``log(recorder, fleet)`` logs it and returns its layout, None where there is nothing to show.
+    """
+
+    name: str
+    log: Callable[[Any, "FleetResults"], Any]
 
 
 @dataclass(frozen=True)
@@ -61,7 +73,15 @@ def _no_plots() -> "Mapping[str, Describe]":
     return {}
 
 
+def _no_fleet_chapters() -> "tuple[FleetChapter, ...]":
+    return ()
+
+
 def _no_tabs() -> tuple[Tab, ...]:
+    return ()
+
+
+def _no_fleet_tabs() -> tuple[FleetTab, ...]:
     return ()
 
 
@@ -88,6 +108,12 @@ class System:
         Descriptions of its figures, by the name that a chapter gives.
     tabs : callable
         Tabs of the recording, in their order.
+    fleet_chapters : callable
+        Chapters of the report of all flights, each with its place among those of the others.
+    fleet_plots : callable
+        Descriptions of their figures, by the name that a chapter gives.
+    fleet_tabs : callable
+        Tabs of the recording of all flights.
     """
 
     name: str
@@ -98,6 +124,9 @@ class System:
     chapters: "Callable[[], tuple[Chapter, ...]]" = _no_chapters
     plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
     tabs: Callable[[], tuple[Tab, ...]] = _no_tabs
+    fleet_chapters: "Callable[[], tuple[FleetChapter, ...]]" = _no_fleet_chapters
+    fleet_plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
+    fleet_tabs: Callable[[], tuple[FleetTab, ...]] = _no_fleet_tabs
 
 
 @dataclass(frozen=True)
@@ -166,6 +195,27 @@ class Systems:
         from groundstation.chapters.plots import PLOTS
 
         return {**PLOTS, **{name: describe for one in self.every for name, describe in one.plots().items()}}
+
+    @cached_property
+    def fleet_chapters(self) -> "tuple[FleetChapter, ...]":
+        """Chapters of the report of all flights, in its order."""
+        from groundstation.chapters.fleet import CHAPTERS
+
+        every = (*CHAPTERS, *(chapter for one in self.every for chapter in one.fleet_chapters()))
+        return tuple(sorted(every, key=lambda chapter: chapter.place))
+
+    @cached_property
+    def fleet_plots(self) -> "Mapping[str, Describe]":
+        """Descriptions of the figures of that report, by the name that a chapter gives."""
+        from groundstation.chapters.plots.fleet import FLEET_PLOTS
+
+        own = (told for one in self.every for told in one.fleet_plots().items())
+        return {**FLEET_PLOTS, **dict(own)}
+
+    @cached_property
+    def fleet_tabs(self) -> tuple[FleetTab, ...]:
+        """Tabs of the recording of all flights."""
+        return tuple(tab for one in self.every for tab in one.fleet_tabs())
 
     @cached_property
     def tabs(self) -> tuple[Tab, ...]:

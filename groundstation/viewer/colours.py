@@ -13,6 +13,8 @@ from typing import Final, TypeAlias
 from groundstation.plots.marks import Emphasis, Role
 
 Colour: TypeAlias = tuple[int, int, int, int]
+UNSEEN: Final[Colour] = (0, 0, 0, 1)  # wholly transparent means "choose a colour" to Rerun
+NO_WIDTH: Final = 1e-6  # of an unseen bar, in the unit of its axis
 
 
 def _rgb(code: int, alpha: int = 255) -> Colour:

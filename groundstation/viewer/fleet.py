@@ -10,22 +10,20 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.base.failures import attempt
-from groundstation.chapters.plots.fleet.skill import growth
 from groundstation.chapters.plots.fleet.trend import HEADING
 from groundstation.results.fleet import FleetResults
+from groundstation.systems.system import Systems
 from groundstation.viewer.fleet_charts import (
     MOST_AIRCRAFT,
     Aircraft,
     aircraft_of,
     by_aircraft,
     log_aircraft,
-    skill_over_flights,
     verdicts,
 )
 from groundstation.viewer.fleet_density import heading_error_density
 from groundstation.viewer.fleet_recorder import FLIGHT_NUMBER, FleetRecorder
-from groundstation.viewer.fleet_text import aircraft_text, failed_text, flights_text, forecast_text
-from groundstation.viewer.plot_views import panels_of
+from groundstation.viewer.fleet_text import aircraft_text, failed_text, flights_text
 from groundstation.viewer.recording import save_stream, send_layout
 from groundstation.viewer.views import document
 
@@ -34,7 +32,7 @@ FLEET = "fleet"
 FLIGHTS_TEXT = "flights"  # entity of the table of flights
 
 
-def write_fleet_recording(path: Path, fleet: FleetResults) -> None:
+def write_fleet_recording(path: Path, fleet: FleetResults, systems: Systems) -> None:
     """Write the recording of a fleet, blueprint embedded.
 
     Parameters
@@ -42,27 +40,32 @@ def write_fleet_recording(path: Path, fleet: FleetResults) -> None:
     path : Path
         The .rrd file; its folder holds the flight folders that its links name. Moved into place when complete.
     fleet : FleetResults
+    systems : Systems
 
     Raises
     ------
     GroundstationError
         When Rerun refused the data or the file could not be written.
     """
-    save_stream(path, FLEET, lambda stream: send_fleet(stream, fleet))
+    save_stream(path, FLEET, lambda stream: send_fleet(stream, fleet, systems))
 
 
-def send_fleet(stream: rr.RecordingStream, fleet: FleetResults) -> rrb.Blueprint:
+def send_fleet(stream: rr.RecordingStream, fleet: FleetResults, systems: Systems) -> rrb.Blueprint:
     """Log a fleet to a stream that has its sink, and send the layout.
 
     Waits until all is out; returns the layout.
     """
-    recorder = FleetRecorder(stream, fleet)
+    recorder = FleetRecorder(stream, fleet, systems)
     stream.send_recording_name("Fleet")
     logged = (attempt("aircraft", one.name, _logged, recorder, fleet, one) for one in aircraft_of(fleet))
     found = [one for one in logged if one is not None]
-    shown = (attempt("tab", name, tab, recorder, fleet, found) for name, tab in TABS.items())
-    tabs = [tab for tab in shown if tab is not None]
-    return send_layout(stream, tabs, timeline=FLIGHT_NUMBER)  # on utc, the flights of a year are a few columns of dots
+    tabs = [
+        *(attempt("tab", name, tab, recorder, fleet, found) for name, tab in TABS.items()),
+        *(attempt("tab", tab.name, tab.log, recorder, fleet) for tab in systems.fleet_tabs),
+        *(attempt("tab", name, tab, recorder, fleet, found) for name, tab in TABS_BEHIND.items()),
+    ]
+    shown = [tab for tab in tabs if tab is not None]
+    return send_layout(stream, shown, timeline=FLIGHT_NUMBER)  # on utc, the flights of a year are a few columns of dots
 
 
 def _logged(recorder: FleetRecorder, fleet: FleetResults, one: Aircraft) -> Logged:
@@ -71,7 +74,7 @@ def _logged(recorder: FleetRecorder, fleet: FleetResults, one: Aircraft) -> Logg
 
 def _fleet(recorder: FleetRecorder, fleet: FleetResults, found: list[Logged]) -> rrb.Container:
     aircraft = [one for one, _ in found]
-    recorder.document("by_aircraft", aircraft_text(fleet, {one.name: one.entity for one in aircraft}))
+    recorder.document("by_aircraft", aircraft_text(fleet, {one.name: one.entity for one in aircraft}, recorder.systems))
     errors = by_aircraft([one for one, views in found if HEADING in views], HEADING)
     plots = [*errors, *([verdicts(aircraft)] if aircraft else [])]
     answer = [document("By aircraft", "by_aircraft"), *heading_error_density(recorder, fleet)]
@@ -89,16 +92,6 @@ def _aircraft(_recorder: FleetRecorder, _fleet: FleetResults, found: list[Logged
     return rrb.Tabs(contents=own, name="Aircraft") if own else None
 
 
-def _forecast(recorder: FleetRecorder, fleet: FleetResults, _found: list[Logged]) -> rrb.Container | None:
-    skill = forecast_text(fleet)
-    if not skill:
-        return None
-    forecast = [*skill_over_flights(recorder, fleet), *panels_of(recorder, growth(fleet))]
-    recorder.document("forecast/skill", skill)
-    views = [*forecast, document("Skill of the forecast", "forecast/skill")]
-    return rrb.Grid(contents=views, grid_columns=2, name="Forecast")
-
-
 def _flights(recorder: FleetRecorder, fleet: FleetResults, _found: list[Logged]) -> rrb.Container:
     recorder.document(FLIGHTS_TEXT, flights_text(recorder, fleet))
     return rrb.Vertical(contents=[document("Flights and their recordings", FLIGHTS_TEXT)], name="Flights")
@@ -111,10 +104,6 @@ def _failed(recorder: FleetRecorder, fleet: FleetResults, _found: list[Logged]) 
     return rrb.Vertical(contents=[document("Logs without a flight", "failed")], name="Failed")
 
 
-TABS: dict[str, Callable[[FleetRecorder, FleetResults, list[Logged]], rrb.Container | None]] = {
-    "fleet": _fleet,
-    "aircraft": _aircraft,
-    "forecast": _forecast,
-    "flights": _flights,
-    "failed": _failed,
-}
+Log = Callable[[FleetRecorder, FleetResults, list[Logged]], rrb.Container | None]
+TABS: dict[str, Log] = {"fleet": _fleet, "aircraft": _aircraft}
+TABS_BEHIND: dict[str, Log] = {"flights": _flights, "failed": _failed}  # the tabs of the systems

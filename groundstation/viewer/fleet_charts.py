@@ -8,7 +8,6 @@ import rerun.blueprint as rrb
 
 from groundstation.chapters.fleet.common import title_of
 from groundstation.chapters.fleet.trend import QUANTITIES
-from groundstation.chapters.plots.fleet.skill import by_horizon
 from groundstation.chapters.plots.fleet.trend import HEADING, POSITIVE, chart
 from groundstation.plots.marks import Role, series
 from groundstation.plots.plot import Axis
@@ -84,9 +83,3 @@ def by_aircraft(having: Sequence[Aircraft], quantity: str) -> list[rrb.View]:
 def verdicts(aircraft: Sequence[Aircraft]) -> rrb.View:
     """Lanes of the verdicts: each holds until the next flight of the aircraft."""
     return lanes("Verdict on the heading correction", [f"{one.entity}/verdict" for one in aircraft])
-
-
-def skill_over_flights(recorder: FleetRecorder, fleet: FleetResults) -> list[rrb.View]:
-    """Log the forecast skill of every flight, a series a horizon; the view."""
-    told = by_horizon(fleet, BY_NUMBER, recorder.places)
-    return [] if told is None else [over_time(recorder, "forecast/rms_by_flight", told, told.y.title)]

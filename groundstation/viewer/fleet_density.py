@@ -13,9 +13,8 @@ import rerun.blueprint as rrb
 
 from groundstation.base.records import Int64Array
 from groundstation.results.fleet import Densities, FittedNormal, FleetResults
-from groundstation.systems.heading.distribution_tab import NO_WIDTH, UNSEEN
 from groundstation.viewer import colours
-from groundstation.viewer.colours import Colour
+from groundstation.viewer.colours import NO_WIDTH, UNSEEN, Colour
 from groundstation.viewer.fleet_recorder import FleetRecorder
 from groundstation.viewer.series import FloatArray
 

@@ -8,9 +8,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from groundstation.base.records import Int64Array
 from groundstation.results.fleet import FleetResults
+from groundstation.systems.system import Systems
 from groundstation.viewer.colours import Colour, for_states
 from groundstation.viewer.names import clean_text
-from groundstation.viewer.recorder import UTC, Recorder
+from groundstation.viewer.recorder import NO_SYSTEMS, UTC, Recorder
 from groundstation.viewer.series import FloatArray
 
 FLIGHT_NUMBER = "flight_number"
@@ -26,15 +27,16 @@ class FleetRecorder(Recorder):
     ----------
     stream : rerun.RecordingStream
     fleet : FleetResults
+    systems : Systems, optional
     """
 
-    def __init__(self, stream: rr.RecordingStream, fleet: FleetResults) -> None:
+    def __init__(self, stream: rr.RecordingStream, fleet: FleetResults, systems: Systems = NO_SYSTEMS) -> None:
         starts = fleet.flights["start_utc"].astype("datetime64[ns]")
         ids = fleet.flights["flight_id"].astype(np.str_)
         self.order: Int64Array = np.lexsort((ids, starts.astype(np.int64), np.isnat(starts)))
         self.starts, self.timed = starts[self.order], int((~np.isnat(starts)).sum())
         self._number = {name: place + 1 for place, name in enumerate(ids[self.order].tolist())}
-        super().__init__(stream, 0, self.timed > 0)
+        super().__init__(stream, 0, self.timed > 0, systems)
 
     def time_ns(self, flight_seconds: ArrayLike) -> Int64Array:
         """Numbers of flights as they stand on the axes of plots."""

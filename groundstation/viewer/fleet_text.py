@@ -9,12 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from groundstation.chapters.fleet import aircraft, calibration, flights, rest, sessions, skill, trend
+from groundstation.base.failures import attempt
+from groundstation.chapters.fleet import flights, rest
 from groundstation.chapters.fleet.common import aircraft_name, plural
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Note, Section
 from groundstation.chapters.shortened import shortened
 from groundstation.results.fleet import FleetResults
+from groundstation.systems.system import Systems
 from groundstation.viewer.fleet_recorder import FleetRecorder
 
 MOST_ROWS = 500  # of a table: the viewer lays out the whole text again and again
@@ -27,22 +29,24 @@ LINKS = (
 )
 
 
-def aircraft_text(fleet: FleetResults, entities: Mapping[str, str]) -> str:
-    """Return the heading error by aircraft, each a link to its entity.
-
-    Then changes of level, outliers and calibration.
-    """
+def aircraft_text(fleet: FleetResults, entities: Mapping[str, str], systems: Systems) -> str:
+    """Return what is told by aircraft, each a link to its entity."""
     names = {aircraft_name(name): f"recording://{entity}" for name, entity in entities.items() if name}
     links = {name: link for name, link in names.items() if link.isascii()}
-    told = [aircraft.heading(fleet)]
-    told += [trend.build(fleet)] if fleet.change_points else []
-    told += [rest.outliers(fleet)] if fleet.outliers else []
-    told += [calibration.build(fleet)] if fleet.calibration else []
-    return "\n\n".join(_text(section, links) for section in told)
+    return "\n\n".join(text_of(section, links) for section in _of_panel("aircraft", fleet, systems))
+
+
+def _of_panel(panel: str, fleet: FleetResults, systems: Systems) -> Iterator[Section]:
+    """Chapters of a text panel."""
+    for chapter in systems.fleet_chapters:
+        if chapter.panel == panel and chapter.is_in_panel(fleet):
+            section = attempt("chapter", chapter.key, chapter.build, fleet)
+            if section is not None:
+                yield section
 
 
 def flights_text(recorder: FleetRecorder, fleet: FleetResults) -> str:
-    """Return the table of the flights in order, then the sessions.
+    """Return the table of the flights in order, then what stands below it: the sessions.
 
     Each name is a link to its recording.
     """
@@ -51,26 +55,20 @@ def flights_text(recorder: FleetRecorder, fleet: FleetResults) -> str:
     told = flights.by_number(fleet, rows, numbers)
     ids, recordings = (fleet.flights[name][rows].tolist() for name in ("flight_id", "recording"))
     links = _recordings(zip(ids, recordings, strict=True))
-    parts = [_text(replace(told, above=(*_notes(recorder, fleet), *told.above)), links)]
-    of_several = sessions.build(fleet)
-    if of_several is not None:
-        parts.append(_text(of_several, _recordings((one.session_id, one.recording) for one in fleet.sessions)))
+    parts = [text_of(replace(told, above=(*_notes(recorder, fleet), *told.above)), links)]
+    of_sessions = _recordings((one.session_id, one.recording) for one in fleet.sessions)
+    parts += [text_of(section, of_sessions) for section in _of_panel("flights", fleet, recorder.systems)]
     return "\n\n".join(parts)
-
-
-def forecast_text(fleet: FleetResults) -> str:
-    """Return the skill of the methods over all flights; empty where there is no forecast."""
-    told = skill.build(fleet)
-    return "" if told is None else _text(told, {})
 
 
 def failed_text(fleet: FleetResults) -> str:
     """Return the table of the logs that gave no flight, and why."""
-    return _text(rest.not_in_fleet(fleet), {}, "index.csv")
+    return text_of(rest.not_in_fleet(fleet), where="index.csv")
 
 
-def _text(section: Section, links: Mapping[str, str], where: str = EVERY_ONE) -> str:
-    return markdown(shortened(section, MOST_ROWS, where), widest=WIDEST_CELL, links=links)
+def text_of(section: Section, links: Mapping[str, str] | None = None, where: str = EVERY_ONE) -> str:
+    """Return a chapter as a text panel; cells that are in ``links`` become links."""
+    return markdown(shortened(section, MOST_ROWS, where), widest=WIDEST_CELL, links=links or {})
 
 
 def _recordings(named: Iterable[tuple[str, str]]) -> dict[str, str]:

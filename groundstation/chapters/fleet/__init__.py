@@ -1,37 +1,26 @@
-"""Chapters of the fleet report.
-
-``build(fleet)`` returns a Section, or None when there is nothing to say.
-"""
-
-from collections.abc import Callable
+"""Chapters of the fleet report; those of one system stand in its folder."""
 
 from groundstation.chapters.fleet import (
-    aircraft,
-    calibration,
-    densities,
-    deviation,
     flights,
-    installations,
     rest,
-    sessions,
-    skill,
     trend,
 )
-from groundstation.chapters.parts import Section
+from groundstation.chapters.fleet.chapter import FleetChapter
 from groundstation.results.fleet import FleetResults
 
-CHAPTERS: dict[str, Callable[[FleetResults], Section | None]] = {
-    "flights": flights.build,
-    "sessions": sessions.build,
-    "densities": densities.build,
-    "heading": aircraft.heading,
-    "installations": installations.build,
-    "trend": trend.build,
-    "ins": aircraft.ins,
-    "skill": skill.build,
-    "calibration": calibration.build,
-    "deviation": deviation.build,
-    "outliers": rest.outliers,
-    "not_in_fleet": rest.not_in_fleet,
-    "method": rest.method,
-}
+
+def _has_changes(fleet: FleetResults) -> bool:
+    return bool(fleet.change_points)
+
+
+def _has_outliers(fleet: FleetResults) -> bool:
+    return bool(fleet.outliers)
+
+
+CHAPTERS = (
+    FleetChapter("flights", 0, flights.build),
+    FleetChapter("trend", 500, trend.build, "aircraft", _has_changes),
+    FleetChapter("outliers", 900, rest.outliers, "aircraft", _has_outliers),
+    FleetChapter("not_in_fleet", 910, rest.not_in_fleet),
+    FleetChapter("method", 920, rest.method),
+)

@@ -1,15 +1,15 @@
 """Top of the fleet report: what the fleet is, what asks for attention, key figures."""
 
 from collections import Counter
+from collections.abc import Iterable
 
 import numpy as np
 
-from groundstation.chapters.fleet import skill
-from groundstation.chapters.fleet.aircraft import median_rate
-from groundstation.chapters.fleet.common import aircraft_name, bounded, day, figure_of, plural, title_of, verdict_words
+from groundstation.chapters.fleet.chapter import FleetChapter
+from groundstation.chapters.fleet.common import aircraft_name, day, figure_of, plural, title_of, verdict_words
 from groundstation.chapters.parts import Cell, Front, Mark
 from groundstation.chapters.verdict import VERDICTS
-from groundstation.chapters.wording import ABSENT, number, percent
+from groundstation.chapters.wording import ABSENT, number
 from groundstation.results.fleet import FleetResults
 
 MOST_NAMES = 6
@@ -17,8 +17,8 @@ MOST_CHANGES = 3  # each in a sentence
 LONGEST_NAME = 24
 
 
-def build(fleet: FleetResults) -> Front:
-    """Put the top of the report together."""
+def build(fleet: FleetResults, chapters: Iterable[FleetChapter]) -> Front:
+    """Put the top of the report together, with the key figures of its chapters."""
     named = [name for name in fleet.aircraft if name]
     title = (
         f"{plural(len(fleet), 'flight')} of {plural(len(named), 'aircraft', 'aircraft')}"
@@ -39,7 +39,7 @@ def build(fleet: FleetResults) -> Front:
         verdict=verdict,
         headline=headline,
         sentences=(*_changes(fleet), _judged(fleet)) if len(fleet) else (),
-        figures=_figures(fleet),
+        figures=tuple(figure for chapter in chapters for figure in chapter.figures(fleet)),
     )
 
 
@@ -108,26 +108,3 @@ def _judged(fleet: FleetResults) -> str:
     if charted == named or fewest is None:
         return ""
     return f"A trend needs {number(fewest, 0)} flights with a time: {charted} of {named} aircraft have them."
-
-
-def _figures(fleet: FleetResults) -> tuple[tuple[str, str, str], ...]:
-    figures = []
-    whole = fleet.by_aircraft[0] if fleet.by_aircraft else None
-    if whole is not None and whole.mean_deg is not None:
-        rejected = whole.assessed - whole.averaged
-        remark = f"mean over {plural(whole.averaged, 'flight')}"
-        remark += f"; {number(rejected, 0)} rejected left out" if rejected else ""
-        figures.append(("Heading error", bounded(whole.mean_deg, 3, "°", signed=True), remark))
-    rate, flights = median_rate(fleet)
-    if rate is not None:
-        figures.append(("INS drift", bounded(rate, 2, "nmi/h"), f"median of {plural(flights, 'unaided flight')}"))
-    if (row := skill.headline(fleet)) is not None:
-        remark = f"RMS over {number(row.starts, 0)} starts on {plural(row.flights, 'flight')}"
-        figures.append((f"Forecast, {row.horizon_min:g} min", bounded(row.rms_m, 0, "m"), remark))
-    if fleet.calibration:
-        first = fleet.calibration[0]
-        remark = f"inside the stated 95 %: {first.title}"
-        figures.append(
-            ("Calibration", f"{first.inside} of {first.checks}", f"{remark} ({percent(first.share_inside, 0)})")
-        )
-    return tuple(figures)

@@ -8,6 +8,7 @@ from groundstation.systems.system import Study, System, Tab
 
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter
+    from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.plots.plot import Describe
     from groundstation.systems.study import StudyResult
 
@@ -18,6 +19,13 @@ def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.systems.cooperative.chapter import cooperative, session_front
 
     return (Chapter((CooperativeResult,), cooperative, session_front),)
+
+
+def _fleet_chapters() -> "tuple[FleetChapter, ...]":
+    from groundstation.chapters.fleet.chapter import FleetChapter
+    from groundstation.systems.cooperative.fleet_chapter import build
+
+    return (FleetChapter("sessions", 100, build, "flights"),)
 
 
 def _plots() -> "Mapping[str, Describe]":
@@ -51,4 +59,5 @@ SYSTEM = System(
     chapters=_chapters,
     plots=_plots,
     tabs=_tabs,
+    fleet_chapters=_fleet_chapters,
 )

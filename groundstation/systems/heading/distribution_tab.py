@@ -14,17 +14,15 @@ import rerun.blueprint as rrb
 from groundstation.results.flight import FlightResults
 from groundstation.systems.heading.arrays import HeadingDistribution, HeadingGrowth, HeadingNormal
 from groundstation.viewer import colours
-from groundstation.viewer.colours import Colour
+from groundstation.viewer.colours import NO_WIDTH, UNSEEN, Colour
 from groundstation.viewer.recorder import FLIGHT_TIME, UTC, Recorder
 from groundstation.viewer.series import FloatArray
 
 PATH = "distribution"
 HAIRLINE = 1.0  # of the distance between two points of the fitted normal
 SLIM = 0.5  # of a bin: what grows stands before what it grows into
-NO_WIDTH = 1e-6  # of the invisible bar, deg
 CEILING = 2.0  # highest bar of the growing density, in peaks of the final one
 BEHIND, MIDDLE, FRONT = 100, 100, 255  # opacity; Rerun draws in alphabetical order of the entities
-UNSEEN: Colour = (0, 0, 0, 1)  # wholly transparent means "choose a colour" to Rerun
 
 
 def heading_error(recorder: Recorder, results: FlightResults) -> list[rrb.View]:

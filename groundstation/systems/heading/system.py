@@ -9,6 +9,7 @@ from groundstation.systems.system import Study, System, Tab
 
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter
+    from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.plots.plot import Describe
     from groundstation.systems.study import StudyResult
 
@@ -24,6 +25,32 @@ def _chapters() -> "tuple[Chapter, ...]":
         Chapter((InstallationResult,), installation),
         Chapter((HeadingResult,), heading),
     )
+
+
+def _fleet_chapters() -> "tuple[FleetChapter, ...]":
+    from groundstation.chapters.fleet.chapter import FleetChapter
+    from groundstation.systems.heading import fleet_chapter as aircraft
+    from groundstation.systems.heading import fleet_densities_chapter as densities
+    from groundstation.systems.heading.installation import fleet_chapter as installations
+
+    return (
+        FleetChapter("densities", 200, densities.build),
+        FleetChapter("heading", 300, aircraft.build, "aircraft", figures=aircraft.figures),
+        FleetChapter("installations", 400, installations.build),
+    )
+
+
+def _fleet_plots() -> "Mapping[str, Describe]":
+    from groundstation.systems.heading import fleet_densities_plots as densities
+    from groundstation.systems.heading import fleet_plots as aircraft
+    from groundstation.systems.heading.installation import fleet_plots as installations
+
+    return {
+        "fleet.forest": aircraft.forest,
+        "fleet.densities": densities.overlay,
+        "fleet.densities_by_aircraft": densities.by_aircraft,
+        "fleet.installation": installations.over_time,
+    }
 
 
 def _plots() -> "Mapping[str, Describe]":
@@ -108,4 +135,6 @@ SYSTEM = System(
     chapters=_chapters,
     plots=_plots,
     tabs=_tabs,
+    fleet_chapters=_fleet_chapters,
+    fleet_plots=_fleet_plots,
 )

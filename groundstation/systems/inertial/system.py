@@ -4,10 +4,11 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from groundstation.systems.inertial.analysis import FORECAST, INERTIAL
-from groundstation.systems.system import Study, System, Tab
+from groundstation.systems.system import FleetTab, Study, System, Tab
 
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter
+    from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.plots.plot import Describe
     from groundstation.systems.study import StudyResult
 
@@ -23,6 +24,30 @@ def _chapters() -> "tuple[Chapter, ...]":
         Chapter((InertialResult,), inertial),
         Chapter((ForecastResult,), forecast),
     )
+
+
+def _fleet_chapters() -> "tuple[FleetChapter, ...]":
+    from groundstation.chapters.fleet.chapter import FleetChapter
+    from groundstation.systems.inertial import fleet_chapter as skill
+    from groundstation.systems.inertial import fleet_drift_chapter as drift
+
+    return (
+        FleetChapter("ins", 600, drift.build, figures=drift.figures),
+        FleetChapter("skill", 650, skill.build, figures=skill.figures),
+    )
+
+
+def _fleet_plots() -> "Mapping[str, Describe]":
+    from groundstation.systems.inertial import fleet_plots as skill
+    from groundstation.systems.inertial.fleet_drift_plots import rates
+
+    return {"fleet.rates": rates, "fleet.growth": skill.growth, "fleet.skill": skill.flights}
+
+
+def _fleet_tabs() -> tuple[FleetTab, ...]:
+    from groundstation.systems.inertial.fleet_tab import forecast
+
+    return (FleetTab("forecast", forecast),)
 
 
 def _plots() -> "Mapping[str, Describe]":
@@ -64,4 +89,7 @@ SYSTEM = System(
     chapters=_chapters,
     plots=_plots,
     tabs=_tabs,
+    fleet_chapters=_fleet_chapters,
+    fleet_plots=_fleet_plots,
+    fleet_tabs=_fleet_tabs,
 )

@@ -8,6 +8,7 @@ from groundstation.systems.system import Study, System, Tab
 
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter
+    from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.plots.plot import Describe
     from groundstation.systems.study import StudyResult
 
@@ -27,6 +28,19 @@ def _chapters() -> "tuple[Chapter, ...]":
             magnetic,
         ),
     )
+
+
+def _fleet_chapters() -> "tuple[FleetChapter, ...]":
+    from groundstation.chapters.fleet.chapter import FleetChapter
+    from groundstation.systems.magnetic.fleet_chapter import build
+
+    return (FleetChapter("deviation", 800, build),)
+
+
+def _fleet_plots() -> "Mapping[str, Describe]":
+    from groundstation.systems.magnetic.fleet_plots import curves
+
+    return {"fleet.deviation": curves}
 
 
 def _plots() -> "Mapping[str, Describe]":
@@ -71,4 +85,6 @@ SYSTEM = System(
     chapters=_chapters,
     plots=_plots,
     tabs=_tabs,
+    fleet_chapters=_fleet_chapters,
+    fleet_plots=_fleet_plots,
 )

@@ -8,6 +8,7 @@ from groundstation.systems.system import System, Tab
 
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter
+    from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.plots.plot import Describe
 
 
@@ -17,6 +18,20 @@ def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.systems.reference.chapter import reference
 
     return (Chapter((ReferenceResult,), reference),)
+
+
+def _fleet_chapters() -> "tuple[FleetChapter, ...]":
+    from groundstation.chapters.fleet.chapter import FleetChapter
+    from groundstation.systems.reference import fleet_chapter as calibration
+
+    build, figures = calibration.build, calibration.figures
+    return (FleetChapter("calibration", 700, build, "aircraft", calibration.has_checks, figures),)
+
+
+def _fleet_plots() -> "Mapping[str, Describe]":
+    from groundstation.systems.reference.fleet_plots import checks
+
+    return {"fleet.calibration": checks}
 
 
 def _plots() -> "Mapping[str, Describe]":
@@ -37,4 +52,6 @@ SYSTEM = System(
     chapters=_chapters,
     plots=_plots,
     tabs=_tabs,
+    fleet_chapters=_fleet_chapters,
+    fleet_plots=_fleet_plots,
 )

@@ -108,8 +108,9 @@ def _write_beside(
     from groundstation.viewer.fleet import write_fleet_recording
 
     recording = out / FLEET_RECORDING
-    attempt("recording", "fleet", write_fleet_recording, recording, fleet, unless=(OSError, GroundstationError))
-    problem = write_fleet_report(out, fleet, with_pdf=with_pdf).problem
+    write = partial(write_fleet_recording, recording, fleet, systems())
+    attempt("recording", "fleet", write, unless=(OSError, GroundstationError))
+    problem = write_fleet_report(out, fleet, systems(), with_pdf=with_pdf).problem
     return [*problems, outcome_beside(out, "skipped", f"{out}: {problem}")] if problem else problems
 
 

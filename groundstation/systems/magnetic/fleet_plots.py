@@ -3,7 +3,6 @@
 import numpy as np
 
 from groundstation.chapters.fleet.common import aircraft_name
-from groundstation.chapters.fleet.deviation import usable
 from groundstation.chapters.plots.common import label
 from groundstation.chapters.plots.fleet.common import roles_of
 from groundstation.chapters.wording import number
@@ -11,6 +10,7 @@ from groundstation.plots.axes import ZERO
 from groundstation.plots.marks import AnyMark, Curve
 from groundstation.plots.plot import Axis, Panel, Plot, one_panel
 from groundstation.results.fleet import FleetResults
+from groundstation.systems.magnetic.fleet_chapter import usable
 
 MOST_CURVES = 60
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from groundstation.chapters.fleet.skill import HEADLINE_MIN, drawn, method_title, shipped_method
 from groundstation.chapters.plots.common import label, line_with_dots
 from groundstation.chapters.plots.fleet.common import Places, date_axis, roles_of, seconds_of
 from groundstation.plots.marks import AnyMark, Curve, Dots, Emphasis, Limit, Role, series
 from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
 from groundstation.results.fleet import FleetResults
+from groundstation.systems.inertial.fleet_chapter import HEADLINE_MIN, drawn, method_title, shipped_method
 from groundstation.systems.inertial.forecast_plots import HORIZON, OTHERS
 
 CONFIDENCE = 95.0

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from groundstation.chapters.fleet.chapter import KeyFigure
 from groundstation.chapters.fleet.common import bounded, plural
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Note, Part, Section
 from groundstation.chapters.wording import clean, is_number, number, percent
@@ -55,6 +56,15 @@ def headline(fleet: FleetResults) -> FleetSkill | None:
     exact = [row for row in mine if row.horizon_min == HEADLINE_MIN]
     found = exact or mine
     return found[-1] if found else None
+
+
+def figures(fleet: FleetResults) -> tuple[KeyFigure, ...]:
+    """Return the RMS error of the shipped method."""
+    row = headline(fleet)
+    if row is None:
+        return ()
+    remark = f"RMS over {number(row.starts, 0)} starts on {plural(row.flights, 'flight')}"
+    return ((f"Forecast, {row.horizon_min:g} min", bounded(row.rms_m, 0, "m"), remark),)
 
 
 def method_title(name: str) -> str:

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.chapters.fleet.common import aircraft_name, plural
-from groundstation.chapters.fleet.densities import angle
 from groundstation.chapters.plots.common import label
 from groundstation.chapters.plots.fleet.common import left_out, roles_of, rows_shown
 from groundstation.chapters.wording import number
@@ -15,6 +14,7 @@ from groundstation.plots.marks import AnyMark, Band, Curve, Emphasis, Floats, Ro
 from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import padded
 from groundstation.results.fleet import Densities, FittedNormal, FleetResults
+from groundstation.systems.heading.fleet_densities_chapter import angle
 
 MOST_LINES = 150  # flights drawn as lines; more become bands of quantiles
 MOST_LINES_OF_A_PANEL = 60

@@ -1,5 +1,6 @@
 """Chapter: whether stated sigmas are honest, by independent checks over all flights."""
 
+from groundstation.chapters.fleet.chapter import KeyFigure
 from groundstation.chapters.parts import Figure, Grid, Head, Mark, Note, Section
 from groundstation.chapters.wording import number, percent, typeset
 from groundstation.results.fleet import FleetCalibration, FleetResults
@@ -14,6 +15,20 @@ def build(fleet: FleetResults) -> Section:
         text = "No flight has an independent check of its answers."
         return Section("calibration", title, LEAD, (Note(text, "unknown"),))
     return Section("calibration", title, LEAD, (Figure("fleet.calibration"), _table(fleet)))
+
+
+def figures(fleet: FleetResults) -> tuple[KeyFigure, ...]:
+    """Return the share inside of the first kind of check."""
+    if not fleet.calibration:
+        return ()
+    first = fleet.calibration[0]
+    remark = f"inside the stated 95 %: {first.title}"
+    return (("Calibration", f"{first.inside} of {first.checks}", f"{remark} ({percent(first.share_inside, 0)})"),)
+
+
+def has_checks(fleet: FleetResults) -> bool:
+    """Tell whether any answer was checked."""
+    return bool(fleet.calibration)
 
 
 def judged(row: FleetCalibration) -> Mark:

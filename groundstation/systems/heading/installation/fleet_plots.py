@@ -3,10 +3,10 @@
 import numpy as np
 
 from groundstation.base.normal import NORMAL_95
-from groundstation.chapters.fleet.installations import name_of, rows_of
 from groundstation.plots.marks import Band, Curve, Dots, Floats
 from groundstation.plots.plot import Axis, Panel, Plot, Row
 from groundstation.results.fleet import FleetResults
+from groundstation.systems.heading.installation.fleet_chapter import name_of, rows_of
 
 
 def over_time(fleet: FleetResults, place: str) -> Plot | None:
