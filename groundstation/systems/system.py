@@ -14,7 +14,7 @@ from groundstation.systems.analysis import Analysis
 from groundstation.systems.plan import Plan
 
 if TYPE_CHECKING:
-    from groundstation.chapters.chapter import Chapter, Chapters
+    from groundstation.chapters.chapter import Adviser, Chapter, Chapters
     from groundstation.plots.plot import Describe
     from groundstation.results.flight import FlightResults
     from groundstation.systems.study import StudyResult
@@ -88,6 +88,8 @@ class System:
         Descriptions of its figures, by the name that a chapter gives.
     tabs : callable
         Tabs of the recording, in their order.
+    advice : callable, optional
+        What the chapter on what to do next says for it.
     """
 
     name: str
@@ -98,6 +100,7 @@ class System:
     chapters: "Callable[[], tuple[Chapter, ...]]" = _no_chapters
     plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
     tabs: Callable[[], tuple[Tab, ...]] = _no_tabs
+    advice: "Callable[[], Adviser] | None" = None
 
 
 @dataclass(frozen=True)
@@ -155,7 +158,11 @@ class Systems:
         every = [chapter for one in self.every for chapter in one.chapters()]
         plans = tuple(_of(every, PlanAnswer))
         sessions = tuple(_of(every, SessionAnswer))
-        return Chapters(tuple(one for one in every if one not in (*plans, *sessions)), sessions, plans)
+        titles = {one.name: one.title_of_pages for one in (*self.analyses, *self.session_analyses)}
+        advisers = tuple(one.advice() for one in self.every if one.advice is not None)
+        return Chapters(
+            tuple(one for one in every if one not in (*plans, *sessions)), sessions, plans, titles, advisers
+        )
 
     @cached_property
     def plots(self) -> "Mapping[str, Describe]":

@@ -7,7 +7,7 @@ from groundstation.systems.inertial.analysis import FORECAST, INERTIAL
 from groundstation.systems.system import Study, System, Tab
 
 if TYPE_CHECKING:
-    from groundstation.chapters.chapter import Chapter
+    from groundstation.chapters.chapter import Adviser, Chapter
     from groundstation.plots.plot import Describe
     from groundstation.systems.study import StudyResult
 
@@ -23,6 +23,13 @@ def _chapters() -> "tuple[Chapter, ...]":
         Chapter((InertialResult,), inertial),
         Chapter((ForecastResult,), forecast),
     )
+
+
+def _advice() -> "Adviser":
+    from groundstation.chapters.chapter import Adviser
+    from groundstation.systems.inertial import advice_chapter
+
+    return Adviser(advise=advice_chapter.advise)
 
 
 def _plots() -> "Mapping[str, Describe]":
@@ -64,4 +71,5 @@ SYSTEM = System(
     chapters=_chapters,
     plots=_plots,
     tabs=_tabs,
+    advice=_advice,
 )

@@ -7,7 +7,7 @@ from groundstation.systems.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
 from groundstation.systems.system import Study, System, Tab
 
 if TYPE_CHECKING:
-    from groundstation.chapters.chapter import Chapter
+    from groundstation.chapters.chapter import Adviser, Chapter
     from groundstation.plots.plot import Describe
     from groundstation.systems.study import StudyResult
 
@@ -27,6 +27,13 @@ def _chapters() -> "tuple[Chapter, ...]":
             magnetic,
         ),
     )
+
+
+def _advice() -> "Adviser":
+    from groundstation.chapters.chapter import Adviser
+    from groundstation.systems.magnetic import advice_chapter
+
+    return Adviser(advice_chapter.REMEDIES)
 
 
 def _plots() -> "Mapping[str, Describe]":
@@ -71,4 +78,5 @@ SYSTEM = System(
     chapters=_chapters,
     plots=_plots,
     tabs=_tabs,
+    advice=_advice,
 )
