@@ -458,14 +458,14 @@ def test_a_session_with_failures_has_all_else_and_is_run_again(tmp_path: Path, m
     from groundstation.pipeline.one_flight.configuration import load_configuration
     from groundstation.pipeline.verbs.cooperative import run_session
     from groundstation.simulation.session_log import write_session
-    from groundstation.viewer import session as viewer_session
     from tests.session_example import SEED
     from tests.session_example import SHORT as SCENARIO
 
     write_session(SCENARIO, tmp_path, "example", SEED)
     logs, settings = sorted(tmp_path.glob("*.csv")), load_configuration(tmp_path / "settings.toml")
     with monkeypatch.context() as patch:
-        patch.setattr(viewer_session, "cooperative", fails)
+        broken = [one._replace(log=fails) if one.shows == ("cooperative",) else one for one in systems().tabs]
+        patch.setitem(systems().__dict__, "tabs", tuple(broken))
         patch.setitem(PLOTS, "cooperative.map", fails)
         (done,) = run_session(logs, tmp_path / "out", settings, with_pdf=False)
         assert (done.state, done.code) == ("incomplete", 1)

@@ -18,20 +18,22 @@ from tests.recording_contents import Contents
 
 TABS = Path(groundstation.viewer.tabs.__file__).parent
 ROOM = TABS.parent
+SYSTEMS = ROOM.with_name("systems")
 LOGGING = {"lines", "thinned", "band", "dots", "lane", "spans"}  # of a Recorder
 # What is not told once. A tab that is not here shows plots of its chapter alone.
 BY_HAND = {
     "overview": {"lines", "spans"},  # more series than the page has, and lanes with all states
     "raw": {"lines", "lane"},  # the tables themselves
     "quality": {"thinned", "spans"},  # the same; every gap, where the page widens and counts them
-    "inertial": {"lane"},  # states of the filter: grounds of the page's panels
-    "cooperative": {"lines", "spans"},  # sources heard, lanes of links
-    "landing_ranges": {"lines"},  # speed of the moving point, beside its space
-    "magnetic": {"dots"},  # a deviation applied to the log
+    "inertial/tab": {"lane"},  # states of the filter: grounds of the page's panels
+    "cooperative/tab": {"lines", "spans"},  # sources heard, lanes of links
+    "planning/landing/tab": {"lines"},  # speed of the moving point, beside its space
+    "magnetic/tab": {"dots"},  # a deviation applied to the log
 }
 BY_RERUN = {  # spaces, maps, tensors, and what grows with time
-    *("control", "placement", "landing", "landing_ranges", "flight_space", "session_space", "track"),
-    *("magnetic_field", "distribution", "forecast"),
+    *("track", "flight_space", "landing/tab", "planning/landing/tab", "planning/session/tab"),
+    *("planning/session/placement_tab", "cooperative/space_tab", "magnetic/field_tab", "heading/distribution_tab"),
+    "inertial/forecast_tab",
 }
 # The same of the room itself: fleet, comparison, plan, session, and what all painters log with.
 ROOM_BY_HAND = {
@@ -62,9 +64,10 @@ def draws_by_rerun(path: Path) -> bool:
 
 
 def test_tabs_that_log_by_hand_are_listed() -> None:
-    paths = sorted(TABS.glob("*.py"))
-    assert {path.stem: calls for path in paths if (calls := calls_of(path))} == BY_HAND
-    assert {path.stem for path in paths if draws_by_rerun(path)} == BY_RERUN
+    paths = {path.stem: path for path in TABS.glob("*.py")}
+    paths |= {str(path.relative_to(SYSTEMS).with_suffix("")): path for path in SYSTEMS.rglob("*tab.py")}
+    assert {name: calls for name, path in paths.items() if (calls := calls_of(path))} == BY_HAND
+    assert {name for name, path in paths.items() if draws_by_rerun(path)} == BY_RERUN
 
 
 def test_the_room_logs_by_hand_where_it_is_listed() -> None:

@@ -7,7 +7,7 @@ page the chapters and plots, a recording the tabs, a study its own simulation.
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from groundstation.results.answer import Answer, PlanAnswer, SessionAnswer
 from groundstation.systems.analysis import Analysis
@@ -24,11 +24,12 @@ class Tab(NamedTuple):
     """A tab of the recording, and the analyses whose answers it shows.
 
     ``log(recorder, results)`` logs it and returns its layout, None where there is nothing to show. Without it the
-    answers have no tab: another one shows them.
+    answers have no tab: another one shows them. ``part_of`` names the one that shows their chapters: "quality".
     """
 
     shows: tuple[str, ...]
     log: Callable[[Any, "FlightResults"], Any] | None
+    part_of: Literal["", "quality"] = ""
 
 
 @dataclass(frozen=True)
