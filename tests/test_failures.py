@@ -211,7 +211,7 @@ def test_a_chapter_on_a_flight_that_fails_leaves_the_others(
     assert len(found) > 5 and "heading" in {one.key for one in found}
 
 
-@pytest.mark.parametrize("kind", Chapters._fields)
+@pytest.mark.parametrize("kind", ["flight", "session", "plan"])
 def test_a_chapter_on_an_answer_that_fails_leaves_the_others(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     every = getattr(systems().chapters, kind)
     if kind != "flight":

@@ -8,7 +8,7 @@ from groundstation.base.records import Column
 from groundstation.methods.overview import overview, state_lanes
 from groundstation.results.figures import FigureData
 from groundstation.results.grouped_findings import grouped
-from groundstation.results.reasons import WHAT_HEADING_NEEDS, explained
+from groundstation.systems.heading.advice_chapter import WHAT_IT_NEEDS, explained
 from groundstation.tables.table import Flight, Table
 from tests.viewer_example import START_NS, table
 
@@ -141,8 +141,8 @@ def test_only_remarks_on_raw_topics_are_joined(severity: str) -> None:
 
 
 def test_a_log_without_taxi_is_told_what_the_method_needs() -> None:
-    assert WHAT_HEADING_NEEDS in explained("heading", "ground speed never above 6 m/s before lift-off: highest 1.4 m/s")
-    assert explained("magnetic", "no straight taxi") == "no straight taxi"
+    assert WHAT_IT_NEEDS in explained("ground speed never above 6 m/s before lift-off: highest 1.4 m/s")
+    assert explained("no GNSS velocity") == "no GNSS velocity"
 
 
 def test_a_log_of_attitude_alone_has_an_overview() -> None:

@@ -8,7 +8,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.chapters import by_answer
+from groundstation.chapters.chapter import Adviser
 from groundstation.chapters.front import front as top
+from groundstation.chapters.next_steps import next_steps as steps
 from groundstation.chapters.parts import Document, Front, Section
 from groundstation.reports import flight_report, sections
 from groundstation.results.answer import Answer
@@ -28,6 +30,11 @@ PLOTS = systems().plots
 def front(results: FlightResults) -> Front:
     """Return the top of a report."""
     return top(results, systems().chapters)
+
+
+def next_steps(results: FlightResults) -> Section | None:
+    """Return the chapter on what to do next."""
+    return steps(results, systems().chapters)
 
 
 def answer_chapters(results: FlightResults) -> tuple[Section, ...]:
@@ -89,6 +96,8 @@ def shipped_but(**parts: Any) -> Systems:
     """Return the shipped systems as one, with parts of it replaced."""
     every = systems()
     listed = every.chapters
+    remedies = tuple(remedy for one in listed.advisers for remedy in one.remedies)
+    advised = Adviser(remedies, lambda results: [advice for one in listed.advisers for advice in one.advise(results)])
     whole = System(
         "every",
         every.analyses,
@@ -98,5 +107,6 @@ def shipped_but(**parts: Any) -> Systems:
         lambda: (*listed.flight, *listed.session, *listed.plan),
         lambda: every.plots,
         lambda: every.tabs,
+        lambda: advised,
     )
     return Systems((replace(whole, **parts),))

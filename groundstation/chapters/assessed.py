@@ -1,25 +1,11 @@
 """Subjects that could not be assessed, and the reasons in plain words."""
 
+from groundstation.chapters.chapter import Chapters
 from groundstation.chapters.generic import titled
 from groundstation.chapters.parts import Note, Section
 from groundstation.chapters.wording import typeset, words
 from groundstation.results.flight import FlightResults
-from groundstation.results.reasons import explained, in_plain_words
-
-# By the name of the analysis; others are called by their name.
-SUBJECTS = {
-    "heading": "Heading correction",
-    "inertial": "INS errors",
-    "forecast": "Forecast without GNSS",
-    "latency": "Latency between sensors",
-    "magnetic": "Magnetic deviation",
-    "magnetic_ground": "Heading sensor on the ground",
-    "landing": "Approaches",
-    "landing_beacons": "Landing by locators",
-    "together": "Joining of logs",
-    "reference": "Comparison with the reference",
-    "cooperative": "Navigation between aircraft",
-}
+from groundstation.results.reasons import in_plain_words
 
 
 def reason_of(results: FlightResults, analysis: str) -> str:
@@ -28,13 +14,13 @@ def reason_of(results: FlightResults, analysis: str) -> str:
     Empty where the results give no reason.
     """
     reasons = results.reasons(analysis)
-    return explained(analysis, reasons[0]) if reasons else ""
+    return in_plain_words(reasons[0]) if reasons else ""
 
 
-def not_assessed(results: FlightResults) -> tuple[tuple[str, str], ...]:
+def not_assessed(results: FlightResults, chapters: Chapters) -> tuple[tuple[str, str], ...]:
     """Return the subject and reason of every analysis that could not be carried out."""
     return tuple(
-        (SUBJECTS.get(one.analysis) or titled(words(one.analysis)), typeset(in_plain_words(one.reason)))
+        (chapters.titles.get(one.analysis) or titled(words(one.analysis)), typeset(in_plain_words(one.reason)))
         for one in results.not_assessable
     )
 

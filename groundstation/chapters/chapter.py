@@ -1,7 +1,8 @@
 """A chapter with the answers it tells, and the chapters of flights, sessions and plans."""
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+from typing import Literal, NamedTuple
 
 from groundstation.chapters.parts import Cell, Front, Section
 from groundstation.results.answer import Answer
@@ -28,15 +29,46 @@ class Chapter(NamedTuple):
         return self.answers[0].analysis
 
 
+NextLine = Literal["Fly", "Record", "Check"]
+# Each a part of the reason for which an analysis could not be carried out, with the line and the text that mend it.
+Remedies = tuple[tuple[str, tuple[NextLine, str]], ...]
+
+
+class Advice(NamedTuple):
+    """Advice for the next flight: its line, its text, and what it is for, empty where for all.
+
+    What keeps an answer from being used is pressing: it stands before what would give a missing one.
+    """
+
+    line: NextLine
+    text: str
+    purpose: str
+    is_pressing: bool = False
+
+
+def _no_advice(_results: FlightResults) -> tuple[Advice, ...]:
+    return ()
+
+
+class Adviser(NamedTuple):
+    """Advice of a system: remedies of missing answers, and what would better those there are."""
+
+    remedies: Remedies = ()
+    advise: Callable[[FlightResults], Iterable[Advice]] = _no_advice
+
+
 class Chapters(NamedTuple):
     """Chapters of flights, sessions and plans, in the order of the report.
 
-    An answer that none of them tells has the generic chapter.
+    An answer that none of them tells has the generic chapter. ``titles`` are those of the analyses, by name, where
+    they could not be carried out; ``advisers`` fill the chapter on what to do next.
     """
 
     flight: tuple[Chapter, ...] = ()
     session: tuple[Chapter, ...] = ()
     plan: tuple[Chapter, ...] = ()
+    titles: Mapping[str, str] = MappingProxyType({})
+    advisers: tuple[Adviser, ...] = ()
 
     def of(self, results: FlightResults) -> tuple[Chapter, ...]:
         """Return the chapters of what the results are of."""
@@ -45,4 +77,5 @@ class Chapters(NamedTuple):
     @property
     def told(self) -> tuple[type[Answer], ...]:
         """Types of the answers that some chapter tells."""
-        return tuple(kind for every in self for chapter in every for kind in chapter.answers)
+        every = (*self.flight, *self.session, *self.plan)
+        return tuple(kind for chapter in every for kind in chapter.answers)

@@ -7,7 +7,6 @@ from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Part, Sec
 from groundstation.chapters.wording import number
 from groundstation.results.flight import FlightResults
 from groundstation.results.grouped_findings import NAMED, grouped
-from groundstation.results.reasons import explained
 
 MOST_FINDINGS = 200
 TOLD_ABOVE = (".not_assessable", *(f"heading.{one}" for one in ("accept", "advisory", "reject", "extend", "undecided")))
@@ -46,12 +45,6 @@ def _joined(alike: Sequence[Finding]) -> Finding:
     counts = [remark.count for remark in alike if remark.count is not None]
     text = f"{alike[0].text}; {len(alike) - 1} more of this kind"
     return Finding("info", alike[0].code, text, ", ".join(topics[:NAMED]) + more, "", sum(counts) if counts else None)
-
-
-def not_assessable(results: FlightResults) -> Grid | None:
-    """Return the analyses that could not be carried out, with reasons; None where all could."""
-    rows = [(entry.analysis, explained(entry.analysis, entry.reason)) for entry in results.not_assessable]
-    return Grid("Not assessable", (Head("Analysis"), Head("Reason")), rows) if rows else None
 
 
 def _table(found: Sequence[Finding]) -> Grid:

@@ -32,7 +32,7 @@ def front(results: FlightResults, chapters: Chapters) -> Front:
     sections = answer_chapters(results, chapters)
     tiles = [Tile(one.title, one.key, one.claim) for one in sections if one.claim is not None]
     left_open = tuple((one.title, one.headline) for one in sections if one.is_open)
-    pairs, missing = _pairs(results), (*left_open, *not_assessed(results))
+    pairs, missing = _pairs(results), (*left_open, *not_assessed(results, chapters))
     if not tiles:
         return Front(title, pairs, NO_ANSWER, NOTHING, _recorded(results), missing=missing)
     best, *others = tiles

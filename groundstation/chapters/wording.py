@@ -149,6 +149,18 @@ def sentence(text: str) -> str:
     return f"{told[:1].upper()}{told[1:]}."
 
 
+def with_full_stop(text: str) -> str:
+    """Return text with a capital, and a full stop where it ends without a sign.
+
+    Examples
+    --------
+    >>> with_full_stop("every required gate passed"), with_full_stop("Why?")
+    ('Every required gate passed.', 'Why?')
+    """
+    text = text.strip()
+    return text[:1].upper() + text[1:] + ("" if not text or text[-1] in ".!?" else ".")
+
+
 def words(name: str) -> str:
     """Return a field name as words: ``largest_gap`` becomes ``largest gap``."""
     return clean(name).replace("_", " ").strip()

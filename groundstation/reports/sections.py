@@ -9,6 +9,7 @@ from typing import Any
 
 from groundstation.base.failures import attempt
 from groundstation.chapters.by_answer import answer_chapters, chapters_of
+from groundstation.chapters.chapter import Chapters
 from groundstation.chapters.findings import findings
 from groundstation.chapters.next_steps import next_steps
 from groundstation.chapters.overview import overview
@@ -22,7 +23,10 @@ from groundstation.results.flight import FlightResults
 from groundstation.systems.system import Systems
 
 Build = Callable[[FlightResults], Section | None]
-BEFORE_THE_ANSWERS: dict[str, Build] = {"overview": overview, "next_steps": next_steps}
+BEFORE_THE_ANSWERS: dict[str, Callable[[FlightResults, Chapters], Section | None]] = {
+    "overview": lambda results, _: overview(results),
+    "next_steps": next_steps,
+}
 ON_THE_DATA: dict[str, Build] = {"findings": findings, "quality": quality}  # behind the chapters on the answers
 ON_THE_SESSION: dict[str, Build] = {"findings": findings, "provenance": provenance}  # and of a plan
 APPENDICES: dict[str, Build] = {"provenance": provenance, "sources": sources}
@@ -47,7 +51,7 @@ def told_sections(saved: SavedFlight, systems: Systems) -> tuple[list[Section], 
     is_flight = not (results.is_session or results.is_plan)
     told = (
         (
-            *_built(BEFORE_THE_ANSWERS, results),
+            *(attempt("chapter", name, build, results, systems.chapters) for name, build in BEFORE_THE_ANSWERS.items()),
             *answer_chapters(results, systems.chapters),
             *_built(ON_THE_DATA, results),
         )

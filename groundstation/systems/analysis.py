@@ -101,6 +101,8 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
         What ``list`` says it does.
     subject : str
         What its findings speak of: "magnetic deviation".
+    page_title : str
+        What pages call it where it could not be carried out; empty: its subject.
     needs : str
         What a log must hold, for people.
     settings : type
@@ -158,6 +160,7 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     judges: bool = False
     rules: Rules | None = None
     offers: Mapping[type[Any], Callable[[KnownT], Any]] = field(default_factory=dict)
+    page_title: str = ""
 
     def __post_init__(self) -> None:
         known = {field.name for field in dataclasses.fields(cast(Any, self.answer))}
@@ -169,6 +172,11 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     def settings_table(self) -> str:
         """Name of the TOML table with its settings."""
         return self.table or self.name
+
+    @property
+    def title_of_pages(self) -> str:
+        """Title of pages, with a capital."""
+        return self.page_title or f"{self.subject[:1].upper()}{self.subject[1:]}"
 
     def values(self, answers: Answers) -> dict[str, Any]:
         """Values of its columns in the tables of flights, by name; none without an answer."""

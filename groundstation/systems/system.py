@@ -7,14 +7,14 @@ page the chapters and plots, a recording the tabs, a study its own simulation.
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from groundstation.results.answer import Answer, PlanAnswer, SessionAnswer
 from groundstation.systems.analysis import Analysis
 from groundstation.systems.plan import Plan
 
 if TYPE_CHECKING:
-    from groundstation.chapters.chapter import Chapter, Chapters
+    from groundstation.chapters.chapter import Adviser, Chapter, Chapters
     from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.plots.plot import Describe
     from groundstation.results.fleet import FleetResults
@@ -26,11 +26,12 @@ class Tab(NamedTuple):
     """A tab of the recording, and the analyses whose answers it shows.
 
     ``log(recorder, results)`` logs it and returns its layout, None where there is nothing to show. Without it the
-    answers have no tab: another one shows them.
+    answers have no tab: another one shows them. ``part_of`` names the one that shows their chapters: "quality".
     """
 
     shows: tuple[str, ...]
     log: Callable[[Any, "FlightResults"], Any] | None
+    part_of: Literal["", "quality"] = ""
 
 
 class FleetTab(NamedTuple):
@@ -114,6 +115,8 @@ class System:
         Descriptions of their figures, by the name that a chapter gives.
     fleet_tabs : callable
         Tabs of the recording of all flights.
+    advice : callable, optional
+        What the chapter on what to do next says for it.
     """
 
     name: str
@@ -127,6 +130,7 @@ class System:
     fleet_chapters: "Callable[[], tuple[FleetChapter, ...]]" = _no_fleet_chapters
     fleet_plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
     fleet_tabs: Callable[[], tuple[FleetTab, ...]] = _no_fleet_tabs
+    advice: "Callable[[], Adviser] | None" = None
 
 
 @dataclass(frozen=True)
@@ -184,7 +188,11 @@ class Systems:
         every = [chapter for one in self.every for chapter in one.chapters()]
         plans = tuple(_of(every, PlanAnswer))
         sessions = tuple(_of(every, SessionAnswer))
-        return Chapters(tuple(one for one in every if one not in (*plans, *sessions)), sessions, plans)
+        titles = {one.name: one.title_of_pages for one in (*self.analyses, *self.session_analyses)}
+        advisers = tuple(one.advice() for one in self.every if one.advice is not None)
+        return Chapters(
+            tuple(one for one in every if one not in (*plans, *sessions)), sessions, plans, titles, advisers
+        )
 
     @cached_property
     def plots(self) -> "Mapping[str, Describe]":

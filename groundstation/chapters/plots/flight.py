@@ -16,7 +16,7 @@ from groundstation.results.arrays.flight import GnssLanes, Overview, PhaseSpans,
 from groundstation.results.arrays.typed import Flags
 from groundstation.results.corrected_position import CorrectedPosition, corrected_position
 from groundstation.results.flight import FlightResults
-from groundstation.systems.heading.answer import HeadingResult, TaxiSegment
+from groundstation.results.on_map import on_taxi
 
 SMALLEST_TAXI_M = 10.0  # less is no taxi worth enlarging: a receiver at rest, or a start by hand
 SMALLEST_MAP_M = 2.0  # side of the map of an aircraft that did not move
@@ -38,11 +38,11 @@ def track_map(results: FlightResults) -> Plot | None:
         return None
     origin = float(latitude[known[0]]), float(longitude[known[0]])
     north, east = plan_north_east_m(latitude, longitude, *origin)
-    answer = results.answer(HeadingResult)
-    segments = () if answer is None else answer.segments
+    answer = on_taxi(results.answers)
+    stretches = () if answer is None else answer.taxi_used_s
     time = data.time_s
-    used = _used_rows(time, segments)
-    taxi = _taxi_rows(time, segments, results.rows_of(PhaseSpans))
+    used = _used_rows(time, stretches)
+    taxi = _taxi_rows(time, stretches, results.rows_of(PhaseSpans))
     on_ground = _extent(north[taxi], east[taxi])
     zoom = on_ground > SMALLEST_TAXI_M and _extent(north, east) > 2.0 * on_ground
     corrected = corrected_position(results)
@@ -53,8 +53,8 @@ def track_map(results: FlightResults) -> Plot | None:
     if zoom:
         panels.append(_map(time[taxi], north[taxi], east[taxi], used[taxi], "Taxi"))
     caption = f"Ring: start ({number(origin[0], 5, '°')}, {number(origin[1], 5, '°')})."
-    if used.any():
-        caption += " Green: straight taxi used for the heading error."
+    if answer is not None and used.any():
+        caption += f" Green: straight taxi used for {answer.taxi_serves}."
     if corrected is not None:
         size = f", drawn {number(larger, 0)} times their size" if larger > 1 else ""
         caption += f" Ellipses: 95 % of the corrected position{size}."
@@ -63,19 +63,19 @@ def track_map(results: FlightResults) -> Plot | None:
     return Plot("overview.track", "Track", caption, alt, rows, ("overview",))
 
 
-def _used_rows(time: Floats, segments: Sequence[TaxiSegment]) -> Flags:
+def _used_rows(time: Floats, stretches: Sequence[tuple[float, float]]) -> Flags:
     used = np.zeros(len(time), dtype=bool)
-    for segment in segments:
-        used |= (time >= segment.start_s) & (time <= segment.end_s)
+    for start_s, end_s in stretches:
+        used |= (time >= start_s) & (time <= end_s)
     return used
 
 
-def _taxi_rows(time: Floats, segments: Sequence[TaxiSegment], phases: PhaseSpans | None) -> Flags:
+def _taxi_rows(time: Floats, stretches: Sequence[tuple[float, float]], phases: PhaseSpans | None) -> Flags:
     if phases is not None:
         airborne = np.flatnonzero(np.isin(phases.phase, ("take-off run", "airborne")))
         if airborne.size:
             return np.asarray(time < float(phases.start_s[airborne[0]]))
-    ends = [segment.end_s for segment in segments]
+    ends = [end_s for _, end_s in stretches]
     return np.asarray(time <= max(ends)) if ends else np.zeros(len(time), dtype=bool)
 
 

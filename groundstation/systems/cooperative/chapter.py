@@ -7,8 +7,17 @@ from collections.abc import Mapping, Sequence
 
 from groundstation.chapters.assessed import reason_of, without_answer
 from groundstation.chapters.parts import Cell, Facts, Figure, Front, Grid, Head, Mark, Note, Part, Section
-from groundstation.chapters.verdict import NOT_ASSESSABLE, sentence
-from groundstation.chapters.wording import any_value, clock, is_number, named_quantity, number, significant, words
+from groundstation.chapters.verdict import NOT_ASSESSABLE
+from groundstation.chapters.wording import (
+    any_value,
+    clock,
+    is_number,
+    named_quantity,
+    number,
+    significant,
+    with_full_stop,
+    words,
+)
 from groundstation.results.arrays.cooperative import SessionClocks
 from groundstation.results.fleet import SessionRow
 from groundstation.results.flight import FlightResults
@@ -134,7 +143,9 @@ def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -
     if answer is None:
         why = reason_of(results, "cooperative") or "the logs do not hold what the method needs"
         headline = f"{TITLE}: not assessable"
-        return Front(f"Session of {results.metadata['aircraft']}", pairs, NOT_ASSESSABLE, headline, (sentence(why),))
+        return Front(
+            f"Session of {results.metadata['aircraft']}", pairs, NOT_ASSESSABLE, headline, (with_full_stop(why),)
+        )
     best, reckoned = trusted(answer), _row(answer, REFERENCE)
     figures = [("2σ_r", number(best.two_sigma_r_m, 1, "m"), "worst aircraft at the end, as computed")]
     if reckoned is not None and reckoned is not best:

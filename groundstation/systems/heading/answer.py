@@ -10,6 +10,7 @@ from typing import ClassVar, Literal
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
+from groundstation.results.on_map import OnTaxi
 
 Verdict = Literal["accept", "advisory", "reject", "extend", "undecided"]
 
@@ -123,7 +124,7 @@ class OnboardComparison:
 
 
 @dataclass(frozen=True)
-class HeadingResult(Answer):
+class HeadingResult(Answer, OnTaxi):
     """INS heading error found on straight taxi (error = INS heading - true heading).
 
     Parameters
@@ -182,6 +183,7 @@ class HeadingResult(Answer):
     """
 
     analysis: ClassVar[str] = "heading"
+    taxi_serves: ClassVar[str] = "the heading error"
 
     ins_topic: str
     gnss_topic: str
@@ -254,3 +256,8 @@ class HeadingResult(Answer):
         if self.platform_error_deg is None or self.platform_standard_error_deg is None:
             return self.error_deg, self.standard_error_deg
         return self.platform_error_deg, self.platform_standard_error_deg
+
+    @property
+    def taxi_used_s(self) -> tuple[tuple[float, float], ...]:
+        """Ends of the segments, flight seconds."""
+        return tuple((one.start_s, one.end_s) for one in self.segments)

@@ -6,15 +6,16 @@ Gates, estimates and the figures of the published method (Markelov 2015).
 from collections.abc import Mapping, Sequence
 
 from groundstation.chapters.agreement import agreement_note
-from groundstation.chapters.assessed import reason_of
 from groundstation.chapters.gates import gate_grid, setting_facts
 from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Part, Section, kept
-from groundstation.chapters.verdict import NOT_ASSESSABLE, PARTS, claim
+from groundstation.chapters.verdict import NOT_ASSESSABLE
 from groundstation.chapters.wording import ABSENT, clock, interval, is_number, number, step_places
 from groundstation.results.agreement import heading_agreement
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults
+from groundstation.systems.heading.advice_chapter import explained
 from groundstation.systems.heading.answer import HeadingResult, OnboardComparison, Standstill, TaxiSegment
+from groundstation.systems.heading.claim_chapter import PARTS, claim
 
 TITLE = "Heading correction"
 LEAD = "On straight taxi the nose points where the aircraft moves: INS heading − GNSS track is the heading error."
@@ -41,7 +42,8 @@ def heading(results: FlightResults) -> Section:
     """Return the chapter; without an answer it says why there is none."""
     answer = results.answer(HeadingResult)
     if answer is None:
-        note = Note(f"Not assessable: {reason_of(results, 'heading') or UNKNOWN_REASON}", "unknown")
+        why = next(map(explained, results.reasons("heading")), UNKNOWN_REASON)
+        note = Note(f"Not assessable: {why}", "unknown")
         headline = f"{NOT_ASSESSABLE.symbol} Heading not assessable"
         return Section("heading", TITLE, LEAD, (note,), headline)
     told, segments = claim(answer), _segments(answer.segments)

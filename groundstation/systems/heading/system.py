@@ -8,7 +8,7 @@ from groundstation.systems.heading.installation.analysis import INSTALLATION
 from groundstation.systems.system import Study, System, Tab
 
 if TYPE_CHECKING:
-    from groundstation.chapters.chapter import Chapter
+    from groundstation.chapters.chapter import Adviser, Chapter
     from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.plots.plot import Describe
     from groundstation.systems.study import StudyResult
@@ -51,6 +51,13 @@ def _fleet_plots() -> "Mapping[str, Describe]":
         "fleet.densities_by_aircraft": densities.by_aircraft,
         "fleet.installation": installations.over_time,
     }
+
+
+def _advice() -> "Adviser":
+    from groundstation.chapters.chapter import Adviser
+    from groundstation.systems.heading import advice_chapter
+
+    return Adviser(advice_chapter.REMEDIES, advice_chapter.advise)
 
 
 def _plots() -> "Mapping[str, Describe]":
@@ -137,4 +144,5 @@ SYSTEM = System(
     tabs=_tabs,
     fleet_chapters=_fleet_chapters,
     fleet_plots=_fleet_plots,
+    advice=_advice,
 )

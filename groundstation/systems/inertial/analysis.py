@@ -140,6 +140,7 @@ FORECAST = Analysis(
     name="forecast",
     title="forecast of the INS errors without GNSS, replayed throughout the flight",
     subject="forecast of INS errors",
+    page_title="Forecast without GNSS",
     needs="what inertial needs, of an INS that GNSS does not correct; a calibration needs one Schuler period",
     settings=InertialSettings,
     answer=ForecastResult,

@@ -7,7 +7,7 @@ from groundstation.systems.inertial.analysis import FORECAST, INERTIAL
 from groundstation.systems.system import FleetTab, Study, System, Tab
 
 if TYPE_CHECKING:
-    from groundstation.chapters.chapter import Chapter
+    from groundstation.chapters.chapter import Adviser, Chapter
     from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.plots.plot import Describe
     from groundstation.systems.study import StudyResult
@@ -48,6 +48,13 @@ def _fleet_tabs() -> tuple[FleetTab, ...]:
     from groundstation.systems.inertial.fleet_tab import forecast
 
     return (FleetTab("forecast", forecast),)
+
+
+def _advice() -> "Adviser":
+    from groundstation.chapters.chapter import Adviser
+    from groundstation.systems.inertial import advice_chapter
+
+    return Adviser(advise=advice_chapter.advise)
 
 
 def _plots() -> "Mapping[str, Describe]":
@@ -92,4 +99,5 @@ SYSTEM = System(
     fleet_chapters=_fleet_chapters,
     fleet_plots=_fleet_plots,
     fleet_tabs=_fleet_tabs,
+    advice=_advice,
 )

@@ -341,6 +341,7 @@ LANDING = Analysis(
     name="landing",
     title="approaches and landings against their runway, localizer and glide path",
     subject="approach",
+    page_title="Approaches",
     needs="positions, a height, a landing or a go-around; guidance deviations and a site file with the runway add more",
     settings=LandingSettings,
     answer=LandingResult,

@@ -8,7 +8,7 @@ from groundstation.systems.landing.beacons.analysis import LANDING_BEACONS
 from groundstation.systems.system import Study, System, Tab
 
 if TYPE_CHECKING:
-    from groundstation.chapters.chapter import Chapter
+    from groundstation.chapters.chapter import Adviser, Chapter
     from groundstation.plots.plot import Describe
     from groundstation.systems.study import StudyResult
 
@@ -24,6 +24,13 @@ def _chapters() -> "tuple[Chapter, ...]":
         Chapter((LandingResult,), landing),
         Chapter((BeaconLanding,), landing_beacons),
     )
+
+
+def _advice() -> "Adviser":
+    from groundstation.chapters.chapter import Adviser
+    from groundstation.systems.landing import advice_chapter
+
+    return Adviser(advice_chapter.REMEDIES)
 
 
 def _plots() -> "Mapping[str, Describe]":
@@ -65,4 +72,5 @@ SYSTEM = System(
     chapters=_chapters,
     plots=_plots,
     tabs=_tabs,
+    advice=_advice,
 )

@@ -48,6 +48,7 @@ LATENCY = Analysis(
     name="latency",
     title="latency of GNSS, barometer, magnetometer and further INS behind the INS, from ordinary motion",
     subject="latency",
+    page_title="Latency between sensors",
     needs="ins velocity with gnss velocities, vertical speed with baro, or attitude with a magnetometer; turns and "
     "climbs",
     settings=LatencySettings,

@@ -144,6 +144,7 @@ MAGNETIC_GROUND = Analysis(
     name="magnetic_ground",
     title="errors of the installed heading sensor on straight ground runs",
     subject="heading sensor on ground runs",
+    page_title="Heading sensor on the ground",
     needs="ins magnetic heading, gnss velocities and positions, a date, proof of ground contact, straight runs "
     "above 3 m/s",
     settings=MagneticGroundSettings,

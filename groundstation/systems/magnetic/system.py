@@ -7,7 +7,7 @@ from groundstation.systems.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
 from groundstation.systems.system import Study, System, Tab
 
 if TYPE_CHECKING:
-    from groundstation.chapters.chapter import Chapter
+    from groundstation.chapters.chapter import Adviser, Chapter
     from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.plots.plot import Describe
     from groundstation.systems.study import StudyResult
@@ -41,6 +41,13 @@ def _fleet_plots() -> "Mapping[str, Describe]":
     from groundstation.systems.magnetic.fleet_plots import curves
 
     return {"fleet.deviation": curves}
+
+
+def _advice() -> "Adviser":
+    from groundstation.chapters.chapter import Adviser
+    from groundstation.systems.magnetic import advice_chapter
+
+    return Adviser(advice_chapter.REMEDIES)
 
 
 def _plots() -> "Mapping[str, Describe]":
@@ -87,4 +94,5 @@ SYSTEM = System(
     tabs=_tabs,
     fleet_chapters=_fleet_chapters,
     fleet_plots=_fleet_plots,
+    advice=_advice,
 )

@@ -10,7 +10,6 @@ from groundstation.chapters.front import front
 from groundstation.chapters.markdown import front_markdown
 from groundstation.results.arrays.flight import GnssLanes, Overview, PhaseSpans, StateLanes
 from groundstation.results.flight import FlightResults
-from groundstation.systems.heading.arrays import HeadingLanes
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour
 from groundstation.viewer.names import path_parts
@@ -125,7 +124,7 @@ def overview(recorder: Recorder, results: FlightResults) -> rrb.Container:
 
 
 def log_lane(
-    recorder: Recorder, path: str, spans: PhaseSpans | GnssLanes | HeadingLanes | None, palette: Mapping[str, Colour]
+    recorder: Recorder, path: str, spans: PhaseSpans | GnssLanes | None, palette: Mapping[str, Colour]
 ) -> list[str]:
     """Log spans as one lane; the path logged, or nothing when the flight has none."""
     if spans is None:

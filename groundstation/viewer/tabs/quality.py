@@ -8,8 +8,6 @@ from groundstation.chapters.markdown import markdown
 from groundstation.chapters.quality import quality as quality_chapter
 from groundstation.results.arrays.flight import GapRows, LedgerRows
 from groundstation.results.flight import FlightResults
-from groundstation.systems.latency.answer import Latencies
-from groundstation.systems.latency.chapter import latency
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer import colours
 from groundstation.viewer.names import label, path_parts, topic_label
@@ -23,11 +21,12 @@ PLOTS = {
     "GNSS velocity sigma, m/s": ("velocity_sigma_mps",),
 }
 PLOT_ROWS = 20_000
+PART = "quality"  # what answers without a tab name to stand here
 
 
 def quality(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Container:
     """Log the data quality tab: every flight has a ledger."""
-    recorder.document("quality/ledger", _ledger_text(results))
+    recorder.document("quality/ledger", _ledger_text(recorder, results))
     top: list[rrb.View | rrb.Container] = [document("Integrity ledger", "quality/ledger")]
     receivers = [flight[topic] for topic in topics_of_kind("gnss", flight.topics())]
     plots = []
@@ -89,7 +88,10 @@ def _plot(recorder: Recorder, table_of_topic: Table, names: tuple[str, ...]) -> 
     return [path]
 
 
-def _ledger_text(results: FlightResults) -> str:
-    motion = latency(results) if results.answer(Latencies) else None
-    parts = [markdown(quality_chapter(results)), *([] if motion is None else [markdown(motion, level=2)])]
-    return "\n\n".join(parts)
+def _ledger_text(recorder: Recorder, results: FlightResults) -> str:
+    """Return the chapter on quality, and those of the answers that are shown beside it."""
+    names = {name for tab in recorder.systems.tabs_of(None) if tab.part_of == PART for name in tab.shows}
+    answered = names & results.answers.keys()
+    told = (chapter.build(results) for chapter in recorder.systems.chapters.flight if chapter.name in answered)
+    beside = (markdown(section, level=2) for section in told if section is not None)
+    return "\n\n".join((markdown(quality_chapter(results)), *beside))

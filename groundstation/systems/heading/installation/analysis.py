@@ -70,6 +70,7 @@ INSTALLATION = Analysis(
     name="installation",
     title="heading error with the mounting and the crosswind factor that earlier flights taught",
     subject="learned installation",
+    page_title="Installation",
     needs="a heading error, aircraft, INS serial and UTC, and a file of earlier flights (--installation)",
     settings=HeadingSettings,
     answer=InstallationResult,

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.chapters.parts import Claim, Facts, Grid, Head, Note, Part, Rank, Section, kept
-from groundstation.chapters.verdict import ADVICE, PARTS, VERDICTS
+from groundstation.chapters.verdict import VERDICTS
 from groundstation.chapters.wording import ABSENT, clean, interval, is_number, number, step_places, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.systems.heading.answer import HeadingResult, IntervalPart
+from groundstation.systems.heading.claim_chapter import ADVICE, PARTS
 from groundstation.systems.heading.installation.answer import InstallationResult, Installed
 
 TITLE = "Installation, learned"

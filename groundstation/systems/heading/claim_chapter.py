@@ -1,0 +1,144 @@
+"""Claim of the heading correction: the verdict, what to enter, why, and the figures."""
+
+import re
+from collections.abc import Mapping
+
+from groundstation.base.units import ARCMIN_PER_DEG
+from groundstation.chapters.gates import failed_to_inform
+from groundstation.chapters.parts import Claim, Rank
+from groundstation.chapters.verdict import VERDICTS
+from groundstation.chapters.wording import ABSENT, interval, is_number, number, step_places, typeset, with_full_stop
+from groundstation.systems.heading.answer import HeadingResult
+
+PUBLISHED_LIMIT_ARCMIN = 20.0
+PARTS: Mapping[str, str] = {"taxi": "this taxi", "wind": "wind", "installation": "installation"}
+SAME_EVERYWHERE = (
+    "It holds for even power and free brakes: one engine, or a brake that drags, adds 9 to 24′ that nothing shows, not "
+    "even there and back."
+)
+UNEVEN_POWER = "Uneven power is stated: what it may add is in the interval, under installation."
+GOOD_TO = "good to +-"  # what the reason of an advisory begins with; the headline says it
+ADVICE: Mapping[str, str] = {
+    "reject": "Enter no correction",
+    "extend": "No correction yet: measure longer",
+    "undecided": "No correction: a required gate was not measured",
+}
+
+
+def claim(heading: HeadingResult) -> Claim:
+    """Return the verdict with the number to type, or why there is none."""
+    is_late = any(gate.name == "before_take_off" and gate.state == "failed" for gate in heading.gates)
+    return Claim(
+        Rank.HEADING_OPEN if heading.verdict == "undecided" or is_late else Rank.HEADING,
+        VERDICTS[heading.verdict],
+        what_to_enter(heading),
+        value=number(heading.error_deg, 2, "°", signed=True),
+        remark=f"95 % {interval(heading.confidence95_deg, 2, '°')}",
+        sentences=reasons(heading),
+        figures=figures(heading),
+        to_sign=heading.verdict == "accept",
+    )
+
+
+def what_to_enter(heading: HeadingResult) -> str:
+    """Return the number to type, with its sign and the digits of the entry step.
+
+    Words instead of a number where nothing is to be typed.
+    """
+    if heading.verdict == "advisory":
+        return f"Good to {half_width(heading.confidence95_deg)} only: taxi the other way, or state the wind"
+    if heading.verdict != "accept":
+        return ADVICE[heading.verdict]
+    step, correction = heading.entry_step_deg, heading.correction_deg
+    if is_number(correction) and correction:
+        return f"Enter {number(correction, step_places(step), '°', signed=True)}"
+    return f"Nothing to enter: the error is below half the entry step of {number(step, step_places(step), '°')}"
+
+
+def reasons(heading: HeadingResult) -> tuple[str, ...]:
+    """Return why the verdict is what it is, failed side checks, and the error in words."""
+    why = typeset(
+        re.split(r": enter |\. Not to be entered|\. To be entered", heading.verdict_reason)[0]
+    )  # told by the headline
+    each = [with_full_stop(part) for part in why.split("; ") if not part.startswith(typeset(GOOD_TO))]
+    return tuple(filter(None, (*each, _in_words(heading), *steady_terms(heading), failed_to_inform(heading.gates))))
+
+
+def half_width(ends: tuple[float, float]) -> str:
+    """Return the half width of an interval in arcminutes, as ± figure."""
+    return f"± {number(0.5 * (ends[1] - ends[0]) * ARCMIN_PER_DEG, 0, '′')}"
+
+
+def steady_terms(heading: HeadingResult) -> tuple[str, ...]:
+    """Return the shares of this taxi, the wind and the installation in the interval.
+
+    The text also says whose error it is: the airframe's or the platform's. Empty where the steady sideslip is not
+    known.
+    """
+    if not is_number(heading.steady_sigma_deg):
+        return ()
+    power = UNEVEN_POWER if heading.settings.get("aircraft.taxi_power") == "uneven" else SAME_EVERYWHERE
+    return tuple(filter(None, (_parts(heading), power, _typed(heading))))
+
+
+def _parts(heading: HeadingResult) -> str:
+    """Return the parts of the interval, each as the half width it would have alone."""
+    parts = (
+        f"{PARTS.get(one.name, one.name)} ± {number(one.half_width_deg * ARCMIN_PER_DEG, 0, '′')}"
+        for one in heading.interval_parts
+    )
+    told = ", ".join(parts)
+    wind = heading.wind
+    known = (
+        f" Sideslip of {number(heading.sideslip_deg, 2, '°', signed=True)} by the wind ({wind.origin}) is taken off."
+        if wind
+        else ""
+    )
+    origin = ", by the aircraft file" if heading.steady_origin == "aircraft file" else ""
+    return f"95 %, {half_width(heading.confidence95_deg)}: {told}{origin}.{known}" if told else ""
+
+
+def _typed(heading: HeadingResult) -> str:
+    """Return which of the two numbers is typed, and the other with its own half width."""
+    ends = heading.platform_confidence95_deg
+    if ends is None or not all(map(is_number, ends)):
+        return ""
+    azimuth = number(heading.platform_error_deg, 3, "°", signed=True)
+    return (
+        "This is the airframe's error, which is typed because the airframe is what is pointed and checked; the "
+        f"platform's, mounting taken off, is {azimuth} {half_width(ends)}."
+    )
+
+
+def _in_words(heading: HeadingResult) -> str:
+    error = heading.error_deg
+    if not is_number(error):
+        return "The heading error could not be estimated."
+    if round(error, 2) == 0:
+        return "INS heading agrees with the GNSS track within 0.01°."
+    sense = "high" if error > 0 else "low"
+    text = f"INS heading reads too {sense} by {number(abs(error), 2, '°')}"
+    if heading.verdict == "accept":
+        step = heading.entry_step_deg
+        return f"{text}; entry step {number(step, step_places(step), '°')}."
+    return f"{text}."
+
+
+def figures(heading: HeadingResult) -> tuple[tuple[str, str, str], ...]:
+    """Return the figures that decide, each with what it rests on."""
+    samples, taxi = number(heading.samples, 0), number(heading.taxi_seconds, 0, "s")
+    shown, sigma = number(heading.parking_ins_heading_deg, 2, "°"), number(heading.parking_sigma_deg, 2, "°")
+    remark = f"95 % interval {interval(heading.confidence95_deg, 3, '°')}"
+    found = (
+        ("Heading error", number(heading.error_deg, 3, "°", signed=True), remark),
+        ("Precision e", number(heading.precision_deg, 3, "°"), f"{samples} samples, {taxi} of straight taxi"),
+        ("Parking heading, corrected", number(heading.parking_heading_deg, 2, "°"), f"INS showed {shown}; σ {sigma}"),
+        _against_reference(heading),
+    )
+    return tuple(figure for figure in found if figure[1] != ABSENT)
+
+
+def _against_reference(heading: HeadingResult) -> tuple[str, str, str]:
+    residual, reference = heading.reference_residual_arcmin, number(heading.reference_parking_heading_deg, 2, "°")
+    remark = f"reference {reference}; runs of Markelov 2015: within {PUBLISHED_LIMIT_ARCMIN:.0f}′"
+    return ("Against the reference", number(residual, 1, "′", signed=True), remark)

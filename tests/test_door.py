@@ -1,0 +1,75 @@
+"""A system can be taken out: without its folder and its line everything else runs."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from groundstation.systems import OURS, systems
+
+ROOT = Path(__file__).parents[1]
+SAMPLE = ROOT / "sample_logs" / "taxi-short.csv"
+LONGEST_S = 300
+NAMES = tuple(path.split(".")[2] for path in OURS)
+# Files outside still import these: see tests/references/systems_named.txt.
+STILL_NAMED = {line.split()[0] for line in ()}
+TODAY = NAMES[datetime.now(UTC).toordinal() % len(NAMES)]  # one by turns; all by the slow mark
+
+
+def taken_out(folder: Path, name: str) -> list[str]:
+    """Copy the package without a system and those that require it; their names."""
+    shutil.copytree(
+        ROOT / "groundstation", folder / "groundstation", ignore=shutil.ignore_patterns("*.pyc.*", "*.tmp.*")
+    )
+    gone = [name, *_requiring(name)]
+    listed = folder / "groundstation" / "systems" / "__init__.py"
+    text = listed.read_text(encoding="utf-8")
+    for one in gone:
+        shutil.rmtree(folder / "groundstation" / "systems" / one)
+        text, count = re.subn(rf'    "groundstation\.systems\.{one}\.system",\n', "", text)
+        assert count == 1
+    listed.write_text(text, encoding="utf-8")
+    return gone
+
+
+def _requiring(name: str) -> list[str]:
+    """Names of the systems with an analysis that cannot run without one of a system."""
+    system = next(one for one in systems().every if one.name == name)
+    own = {one.name for one in (*system.analyses, *system.session_analyses)}
+    others = (one for one in systems().every if one is not system)
+    return [one.name for one in others if any(own & set(analysis.requires) for analysis in one.analyses)]
+
+
+def _groundstation(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "groundstation", *arguments],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(folder)},
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=LONGEST_S,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("name", [one if one == TODAY else pytest.param(one, marks=pytest.mark.slow) for one in NAMES])
+def test_everything_else_runs_without_a_system(name: str, tmp_path: Path) -> None:
+    gone = taken_out(tmp_path, name)
+    listed = _groundstation(tmp_path, "list")
+    assert listed.returncode == 0, listed.stderr
+    done = _groundstation(tmp_path, "run", str(SAMPLE), "-o", "out", "-j", "1")
+    assert done.returncode == 0, done.stdout + done.stderr
+    again = _groundstation(tmp_path, "report", "out")
+    assert again.returncode == 0, again.stdout + again.stderr
+    (summary,) = (tmp_path / "out").glob("*/summary.json")
+    results = summary.read_text(encoding="utf-8")
+    assert '"internal.' not in results
+    for one in systems().every:
+        if one.name in gone:
+            assert not any(f'"{analysis.name}": {{' in results for analysis in one.analyses)
