@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter, Chapters
     from groundstation.plots.plot import Describe
     from groundstation.results.flight import FlightResults
+    from groundstation.systems.applied import ApplyStep
     from groundstation.systems.study import StudyResult
 
 
@@ -88,6 +89,8 @@ class System:
         Descriptions of its figures, by the name that a chapter gives.
     tabs : callable
         Tabs of the recording, in their order.
+    apply : callable, optional
+        Imports what ``run --apply`` does behind the analyses and returns it; that of the first system that has one.
     """
 
     name: str
@@ -98,6 +101,7 @@ class System:
     chapters: "Callable[[], tuple[Chapter, ...]]" = _no_chapters
     plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
     tabs: Callable[[], tuple[Tab, ...]] = _no_tabs
+    apply: "Callable[[], ApplyStep] | None" = None
 
 
 @dataclass(frozen=True)
@@ -139,6 +143,11 @@ class Systems:
     def studies(self) -> tuple[Study, ...]:
         """Studies."""
         return tuple(study for one in self.every for study in one.studies)
+
+    @property
+    def apply(self) -> "ApplyStep | None":
+        """Step of ``run --apply``; None where no system has one."""
+        return next((one.apply() for one in self.every if one.apply is not None), None)
 
     @cached_property
     def answer_types(self) -> Mapping[str, type[Answer]]:

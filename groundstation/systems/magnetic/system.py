@@ -9,6 +9,7 @@ from groundstation.systems.system import Study, System, Tab
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter
     from groundstation.plots.plot import Describe
+    from groundstation.systems.applied import ApplyStep
     from groundstation.systems.study import StudyResult
 
 
@@ -55,6 +56,12 @@ def _study_magnetic() -> "Callable[..., StudyResult]":
     return study_magnetic
 
 
+def _apply() -> "ApplyStep":
+    from groundstation.systems.magnetic.apply_deviation import STEP
+
+    return STEP
+
+
 SYSTEM = System(
     name="magnetic",
     analyses=(
@@ -71,4 +78,5 @@ SYSTEM = System(
     chapters=_chapters,
     plots=_plots,
     tabs=_tabs,
+    apply=_apply,
 )
