@@ -142,7 +142,7 @@ def test_an_analysis_that_fails_leaves_the_others(name: str, part: str, monkeypa
 
 @pytest.mark.parametrize("name", [one.name for one in systems().session_analyses])
 def test_an_analysis_of_a_session_that_fails_leaves_the_others(name: str) -> None:
-    from groundstation.systems.cooperative.analysis import SessionKnown
+    from groundstation.systems.known import SessionKnown
 
     known = SessionKnown(settings=Configuration().settings.analyses)
     with gathered_failures():
@@ -334,7 +334,7 @@ def test_a_tab_of_another_recording_that_fails_leaves_the_others(
         if tabs in (viewer_fleet.TABS, viewer_fleet.TABS_BEHIND):
             viewer_fleet.write_fleet_recording(path, fleet, systems())
         elif tabs is OF_PLANS:
-            planned = shipped_but(tabs=lambda: tuple(Tab((one,), tab) for one, tab in made.items()))
+            planned = shipped_but(tabs=tuple(Tab((one,), tab) for one, tab in made.items()))
             viewer_plan.write_plan_recording(path, replace(ANSWERED, answers={}, figures=()), planned)
         else:
             saved = load(folder)

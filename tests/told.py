@@ -1,6 +1,5 @@
 """Chapters, pages and recordings with the systems that ship, for tests that do not choose them."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +7,6 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.chapters import by_answer
-from groundstation.chapters.chapter import Adviser
 from groundstation.chapters.front import front as top
 from groundstation.chapters.next_steps import next_steps as steps
 from groundstation.chapters.parts import Document, Front, Section
@@ -18,7 +16,7 @@ from groundstation.results.files import SavedFlight
 from groundstation.results.fleet import FleetResults
 from groundstation.results.flight import FlightResults
 from groundstation.systems import systems
-from groundstation.systems.system import System, Systems
+from groundstation.systems.system import Systems
 from groundstation.tables.table import Flight
 from groundstation.viewer import fleet as viewer_fleet
 from groundstation.viewer import recording
@@ -93,20 +91,7 @@ def send_flight(stream: rr.RecordingStream, flight: Flight, results: FlightResul
 
 
 def shipped_but(**parts: Any) -> Systems:
-    """Return the shipped systems as one, with parts of it replaced."""
-    every = systems()
-    listed = every.chapters
-    remedies = tuple(remedy for one in listed.advisers for remedy in one.remedies)
-    advised = Adviser(remedies, lambda results: [advice for one in listed.advisers for advice in one.advise(results)])
-    whole = System(
-        "every",
-        every.analyses,
-        every.session_analyses,
-        every.plans,
-        every.studies,
-        lambda: (*listed.flight, *listed.session, *listed.plan),
-        lambda: every.plots,
-        lambda: every.tabs,
-        lambda: advised,
-    )
-    return Systems((replace(whole, **parts),))
+    """Return the shipped systems with what they list replaced: analyses, tabs, ... as tuples."""
+    found = Systems(systems().every)
+    found.__dict__.update(parts)
+    return found

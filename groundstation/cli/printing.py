@@ -234,6 +234,7 @@ KINDS = {
     "session": "sessions",
     "plan": "plans",
     "study": "studies",
+    "not loaded": "not loaded",
 }
 
 

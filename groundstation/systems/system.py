@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from groundstation.plots.plot import Describe
     from groundstation.results.fleet import FleetResults
     from groundstation.results.flight import FlightResults
+    from groundstation.systems.applied import ApplyStep
+    from groundstation.systems.joining import JoinStep
     from groundstation.systems.study import StudyResult
 
 
@@ -117,6 +119,10 @@ class System:
         Tabs of the recording of all flights.
     advice : callable, optional
         What the chapter on what to do next says for it.
+    apply : callable, optional
+        Imports what ``run --apply`` does behind the analyses and returns it; that of the first system that has one.
+    join : callable, optional
+        Imports what relates the clocks of several logs for ``run --together``, and returns it.
     """
 
     name: str
@@ -131,6 +137,8 @@ class System:
     fleet_plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
     fleet_tabs: Callable[[], tuple[FleetTab, ...]] = _no_fleet_tabs
     advice: "Callable[[], Adviser] | None" = None
+    apply: "Callable[[], ApplyStep] | None" = None
+    join: "Callable[[], JoinStep] | None" = None
 
 
 @dataclass(frozen=True)
@@ -172,6 +180,16 @@ class Systems:
     def studies(self) -> tuple[Study, ...]:
         """Studies."""
         return tuple(study for one in self.every for study in one.studies)
+
+    @property
+    def apply(self) -> "ApplyStep | None":
+        """Step of ``run --apply``; None where no system has one."""
+        return next((one.apply() for one in self.every if one.apply is not None), None)
+
+    @property
+    def join(self) -> "JoinStep | None":
+        """Step of ``run --together``; None where no system has one."""
+        return next((one.join() for one in self.every if one.join is not None), None)
 
     @cached_property
     def answer_types(self) -> Mapping[str, type[Answer]]:

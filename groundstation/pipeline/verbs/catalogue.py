@@ -30,6 +30,7 @@ def catalogue(log: Path | None = None, profile: Path | None = None) -> list[dict
             *_sessions(),
             *_plans(),
             *_studies(),
+            *_failures(),
         ]
     folder = log.parent if log.name == SUMMARY else log
     return _of_a_session(folder) if is_session(folder) else _with_answers(log, profile)
@@ -139,3 +140,7 @@ def _studies() -> list[dict[str, Any]]:
         {"kind": "study", "name": study.name, "title": f"study: {study.title}", "needs": "nothing"}
         for study in systems().studies
     ]
+
+
+def _failures() -> list[dict[str, Any]]:
+    return [{"kind": "not loaded", "name": "plug-in", "title": line, "needs": ""} for line in systems().failures]

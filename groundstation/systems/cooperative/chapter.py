@@ -3,7 +3,7 @@
 How good it is, and on what it rests.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from groundstation.chapters.assessed import reason_of, without_answer
 from groundstation.chapters.parts import Cell, Facts, Figure, Front, Grid, Head, Mark, Note, Part, Section
@@ -13,6 +13,7 @@ from groundstation.chapters.wording import (
     clock,
     is_number,
     named_quantity,
+    names_or_count,
     number,
     significant,
     with_full_stop,
@@ -38,7 +39,7 @@ TITLES: Mapping[str, str] = {
     "pairwise": "Stored pairwise covariances",
 }
 REFERENCE = "dead_reckoning"
-MOST_LINKS, MOST_NAMES = 40, 6
+MOST_LINKS = 40
 ALGORITHM_HEADS = (
     *(Head("Algorithm"), Head("Update"), Head("2σ_r, worst at the end, m", True), Head("RMS error, m", True)),
     *(Head("RMS over the bound", True), Head("NEES (95 % limits)", True), Head("Consistent"), Head("Diverges")),
@@ -169,17 +170,6 @@ def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -
         sentences=(_reason(answer, best),),
         figures=tuple(figures),
     )
-
-
-def names_or_count(names: Sequence[str]) -> str:
-    """Return the names of a few aircraft, or the count of many.
-
-    Examples
-    --------
-    >>> names_or_count(["A", "B"]), names_or_count(["A"] * 20)
-    ('A, B', '20 aircraft')
-    """
-    return ", ".join(names) if len(names) <= MOST_NAMES else f"{len(names)} aircraft"
 
 
 def _headline(best: AlgorithmRow) -> str:

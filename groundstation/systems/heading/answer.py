@@ -11,6 +11,7 @@ from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
 from groundstation.results.on_map import OnTaxi
+from groundstation.results.roles import SettingsOfHeading
 
 Verdict = Literal["accept", "advisory", "reject", "extend", "undecided"]
 
@@ -124,7 +125,7 @@ class OnboardComparison:
 
 
 @dataclass(frozen=True)
-class HeadingResult(Answer, OnTaxi):
+class HeadingResult(Answer, OnTaxi, SettingsOfHeading):
     """INS heading error found on straight taxi (error = INS heading - true heading).
 
     Parameters
