@@ -27,6 +27,7 @@ class SessionAnswer(Answer):
 
 
 A = TypeVar("A", bound=Answer)
+R = TypeVar("R")
 Answers = Mapping[str, Answer]  # by the name of the analysis
 
 
@@ -35,12 +36,24 @@ def answer_of(answers: Answers, kind: type[A]) -> A | None:
 
     Examples
     --------
-    >>> from groundstation.systems.latency.answer import Latencies
-    >>> answer_of({}, Latencies) is None, answer_of({"latency": Latencies(rows=())}, Latencies)
-    (True, Latencies(rows=(), settings={}, figures=()))
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Wind(Answer):
+    ...     analysis = "wind"
+    ...     speed_mps: float
+    >>> answer_of({}, Wind) is None, answer_of({"wind": Wind(3.0)}, Wind)
+    (True, Wind(speed_mps=3.0))
     """
     found = answers.get(kind.analysis)
     return found if isinstance(found, kind) else None
+
+
+def answer_meeting(answers: Answers, role: type[R]) -> R | None:
+    """The first answer that plays a role, None where none does.
+
+    The roles stand in :mod:`groundstation.results.roles`.
+    """
+    return next((found for found in answers.values() if isinstance(found, role)), None)
 
 
 def by_analysis(*answers: Answer | None) -> dict[str, Answer]:

@@ -7,9 +7,14 @@ import math
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
+import numpy as np
+
 from groundstation.results.answer import Answer
+from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
+from groundstation.results.roles import FloatArray, HeadingByTrack, LatencyByTurns
+from groundstation.systems.heading.arrays import HeadingSamples
 
 Verdict = Literal["accept", "advisory", "reject", "extend", "undecided"]
 
@@ -123,7 +128,7 @@ class OnboardComparison:
 
 
 @dataclass(frozen=True)
-class HeadingResult(Answer):
+class HeadingResult(Answer, HeadingByTrack, LatencyByTurns):
     """INS heading error found on straight taxi (error = INS heading - true heading).
 
     Parameters
@@ -254,3 +259,20 @@ class HeadingResult(Answer):
         if self.platform_error_deg is None or self.platform_standard_error_deg is None:
             return self.error_deg, self.standard_error_deg
         return self.platform_error_deg, self.platform_standard_error_deg
+
+    @property
+    def begins_s(self) -> float | None:
+        """Flight second of the first straight segment, None where there is none."""
+        return self.segments[0].start_s if self.segments else None
+
+    def times_used_s(self) -> FloatArray | None:
+        """Flight seconds of the epochs used, shape (n,); None where the samples are not kept."""
+        samples = found_in(self.figures, HeadingSamples)
+        return None if samples is None else samples.time_s[samples.is_used]
+
+    def seconds_used(self) -> float:
+        """Seconds that the epochs used stand for."""
+        samples = found_in(self.figures, HeadingSamples)
+        if samples is None:
+            return 0.0
+        return int(np.count_nonzero(samples.is_used)) * float(np.median(np.diff(samples.time_s)))

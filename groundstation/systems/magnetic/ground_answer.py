@@ -16,6 +16,7 @@ RunState = Literal["used", "rejected"]
 CoefficientState = Literal["found", "not observable"]
 
 
+
 @dataclass(frozen=True)
 class GroundRun:
     """Straight run on the ground, and the reason where it is not used. Times: flight seconds.
