@@ -7,8 +7,8 @@ import numpy as np
 
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.results.figures import FigureData
+from groundstation.results.roles import AzimuthEstimate
 from groundstation.systems.inertial.answer import (
-    AzimuthEstimate,
     ChannelResult,
     Difference,
     InertialResult,

@@ -9,20 +9,18 @@ import pytest
 from groundstation.chapters.agreement import agreement_note
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Note, Section
-from groundstation.results.agreement import (
-    Agreement,
-    OneFinding,
-    deviation_agreement,
-    heading_agreement,
-    latency_agreement,
-)
+from groundstation.results.agreement import Agreement, OneFinding
 from groundstation.results.answer import Answer, by_analysis
 from groundstation.results.flight import FlightResults, Source
+from groundstation.results.roles import AzimuthEstimate
+from groundstation.systems.heading.agreement_answer import heading_agreement
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.chapter import heading as heading_chapter
-from groundstation.systems.inertial.answer import AzimuthEstimate, InertialResult
+from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.latency.agreement_answer import latency_agreement
 from groundstation.systems.latency.answer import Latencies, Latency
 from groundstation.systems.latency.chapter import latency as latency_chapter
+from groundstation.systems.magnetic.agreement_answer import deviation_agreement
 from groundstation.systems.magnetic.answer import DeclinationUsed, MagneticResult
 from groundstation.systems.magnetic.chapter import magnetic as magnetic_chapter
 from groundstation.systems.magnetic.estimate import estimate_deviation

@@ -7,7 +7,8 @@ import pytest
 
 from groundstation.chapters.parts import Section
 from groundstation.results.flight import NotAssessable
-from groundstation.systems.inertial.answer import AzimuthEstimate, ChannelResult, RealOutage
+from groundstation.results.roles import AzimuthEstimate
+from groundstation.systems.inertial.answer import ChannelResult, RealOutage
 from groundstation.systems.inertial.chapter import inertial
 from tests.inertial_example import AIDED, inertial_result
 from tests.report_example import example

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from groundstation.methods.ins_noise import InsNoise
+from groundstation.results.roles import AzimuthEstimate
 from groundstation.simulation.inertial_family import FamilySettings, GnssNoise, simulate_family
 from groundstation.simulation.ins_class import load_ins_class
 from groundstation.simulation.ins_errors import SensorErrors, TrueMotion, propagate
 from groundstation.systems.inertial import azimuth, velocity_changes
-from groundstation.systems.inertial.answer import AzimuthEstimate
 from groundstation.systems.inertial.azimuth import estimate_azimuth
 from groundstation.systems.inertial.differences import Differences, drag_per_s
 from groundstation.systems.inertial.filter import Epochs, FilterRun, run_filter

@@ -183,7 +183,7 @@ def test_stated_mounting_and_sideslip_are_the_prior() -> None:
 
 def test_azimuth_of_the_first_hour_is_carried_back_to_the_taxi() -> None:
     inertial = replace(inertial_of(0.2), ins_topic="ins")
-    lesson = lesson_of(stored(inertial=inertial))
+    lesson = lesson_of(stored(turns=inertial))
     assert lesson.azimuth_deg == pytest.approx(0.2) and lesson.azimuth_sigma_deg == pytest.approx(0.0303, abs=1e-4)
 
 
@@ -191,13 +191,13 @@ def test_azimuth_of_the_first_hour_is_carried_back_to_the_taxi() -> None:
     "changes",
     [
         {"findings": frozenset({"inertial.realigned"})},
-        {"inertial": replace(inertial_of(0.2), ins_topic="ins.2")},
-        {"inertial": replace(inertial_of(None), ins_topic="ins")},
+        {"turns": replace(inertial_of(0.2), ins_topic="ins.2")},
+        {"turns": replace(inertial_of(None), ins_topic="ins")},
         {"heading": heading_of(0.3, reference_time_s=9000.0)},
     ],
 )
 def test_azimuth_of_another_alignment_unit_or_time_is_not_used(changes: dict[str, Any]) -> None:
-    base: dict[str, Any] = {"inertial": replace(inertial_of(0.2), ins_topic="ins")}
+    base: dict[str, Any] = {"turns": replace(inertial_of(0.2), ins_topic="ins")}
     assert lesson_of(stored(**(base | changes))).azimuth_deg is None
 
 
@@ -300,7 +300,7 @@ def test_a_file_that_is_none_is_refused_in_a_line(tmp_path: Path, content: str |
 
 def test_unaided_azimuth_needs_an_answer() -> None:
     assert isinstance(inertial_of(None), InertialResult)
-    assert lesson_of(stored(inertial=None)).azimuth_deg is None
+    assert lesson_of(stored(turns=None)).azimuth_deg is None
 
 
 # Other limits

@@ -22,6 +22,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.answer import Answer, by_analysis
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.gates import Gate
+from groundstation.results.roles import AzimuthEstimate
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.flight_errors import heading_error_deg
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, simulate_magnetic_family
@@ -30,7 +31,7 @@ from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.estimate import estimate_heading_error
 from groundstation.systems.heading.on_ground import Estimator
 from groundstation.systems.heading.settings import HeadingSettings
-from groundstation.systems.inertial.answer import AzimuthEstimate, InertialResult
+from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.known import AircraftData
 from groundstation.systems.magnetic.alignment import NOT_IN_INTERVAL, against_heading, align, refused
 from groundstation.systems.magnetic.answer import Alignment, MagneticResult
@@ -301,29 +302,29 @@ def turned_by(error_deg: float, sigma_deg: float = 0.03, ins_topic: str = "ins")
 
 def test_azimuth_by_turns_aligns_alone_and_is_weighed_with_taxi() -> None:
     settings, heading = MagneticSettings(drift_sigma_deg_per_h=0.0), taxi_heading(standard_error_deg=0.2)
-    alone = align(None, "ins", 0.0, settings, inertial=turned_by(0.5))
+    alone = align(None, "ins", 0.0, settings, by_turns=turned_by(0.5))
     assert (alone.error_deg, alone.sigma_deg) == pytest.approx((0.5, math.hypot(0.03, 0.1)))
     assert (alone.origin, alone.aligned_at_s) == ("azimuth by turns", 1800.0)
     known = AircraftData(mounting_sigma_deg=0.0)
-    assert align(None, "ins", 0.0, settings, inertial=turned_by(0.5), aircraft=known).sigma_deg == pytest.approx(0.03)
-    both = align(heading, "ins", 0.0, settings, inertial=turned_by(0.3, math.sqrt(0.03)))
+    assert align(None, "ins", 0.0, settings, by_turns=turned_by(0.5), aircraft=known).sigma_deg == pytest.approx(0.03)
+    both = align(heading, "ins", 0.0, settings, by_turns=turned_by(0.3, math.sqrt(0.03)))
     assert (both.error_deg, both.sigma_deg) == pytest.approx((0.15, 0.2 / math.sqrt(2.0)))
     assert both.origin.endswith(" and azimuth by turns")
-    other = align(heading, "ins", 0.0, settings, inertial=turned_by(0.3, ins_topic="ins.2"))
+    other = align(heading, "ins", 0.0, settings, by_turns=turned_by(0.3, ins_topic="ins.2"))
     assert other.error_deg == 0.0
 
 
 def test_turns_that_contradict_taxi_do_not_align_and_the_table_is_not_accepted() -> None:
     settings, heading = MagneticSettings(), taxi_heading(standard_error_deg=0.2)
-    found = align(heading, "ins", 0.0, settings, inertial=turned_by(1.5))
+    found = align(heading, "ins", 0.0, settings, by_turns=turned_by(1.5))
     assert (found.error_deg, found.origin) == (0.0, "straight taxi (100 epochs), verdict accept")
     apart = against_heading(found)
     assert apart is not None and apart > settings.heading_sigmas_max
-    refused_taxi = align(failing("steps"), "ins", 0.0, settings, inertial=turned_by(-0.2))
+    refused_taxi = align(failing("steps"), "ins", 0.0, settings, by_turns=turned_by(-0.2))
     assert refused_taxi.origin == "azimuth by turns"
     assert against_heading(refused_taxi) == pytest.approx(1.58 / math.hypot(0.27, refused_taxi.sigma_deg))
     assert against_heading(align(heading, "ins", 0.0, settings)) == 0.0
-    assert against_heading(align(None, "ins", 0.0, settings, inertial=turned_by(1.5))) is None
+    assert against_heading(align(None, "ins", 0.0, settings, by_turns=turned_by(1.5))) is None
 
 
 def test_a_log_that_begins_in_the_air_has_no_ground_run() -> None:

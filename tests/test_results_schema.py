@@ -13,6 +13,7 @@ from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.files import json_text
 from groundstation.results.flight import FlightResults, NotAssessable, Source
+from groundstation.results.roles import AzimuthEstimate
 from groundstation.results.schema import schema_text
 from groundstation.results.summary import SCHEMA_VERSION, summary_of
 from groundstation.systems import systems
@@ -62,7 +63,7 @@ def least_inertial() -> errors.InertialResult:
     channels = tuple(
         errors.ChannelResult(name, states, unknown, None, None, unknown, 0, 0, None, None) for name in ("north", "east")
     )
-    azimuth = errors.AzimuthEstimate(False, None, None, 0, unknown, "no turn")
+    azimuth = AzimuthEstimate(False, None, None, 0, unknown, "no turn")
     return errors.InertialResult(
         *("ins", "gnss", "unaided", "", 0, 0.0, "navigation", "default", "first_order", *channels),
         outages=(errors.RealOutage(0.0, 1.0, 1.0, None, None),),
@@ -126,7 +127,7 @@ def test_summaries_obey_the_schema(results: FlightResults) -> None:
         ("channel", errors.ChannelResult),
         ("state", errors.StateEstimate),
         ("outage", errors.RealOutage),
-        ("azimuth", errors.AzimuthEstimate),
+        ("azimuth", AzimuthEstimate),
         ("forecast", outlook.ForecastResult),
         ("skill", outlook.SkillRow),
         ("gap", outlook.GapRow),

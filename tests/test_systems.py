@@ -64,7 +64,7 @@ def test_a_name_of_an_analysis_that_is_taken_is_told(monkeypatch: pytest.MonkeyP
 
 
 def test_a_run_has_a_finding_on_a_system_that_could_not_be_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
-    flight = make_flight(60.0, 5.0)
+    flight = make_flight(240.0, 5.0)
     results = make_results(flight)
     flight = replace(flight, tables={"discrete": flight["discrete"]})
     monkeypatch.setattr(analysing, "systems", lambda: Systems((System("bare"),), ("system plug-in 'x' is broken",)))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from groundstation.methods.taxi.settings import TaxiLimits
-from groundstation.systems.heading.answer import HeadingResult
+from groundstation.results.roles import HeadingByTrack
 from groundstation.tables.table import Flight
 
 
@@ -18,7 +18,7 @@ class FindHeadingError(Protocol):
 
     def __call__(
         self, part: Flight, whole: Flight, ins_topic: str, speeds_mps: tuple[float, float] | None = None
-    ) -> HeadingResult:
+    ) -> HeadingByTrack:
         """Estimate it from the GNSS epochs of a part of a flight.
 
         Parameters

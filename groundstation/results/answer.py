@@ -36,9 +36,13 @@ def answer_of(answers: Answers, kind: type[A]) -> A | None:
 
     Examples
     --------
-    >>> from groundstation.systems.latency.answer import Latencies
-    >>> answer_of({}, Latencies) is None, answer_of({"latency": Latencies(rows=())}, Latencies)
-    (True, Latencies(rows=(), settings={}, figures=()))
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Wind(Answer):
+    ...     analysis = "wind"
+    ...     speed_mps: float
+    >>> answer_of({}, Wind) is None, answer_of({"wind": Wind(3.0)}, Wind)
+    (True, Wind(speed_mps=3.0))
     """
     found = answers.get(kind.analysis)
     return found if isinstance(found, kind) else None

@@ -7,11 +7,9 @@ from numpy.typing import NDArray
 
 from groundstation.base.ellipse import ELLIPSE_95, magnified
 from groundstation.results.flight import FlightResults
-from groundstation.systems.inertial.arrays import InertialStates, InertialTrack
 
 FloatArray = NDArray[np.float64]
 SHOWN_ALONG = 8  # ellipses of a track
-LARGEST_SIGMA_M = 1e7  # more is no position on Earth
 
 
 @dataclass(frozen=True)
@@ -37,14 +35,15 @@ class CorrectedPosition:
         return magnified(side_m, float(np.median(half_m)))
 
 
+class BestTrack:
+    """Role of an answer that corrects the position of an INS along the flight."""
+
+    def best_track(self, results: FlightResults) -> CorrectedPosition | None:
+        """The rows with a place and sigmas; None of an INS that was not corrected."""
+        raise NotImplementedError
+
+
 def corrected_position(results: FlightResults) -> CorrectedPosition | None:
-    """The rows with a place and sigmas; None of an INS that was not corrected."""
-    track, states = results.rows_of(InertialTrack), results.rows_of(InertialStates)
-    if track is None or states is None or len(track) != len(states):
-        return None
-    if track.corrected_latitude_deg is None or track.corrected_longitude_deg is None:
-        return None
-    columns = [track.time_s, track.corrected_latitude_deg, track.corrected_longitude_deg]
-    columns += [states.north.position_sigma_m, states.east.position_sigma_m]
-    known = np.isfinite(columns).all(axis=0) & (np.abs(columns[3:]) < LARGEST_SIGMA_M).all(axis=0)
-    return CorrectedPosition(*(column[known] for column in columns)) if known.any() else None
+    """The corrected position of the flight; None of an INS that was not corrected."""
+    tracks = (one.best_track(results) for one in results.answers.values() if isinstance(one, BestTrack))
+    return next((track for track in tracks if track is not None), None)

@@ -5,7 +5,162 @@ An answer that plays a role is derived from it. A reader finds it with
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundstation.results.gates import Gate
+
+FloatArray = NDArray[np.float64]
+
+
+class Delay:
+    """Delay of one sensor behind another that a flight shows; see :class:`Delays`.
+
+    Positive: it shows a motion later by its time stamps.
+    """
+
+    latency_s: float | None
+    sigma_s: float | None
+    confidence95_s: tuple[float, float] | None
+
+
+class Delays:
+    """Role of an answer with delays between the sensors of a flight."""
+
+    def observed(self, reference: str, other: str) -> Delay | None:
+        """Delay of one topic behind another, None where it is not observed."""
+        raise NotImplementedError
+
+
+class KindOfIns:
+    """Role of an answer that tells whether GNSS corrects an INS.
+
+    ``kind`` is that of ``ins_topic``; the kinds stand in :mod:`groundstation.tables.ins_kind`.
+    """
+
+    ins_topic: str
+    kind: str
+
+    @property
+    def kinds(self) -> dict[str, str]:
+        """The kind by topic."""
+        return {self.ins_topic: self.kind}
+
+
+@dataclass(frozen=True)
+class EarlyAzimuth:
+    """Azimuth error at flight time ``time_s``, and its drift.
+
+    It rests on the turns of the first hour of turns alone. An azimuth error oscillates over 24 h: what is carried back
+    to the taxi may not come from hours later.
+    """
+
+    error_deg: float
+    sigma_deg: float
+    time_s: float
+    rate_deg_per_h: float
+    rate_sigma_deg_per_h: float
+    correlation: float
+    turns: int
+
+    def at(self, time_s: float) -> tuple[float, float]:
+        """The error and its sigma at another flight time, deg.
+
+        Examples
+        --------
+        >>> seen = EarlyAzimuth(0.5, 0.03, 3600.0, 0.1, 0.02, 0.0, 4)
+        >>> [round(value, 4) for value in seen.at(0.0)]
+        [0.4, 0.0361]
+        """
+        hours = (time_s - self.time_s) / 3600.0
+        grown = self.rate_sigma_deg_per_h * hours
+        variance = self.sigma_deg**2 + grown**2 + 2.0 * self.correlation * self.sigma_deg * grown
+        return self.error_deg + self.rate_deg_per_h * hours, max(variance, 0.0) ** 0.5
+
+
+@dataclass(frozen=True)
+class AzimuthEstimate:
+    """Azimuth (heading) error of the INS, from the effect of turns on its velocity error.
+
+    It is offered only where the turns allow it. ``observable`` says whether ``sigma_deg`` is below the limit of the
+    settings; if not, ``error_deg`` is None. The error is that at ``time_s``, flight seconds: the last turn; ``early``
+    is for the time of the taxi, None where the first hour shows too little.
+    """
+
+    observable: bool
+    error_deg: float | None
+    sigma_deg: float | None
+    turns: int
+    velocity_change_mps: float
+    reason: str
+    time_s: float | None = None
+    early: EarlyAzimuth | None = None
+
+
+class AzimuthByTurns:
+    """Role of an answer with the azimuth error of an INS by its turns in flight."""
+
+    ins_topic: str
+    azimuth: AzimuthEstimate | None
+
+
+class HeadingByTrack:
+    """Role of an answer with the heading error of an INS by its track on the ground.
+
+    Error = INS heading - true heading. ``error_deg``, ``standard_error_deg`` and ``confidence95_deg`` are the
+    airframe's, at ``reference_time_s``.
+    """
+
+    ins_topic: str
+    error_deg: float
+    standard_error_deg: float
+    confidence95_deg: tuple[float, float]
+    drift_deg_per_h: float | None
+    drift_sigma_deg_per_h: float | None
+    reference_time_s: float | None
+    samples: int
+    gates: tuple[Gate, ...]
+    verdict: str
+    verdict_reason: str
+
+    @property
+    def begins_s(self) -> float | None:
+        """Flight second of the first straight part it rests on, None where there is none."""
+        raise NotImplementedError
+
+    def times_used_s(self) -> FloatArray | None:
+        """Flight seconds of the epochs used, shape (n,); None where they are not known."""
+        raise NotImplementedError
+
+    def seconds_used(self) -> float:
+        """Seconds that the epochs used stand for."""
+        raise NotImplementedError
+
+
+class LatencyByTurns:
+    """Role of an answer with the delay of GNSS behind the INS by the turns of a taxi.
+
+    ``time_offset_s`` is the delay that they still show after ``latency_used_s`` was taken out; ``latency_origin`` is
+    the origin of the latter: ``motion``, ``aircraft file`` or nothing.
+    """
+
+    ins_topic: str
+    gnss_topic: str
+    time_offset_s: float | None
+    time_offset_sigma_s: float | None
+    latency_used_s: float | None
+    latency_origin: str
+
+
+class CompassCoefficients:
+    """Role of an answer with the coefficients of a compass deviation, by letter."""
+
+    verdict: str
+    coefficients_deg: Mapping[str, float]
+    coefficients_sigma_deg: Mapping[str, float]
 
 
 class SettingsOfHeading:

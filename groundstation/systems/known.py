@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from groundstation.base.errors import GroundstationError, SettingsError
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.toml_settings import check_ranges, number, required_number
-from groundstation.results.answer import A, Answers, answer_of
+from groundstation.results.answer import A, Answers, answer_meeting, answer_of
 from groundstation.systems.heading.installation.answer import Lesson
 from groundstation.tables.intervals import Interval
 from groundstation.tables.phases import Phases
@@ -251,6 +251,10 @@ class Known:
     def answer(self, kind: type[A]) -> A | None:
         """The answer of that type, None where there is none."""
         return answer_of(self.answers, kind)
+
+    def answer_meeting(self, role: type[S]) -> S | None:
+        """The answer that plays a role of :mod:`groundstation.results.roles`, else None."""
+        return answer_meeting(self.answers, role)
 
     def settings_of(self, kind: type[S]) -> S:
         """The settings of that type, the shipped ones where the user set none."""

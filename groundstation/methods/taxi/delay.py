@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from groundstation.methods.intervals import BOUND95
-from groundstation.systems.latency.answer import Latencies
+from groundstation.results.roles import Delays
 
 
 @dataclass(frozen=True)
@@ -19,14 +19,14 @@ class KnownDelay:
 
 
 def known_delay(
-    pair: tuple[str, str], latencies: Latencies | None, stated_s: float | None, stated_sigma_s: float
+    pair: tuple[str, str], latencies: Delays | None, stated_s: float | None, stated_sigma_s: float
 ) -> KnownDelay | None:
     """Return the latency to take out of a pair of INS and GNSS; None where none is known.
 
     Parameters
     ----------
     pair : INS and GNSS topic
-    latencies : Latencies, optional
+    latencies : Delays, optional
         Those found on this flight.
     stated_s, stated_sigma_s : float or None, float
         Latency that the aircraft file states; it goes before them.

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 from groundstation.base.findings import Finding
 from groundstation.methods.roles import HeadingOnGround, LimitsOfTaxi
 from groundstation.results.answer import Answers, answer_of
+from groundstation.results.roles import Delays
 from groundstation.results.rules import Rejudged
 from groundstation.systems.analysis import Analysis, Found, RejudgeAlso, RestsOn, Rules, Shortfall
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.columns import COLUMNS
 from groundstation.systems.heading.settings import LIMITS, HeadingRequest, HeadingSettings
 from groundstation.systems.known import Known
-from groundstation.systems.latency.answer import Latencies
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -42,7 +42,7 @@ def _run(flight: "Flight", known: Known, settings: HeadingSettings) -> Found[Hea
         aircraft=known.aircraft,
         site=known.site,
         request=HeadingRequest(intervals=known.intervals),
-        latencies=known.answer(Latencies),
+        latencies=known.answer_meeting(Delays),
         phases=known.phases,
         weather=known.weather,
     )

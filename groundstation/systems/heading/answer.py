@@ -7,11 +7,15 @@ import math
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
+import numpy as np
+
 from groundstation.results.answer import Answer
+from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
 from groundstation.results.on_map import OnTaxi
-from groundstation.results.roles import SettingsOfHeading
+from groundstation.results.roles import FloatArray, HeadingByTrack, LatencyByTurns, SettingsOfHeading
+from groundstation.systems.heading.arrays import HeadingSamples
 
 Verdict = Literal["accept", "advisory", "reject", "extend", "undecided"]
 
@@ -125,7 +129,7 @@ class OnboardComparison:
 
 
 @dataclass(frozen=True)
-class HeadingResult(Answer, OnTaxi, SettingsOfHeading):
+class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns, SettingsOfHeading):
     """INS heading error found on straight taxi (error = INS heading - true heading).
 
     Parameters
@@ -262,3 +266,20 @@ class HeadingResult(Answer, OnTaxi, SettingsOfHeading):
     def taxi_used_s(self) -> tuple[tuple[float, float], ...]:
         """Ends of the segments, flight seconds."""
         return tuple((one.start_s, one.end_s) for one in self.segments)
+
+    @property
+    def begins_s(self) -> float | None:
+        """Flight second of the first straight segment, None where there is none."""
+        return self.segments[0].start_s if self.segments else None
+
+    def times_used_s(self) -> FloatArray | None:
+        """Flight seconds of the epochs used, shape (n,); None where the samples are not kept."""
+        samples = found_in(self.figures, HeadingSamples)
+        return None if samples is None else samples.time_s[samples.is_used]
+
+    def seconds_used(self) -> float:
+        """Seconds that the epochs used stand for."""
+        samples = found_in(self.figures, HeadingSamples)
+        if samples is None:
+            return 0.0
+        return int(np.count_nonzero(samples.is_used)) * float(np.median(np.diff(samples.time_s)))

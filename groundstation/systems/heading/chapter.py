@@ -10,10 +10,10 @@ from groundstation.chapters.gates import gate_grid, setting_facts
 from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Part, Section, kept
 from groundstation.chapters.verdict import NOT_ASSESSABLE
 from groundstation.chapters.wording import ABSENT, clock, interval, is_number, number, step_places
-from groundstation.results.agreement import heading_agreement
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults
 from groundstation.systems.heading.advice_chapter import explained
+from groundstation.systems.heading.agreement_answer import heading_agreement
 from groundstation.systems.heading.answer import HeadingResult, OnboardComparison, Standstill, TaxiSegment
 from groundstation.systems.heading.claim_chapter import PARTS, claim
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from groundstation.methods.taxi.pair import HEADING_AND_VELOCITY
 from groundstation.methods.taxi.samples import HeadingOf, OnGround, logged_heading
+from groundstation.results.roles import Delays
 from groundstation.systems.heading.answer import HeadingResult, HeadingStep
 from groundstation.systems.heading.outcome import build_answer
 from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings
@@ -16,7 +17,6 @@ from groundstation.systems.heading.steady import steady_prior
 from groundstation.systems.heading.steps import heading_steps
 from groundstation.systems.heading.taxi import delay_of, straight_taxi
 from groundstation.systems.known import AircraftData, SiteData
-from groundstation.systems.latency.answer import Latencies
 from groundstation.tables.phases import Phases
 from groundstation.tables.sources import choose_pair
 from groundstation.tables.table import Flight
@@ -31,7 +31,7 @@ def estimate_heading_error(
     aircraft: AircraftData | None = None,
     site: SiteData | None = None,
     request: HeadingRequest | None = None,
-    latencies: Latencies | None = None,
+    latencies: Delays | None = None,
     phases: Phases | None = None,
     weather: Iterable[str] = (),
 ) -> HeadingResult:
@@ -49,7 +49,7 @@ def estimate_heading_error(
     heading : callable, optional
         True heading of an INS topic, e.g. ``lambda topic: true_heading(flight, topic)``; default: as logged.
     settings, aircraft, site, request : optional
-    latencies : Latencies, optional
+    latencies : Delays, optional
         Where that of GNSS behind the INS is observed, GNSS times are put back by it; the aircraft file's comes first.
     phases : Phases, optional
         Phases of the flight: take-off run and landing roll are not taxi and not used.

@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.methods.taxi.pair import HEADING_AND_VELOCITY
 from groundstation.methods.taxi.samples import Samples
+from groundstation.results.roles import Delays
 from groundstation.systems.analysis import Shortfall
 from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.systems.heading.standstill import find_standstill
@@ -13,7 +14,6 @@ from groundstation.systems.heading.taxi import delay_of, straight_taxi
 from groundstation.systems.heading.verdict import STANDSTILL_GATE, Figures, build_gates
 from groundstation.systems.heading.wording import told
 from groundstation.systems.known import Known
-from groundstation.systems.latency.answer import Latencies
 from groundstation.tables.headings import true_heading
 from groundstation.tables.phases import ground_mask
 from groundstation.tables.sources import choose_pair
@@ -38,7 +38,7 @@ def examine_heading(flight: Flight, known: Known, settings: HeadingSettings) -> 
         raise known.intervals_problem
     request = HeadingRequest(intervals=known.intervals)
     topics = choose_pair(flight, HEADING_AND_VELOCITY, request.ins_topic, request.gnss_topic)
-    delay = delay_of(topics, known.answer(Latencies), known.aircraft, settings)
+    delay = delay_of(topics, known.answer_meeting(Delays), known.aircraft, settings)
     samples = straight_taxi(
         *(flight, *topics),
         settings=settings,

@@ -6,11 +6,11 @@ The limits of speed may differ from those of taxi.
 from dataclasses import dataclass, field, replace
 
 from groundstation.methods.roles import HeadingOnGround
+from groundstation.results.roles import Delays
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.estimate import estimate_heading_error
 from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.systems.known import AircraftData, Known, SiteData
-from groundstation.systems.latency.answer import Latencies
 from groundstation.tables.phases import ground_mask
 from groundstation.tables.table import Flight
 
@@ -26,7 +26,7 @@ class Estimator:
     settings: HeadingSettings = field(default_factory=HeadingSettings)
     aircraft: AircraftData = field(default_factory=AircraftData)
     request: HeadingRequest = field(default_factory=HeadingRequest)
-    latencies: Latencies | None = None
+    latencies: Delays | None = None
     site: SiteData | None = None
     weather: tuple[str, ...] = ()
 
@@ -58,7 +58,7 @@ def offered(known: Known) -> HeadingOnGround:
             settings=known.settings_of(HeadingSettings),
             aircraft=known.aircraft,
             request=HeadingRequest(intervals=() if known.intervals_problem else known.intervals),
-            latencies=known.answer(Latencies),
+            latencies=known.answer_meeting(Delays),
             site=known.site,
             weather=known.weather,
         )

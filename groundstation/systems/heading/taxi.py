@@ -6,9 +6,9 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.methods.taxi.delay import KnownDelay, known_delay
 from groundstation.methods.taxi.gating import gate_samples
 from groundstation.methods.taxi.samples import HeadingOf, OnGround, Samples, pair_samples
+from groundstation.results.roles import Delays
 from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.systems.known import AircraftData
-from groundstation.systems.latency.answer import Latencies
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight
 
@@ -58,7 +58,7 @@ def straight_taxi(
 
 
 def delay_of(
-    pair: tuple[str, str], latencies: Latencies | None, aircraft: AircraftData, settings: HeadingSettings
+    pair: tuple[str, str], latencies: Delays | None, aircraft: AircraftData, settings: HeadingSettings
 ) -> KnownDelay | None:
     """Return the latency of GNSS behind the INS to take out.
 

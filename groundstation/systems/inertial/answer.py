@@ -5,10 +5,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
 from groundstation.results.answer import Answer
+from groundstation.results.corrected_position import BestTrack, CorrectedPosition
 from groundstation.results.figures import FigureData
+from groundstation.results.flight import FlightResults
 from groundstation.results.frames import rows_frame
-from groundstation.results.roles import ErrorsAlongTheFlight
+from groundstation.results.roles import AzimuthByTurns, AzimuthEstimate, ErrorsAlongTheFlight, KindOfIns
+from groundstation.systems.inertial.arrays import InertialStates, InertialTrack
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,6 +25,7 @@ STARTS = ("stated", "mode", "standstill", "unknown")
 STATES = ("position", "velocity", "tilt", "drift", "drift_rate", "random_drift")
 NOT_SEEN = 0.01  # observability below which the data said nothing of a state
 UNMOVED = 0.01  # share of its sigma at the start by which the sigma of such a state may differ
+LARGEST_SIGMA_M = 1e7  # more is no position on Earth
 SUMMARY_ROUNDING = 1e-6  # rounding of a sigma in summary.json
 
 
@@ -80,56 +86,6 @@ class RealOutage:
 
 
 @dataclass(frozen=True)
-class EarlyAzimuth:
-    """Azimuth error at flight time ``time_s``, and its drift.
-
-    It rests on the turns of the first hour of turns alone. An azimuth error oscillates over 24 h: what is carried back
-    to the taxi may not come from hours later.
-    """
-
-    error_deg: float
-    sigma_deg: float
-    time_s: float
-    rate_deg_per_h: float
-    rate_sigma_deg_per_h: float
-    correlation: float
-    turns: int
-
-    def at(self, time_s: float) -> tuple[float, float]:
-        """The error and its sigma at another flight time, deg.
-
-        Examples
-        --------
-        >>> seen = EarlyAzimuth(0.5, 0.03, 3600.0, 0.1, 0.02, 0.0, 4)
-        >>> [round(value, 4) for value in seen.at(0.0)]
-        [0.4, 0.0361]
-        """
-        hours = (time_s - self.time_s) / 3600.0
-        grown = self.rate_sigma_deg_per_h * hours
-        variance = self.sigma_deg**2 + grown**2 + 2.0 * self.correlation * self.sigma_deg * grown
-        return self.error_deg + self.rate_deg_per_h * hours, max(variance, 0.0) ** 0.5
-
-
-@dataclass(frozen=True)
-class AzimuthEstimate:
-    """Azimuth (heading) error of the INS, from the effect of turns on its velocity error.
-
-    It is offered only where the turns allow it. ``observable`` says whether ``sigma_deg`` is below the limit of the
-    settings; if not, ``error_deg`` is None. The error is that at ``time_s``, flight seconds: the last turn; ``early``
-    is for the time of the taxi, None where the first hour shows too little.
-    """
-
-    observable: bool
-    error_deg: float | None
-    sigma_deg: float | None
-    turns: int
-    velocity_change_mps: float
-    reason: str
-    time_s: float | None = None
-    early: EarlyAzimuth | None = None
-
-
-@dataclass(frozen=True)
 class Difference:
     """INS minus GNSS over the epochs compared.
 
@@ -184,7 +140,7 @@ class NavigationStart:
 
 
 @dataclass(frozen=True)
-class InertialResult(Answer, ErrorsAlongTheFlight):
+class InertialResult(Answer, KindOfIns, AzimuthByTurns, BestTrack, ErrorsAlongTheFlight):
     """INS errors of one flight.
 
     For an INS that GNSS corrects already, it only has the differences from GNSS.
@@ -273,6 +229,18 @@ class InertialResult(Answer, ErrorsAlongTheFlight):
     def difference(self, quantity: str, axis: str = "horizontal") -> Difference | None:
         """INS minus GNSS of a quantity along an axis, None where there is none."""
         return next((row for row in self.differences if (row.quantity, row.axis) == (quantity, axis)), None)
+
+    def best_track(self, results: FlightResults) -> CorrectedPosition | None:
+        """The rows with a place and sigmas; None of an INS that was not corrected."""
+        track, states = results.rows_of(InertialTrack), results.rows_of(InertialStates)
+        if track is None or states is None or len(track) != len(states):
+            return None
+        if track.corrected_latitude_deg is None or track.corrected_longitude_deg is None:
+            return None
+        columns = [track.time_s, track.corrected_latitude_deg, track.corrected_longitude_deg]
+        columns += [states.north.position_sigma_m, states.east.position_sigma_m]
+        known = np.isfinite(columns).all(axis=0) & (np.abs(columns[3:]) < LARGEST_SIGMA_M).all(axis=0)
+        return CorrectedPosition(*(column[known] for column in columns)) if known.any() else None
 
     def table_names(self) -> tuple[str, ...]:
         """Names that :meth:`to_frame` takes."""

@@ -13,7 +13,7 @@ from groundstation.base.quantiles import student_quantile
 from groundstation.base.records import BoolArray
 from groundstation.methods.ins_noise import RADPS_PER_DPH
 from groundstation.methods.intervals import BOUND95
-from groundstation.systems.inertial.answer import AzimuthEstimate, EarlyAzimuth
+from groundstation.results.roles import AzimuthEstimate, EarlyAzimuth
 from groundstation.systems.inertial.differences import Differences
 from groundstation.systems.inertial.filter import Epochs, FilterRun, run_filter
 from groundstation.systems.inertial.model import VELOCITY, FloatArray

@@ -20,10 +20,10 @@ from groundstation.chapters.wording import (
     unit_sign,
 )
 from groundstation.results.flight import FlightResults
+from groundstation.results.roles import AzimuthEstimate
 from groundstation.systems.inertial.aided_chapter import aided
 from groundstation.systems.inertial.answer import (
     MISSING,
-    AzimuthEstimate,
     ChannelResult,
     InertialResult,
     RealOutage,

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding
 from groundstation.methods.lag.settings import LatencySettings
+from groundstation.results.roles import KindOfIns
 from groundstation.systems.analysis import Analysis, Found
-from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.known import Known
 from groundstation.systems.latency.answer import Latencies
 
@@ -18,8 +18,8 @@ TOLD_S = 0.02  # a latency that is surely larger is worth a line
 def _run(flight: "Flight", known: Known, settings: LatencySettings) -> Found[Latencies]:
     from groundstation.systems.latency.estimate import estimate_latencies
 
-    inertial = known.answer(InertialResult)
-    found = estimate_latencies(flight, settings=settings, kinds={inertial.ins_topic: inertial.kind} if inertial else {})
+    known_ins = known.answer_meeting(KindOfIns)
+    found = estimate_latencies(flight, settings=settings, kinds=known_ins.kinds if known_ins else {})
     return Found(found, _findings(found))
 
 

@@ -5,6 +5,7 @@ from typing import Any, ClassVar, Literal
 
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
+from groundstation.results.roles import Delay, Delays
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
@@ -13,7 +14,7 @@ LatencyState = Literal["observed", "not_observable"]
 
 
 @dataclass(frozen=True)
-class Latency:
+class Latency(Delay):
     """Latency of one sensor behind the reference.
 
     Parameters
@@ -54,7 +55,7 @@ class Latency:
 
 
 @dataclass(frozen=True)
-class Latencies(Answer):
+class Latencies(Answer, Delays):
     """Latencies of all pairs of a flight; ``settings`` by name."""
 
     analysis: ClassVar[str] = "latency"

@@ -4,8 +4,8 @@ from groundstation.chapters.agreement import agreement_note
 from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Claim, Facts, Figure, Grid, Head, Mark, Part, Rank, Section, kept
 from groundstation.chapters.wording import interval, number, significant, typeset
-from groundstation.results.agreement import latency_agreement
 from groundstation.results.flight import FlightResults
+from groundstation.systems.latency.agreement_answer import latency_agreement
 from groundstation.systems.latency.answer import Latencies, Latency
 
 TITLE = "Latency between sensors"

@@ -10,8 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.inertial.answer import InertialResult
+from groundstation.results.roles import AzimuthByTurns, HeadingByTrack
 from groundstation.systems.known import AircraftData
 from groundstation.systems.magnetic.answer import Alignment, AlignmentSource, SourceName
 from groundstation.systems.magnetic.before_lift_off import GroundRuns
@@ -39,14 +38,14 @@ class _Carried:
 
 
 def align(
-    heading: HeadingResult | None,
+    heading: HeadingByTrack | None,
     ins_topic: str,
     figure_at_s: float,
     settings: MagneticSettings,
     runs: GroundRuns | None = None,
     gyros: GyroDrift | None = None,
     *,
-    inertial: InertialResult | None = None,
+    by_turns: AzimuthByTurns | None = None,
     aircraft: AircraftData | None = None,
 ) -> Alignment:
     """INS heading error carried from where it was seen to the figure.
@@ -69,7 +68,7 @@ def align(
     listed = {
         "taxi": _from_ground("taxi", runs.taxi, runs.why_not_taxi, ins_topic, aircraft, settings),
         "ground run": _from_ground("ground run", runs.fast, runs.why_not, ins_topic, aircraft, settings),
-        "turns": _from_turns(inertial, ins_topic, aircraft, settings),
+        "turns": _from_turns(by_turns, ins_topic, aircraft, settings),
     }
     carried = {name: _carry(one, figure_at_s, _drift(found, gyros, prior)) for name, (one, found) in listed.items()}
     usable = {name: one for name, one in carried.items() if one is not None and not one.source.reason}
@@ -119,12 +118,12 @@ def against_heading(alignment: Alignment) -> float | None:
 
 def _from_ground(
     name: SourceName,
-    found: HeadingResult | None,
+    found: HeadingByTrack | None,
     missing: str,
     ins_topic: str,
     aircraft: AircraftData,
     settings: MagneticSettings,
-) -> tuple[AlignmentSource, HeadingResult | None]:
+) -> tuple[AlignmentSource, HeadingByTrack | None]:
     """Return an answer of system 1 as a source.
 
     Its error is that of the airframe less the mounting that is stated.
@@ -143,7 +142,7 @@ def _from_ground(
     return AlignmentSource(name, error, sigma, found.reference_time_s or 0.0, False, reason, found.verdict), found
 
 
-def refused(found: HeadingResult) -> str:
+def refused(found: HeadingByTrack) -> str:
     """Return why an answer of system 1 does not align; empty where it does.
 
     Something failed that its interval does not hold.
@@ -155,10 +154,10 @@ def refused(found: HeadingResult) -> str:
 
 
 def _from_turns(
-    inertial: InertialResult | None, ins_topic: str, aircraft: AircraftData, settings: MagneticSettings
+    by_turns: AzimuthByTurns | None, ins_topic: str, aircraft: AircraftData, settings: MagneticSettings
 ) -> tuple[AlignmentSource, None]:
     """Azimuth by turns as a source: the mounting is not in it, its sigma is."""
-    azimuth = inertial.azimuth if inertial is not None and inertial.ins_topic == ins_topic else None
+    azimuth = by_turns.azimuth if by_turns is not None and by_turns.ins_topic == ins_topic else None
     if azimuth is None or azimuth.error_deg is None or azimuth.sigma_deg is None or azimuth.time_s is None:
         reason = "no azimuth by turns" if azimuth is None else f"azimuth by turns: {azimuth.reason}"
         return AlignmentSource("turns", None, None, None, False, reason), None
@@ -235,7 +234,7 @@ def _mean(weights: Sequence[float], values: Sequence[float]) -> float:
     return sum(part * value for part, value in zip(weights, values, strict=True))
 
 
-def _drift(heading: HeadingResult | None, gyros: GyroDrift | None, prior_sigma: float) -> tuple[float, float]:
+def _drift(heading: HeadingByTrack | None, gyros: GyroDrift | None, prior_sigma: float) -> tuple[float, float]:
     """Drift and its sigma, deg/h: measured and known beforehand, weighed by their variances."""
     drift, sigma = 0.0, prior_sigma
     if heading is not None:

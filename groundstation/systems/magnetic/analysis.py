@@ -6,12 +6,10 @@ from groundstation.base.findings import Finding
 from groundstation.base.signals import topics_of_kind
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.answer import Answers, answer_of
+from groundstation.results.roles import AzimuthByTurns, Delays, HeadingByTrack, KindOfIns
 from groundstation.results.rules import Rejudged
 from groundstation.systems.analysis import Analysis, Found, Rules, Shortfall
-from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.known import Known
-from groundstation.systems.latency.answer import Latencies
 from groundstation.systems.magnetic.answer import MagneticResult
 from groundstation.systems.magnetic.columns import COLUMNS
 from groundstation.systems.magnetic.ground_answer import GroundDeviation
@@ -27,15 +25,15 @@ SURE_SIGMAS = 2.0
 def _run(flight: "Flight", known: Known, settings: MagneticSettings) -> Found[MagneticResult]:
     from groundstation.systems.magnetic.estimate import estimate_deviation
 
-    inertial = known.answer(InertialResult)
+    known_ins = known.answer_meeting(KindOfIns)
     found = estimate_deviation(
         flight,
         settings=settings,
-        heading=known.answer(HeadingResult),
+        heading=known.answer_meeting(HeadingByTrack),
         on_ground=known.role(HeadingOnGround),
-        inertial=inertial,
-        latencies=known.answer(Latencies),
-        kinds={inertial.ins_topic: inertial.kind} if inertial else {},
+        by_turns=known.answer_meeting(AzimuthByTurns),
+        latencies=known.answer_meeting(Delays),
+        kinds=known_ins.kinds if known_ins else {},
         aircraft=known.aircraft,
         phases=known.phases,
     )
@@ -77,7 +75,7 @@ def _run_on_ground(flight: "Flight", known: Known, settings: MagneticGroundSetti
         settings=settings,
         phases=known.phases,
         aircraft=known.aircraft,
-        latencies=known.answer(Latencies),
+        latencies=known.answer_meeting(Delays),
         excluded_s=known.excluded_s,
     )
     text = _ground_text(found)

@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
+from groundstation.results.roles import CompassCoefficients
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
@@ -281,7 +282,7 @@ class CardRow:
 
 
 @dataclass(frozen=True)
-class MagneticResult(Answer):
+class MagneticResult(Answer, CompassCoefficients):
     """Deviation of the magnetic heading found in flight. Advisory, not a release to service.
 
     Parameters

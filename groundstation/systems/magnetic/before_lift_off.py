@@ -14,9 +14,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.methods.taxi.pair import HEADING_AND_VELOCITY
-from groundstation.results.arrays.typed import found_in
-from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.heading.arrays import HeadingSamples
+from groundstation.results.roles import HeadingByTrack
 from groundstation.systems.magnetic.entered import corrections_entered
 from groundstation.systems.magnetic.gyros import GyroDrift, gyro_drift
 from groundstation.systems.magnetic.settings import MagneticSettings
@@ -34,17 +32,17 @@ class GroundRuns:
 
     Parameters
     ----------
-    fast : HeadingResult or None
+    fast : HeadingByTrack or None
         Of what is faster than ``speed_min_mps`` before lift-off, the take-off run above all; ``why_not`` says why
         there is none. Looked for only where taxi is not what aligns.
-    taxi : HeadingResult or None
+    taxi : HeadingByTrack or None
         Of taxi within the speed limits of system 1; ``why_not_taxi`` likewise.
     since : str
         What they begin with, if not with the log.
     """
 
-    fast: HeadingResult | None = None
-    taxi: HeadingResult | None = None
+    fast: HeadingByTrack | None = None
+    taxi: HeadingByTrack | None = None
     speed_min_mps: float | None = None
     why_not: str = ""
     why_not_taxi: str = ""
@@ -82,12 +80,12 @@ def least_speed_mps(velocity_error_mps: float, track_error_deg: float) -> float:
 def find_ground_runs(
     flight: Flight,
     ins_topic: str,
-    heading: HeadingResult | None,
+    heading: HeadingByTrack | None,
     phases: Phases,
     on_ground: HeadingOnGround | None,
     settings: MagneticSettings,
     *,
-    is_enough: Callable[[HeadingResult], bool] = lambda _found: False,
+    is_enough: Callable[[HeadingByTrack], bool] = lambda _found: False,
 ) -> GroundRuns:
     """Find what aligns the INS heading on the ground.
 
@@ -111,15 +109,15 @@ def find_ground_runs(
     if settings.uses_slower_taxi and taxi is not None and taxi.ins_topic == ins_topic and is_enough(taxi):
         return GroundRuns(None, taxi, speed_min_mps, "taxi aligns", why_not_taxi, since)
     fast, why_not = _estimated(on_ground, part, flight, ins_topic, (speed_min_mps, NO_LIMIT_MPS))
-    seconds = _seconds(fast)
+    seconds = fast.seconds_used() if fast is not None else 0.0
     if fast is not None and seconds < settings.ground_run_min_s:
         fast, why_not = None, f"{seconds:.1f} s straight above {speed_min_mps:.1f} m/s before lift-off"
     return GroundRuns(fast, taxi, speed_min_mps, why_not, why_not_taxi, window.since if fast else since)
 
 
-def _begins_before(heading: HeadingResult | None, window: Window) -> bool:
+def _begins_before(heading: HeadingByTrack | None, window: Window) -> bool:
     """Tell whether an answer rests on data before a window."""
-    return heading is None or not heading.segments or heading.segments[0].start_s < window.start_s
+    return heading is None or heading.begins_s is None or heading.begins_s < window.start_s
 
 
 def gyros_at_standstill(flight: Flight, ins_topic: str, phases: Phases, settings: MagneticSettings) -> GyroDrift | None:
@@ -196,21 +194,13 @@ def _speed_min_mps(part: Flight, ins_topic: str, settings: MagneticSettings) -> 
     return min(least_speed_mps(error_mps, settings.track_error_max_deg), NO_LIMIT_MPS)
 
 
-def _seconds(found: HeadingResult | None) -> float:
-    """Seconds that the epochs used stand for."""
-    samples = found_in(found.figures, HeadingSamples) if found else None
-    if samples is None:
-        return 0.0
-    return int(np.count_nonzero(samples.is_used)) * float(np.median(np.diff(samples.time_s)))
-
-
 def _estimated(
     on_ground: HeadingOnGround | None,
     part: Flight,
     flight: Flight,
     ins_topic: str,
     speeds_mps: tuple[float, float] | None = None,
-) -> tuple[HeadingResult | None, str]:
+) -> tuple[HeadingByTrack | None, str]:
     """Return system 1's answer, or the reason.
 
     Ground contact is judged by the whole flight, not by the part.

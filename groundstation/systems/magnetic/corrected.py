@@ -12,8 +12,8 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
+from groundstation.results.roles import Delays
 from groundstation.systems.known import AircraftData
-from groundstation.systems.latency.answer import Latencies
 from groundstation.systems.magnetic.answer import Residual
 from groundstation.systems.magnetic.apply import corrected_by_coefficients, corrected_by_iron, corrected_by_table
 from groundstation.systems.magnetic.attitude import levelled_heading_deg
@@ -96,7 +96,7 @@ def correct_heading(
     deviation: Deviation,
     *,
     settings: MagneticSettings | None = None,
-    latencies: Latencies | None = None,
+    latencies: Delays | None = None,
 ) -> CorrectedHeading:
     """Add a deviation to the magnetic heading of a flight, its own or another's.
 
@@ -110,7 +110,7 @@ def correct_heading(
     deviation : Deviation
     settings : MagneticSettings, optional
         Longest gap of the attitude; a declination that is stated.
-    latencies : Latencies, optional
+    latencies : Delays, optional
         Where that of the magnetometer is observed, its times are put back by it.
 
     Raises
@@ -155,7 +155,7 @@ def _levelled(
     deviation: Deviation,
     topics: tuple[str, str],
     settings: MagneticSettings,
-    latencies: Latencies | None,
+    latencies: Delays | None,
 ) -> CorrectedHeading:
     unit, table = flight[topics[0]].trusted(), flight[topics[1]]
     at_ns = table.time_ns - round(latency_of(topics, latencies) * NS_PER_S)

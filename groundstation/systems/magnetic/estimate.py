@@ -9,10 +9,8 @@ import numpy as np
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.records import BoolArray
 from groundstation.methods.roles import HeadingOnGround
-from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.inertial.answer import InertialResult
+from groundstation.results.roles import AzimuthByTurns, Delays, HeadingByTrack
 from groundstation.systems.known import AircraftData
-from groundstation.systems.latency.answer import Latencies
 from groundstation.systems.magnetic.alignment import S_PER_H, align, refused
 from groundstation.systems.magnetic.answer import (
     Alignment,
@@ -56,10 +54,10 @@ def estimate_deviation(
     flight: Flight,
     *,
     settings: MagneticSettings | None = None,
-    heading: HeadingResult | None = None,
+    heading: HeadingByTrack | None = None,
     on_ground: HeadingOnGround | None = None,
-    inertial: InertialResult | None = None,
-    latencies: Latencies | None = None,
+    by_turns: AzimuthByTurns | None = None,
+    latencies: Delays | None = None,
     kinds: Mapping[str, str] | None = None,
     aircraft: AircraftData | None = None,
     phases: Phases | None = None,
@@ -73,13 +71,13 @@ def estimate_deviation(
     flight : Flight
         Topics ``ins`` (roll, pitch, true heading) and ``magnetometer``; ``electric`` where there is one.
     settings : MagneticSettings, optional
-    heading : HeadingResult, optional
+    heading : HeadingByTrack, optional
         System 1's answer: aligns the INS heading with its whole interval.
     on_ground : HeadingOnGround, optional
         Looks at the ground run up to lift-off, where the answer of system 1 does not align.
-    inertial : InertialResult, optional
+    by_turns : AzimuthByTurns, optional
         System 2's answer: its azimuth by turns aligns too.
-    latencies : Latencies, optional
+    latencies : Delays, optional
         Where that of the magnetometer is observed, its times are put back by it.
     kinds : mapping of INS topic to kind, optional
         ``gnss_aided`` where system 2 found that other sensors correct the INS.
@@ -114,7 +112,7 @@ def estimate_deviation(
         flight, topics[0], heading, phases, on_ground, settings, is_enough=lambda one: not refused(one)
     )
     gyros = gyros_at_standstill(flight, topics[0], phases, settings)
-    alignment = align(heading, topics[0], figure_at_s, settings, runs, gyros, inertial=inertial, aircraft=aircraft)
+    alignment = align(heading, topics[0], figure_at_s, settings, runs, gyros, by_turns=by_turns, aircraft=aircraft)
     readings = _aligned(readings, alignment, aircraft.mounting_deg)
     result = _answer(flight, topics, readings, is_airborne, (figures, turns), alignment, settings)
     return replace(result, remarks=remarks_on(flight, result, flown.latency_s, kinds or {}, settings))

@@ -3,9 +3,9 @@
 import numpy as np
 
 from groundstation.methods.roles import InsKinds
+from groundstation.results.roles import Delays
 from groundstation.systems.analysis import Shortfall
 from groundstation.systems.known import Known
-from groundstation.systems.latency.answer import Latencies
 from groundstation.systems.magnetic.earth import earth_field
 from groundstation.systems.magnetic.flown import Flown, find_flown
 from groundstation.systems.magnetic.held_out import find_unseen, is_level
@@ -25,7 +25,7 @@ def examine_magnetic(flight: Flight, known: Known, settings: MagneticSettings) -
         Where nothing can be estimated, with the reason that the estimate would give.
     """
     topics = choose_topics(flight)
-    flown = find_flown(flight, topics, known.phases, _kinds(flight, known), known.answer(Latencies), settings)
+    flown = find_flown(flight, topics, known.phases, _kinds(flight, known), known.answer_meeting(Delays), settings)
     rows = np.sort(np.concatenate([one.rows(right) for one in flown.figures for right in (True, False)]))
     earth_field(flight, flown.readings, rows, settings)
     found = []

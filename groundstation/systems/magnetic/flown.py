@@ -10,7 +10,7 @@ import numpy as np
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray
-from groundstation.systems.latency.answer import Latencies
+from groundstation.results.roles import Delays
 from groundstation.systems.magnetic.manoeuvre import Figure, FoundTurn, find_figures, find_turns
 from groundstation.systems.magnetic.readings import ANALYSIS, Readings, gather, why_not_independent
 from groundstation.systems.magnetic.settings import MagneticSettings
@@ -36,7 +36,7 @@ def find_flown(
     topics: tuple[str, str],
     phases: Phases,
     kinds: Mapping[str, str],
-    latencies: Latencies | None,
+    latencies: Delays | None,
     settings: MagneticSettings,
 ) -> Flown:
     """Find the opposite turns of a flight; parameters as of ``estimate_deviation``.

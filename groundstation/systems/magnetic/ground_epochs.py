@@ -15,8 +15,8 @@ from groundstation.methods.taxi.delay import known_delay
 from groundstation.methods.taxi.gating import gate_samples
 from groundstation.methods.taxi.samples import USED, HeadingValues, OnGround, Samples, pair_samples
 from groundstation.methods.taxi.settings import GroundLimits
+from groundstation.results.roles import Delays
 from groundstation.systems.known import AircraftData
-from groundstation.systems.latency.answer import Latencies
 from groundstation.systems.magnetic.answer import DeclinationUsed
 from groundstation.systems.magnetic.ground_answer import LeftOut
 from groundstation.systems.magnetic.ground_settings import MagneticGroundSettings
@@ -65,7 +65,7 @@ def gated(
     settings: MagneticGroundSettings,
     on_ground: OnGround | None,
     aircraft: AircraftData,
-    latencies: Latencies | None,
+    latencies: Delays | None,
     excluded_s: Sequence[tuple[float, float]],
 ) -> Samples:
     """Return the epochs on the ground, gated as system 1 gates taxi.

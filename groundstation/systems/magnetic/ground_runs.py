@@ -17,8 +17,8 @@ from groundstation.methods.moving_lines import fitted_lines, window_bounds
 from groundstation.methods.taxi.samples import OnGround, Samples, take_samples
 from groundstation.methods.taxi_error.interval import Differences, Regressor, error_posterior
 from groundstation.results.figures import FigureData
+from groundstation.results.roles import Delays
 from groundstation.systems.known import AircraftData
-from groundstation.systems.latency.answer import Latencies
 from groundstation.systems.magnetic.answer import DeclinationUsed
 from groundstation.systems.magnetic.arrays import GroundRunCurve, GroundRunEpochs
 from groundstation.systems.magnetic.compass_table import CENTRES_DEG
@@ -62,7 +62,7 @@ def estimate_ground_deviation(
     phases: Phases | None = None,
     on_ground: OnGround | None = None,
     aircraft: AircraftData | None = None,
-    latencies: Latencies | None = None,
+    latencies: Delays | None = None,
     excluded_s: Sequence[tuple[float, float]] = (),
     ins_topic: str = "",
     gnss_topic: str = "",

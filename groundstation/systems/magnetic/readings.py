@@ -10,7 +10,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
-from groundstation.systems.latency.answer import Latencies
+from groundstation.results.roles import Delays
 from groundstation.systems.magnetic.attitude import levelled_heading_deg
 from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.tables.headings import FARTHEST_POSITION_S
@@ -100,7 +100,7 @@ def why_not_independent(flight: Flight, ins_topic: str, kinds: dict[str, str], s
 
 
 def gather(
-    flight: Flight, topics: tuple[str, str], latencies: Latencies | None, settings: MagneticSettings
+    flight: Flight, topics: tuple[str, str], latencies: Delays | None, settings: MagneticSettings
 ) -> tuple[Readings, float]:
     """Return readings at the times of the magnetometer, and its latency.
 
@@ -137,7 +137,7 @@ def gather(
     return readings.take(known), latency_s
 
 
-def latency_of(topics: tuple[str, str], latencies: Latencies | None) -> float:
+def latency_of(topics: tuple[str, str], latencies: Delays | None) -> float:
     """Latency of a magnetometer against an INS where it is observed, else 0, seconds."""
     row = latencies.observed(*topics) if latencies is not None else None
     return row.latency_s if row is not None and row.latency_s is not None else 0.0

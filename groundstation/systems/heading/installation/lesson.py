@@ -8,8 +8,9 @@ from typing import Any
 from groundstation.base.angles import wrap_180
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.timescales import utc_ns_to_iso
-from groundstation.results.answer import Answers, answer_of
+from groundstation.results.answer import Answers, answer_meeting
 from groundstation.results.flight import FlightResults
+from groundstation.results.roles import AzimuthByTurns, CompassCoefficients, Delays
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.installation.answer import Lesson, Measured, as_stored
 from groundstation.systems.heading.installation.settings import (
@@ -21,9 +22,6 @@ from groundstation.systems.heading.installation.settings import (
 from groundstation.systems.heading.references import REFERENCE_SIGMA_DEG, logged_reference
 from groundstation.systems.heading.steady import FACTORS, STATED_AT_MPS
 from groundstation.systems.heading.verdict import CURED_BY_MORE_DATA, STANDSTILL_GATE
-from groundstation.systems.inertial.answer import InertialResult
-from groundstation.systems.latency.answer import Latencies
-from groundstation.systems.magnetic.answer import MagneticResult
 
 LARGEST = 1e3  # no angle in degrees, no wind in m/s is larger
 RUNWAY_CRAB_DEG = 0.3  # of power and wind on the take-off run
@@ -44,7 +42,7 @@ class Stored:
     start_utc_ns: int | None
     stated: Mapping[str, Any]
     heading: HeadingResult | None
-    inertial: InertialResult | None = None
+    turns: AzimuthByTurns | None = None
     others: Answers = field(default_factory=dict)
     findings: frozenset[str] = frozenset()
 
@@ -62,7 +60,7 @@ def lesson_of_flight(results: FlightResults, stated: Mapping[str, Any], flight_i
             results.start_utc_ns,
             stated,
             results.answer(HeadingResult),
-            results.answer(InertialResult),
+            results.answer_meeting(AzimuthByTurns),
             results.answers,
             frozenset(finding.code for finding in results.findings),
         )
@@ -93,7 +91,8 @@ def lesson_of(stored: Stored) -> Lesson:
 def _measured(stored: Stored) -> tuple[Measured, ...]:
     """Return what a flight says of compass, antenna and GNSS, as far as it observed them."""
     found: list[tuple[str, float | None, float | None]] = []
-    magnetic, latencies = answer_of(stored.others, MagneticResult), answer_of(stored.others, Latencies)
+    magnetic = answer_meeting(stored.others, CompassCoefficients)
+    latencies = answer_meeting(stored.others, Delays)
     heading = stored.heading
     if magnetic is not None and magnetic.verdict != "reject":
         found.append(("compass_a_deg", magnetic.coefficients_deg.get("A"), magnetic.coefficients_sigma_deg.get("A")))
@@ -198,9 +197,9 @@ def _azimuth(stored: Stored, heading: HeadingResult) -> dict[str, float]:
 
     Nothing where the INS was another then.
     """
-    inertial = stored.inertial
-    early = None if inertial is None or inertial.azimuth is None else inertial.azimuth.early
-    if inertial is None or early is None or inertial.ins_topic != heading.ins_topic:
+    turns = stored.turns
+    early = None if turns is None or turns.azimuth is None else turns.azimuth.early
+    if turns is None or early is None or turns.ins_topic != heading.ins_topic:
         return {}
     entered = None if heading.onboard is None else heading.onboard.correction_entered_deg
     if entered or heading.reference_time_s is None or heading.reference_time_s > early.time_s:

@@ -115,7 +115,7 @@ def taxi_outcome(name: str, seed: int) -> TaxiOutcome:
     told = "none" if heading is None else heading.verdict
     on_ground = HeadingOnGround(Estimator(latencies=latencies))
     try:
-        found = estimate_deviation(flight, heading=heading, on_ground=on_ground, inertial=inertial, latencies=latencies)
+        found = estimate_deviation(flight, heading=heading, on_ground=on_ground, by_turns=inertial, latencies=latencies)
     except NotAssessableError as error:
         nan = float("nan")
         return TaxiOutcome(name, told, "not assessable", error.found, "", nan, nan, nan, float(off))

@@ -1,0 +1,33 @@
+"""Latency of GNSS by motion beside that by the turns of the taxi."""
+
+from groundstation.base.normal import NORMAL_95
+from groundstation.results.agreement import Agreement, OneFinding
+from groundstation.results.answer import Answers, answer_meeting, answer_of
+from groundstation.results.roles import LatencyByTurns
+from groundstation.systems.latency.answer import Latencies
+
+NARROWED = 0.95  # a sigma that the turns of a taxi leave of the one known before: above it they show nothing
+
+
+def latency_agreement(answers: Answers) -> Agreement | None:
+    """Compare the GNSS latency behind the INS by motion and by the turns of the taxi.
+
+    The first is the latency analysis, the second system 1. Where the former was taken out before the turns were looked
+    at, it was their prior: it is taken off again.
+    """
+    taxi, latencies = answer_meeting(answers, LatencyByTurns), answer_of(answers, Latencies)
+    found = latencies.observed(taxi.ins_topic, taxi.gnss_topic) if latencies and taxi else None
+    if taxi is None or found is None or found.latency_s is None or found.confidence95_s is None:
+        return None
+    low, high = found.confidence95_s
+    motion = OneFinding("by motion", found.latency_s, 0.5 * (high - low) / NORMAL_95)
+    if taxi.time_offset_s is None or not taxi.time_offset_sigma_s or not motion.sigma > 0.0:
+        return None
+    offset, sigma = taxi.time_offset_s, taxi.time_offset_sigma_s
+    if taxi.latency_origin == "motion":
+        if sigma >= NARROWED * motion.sigma:
+            return None
+        information = sigma**-2 - motion.sigma**-2
+        offset, sigma = offset * sigma**-2 / information, information**-0.5
+    turns = OneFinding("by the turns of the taxi", (taxi.latency_used_s or 0.0) + offset, sigma)
+    return Agreement(f"latency of {taxi.gnss_topic} behind {taxi.ins_topic}", "s", motion, turns)
