@@ -23,7 +23,8 @@ from groundstation.results.arrays.flight import GnssLanes, Overview, StateLanes
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, Source
 from groundstation.simulation.session import simulate_session
-from groundstation.systems.cooperative.analysis import COOPERATIVE, SessionKnown
+from groundstation.systems.cooperative.analysis import COOPERATIVE
+from groundstation.systems.known import SessionKnown
 from groundstation.systems.landing.answer import LandingResult
 from groundstation.systems.landing.arrays import LandingPath, LandingProtection
 from groundstation.systems.plan import Planned

@@ -142,7 +142,7 @@ def test_an_analysis_that_fails_leaves_the_others(name: str, part: str, monkeypa
 
 @pytest.mark.parametrize("name", [one.name for one in systems().session_analyses])
 def test_an_analysis_of_a_session_that_fails_leaves_the_others(name: str) -> None:
-    from groundstation.systems.cooperative.analysis import SessionKnown
+    from groundstation.systems.known import SessionKnown
 
     known = SessionKnown(settings=Configuration().settings.analyses)
     with gathered_failures():

@@ -22,11 +22,12 @@ from groundstation.results.files import load_manifest
 from groundstation.results.flight import FlightResults
 from groundstation.simulation.session import simulate_session
 from groundstation.simulation.session_log import write_session
-from groundstation.systems.cooperative.analysis import COOPERATIVE, NIS_MAX, SessionKnown, innovations_of
+from groundstation.systems.cooperative.analysis import COOPERATIVE, NIS_MAX, innovations_of
 from groundstation.systems.cooperative.answer import CooperativeResult
 from groundstation.systems.cooperative.chapter import TITLES, cooperative, session_front, trusted, worst_first
 from groundstation.systems.cooperative.estimate import estimate_session
 from groundstation.systems.cooperative.settings import ALGORITHMS, CooperativeSettings, InsBelief
+from groundstation.systems.known import SessionKnown
 from tests.cooperative_example import believed, truth_of
 from tests.recording_contents import Contents
 from tests.saved import load

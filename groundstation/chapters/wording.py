@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Sequence
 from typing import Any, TypeGuard
 
 from groundstation.base.printable import printable
@@ -10,6 +11,7 @@ from groundstation.base.unit_names import UNITS, split_unit
 ABSENT = "—"
 MINUS = "−"
 NARROW_SPACE = "\u202f"
+MOST_NAMES = 6  # of aircraft, named in a line
 HIDDEN = "\ufffd"  # stands for a control, or a mark that turns the direction of the text around it
 
 
@@ -191,3 +193,14 @@ def number_with_unit(text: str, unit: str) -> str:
     if not unit or text == ABSENT:
         return text
     return text + (unit if unit in "°′%" else NARROW_SPACE + unit)
+
+
+def names_or_count(names: Sequence[str]) -> str:
+    """Return the names of a few aircraft, or the count of many.
+
+    Examples
+    --------
+    >>> names_or_count(["A", "B"]), names_or_count(["A"] * 20)
+    ('A, B', '20 aircraft')
+    """
+    return ", ".join(names) if len(names) <= MOST_NAMES else f"{len(names)} aircraft"

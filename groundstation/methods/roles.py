@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from groundstation.methods.taxi.settings import TaxiLimits
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.tables.table import Flight
 
@@ -56,3 +57,10 @@ class InsKinds:
     """
 
     find: Callable[[Flight], dict[str, str]]
+
+
+@dataclass(frozen=True)
+class LimitsOfTaxi:
+    """Role of an analysis whose settings hold the limits of taxi."""
+
+    limits: TaxiLimits

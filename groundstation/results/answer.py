@@ -27,6 +27,7 @@ class SessionAnswer(Answer):
 
 
 A = TypeVar("A", bound=Answer)
+R = TypeVar("R")
 Answers = Mapping[str, Answer]  # by the name of the analysis
 
 
@@ -41,6 +42,14 @@ def answer_of(answers: Answers, kind: type[A]) -> A | None:
     """
     found = answers.get(kind.analysis)
     return found if isinstance(found, kind) else None
+
+
+def answer_meeting(answers: Answers, role: type[R]) -> R | None:
+    """Return the first answer that plays a role, None where none does.
+
+    The roles stand in :mod:`groundstation.results.roles`.
+    """
+    return next((found for found in answers.values() if isinstance(found, role)), None)
 
 
 def by_analysis(*answers: Answer | None) -> dict[str, Answer]:

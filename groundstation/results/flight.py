@@ -13,7 +13,7 @@ from groundstation.base.failures import attempt
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.units import NS_PER_S
-from groundstation.results.answer import A, Answers, PlanAnswer, SessionAnswer, answer_of
+from groundstation.results.answer import A, Answers, PlanAnswer, R, SessionAnswer, answer_meeting, answer_of
 from groundstation.results.arrays.typed import T
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.figures import FigureData, FigureSet, numbers
@@ -103,6 +103,10 @@ class FlightResults(Tabular):
     def answer(self, kind: type[A]) -> A | None:
         """The answer of that type, None where its analysis has none."""
         return answer_of(self.answers, kind)
+
+    def answer_meeting(self, role: type[R]) -> R | None:
+        """Return the answer that plays a role, None where there is none."""
+        return answer_meeting(self.answers, role)
 
     def reasons(self, *analyses: str) -> tuple[str, ...]:
         """Return the reasons why these analyses could not run, for those that could not."""

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar, cast
 
 from groundstation.base.findings import Finding
@@ -77,16 +78,22 @@ def _no_samples(_data: Any, _answer: Any) -> None:
     """Return no samples: no damage counts against the answer."""
 
 
+RejudgeAlso = Callable[[str, Rejudged, Any], tuple[Rejudged, ...]]
+
+
 @dataclass(frozen=True)
 class Rules:
     """Rules to judge the gates of an answer again under other limits, without the log.
 
     ``limits`` are the settings that bound gates and choose no data; a change of any other one
-    needs the log. ``rejudge(answer, settings)`` gives each verdict before and after.
+    needs the log. ``rejudge(answer, settings)`` gives each verdict before and after. ``also_in(out)`` reads what the
+    flights of a folder gave together; what it returns takes a flight id, one of these verdicts and the settings, and
+    gives the verdicts that rest on both.
     """
 
     limits: frozenset[str]
     rejudge: Callable[[Any, Any], tuple[Rejudged, ...]]
+    also_in: Callable[[Path], RejudgeAlso] | None = None
 
 
 @dataclass(frozen=True)
@@ -133,6 +140,8 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
         Of an answer with gates.
     offers : mapping of role to callable
         What others may ask of it (:mod:`groundstation.methods.roles`): ``offers[role](known)`` makes it.
+    assumes : str
+        What an analysis of a session takes for granted where its table is not set.
     judges : bool
         Whether it is given the truth, by which it judges the others: it runs where there is one, and last; every other
         analysis is given a flight without it.
@@ -156,6 +165,7 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     check: Callable[[Any, Any], None] = _any_settings
     examine: Examine[Data, KnownT, SettingsT] | None = None
     judges: bool = False
+    assumes: str = ""
     rules: Rules | None = None
     offers: Mapping[type[Any], Callable[[KnownT], Any]] = field(default_factory=dict)
 

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from groundstation.base.errors import GroundstationError, SettingsError
 from groundstation.base.timescales import iso_to_utc_ns
@@ -16,6 +16,9 @@ from groundstation.results.answer import A, Answers, answer_of
 from groundstation.systems.heading.installation.answer import Lesson
 from groundstation.tables.intervals import Interval
 from groundstation.tables.phases import Phases
+
+if TYPE_CHECKING:
+    from groundstation.tables.session_assemble import Truth
 
 S = TypeVar("S")
 AircraftClass = Literal["", "light", "jet trainer", "business jet", "airliner", "car", "uav"]
@@ -264,3 +267,23 @@ class Known:
     def workings_of(self, kind: type[S]) -> S | None:
         """Return what an earlier analysis computed on the way, None where there is none."""
         return next((found for found in self.workings.values() if isinstance(found, kind)), None)
+
+
+@dataclass(frozen=True)
+class SessionKnown:
+    """Inputs of an analysis of a session besides the session itself.
+
+    Parameters
+    ----------
+    truth : mapping of vehicle to (time_s, position_m)
+        Only judges.
+    settings : mapping
+        Settings by the name of their table.
+    answers, workings : mappings
+        Of the analyses before this one.
+    """
+
+    truth: "Truth" = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    answers: Answers = field(default_factory=dict)
+    workings: Mapping[str, Any] = field(default_factory=dict)

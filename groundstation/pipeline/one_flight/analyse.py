@@ -20,18 +20,19 @@ from groundstation.base.ledger import Ledger
 from groundstation.base.signals import topics_of_kind
 from groundstation.integrity.ledger import gaps_of
 from groundstation.methods import overview
+from groundstation.methods.roles import LimitsOfTaxi
+from groundstation.methods.taxi.settings import GroundLimits
 from groundstation.pipeline.one_flight import configuration as configured
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.damage import damage_finding
 from groundstation.pipeline.one_flight.intervals import seconds_of
-from groundstation.results.answer import Answers, answer_of
+from groundstation.results.answer import Answers, answer_meeting
 from groundstation.results.chosen import chosen_intervals
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
+from groundstation.results.roles import SettingsOfHeading
 from groundstation.systems import systems
 from groundstation.systems.analysis import Analysis, Found, in_order_of_need
-from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.known import Known
 from groundstation.tables.intervals import Interval
 from groundstation.tables.phases import ALWAYS_ON_GROUND, flight_phases
@@ -268,11 +269,11 @@ def _general_figures(
     flight: Flight, given: Given, known: Known, answers: Answers, gaps: Mapping[str, Gaps]
 ) -> tuple[FigureData, ...]:
     heading = attempt("arrays", "overview_heading", _heading_for_overview, flight, answers) or (None, None)
-    geometry_max = known.settings_of(HeadingSettings).geometry_max
+    limits = (known.role(LimitsOfTaxi) or LimitsOfTaxi(GroundLimits())).limits
     general = (
         attempt("arrays", "overview", overview.overview, flight, *heading),
         attempt("arrays", "phases", overview.phase_figure, known.phases),
-        attempt("arrays", "gnss_lanes", overview.gnss_lanes, flight, geometry_max),
+        attempt("arrays", "gnss_lanes", overview.gnss_lanes, flight, limits.geometry_max),
         attempt("arrays", "state_lanes", overview.state_lanes, flight),
         *(attempt("arrays", "ledger", overview.ledger_figures, flight, given.ledger, gaps) or ()),
     )
@@ -282,7 +283,7 @@ def _general_figures(
 def _heading_for_overview(flight: Flight, answers: Answers) -> tuple[NDArray[np.float64] | None, str | None]:
     from groundstation.tables.headings import true_heading
 
-    heading = answer_of(answers, HeadingResult)
+    heading = answer_meeting(answers, SettingsOfHeading)
     topic = heading.ins_topic if heading else overview.first_of_kind(flight, "ins", "true_heading_deg")
     topic = topic or overview.first_of_kind(flight, "ins", "magnetic_heading_deg")
     if topic is None:

@@ -13,7 +13,7 @@ from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.resume import versions
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import Host, Manifest, PartOfRun, PowerUpOfRun, Resume, SourceOfRun
-from groundstation.systems.heading.answer import HeadingResult
+from groundstation.results.roles import SettingsOfHeading
 
 
 def manifest_of(
@@ -43,14 +43,14 @@ def manifest_of(
     parts : sequence of PartOfRun
         The consecutive logs of the flight.
     """
-    source, heading = results.source, results.answer(HeadingResult)
+    source, heading = results.source, results.answer_meeting(SettingsOfHeading)
     return Manifest(
         groundstation=__version__,
         flight_id=results.flight_id,
         made_utc=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
         source=SourceOfRun(path, source.name, source.sha256, source.size_bytes, source.reader),
         configuration=dict(configuration),
-        heading_settings=heading.settings if heading else {},
+        heading_settings=dict(heading.settings) if heading else {},
         host=Host(platform.platform(), platform.machine(), sys.version.split()[0]),
         versions=versions(),
         resume=resume,

@@ -10,7 +10,7 @@ from groundstation.pipeline.verbs.clip import zero_s
 from groundstation.results.arrays.flight import GnssLanes, PhaseSpans
 from groundstation.results.comparison import Alignment, Event
 from groundstation.results.files import SavedFlight
-from groundstation.systems.inertial.answer import InertialResult
+from groundstation.results.roles import ErrorsAlongTheFlight
 
 EVENTS: tuple[Event, ...] = get_args(Event)
 AT_REST, UNKNOWN, AIRBORNE = "standstill", "unknown", "airborne"
@@ -73,8 +73,8 @@ def events_of(saved: SavedFlight) -> dict[Event, float]:
 
 
 def _first_outage_s(saved: SavedFlight) -> float | None:
-    inertial = saved.results.answer(InertialResult)
-    starts = [one.start_s for one in inertial.outages if one.missing in ("gnss", "both")] if inertial else []
+    found = saved.results.answer_meeting(ErrorsAlongTheFlight)
+    starts = [one.start_s for one in found.outages if one.missing in ("gnss", "both")] if found else []
     lanes = saved.rows_of(GnssLanes)
     if lanes is not None:
         starts += lanes.start_s[lanes.state == NO_GNSS].tolist()

@@ -16,8 +16,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import as_log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
-from groundstation.results.answer import answer_of
-from groundstation.systems.inertial.answer import InertialResult
+from groundstation.results.roles import ErrorsAlongTheFlight
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:
@@ -132,8 +131,8 @@ def saved_flight(folder: Path) -> "SavedFlight":
 
 def _compared_ins(saved: "SavedFlight") -> str:
     """Return the INS whose errors were estimated; empty where none was."""
-    inertial = answer_of(saved.results.answers, InertialResult)
-    return "" if inertial is None else inertial.ins_topic
+    found = saved.results.answer_meeting(ErrorsAlongTheFlight)
+    return "" if found is None else found.ins_topic
 
 
 def _wanted(tracks: tuple[Track, ...], names: Sequence[str], source: str) -> tuple[Track, ...]:

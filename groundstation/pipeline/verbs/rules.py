@@ -12,22 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.base.digits import digits_of
 from groundstation.base.errors import GroundstationError
 from groundstation.base.serial import to_json
 from groundstation.pipeline.many_flights.inputs import saved_flights
 from groundstation.pipeline.one_flight.configuration import Configuration, load_configuration
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, csv_text, load, mapping, write_text
-from groundstation.results.gates import Gate, judged_gate
+from groundstation.results.gates import Gate
 from groundstation.results.rules import Rejudged
 from groundstation.systems import systems
-from groundstation.systems.heading.installation.answer import InstalledFlight, installations_in
-from groundstation.systems.heading.installation.outcome import verdict_of
-from groundstation.systems.heading.settings import HeadingSettings
+from groundstation.systems.analysis import RejudgeAlso
 
-LEARNED_GATE = "whole_half_width_learned"
-LEARNED_TITLE = "half width of the 95 % interval, the installation learned"
 OTHER_TABLES = ("aircraft", "site", "thresholds")  # they change what is measured, not how it is judged
 SHIPPED = "shipped limits"
 
@@ -98,11 +93,11 @@ def rules_test(new: Path, out: Path) -> RulesTest:
     told: list[RulesRow] = []
     unread: list[str] = []
     judged: list[tuple[Rejudged, str]] = []
-    learned = learned_in(out)
+    also = {one.name: one.rules.also_in(out) for one in systems().analyses if one.rules and one.rules.also_in}
     for folder in folders:
         try:
             saved = load(folder, systems().answer_types)
-            found = list(_of_flight(saved, configuration, learned.get(folder.name)))
+            found = list(_of_flight(saved, configuration, also))
         except GroundstationError as error:
             unread.append(str(error))
             continue
@@ -146,45 +141,8 @@ def write_rules(found: RulesTest, path: Path) -> None:
     write_text(path, csv_of(found))
 
 
-def learned_in(out: Path) -> dict[str, InstalledFlight]:
-    """Return flights with a heading answer that earlier ones taught, by their ids."""
-    found = installations_in(out)
-    flights = () if found is None else (flight for one in found.installations for flight in one.flights)
-    return {one.lesson.flight_id: one for one in flights if one.answer is not None and not one.answer.why_not}
-
-
-def _learned(flight: InstalledFlight, heading: Rejudged, settings: HeadingSettings) -> Rejudged:
-    """Return the verdict on the learned number under other limits.
-
-    It rests on the gates on the taxi as they were judged again.
-    """
-    assert flight.answer is not None
-    failed = tuple(gate.name for gate in heading.gates_after if gate.required and gate.state != "passed")
-    limit_deg = round(settings.whole_half_width_max_deg, digits_of("limit_deg"))  # as it is stored
-    lesson = replace(
-        flight.lesson,
-        verdict=heading.after,
-        failed=failed,
-        limit_deg=limit_deg if settings.whole_decides else None,
-    )
-    half_width_deg = flight.answer.half_width_deg
-    before, after = (
-        judged_gate(
-            (None, limit_deg if one.limit_deg is None else one.limit_deg),
-            LEARNED_GATE,
-            LEARNED_TITLE,
-            half_width_deg,
-            unit="deg",
-            required=one.limit_deg is not None,
-        )
-        for one in (flight.lesson, lesson)
-    )
-    verdict = verdict_of(lesson, half_width_deg)
-    return Rejudged("heading, installation learned", flight.answer.verdict, verdict, (before,), (after,))
-
-
 def _of_flight(
-    saved: SavedFlight, configuration: Configuration, learned: InstalledFlight | None = None
+    saved: SavedFlight, configuration: Configuration, also: Mapping[str, RejudgeAlso]
 ) -> Iterator[tuple[Rejudged, str]]:
     """Return every verdict of a flight, judged again, and what only its log could tell."""
     results, unsure = saved.results, set[str]()
@@ -201,8 +159,9 @@ def _of_flight(
             if missing or one.gates_before != one.gates_after:
                 unsure.add(analysis.name)
             yield one, ", ".join(missing)
-            if learned is not None and isinstance(settings, HeadingSettings):
-                yield _learned(learned, one, settings), ", ".join(missing)
+            more = also[analysis.name](saved.folder.name, one, settings) if analysis.name in also else ()
+            for beside in more:
+                yield beside, ", ".join(missing)
 
 
 def _not_limits(settings: Any, stored: Mapping[str, Any], limits: frozenset[str]) -> list[str]:

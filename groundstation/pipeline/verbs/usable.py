@@ -15,7 +15,7 @@ from groundstation.pipeline.one_flight.analyse import known_of, seen_by_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.systems import systems
 from groundstation.systems.analysis import Analysis, Shortfall
-from groundstation.systems.cooperative.analysis import SessionKnown
+from groundstation.systems.known import SessionKnown
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:

@@ -1,8 +1,6 @@
 """Navigation between aircraft as an analysis of a session."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
@@ -10,34 +8,14 @@ from groundstation.results.answer import Answers, answer_of
 from groundstation.systems.analysis import Analysis, Found, Shortfall
 from groundstation.systems.cooperative.answer import CooperativeResult
 from groundstation.systems.cooperative.settings import CooperativeSettings
+from groundstation.systems.known import SessionKnown
 
 if TYPE_CHECKING:
     from groundstation.tables.session import Session
-    from groundstation.tables.session_assemble import Truth
 
 NIS_MAX = 1.5  # white innovations of LEAST_RANGES rows stay below it in all but one of 10 000 sessions
 LEAST_RANGES = 150
 LEAST_OF_A_STATION, GATED_SHARE, OTHERS_SHARE = 10, 0.2, 0.05
-
-
-@dataclass(frozen=True)
-class SessionKnown:
-    """Inputs of an analysis of a session besides the session itself.
-
-    Parameters
-    ----------
-    truth : mapping of vehicle to (time_s, position_m)
-        Only judges.
-    settings : mapping
-        Settings by the name of their table.
-    answers, workings : mappings
-        Of the analyses before this one.
-    """
-
-    truth: "Truth" = field(default_factory=dict)
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    answers: Answers = field(default_factory=dict)
-    workings: Mapping[str, Any] = field(default_factory=dict)
 
 
 def _run(session: "Session", known: SessionKnown, settings: CooperativeSettings) -> Found[CooperativeResult]:
@@ -136,4 +114,5 @@ COOPERATIVE = Analysis(
     run=_run,
     sentence=_sentence,
     examine=_examine,
+    assumes="sigmas of the INS",
 )

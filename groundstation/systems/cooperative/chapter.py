@@ -3,12 +3,21 @@
 How good it is, and on what it rests.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from groundstation.chapters.assessed import reason_of, without_answer
 from groundstation.chapters.parts import Cell, Facts, Figure, Front, Grid, Head, Mark, Note, Part, Section
 from groundstation.chapters.verdict import NOT_ASSESSABLE, sentence
-from groundstation.chapters.wording import any_value, clock, is_number, named_quantity, number, significant, words
+from groundstation.chapters.wording import (
+    any_value,
+    clock,
+    is_number,
+    named_quantity,
+    names_or_count,
+    number,
+    significant,
+    words,
+)
 from groundstation.results.arrays.cooperative import SessionClocks
 from groundstation.results.fleet import SessionRow
 from groundstation.results.flight import FlightResults
@@ -29,7 +38,7 @@ TITLES: Mapping[str, str] = {
     "pairwise": "Stored pairwise covariances",
 }
 REFERENCE = "dead_reckoning"
-MOST_LINKS, MOST_NAMES = 40, 6
+MOST_LINKS = 40
 ALGORITHM_HEADS = (
     *(Head("Algorithm"), Head("Update"), Head("2σ_r, worst at the end, m", True), Head("RMS error, m", True)),
     *(Head("RMS over the bound", True), Head("NEES (95 % limits)", True), Head("Consistent"), Head("Diverges")),
@@ -158,17 +167,6 @@ def session_front(results: FlightResults, pairs: tuple[tuple[str, Cell], ...]) -
         sentences=(_reason(answer, best),),
         figures=tuple(figures),
     )
-
-
-def names_or_count(names: Sequence[str]) -> str:
-    """Return the names of a few aircraft, or the count of many.
-
-    Examples
-    --------
-    >>> names_or_count(["A", "B"]), names_or_count(["A"] * 20)
-    ('A, B', '20 aircraft')
-    """
-    return ", ".join(names) if len(names) <= MOST_NAMES else f"{len(names)} aircraft"
 
 
 def _headline(best: AlgorithmRow) -> str:

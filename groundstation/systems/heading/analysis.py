@@ -6,10 +6,10 @@ It uses the user's intervals and the proof of ground contact.
 from typing import TYPE_CHECKING
 
 from groundstation.base.findings import Finding
-from groundstation.methods.roles import HeadingOnGround
+from groundstation.methods.roles import HeadingOnGround, LimitsOfTaxi
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.rules import Rejudged
-from groundstation.systems.analysis import Analysis, Found, RestsOn, Rules, Shortfall
+from groundstation.systems.analysis import Analysis, Found, RejudgeAlso, RestsOn, Rules, Shortfall
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.columns import COLUMNS
 from groundstation.systems.heading.settings import LIMITS, HeadingRequest, HeadingSettings
@@ -17,6 +17,8 @@ from groundstation.systems.known import Known
 from groundstation.systems.latency.answer import Latencies
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from groundstation.tables.table import Flight
 
 FIELDS = (
@@ -120,6 +122,16 @@ def _rejudge(answer: HeadingResult, settings: HeadingSettings) -> tuple[Rejudged
     return rejudge(answer, settings)
 
 
+def _rejudge_learned(out: "Path") -> RejudgeAlso:
+    from groundstation.systems.heading.installation.rejudged import rejudge_learned
+
+    return rejudge_learned(out)
+
+
+def _limits_of_taxi(known: Known) -> LimitsOfTaxi:
+    return LimitsOfTaxi(known.settings_of(HeadingSettings))
+
+
 HEADING = Analysis(
     name="heading",
     title="INS heading error and correction from GNSS on straight taxi (Markelov et al. 2015)",
@@ -134,6 +146,6 @@ HEADING = Analysis(
     sentence=_sentence,
     columns=COLUMNS,
     examine=_examine,
-    rules=Rules(LIMITS, _rejudge),
-    offers={HeadingOnGround: _on_ground},
+    rules=Rules(LIMITS, _rejudge, _rejudge_learned),
+    offers={HeadingOnGround: _on_ground, LimitsOfTaxi: _limits_of_taxi},
 )

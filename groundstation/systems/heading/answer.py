@@ -10,6 +10,7 @@ from typing import ClassVar, Literal
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
+from groundstation.results.roles import SettingsOfHeading
 
 Verdict = Literal["accept", "advisory", "reject", "extend", "undecided"]
 
@@ -123,7 +124,7 @@ class OnboardComparison:
 
 
 @dataclass(frozen=True)
-class HeadingResult(Answer):
+class HeadingResult(Answer, SettingsOfHeading):
     """INS heading error found on straight taxi (error = INS heading - true heading).
 
     Parameters

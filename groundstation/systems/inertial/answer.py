@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import rows_frame
+from groundstation.results.roles import ErrorsAlongTheFlight
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -183,7 +184,7 @@ class NavigationStart:
 
 
 @dataclass(frozen=True)
-class InertialResult(Answer):
+class InertialResult(Answer, ErrorsAlongTheFlight):
     """INS errors of one flight.
 
     For an INS that GNSS corrects already, it only has the differences from GNSS.

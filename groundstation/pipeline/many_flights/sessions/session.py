@@ -15,6 +15,7 @@ from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import RecordBatch
 from groundstation.base.signals import kind_of
+from groundstation.chapters.wording import names_or_count
 from groundstation.pipeline.many_flights.sessions.job import SessionJob, kept_session
 from groundstation.pipeline.one_flight.analyse import run_analyses
 from groundstation.pipeline.one_flight.convert import convert_log
@@ -39,8 +40,7 @@ from groundstation.results.files import load_document, load_manifest, put_failur
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.manifest import LogOfSession, Manifest, Resume
 from groundstation.systems import systems
-from groundstation.systems.cooperative.analysis import SessionKnown
-from groundstation.systems.cooperative.chapter import names_or_count
+from groundstation.systems.known import SessionKnown
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.session_assemble import AssembledSession, session_from_flights
 from groundstation.tables.session_settings import Stations
@@ -205,11 +205,12 @@ def _results(
     start_utc_ns = assembled.start_ns if assembled.has_utc else None
     identity = flight_id(start_utc_ns, {"aircraft": "session", "flight": joined_names(names)}, job.sha256)
     title = f"session of {names_or_count(names)}"
+    analyses = ", ".join(one.name for one in systems().session_analyses)
     size = sum(log.source.size_bytes for log in job.logs)
     told = sorted({flight.metadata.get("flight", "") for flight in flights} - {""})
     return FlightResults(
         flight_id=_free(job, identity),
-        source=Source(title, job.sha256, size, f"groundstation cooperative, {len(job.logs)} logs"),
+        source=Source(title, job.sha256, size, f"groundstation {analyses}, {len(job.logs)} logs"),
         metadata={"aircraft": ", ".join(names), "flight": ", ".join(told)},
         start_utc_ns=start_utc_ns,
         duration_s=assembled.duration_s,
@@ -226,7 +227,8 @@ def _results(
 def _assumed(job: SessionJob) -> Iterator[Finding]:
     """Findings of what the session takes for granted because nobody set it."""
     tables, settings = job.configuration.tables, job.configuration.settings.session
-    shipped = {"session": f"sigma of a range, {settings.range_sigma_m:g} m", "cooperative": "sigmas of the INS"}
+    shipped = {"session": f"sigma of a range, {settings.range_sigma_m:g} m"}
+    shipped |= {one.settings_table: one.assumes for one in systems().session_analyses if one.assumes}
     told = [what for table, what in shipped.items() if not tables.get(table)]
     if told:
         text = f"not set, so shipped values are used: {', '.join(told)}; the computed sigmas depend on them"
