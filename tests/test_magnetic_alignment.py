@@ -18,7 +18,6 @@ from groundstation.base.units import NS_PER_S
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.pipeline.one_flight import configuration as configured
 from groundstation.pipeline.one_flight.analyse import Given, analyse
-from groundstation.pipeline.one_flight.apply_deviation import ins_error_deg
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.answer import Answer, by_analysis
 from groundstation.results.flight import FlightResults, Source
@@ -35,6 +34,7 @@ from groundstation.systems.inertial.answer import AzimuthEstimate, InertialResul
 from groundstation.systems.known import AircraftData
 from groundstation.systems.magnetic.alignment import NOT_IN_INTERVAL, against_heading, align, refused
 from groundstation.systems.magnetic.answer import Alignment, MagneticResult
+from groundstation.systems.magnetic.apply_deviation import ins_error_deg
 from groundstation.systems.magnetic.attitude import field_in_body
 from groundstation.systems.magnetic.before_lift_off import (
     GroundRuns,

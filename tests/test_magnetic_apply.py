@@ -30,9 +30,7 @@ from groundstation.pipeline.many_flights.inputs import file_in
 from groundstation.pipeline.many_flights.remote.folder import RemoteFolder
 from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.many_flights.runs.dry_run import plan_many
-from groundstation.pipeline.one_flight.apply_deviation import APPLIED, NOT_APPLIED, Applied, apply_deviation
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.deviation_to_apply import Apply, asked_for
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.verbs.check import check_many
 from groundstation.reports.pdf import write_pdf
@@ -45,8 +43,10 @@ from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
 from groundstation.store.reader import read, read_info
+from groundstation.systems.known import Known
 from groundstation.systems.latency.answer import Latencies
 from groundstation.systems.magnetic.answer import ADVISORY, CardRow, MagneticResult
+from groundstation.systems.magnetic.apply_deviation import APPLIED, NOT_APPLIED, AppliedDeviation, apply_deviation
 from groundstation.systems.magnetic.corrected import CorrectedHeading, correct_heading
 from groundstation.systems.magnetic.deviation_answer import (
     DEVIATION_CSV,
@@ -56,7 +56,9 @@ from groundstation.systems.magnetic.deviation_answer import (
     deviation_from_csv,
     deviation_of,
 )
+from groundstation.systems.magnetic.deviation_to_apply import Apply, asked_for
 from groundstation.tables.assemble import flight_from_batches
+from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
 from tests import magnetic_example
 from tests.recording_contents import Contents
@@ -147,8 +149,9 @@ def table_text(deviation_deg: float = -WORST_DEG, *, rows: int = 360, **changes:
     return out.getvalue()
 
 
-def applied_to(flight: Flight, asked: Apply, results: FlightResults | None = None) -> Applied:
-    return apply_deviation(flight, results or analysed(flight), asked, Configuration().settings)
+def applied_to(flight: Flight, asked: Apply, results: FlightResults | None = None) -> AppliedDeviation:
+    known = Known(flight_phases(flight), settings=Configuration().settings.analyses)
+    return apply_deviation(flight, results or analysed(flight), asked, known)
 
 
 def codes(results: FlightResults) -> dict[str, str]:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from groundstation.plots.plot import Describe
     from groundstation.results.fleet import FleetResults
     from groundstation.results.flight import FlightResults
+    from groundstation.systems.applied import ApplyStep
     from groundstation.systems.study import StudyResult
 
 
@@ -114,6 +115,8 @@ class System:
         Descriptions of their figures, by the name that a chapter gives.
     fleet_tabs : callable
         Tabs of the recording of all flights.
+    apply : callable, optional
+        Imports what ``run --apply`` does behind the analyses and returns it; that of the first system that has one.
     """
 
     name: str
@@ -127,6 +130,7 @@ class System:
     fleet_chapters: "Callable[[], tuple[FleetChapter, ...]]" = _no_fleet_chapters
     fleet_plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
     fleet_tabs: Callable[[], tuple[FleetTab, ...]] = _no_fleet_tabs
+    apply: "Callable[[], ApplyStep] | None" = None
 
 
 @dataclass(frozen=True)
@@ -168,6 +172,11 @@ class Systems:
     def studies(self) -> tuple[Study, ...]:
         """Studies."""
         return tuple(study for one in self.every for study in one.studies)
+
+    @property
+    def apply(self) -> "ApplyStep | None":
+        """Step of ``run --apply``; None where no system has one."""
+        return next((one.apply() for one in self.every if one.apply is not None), None)
 
     @cached_property
     def answer_types(self) -> Mapping[str, type[Answer]]:

@@ -11,14 +11,14 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from groundstation.base.errors import SettingsError
+from groundstation.base.errors import SettingsError, UsageError
 from groundstation.base.toml_settings import settings_from
 from groundstation.base.toml_text import toml_table, toml_text
 from groundstation.integrity.limits import Thresholds, thresholds_from
 from groundstation.pipeline.one_flight.isolation import Isolation
 
 if TYPE_CHECKING:
-    from groundstation.pipeline.one_flight.deviation_to_apply import Apply
+    from groundstation.systems.applied import Asked
     from groundstation.systems.heading.installation.answer import Lesson
     from groundstation.systems.known import AircraftData, SiteData
     from groundstation.tables.session_settings import SessionSettings
@@ -132,8 +132,8 @@ class Configuration:
         Files, or names of shipped ones, that tell what the words of a recording's buses mean.
     files : mapping
         The file that a table was read from, for messages.
-    apply : Apply, optional
-        The deviation to add to the magnetic heading.
+    apply : Asked, optional
+        What a step behind the analyses is to apply: the deviation to add to the magnetic heading.
     references : References
         Files of which the one of the log's time judges the answers.
     weather : tuple of str
@@ -153,7 +153,7 @@ class Configuration:
     profile: str | None = None
     icds: tuple[str, ...] = ()
     files: Mapping[str, str] = field(default_factory=dict)
-    apply: "Apply | None" = None
+    apply: "Asked | None" = None
     references: References = NO_REFERENCES
     weather: tuple[str, ...] = ()
     lessons: "tuple[Lesson, ...] | None" = None
@@ -323,9 +323,12 @@ def applying(configuration: Configuration, apply: str) -> Configuration:
     """
     if not apply:
         return configuration
-    from groundstation.pipeline.one_flight.deviation_to_apply import asked_for
+    from groundstation.systems import systems
 
-    return replace(configuration, apply=asked_for(apply))
+    step = systems().apply
+    if step is None:
+        raise UsageError(f"--apply {apply}", "no system that applies anything")
+    return replace(configuration, apply=step.read(apply))
 
 
 def _refuse_wrong(icds: Iterable[str]) -> None:

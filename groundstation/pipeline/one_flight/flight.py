@@ -16,7 +16,7 @@ from groundstation.base.findings import SEVERITIES, Finding, worst
 from groundstation.base.records import RecordBatch
 from groundstation.base.to_disk import sync_folder
 from groundstation.pipeline.one_flight.analyse import Given, analyse
-from groundstation.pipeline.one_flight.apply_deviation import apply_deviation, corrected_name, write_corrected
+from groundstation.pipeline.one_flight.apply import apply_step, corrected_name, write_derived
 from groundstation.pipeline.one_flight.convert import Converted, convert_flight, parts_told
 from groundstation.pipeline.one_flight.identity import flight_id, sha256_of
 from groundstation.pipeline.one_flight.job import Job as Job
@@ -170,15 +170,15 @@ def _run(log: Log, version: Version, job: Job, partial: Path, watch: Stopwatch) 
     identity = flight_id(start_utc_ns, flight.metadata, log.source.sha256, number, add_suffix=job.add_suffix)
     with watch.stage("estimating"):
         results = analyse(flight, given_of(log, converted, identity), job.configuration)
-        asked = job.configuration.apply, job.configuration.settings
-        applied = attempt("applied deviation", "all", apply_deviation, flight, results, *asked, unless=OF_THE_WORLD)
+        asked = flight, results, job.configuration
+        applied = attempt("applied deviation", "all", apply_step, *asked, unless=OF_THE_WORLD)
         results = results if applied is None else applied.results
         for one in systems().analyses:
             attempt("columns", one.name, one.values, results.answers)  # of the tables of flights
     with watch.stage("saving"):
         if applied is not None:
             corrected = partial / corrected_name(identity)
-            write_corrected(corrected, converted.info, flight, applied, job.configuration.thresholds)
+            write_derived(corrected, converted.info, applied.derived, job.configuration.thresholds)
         results = replace(results, findings=with_failures(results.findings, failures()))
         mcap.rename(partial / f"{identity}.mcap")
         text = sentence(results)

@@ -22,7 +22,7 @@ from groundstation.base.errors import GroundstationError
 from groundstation.base.failures import is_incomplete
 from groundstation.base.findings import Finding
 from groundstation.base.version import __version__
-from groundstation.pipeline.one_flight.apply_deviation import APPLIED, corrected_name
+from groundstation.pipeline.one_flight.apply import corrected_name
 from groundstation.pipeline.one_flight.configuration import ISOLATION, Configuration
 from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.log import as_log, digest_of
@@ -34,6 +34,7 @@ from groundstation.results.files import load_document, load_manifest
 from groundstation.results.flight import Source
 from groundstation.results.manifest import Keys as Keys
 from groundstation.results.manifest import Manifest, PartOfRun, PowerUpOfRun
+from groundstation.systems.applied import APPLIED
 from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD
 
 Step = Literal["everything", "analysis", "reports", "pdf", "nothing"]  # what has to be done for a log
@@ -251,7 +252,7 @@ def _finished(
         resume.has_lost_data,
         summary.findings,
         bool(summary.results.get("magnetic")),
-        any(finding.code == APPLIED for finding in summary.findings),
+        any(finding.code.endswith(APPLIED) for finding in summary.findings),
         spoiled,
         "" if mcap is None else mcap.sha256,
         manifest.power_up,

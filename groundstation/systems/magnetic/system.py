@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter
     from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.plots.plot import Describe
+    from groundstation.systems.applied import ApplyStep
     from groundstation.systems.study import StudyResult
 
 
@@ -69,6 +70,12 @@ def _study_magnetic() -> "Callable[..., StudyResult]":
     return study_magnetic
 
 
+def _apply() -> "ApplyStep":
+    from groundstation.systems.magnetic.apply_deviation import STEP
+
+    return STEP
+
+
 SYSTEM = System(
     name="magnetic",
     analyses=(
@@ -87,4 +94,5 @@ SYSTEM = System(
     tabs=_tabs,
     fleet_chapters=_fleet_chapters,
     fleet_plots=_fleet_plots,
+    apply=_apply,
 )

@@ -4,22 +4,19 @@ The deviation is the flight's own or another's.
 """
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding, Severity
-from groundstation.base.ledger import Ledger
-from groundstation.base.records import MAX_BATCH_ROWS, Column, RecordBatch
-from groundstation.integrity.limits import Thresholds
-from groundstation.pipeline.one_flight.convert import census_of, recounted
-from groundstation.pipeline.one_flight.deviation_to_apply import Apply
-from groundstation.results.file_names import CORRECTED
+from groundstation.base.records import Column, RecordBatch
 from groundstation.results.flight import FlightResults
+from groundstation.systems.applied import APPLIED as APPLIED_END
+from groundstation.systems.applied import Applied, ApplyStep, Derived
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.inertial.answer import InertialResult
+from groundstation.systems.known import Known
 from groundstation.systems.latency.answer import Latencies
 from groundstation.systems.magnetic.answer import MagneticResult
 from groundstation.systems.magnetic.arrays import CorrectedHeadingRows
@@ -27,21 +24,20 @@ from groundstation.systems.magnetic.deviation_answer import (
     Deviation,
     deviation_of,
 )
+from groundstation.systems.magnetic.deviation_to_apply import Apply, asked_for
 from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:
-    from groundstation.pipeline.one_flight.configuration import UserSettings
-    from groundstation.store.info import StoreInfo
     from groundstation.systems.magnetic.corrected import CorrectedHeading
 
 TOPIC = "corrected_heading"
-APPLIED, NOT_APPLIED = "magnetic.applied", "magnetic.not_applied"
+APPLIED, NOT_APPLIED = f"magnetic{APPLIED_END}", "magnetic.not_applied"
 MOST_DRAWN = 20_000
 
 
 @dataclass(frozen=True)
-class Applied:
+class AppliedDeviation:
     """Result of ``--apply``: results with their findings, and the corrected heading, if any."""
 
     results: FlightResults
@@ -49,12 +45,7 @@ class Applied:
     corrected: "CorrectedHeading | None" = None
 
 
-def corrected_name(flight_id: str) -> str:
-    """Return the name of the MCAP with the corrected heading, beside the flight's own."""
-    return f"{flight_id}{CORRECTED}"
-
-
-def apply_deviation(flight: Flight, results: FlightResults, asked: Apply | None, settings: "UserSettings") -> Applied:
+def apply_deviation(flight: Flight, results: FlightResults, asked: Apply, known: Known) -> AppliedDeviation:
     """Add a deviation to the magnetic heading of a flight.
 
     A finding says what was done, or why nothing was.
@@ -64,19 +55,17 @@ def apply_deviation(flight: Flight, results: FlightResults, asked: Apply | None,
     flight : Flight
     results : FlightResults
         All answers of the flight: its own deviation, latencies, kind and error of the INS.
-    asked : Apply, optional
-        None: nothing is done.
-    settings : UserSettings
+    asked : Apply
+    known : Known
+        Settings and aircraft.
 
     Returns
     -------
-    Applied
+    AppliedDeviation
         ``results`` with the findings and, where it was applied, the figure ``corrected_heading``.
     """
     from groundstation.systems.magnetic.corrected import correct_heading
 
-    if asked is None:
-        return Applied(results)
     is_own = asked.deviation is None
     deviation = asked.deviation or _own(results)
     if deviation is None:
@@ -87,15 +76,17 @@ def apply_deviation(flight: Flight, results: FlightResults, asked: Apply | None,
         return _not_applied(results, f"{whose} is rejected{why}", "warn")
     try:
         corrected = correct_heading(
-            flight, deviation, settings=settings.of(MagneticSettings), latencies=results.answer(Latencies)
+            flight, deviation, settings=known.settings_of(MagneticSettings), latencies=results.answer(Latencies)
         )
     except NotAssessableError as error:
         return _not_applied(results, str(error).removeprefix("magnetic: "), "info")
     findings = [_told(corrected, deviation, whose)]
     if not is_own:
-        findings += [*_other_aircraft(results, deviation), *_judged(flight, results, corrected, settings)]
+        findings += [*_other_aircraft(results, deviation), *_judged(flight, results, corrected, known)]
     figures = (*results.figures, _figure(flight, corrected))
-    return Applied(replace(results, findings=(*results.findings, *findings), figures=figures), deviation, corrected)
+    return AppliedDeviation(
+        replace(results, findings=(*results.findings, *findings), figures=figures), deviation, corrected
+    )
 
 
 def _own(results: FlightResults) -> Deviation | None:
@@ -103,9 +94,9 @@ def _own(results: FlightResults) -> Deviation | None:
     return deviation_of(found, results.flight_id, results.metadata.get("aircraft", "")) if found else None
 
 
-def _not_applied(results: FlightResults, reason: str, severity: Severity) -> Applied:
+def _not_applied(results: FlightResults, reason: str, severity: Severity) -> AppliedDeviation:
     finding = Finding(severity, NOT_APPLIED, f"no magnetic deviation applied: {reason}")
-    return Applied(replace(results, findings=(*results.findings, finding)))
+    return AppliedDeviation(replace(results, findings=(*results.findings, finding)))
 
 
 def _told(corrected: "CorrectedHeading", deviation: Deviation, whose: str) -> Finding:
@@ -131,25 +122,22 @@ def _other_aircraft(results: FlightResults, deviation: Deviation) -> list[Findin
     return [Finding("warn", "magnetic.other_aircraft", text)]
 
 
-def _judged(
-    flight: Flight, results: FlightResults, corrected: "CorrectedHeading", settings: "UserSettings"
-) -> list[Finding]:
+def _judged(flight: Flight, results: FlightResults, corrected: "CorrectedHeading", known: Known) -> list[Finding]:
     """Return findings on whether the corrected heading is nearer to that of the flight's INS.
 
     It is compared with the heading before the deviation was added.
     """
     from groundstation.systems.magnetic.corrected import judge
-    from groundstation.tables.phases import flight_phases
 
     inertial = results.answer(InertialResult)
     found = judge(
         flight,
         corrected,
-        flight_phases(flight),
+        known.phases,
         kinds={inertial.ins_topic: inertial.kind} if inertial else {},
         ins_error_deg=ins_error_deg(results, corrected.ins_topic),
-        aircraft=settings.aircraft,
-        settings=settings.of(MagneticSettings),
+        aircraft=known.aircraft,
+        settings=known.settings_of(MagneticSettings),
     )
     if found is None:
         return []
@@ -203,45 +191,12 @@ def _fields(corrected: "CorrectedHeading") -> dict[str, np.ndarray]:
     }
 
 
-def write_corrected(target: Path, info: "StoreInfo", flight: Flight, applied: Applied, thresholds: Thresholds) -> None:
-    """Write the corrected heading as an MCAP on the clock of the flight's own.
-
-    Nothing is written where nothing was applied. Log times and device times are those of the samples it comes from, so
-    that a viewer opens both files together.
-
-    Parameters
-    ----------
-    target : Path
-    info : StoreInfo
-        Facts of the flight's MCAP: its clock and metadata are taken over, and whose deviation it is added.
-    thresholds : Thresholds
-        Limits of the ledger.
-    """
-    from groundstation.store.writer import StoreWriter
-
+def derived_of(flight: Flight, applied: AppliedDeviation) -> Derived | None:
+    """Return the records of the corrected heading, None where nothing was applied."""
     corrected, deviation = applied.corrected, applied.deviation
     if corrected is None or deviation is None:
-        return
-    batch = _batch(flight, corrected)
-    # Neither name nor digest of the log: this is a log of its own, and no twin of the one it comes from.
-    facts = replace(
-        info,
-        source_name=target.name,
-        source_sha256="",
-        start_ns=int(flight[corrected.topic].time_ns[corrected.rows[0]]),
-        metadata={**info.metadata, **_origin(corrected, deviation)},
-        ledger=Ledger(),
-        findings=(),
-        remarks=(),
-        damages=(),
-    )
-    census = census_of(facts, thresholds)
-    with StoreWriter(target, facts) as writer:
-        for start in range(0, len(batch), MAX_BATCH_ROWS):
-            part = batch.take(slice(start, start + MAX_BATCH_ROWS))
-            writer.write(part)
-            census.add(part)
-        writer.info = recounted(facts, [], census)
+        return None
+    return Derived(_batch(flight, corrected), _origin(corrected, deviation))
 
 
 def _batch(flight: Flight, corrected: "CorrectedHeading") -> RecordBatch:
@@ -279,3 +234,11 @@ def _origin(corrected: "CorrectedHeading", deviation: Deviation) -> dict[str, st
     if corrected.model:
         told[f"derived.{TOPIC}.true_heading_deg"] = f"magnetic heading + declination of {corrected.model}"
     return {name: text for name, text in told.items() if text}
+
+
+def _run(flight: Flight, results: FlightResults, asked: Apply, known: Known) -> Applied:
+    done = apply_deviation(flight, results, asked, known)
+    return Applied(done.results, derived_of(flight, done))
+
+
+STEP = ApplyStep(asked_for, _run)

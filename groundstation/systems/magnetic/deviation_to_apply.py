@@ -8,6 +8,7 @@ from typing import Any
 
 from groundstation.base.errors import UsageError
 from groundstation.results.file_names import SUMMARY
+from groundstation.systems.applied import Asked
 from groundstation.systems.magnetic.deviation_answer import (
     DEVIATION_CSV,
     Deviation,
@@ -21,7 +22,7 @@ EXPECTED = f"{OWN}, a flight folder, its {SUMMARY} or a {DEVIATION_CSV}"
 
 
 @dataclass(frozen=True)
-class Apply:
+class Apply(Asked):
     """Value of ``--apply`` as plain values, so that it travels to worker processes.
 
     ``deviation`` is None where it is to be the flight's own; ``sha256`` is of the file that another's was read from.
@@ -37,16 +38,14 @@ class Apply:
         return {"from": self.deviation.flight_id, "sha256": self.sha256}
 
 
-def asked_for(text: str) -> Apply | None:
-    """Return the deviation that the text of ``--apply`` asks for; None where it is empty.
+def asked_for(text: str) -> Apply:
+    """Return the deviation that the text of ``--apply`` asks for.
 
     Raises
     ------
     UsageError
         When it names nothing that holds a deviation.
     """
-    if not text:
-        return None
     if text == OWN:
         return Apply()
     path = Path(text)
