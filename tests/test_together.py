@@ -22,10 +22,10 @@ from groundstation.results.files import load
 from groundstation.store.reader import read
 from groundstation.store.writer import StoreWriter
 from groundstation.systems import systems
+from groundstation.systems.joining import NotOneFlightError
 from groundstation.systems.latency.signals import pairs_of
 from groundstation.systems.several_logs.answer import Together
 from groundstation.systems.several_logs.chapter import together as chapter
-from groundstation.systems.several_logs.relation import NotOneFlightError
 from groundstation.tables.motion import motion_of
 from groundstation.tables.sources import TOGETHER, choose_pair, ranked, said_of, sources_of_kind, why_first
 from groundstation.tables.table import Flight, Table

@@ -9,9 +9,10 @@ from groundstation.base.clock import Clock, RelationEntry, SegmentEntry
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
+from groundstation.systems.joining import NotOneFlightError
 from groundstation.systems.several_logs.gnss_time import GnssStretch, GnssTime, gnss_time_of
 from groundstation.systems.several_logs.relate import relate
-from groundstation.systems.several_logs.relation import LogRelation, NotOneFlightError, Stretch, TimedLog
+from groundstation.systems.several_logs.relation import LogRelation, Stretch, TimedLog
 from groundstation.tables.table import Flight
 from tests.two_clocks_example import RECEIVER_TIME, UTC_NS, Twice, recorded_twice, retimed, with_gnss_time
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from groundstation.results.fleet import FleetResults
     from groundstation.results.flight import FlightResults
     from groundstation.systems.applied import ApplyStep
+    from groundstation.systems.joining import JoinStep
     from groundstation.systems.study import StudyResult
 
 
@@ -117,6 +118,8 @@ class System:
         Tabs of the recording of all flights.
     apply : callable, optional
         Imports what ``run --apply`` does behind the analyses and returns it; that of the first system that has one.
+    join : callable, optional
+        Imports what relates the clocks of several logs for ``run --together``, and returns it.
     """
 
     name: str
@@ -131,6 +134,7 @@ class System:
     fleet_plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
     fleet_tabs: Callable[[], tuple[FleetTab, ...]] = _no_fleet_tabs
     apply: "Callable[[], ApplyStep] | None" = None
+    join: "Callable[[], JoinStep] | None" = None
 
 
 @dataclass(frozen=True)
@@ -177,6 +181,11 @@ class Systems:
     def apply(self) -> "ApplyStep | None":
         """Step of ``run --apply``; None where no system has one."""
         return next((one.apply() for one in self.every if one.apply is not None), None)
+
+    @property
+    def join(self) -> "JoinStep | None":
+        """Step of ``run --together``; None where no system has one."""
+        return next((one.join() for one in self.every if one.join is not None), None)
 
     @cached_property
     def answer_types(self) -> Mapping[str, type[Answer]]:

@@ -4,20 +4,18 @@ Each is converted and put on one clock, and its topics get names of their own.
 """
 
 import hashlib
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError, UsageError
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import DamagedSpan, Ledger
-from groundstation.base.normal import NORMAL_95
 from groundstation.base.records import HEADING_IS_TRACK, Damage, Int64Array, RecordBatch
-from groundstation.base.serial import to_json_exactly
 from groundstation.base.source_units import PREFIX as UNITS
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import ClockModel
@@ -30,13 +28,19 @@ from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.log import Log, as_log, open_log
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.store.info import StoreInfo
-from groundstation.systems.several_logs.answer import LABELS, JoinedLog, JoinedStretch, Joining
-from groundstation.systems.several_logs.gnss_time import gnss_time_of
-from groundstation.systems.several_logs.relate import relate
-from groundstation.systems.several_logs.relation import LogRelation, NotOneFlightError, TimedLog
-from groundstation.systems.several_logs.settings import TwoClocksSettings
+from groundstation.systems import systems
+from groundstation.systems.joining import (
+    ClockRelation,
+    JoinStep,
+    NotOneFlightError,
+    PlacedLog,
+    Timed,
+    Told,
+    name_in_flight,
+)
 from groundstation.tables.sources import TOGETHER
 
+LABELS = "bcdefghijklmnopqrstuvwxyz"  # labels of the logs behind the first, whose topics keep their names
 OF_FIELDS = ("derived.", f"{HEADING_IS_TRACK}.")  # keys about a field, <topic>.<field> behind them
 OF_THE_AIRCRAFT = ("aircraft", "flight", "start_utc")  # taken from another log where the first lacks them
 
@@ -52,12 +56,12 @@ class _Part:
     log: Log
     mcap: Path
     converted: Converted
-    timed: TimedLog
-    relation: LogRelation | None = None
+    timed: Timed
+    relation: ClockRelation | None = None
 
     def name(self, topic: str) -> str:
         """Return the name of one of its topics in the flight."""
-        return f"{topic}.{self.label}" if self.label and topic else topic
+        return name_in_flight(topic, self.label)
 
     def time_ns(self, own_ns: Int64Array) -> Int64Array:
         """Return its times on the clock of the flight."""
@@ -67,6 +71,13 @@ class _Part:
     def start_ns(self) -> int:
         """Time of its first sample on the clock of the flight."""
         return int(self.time_ns(np.array([self.timed.flight.start_ns]))[0])
+
+
+def _step() -> JoinStep:
+    step = systems().join
+    if step is None:
+        raise UsageError("--together", "no system that joins logs")
+    return step
 
 
 def joined_name(logs: Sequence[Log]) -> str:
@@ -102,7 +113,7 @@ def join_files(
     logs, used = with_strangers(logs, [path for path, _error in unclaimed])
     listen(Event("stage", joined_name(logs), "joining"))
     target.parent.mkdir(parents=True, exist_ok=True)
-    settings = configuration.settings.of(TwoClocksSettings)
+    settings = configuration.settings.of(_step().settings)
     left_out = [_left_out(path.name, error) for path, error in unclaimed if path not in used]
     return join_logs(logs, target, configuration.thresholds, settings=settings, left_out=left_out)
 
@@ -112,7 +123,7 @@ def join_logs(
     target: Path,
     thresholds: Thresholds | None = None,
     *,
-    settings: TwoClocksSettings | None = None,
+    settings: Any = None,
     left_out: Sequence[Damage] = (),
 ) -> Converted:
     """Write one MCAP of several logs of one flight.
@@ -132,10 +143,11 @@ def join_logs(
     UnreadableLogError
         When none can be read.
     """
-    limits = thresholds or shipped()
+    limits, step = thresholds or shipped(), _step()
+    settings = settings or step.settings()
     _require_different(logs, len(left_out))
     with TemporaryDirectory(prefix="groundstation-") as folder:
-        parts, unread = _converted(logs, Path(folder), limits, settings)
+        parts, unread = _converted(logs, Path(folder), limits, step, settings)
         left_out = (*left_out, *unread)
         if len(parts) == 1:
             info = _alone(parts[0], target, left_out)
@@ -143,21 +155,21 @@ def join_logs(
         clock_of = next((one for one in parts if one.timed.gnss_time), None)
         clock_of = clock_of or next((one for one in parts if one.timed.flight.has_utc), parts[0])
         try:
-            parts = [_related(one, clock_of, settings) for one in parts]
+            parts = [_related(one, clock_of, step, settings) for one in parts]
         except NotOneFlightError:
             whole = in_recordings([(one.log, one.converted, one.timed.flight) for one in parts])
             if len(whole) == len(parts):
                 raise
             return join_logs(whole, target, thresholds, settings=settings, left_out=left_out)
-        info = _written(parts, clock_of, target, limits, left_out)
+        info = _written(parts, clock_of, step, target, limits, left_out)
     has_lost = bool(left_out) or any(one.converted.has_lost_data for one in parts)
     return Converted(info, info.findings, has_lost)
 
 
-def _related(part: _Part, clock_of: _Part, settings: TwoClocksSettings | None) -> _Part:
+def _related(part: _Part, clock_of: _Part, step: JoinStep, settings: Any) -> _Part:
     if part is clock_of:
         return part
-    return replace(part, relation=relate(clock_of.timed, part.timed, settings=settings))
+    return replace(part, relation=step.relate(clock_of.timed, part.timed, settings))
 
 
 def _require_different(logs: Sequence[Log], left_out: int) -> None:
@@ -176,7 +188,7 @@ def _require_different(logs: Sequence[Log], left_out: int) -> None:
 
 
 def _converted(
-    logs: Sequence[Log], folder: Path, limits: Thresholds, settings: TwoClocksSettings | None
+    logs: Sequence[Log], folder: Path, limits: Thresholds, step: JoinStep, settings: Any
 ) -> tuple[list[_Part], list[Damage]]:
     """Convert the logs that can be read, and return a damage for each of the others.
 
@@ -195,7 +207,7 @@ def _converted(
             error = error or reason
             left_out.append(_left_out(log.source.name, reason))
             continue
-        timed = TimedLog(flight, gnss_time_of(converted.info.clock, converted.info.reader, settings))
+        timed = step.timed(flight, converted.info.clock, converted.info.reader, settings)
         parts.append(_Part(label, log, mcap, converted, timed))
     if not parts:
         raise error or UnreadableLogError("--together", "no log")
@@ -231,14 +243,20 @@ def _alone(part: _Part, target: Path, left_out: Sequence[Damage]) -> StoreInfo:
 
 
 def _written(
-    parts: Sequence[_Part], clock_of: _Part, target: Path, limits: Thresholds, left_out: Sequence[Damage]
+    parts: Sequence[_Part],
+    clock_of: _Part,
+    step: JoinStep,
+    target: Path,
+    limits: Thresholds,
+    left_out: Sequence[Damage],
 ) -> StoreInfo:
     from groundstation.store.writer import StoreWriter
 
     start_ns = min(one.start_ns for one in parts)
     of_clock = clock_of.converted.info
     blank = replace(of_clock, start_ns=start_ns)
-    infos, joined = [], []
+    infos: list[StoreInfo] = []
+    placed: list[PlacedLog] = []
     with StoreWriter(target, blank) as writer:
         for part in parts:
             info = _renamed(part, of_clock, start_ns)
@@ -249,9 +267,13 @@ def _written(
             if part is not clock_of:  # its times are others now
                 info = recounted(info, [], census)
             infos.append(info)
-            joined.append(_told(part, census.rows, mover.reordered, start_ns))
-        writer.info = _merged(parts, infos, Joining(tuple(joined)), of_clock, left_out)
+            placed.append(_placed(part, census.rows, mover.reordered))
+        writer.info = _merged(parts, infos, step.told(placed, start_ns), of_clock, left_out)
     return replace(writer.info, start_ns=start_ns)
+
+
+def _placed(part: _Part, rows: int, reordered: int) -> PlacedLog:
+    return PlacedLog(part.label, part.log.source, part.timed.flight.duration_s, part.relation, rows, reordered)
 
 
 class _Mover:
@@ -320,7 +342,7 @@ def _renamed(part: _Part, of_clock: StoreInfo, start_ns: int) -> StoreInfo:
 def _merged(
     parts: Sequence[_Part],
     infos: Sequence[StoreInfo],
-    joining: Joining,
+    told: Told,
     of_clock: StoreInfo,
     left_out: Sequence[Damage],
 ) -> StoreInfo:
@@ -348,12 +370,12 @@ def _merged(
         source_name=joined_name([part.log for part in parts]),
         source_sha256=hashlib.sha256("".join(shas).encode()).hexdigest(),
         reader=" + ".join(info.reader for info in infos),
-        metadata=_metadata(parts, joining),
+        metadata=_metadata(parts, told.text),
         start_ns=min(part.start_ns for part in parts),
         ledger=ledger,
         findings=(
             *_told_left_out(left_out),
-            *_findings(joining.logs),
+            *told.findings,
             *(finding for info in infos for finding in info.findings),
         ),
         remarks=tuple(remark for info in infos for remark in info.remarks),
@@ -361,7 +383,7 @@ def _merged(
     )
 
 
-def _metadata(parts: Sequence[_Part], joining: Joining) -> dict[str, str]:
+def _metadata(parts: Sequence[_Part], joining: str) -> dict[str, str]:
     """Return the metadata of all logs, and how they were joined.
 
     The first log's keys stay as they are, the others' are under their labels.
@@ -379,71 +401,4 @@ def _metadata(parts: Sequence[_Part], joining: Joining) -> dict[str, str]:
                 found[f"{part.label}.{key}"] = value
         for key in OF_THE_AIRCRAFT:
             found.setdefault(key, part.converted.info.metadata.get(key, ""))
-    text = json.dumps(to_json_exactly(joining), sort_keys=True)
-    return {key: value for key, value in {**found, TOGETHER: text}.items() if value}
-
-
-def _told(part: _Part, rows: int, reordered: int, start_ns: int) -> JoinedLog:
-    source, relation = part.log.source, part.relation
-    own = JoinedLog(part.label, source.name, source.sha256, source.reader, rows, "own_clock", reordered=reordered)
-    if relation is None:
-        return replace(own, reason="the flight uses its clock")
-    gap_sigma = relation.gnss_less_motion_sigma_s
-    return replace(
-        own,
-        method=relation.method,
-        reason=relation.reason,
-        remarks=relation.remarks,
-        signals=relation.signals,
-        reference_topic=relation.first_topic,
-        topic=part.name(relation.other_topic),
-        correlation=relation.correlation,
-        gnss_less_motion_s=relation.gnss_less_motion_s,
-        gnss_less_motion_half_width95_s=None if gap_sigma is None else NORMAL_95 * gap_sigma,
-        stretches=tuple(_stretches(part, relation, start_ns)),
-    )
-
-
-def _stretches(part: _Part, relation: LogRelation, start_ns: int) -> Iterator[JoinedStretch]:
-    flight = part.timed.flight
-    ends_s = [*(one.begin_s for one in relation.stretches[1:]), flight.duration_s]
-    base_s = (relation.first_start_ns - relation.other_start_ns) / NS_PER_S
-    to_flight_s = (relation.first_start_ns - start_ns) / NS_PER_S
-    for one, end_s in zip(relation.stretches, ends_s, strict=True):
-        begin_s = max(one.begin_s, 0.0)
-        at_s = np.array([begin_s, 0.5 * (begin_s + end_s), end_s])
-        half_s = NORMAL_95 * one.sigma_at(at_s)
-        is_known = bool(np.isfinite(half_s).all())
-        yield JoinedStretch(
-            start_s=float(begin_s + one.lag_at(begin_s)) + to_flight_s,
-            end_s=float(end_s + one.lag_at(end_s)) + to_flight_s,
-            method=one.method,
-            offset_s=base_s + float(one.lag_at(at_s[1])),
-            half_width95_s=float(half_s[1]) if is_known else None,
-            largest_half_width95_s=float(half_s.max()) if is_known else None,
-            drift_ppm=1e6 * one.drift if is_known else None,
-            drift_half_width95_ppm=1e6 * NORMAL_95 * one.drift_sigma if is_known else None,
-        )
-
-
-def _findings(joined: Sequence[JoinedLog]) -> Iterator[Finding]:
-    for log in joined:
-        if log.method == "own_clock":
-            continue
-        yield Finding("warn" if log.method == "file_time" else "info", "together.joined", joined_text(log))
-        for remark in log.remarks:
-            yield Finding("warn", "together.remark", f"{log.source_name}: {remark}")
-
-
-def joined_text(log: JoinedLog) -> str:
-    """Return in one line how a log was joined."""
-    longest = max(log.stretches, key=lambda one: one.end_s - one.start_s)
-    if longest.half_width95_s is None:
-        return f"{log.source_name} is joined by {log.reason}"
-    drift = ""
-    if longest.drift_ppm is not None and longest.drift_half_width95_ppm is not None:
-        drift = f", drift {longest.drift_ppm:+.1f} ppm (95 %: +- {longest.drift_half_width95_ppm:.1f})"
-    return (
-        f"{log.source_name} is joined with an offset of {longest.offset_s:+.3f} s (95 %: +- "
-        f"{longest.half_width95_s:.3f} s){drift} by {log.reason}"
-    )
+    return {key: value for key, value in {**found, TOGETHER: joining}.items() if value}

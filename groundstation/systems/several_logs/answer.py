@@ -7,7 +7,6 @@ from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
 
 JoinMethod = Literal["own_clock", "gnss_time", "motion", "gnss_time_and_motion", "file_time"]
-LABELS = "bcdefghijklmnopqrstuvwxyz"  # labels of the logs behind the first, whose topics keep their names
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,13 @@ from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.timescales import duration_text, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
+from groundstation.systems.joining import NotOneFlightError
 from groundstation.systems.several_logs.channels import Pair, Side, pair_of
 from groundstation.systems.several_logs.coarse import Place, grids_of, place_of, steps_of
 from groundstation.systems.several_logs.fine import MotionFit, fit_motion
 from groundstation.systems.several_logs.relation import LogRelation, NotOneFlightError, Stretch, TimedLog
+from groundstation.systems.several_logs.places import apart_m
+from groundstation.systems.several_logs.relation import LogRelation, Stretch, TimedLog
 from groundstation.systems.several_logs.settings import TwoClocksSettings
 from groundstation.tables.resample import join
 from groundstation.tables.table import Flight, Table

@@ -6,7 +6,6 @@ from typing import Literal
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.errors import GroundstationError
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
@@ -14,13 +13,6 @@ from groundstation.systems.several_logs.gnss_time import GnssTime
 from groundstation.tables.table import Flight
 
 Method = Literal["gnss_time", "motion", "gnss_time_and_motion", "file_time"]
-
-
-class NotOneFlightError(GroundstationError):
-    """Two logs cannot be put on one clock.
-
-    Nothing tells the lag between them, or they are of different flights.
-    """
 
 
 @dataclass(frozen=True)

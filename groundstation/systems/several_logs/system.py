@@ -9,6 +9,7 @@ from groundstation.systems.system import System, Tab
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter
     from groundstation.plots.plot import Describe
+    from groundstation.systems.joining import JoinStep
 
 
 def _chapters() -> "tuple[Chapter, ...]":
@@ -31,10 +32,17 @@ def _tabs() -> tuple[Tab, ...]:
     return (Tab(("together",), together),)
 
 
+def _join() -> "JoinStep":
+    from groundstation.systems.several_logs.joined import STEP
+
+    return STEP
+
+
 SYSTEM = System(
     name="several_logs",
     analyses=(TOGETHER_ANALYSIS,),
     chapters=_chapters,
     plots=_plots,
     tabs=_tabs,
+    join=_join,
 )
