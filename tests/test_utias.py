@@ -215,7 +215,7 @@ def test_sets_that_cannot_be_run_say_so_in_one_line(tmp_path: Path) -> None:
                 lambda name, text: "" if "_" in name and "Mark" not in name and name.startswith("Robot") else text,
             )
         )
-    assert groundstation("study", "heading", "--recorded", str(tmp_path), "-o", str(tmp_path / "out"))[0] == 2
+    assert groundstation("study", "heading", "--input", str(tmp_path), "-o", str(tmp_path / "out"))[0] == 2
 
 
 @pytest.mark.real_log
