@@ -10,7 +10,7 @@ DEV     := $(VENV)/.dev
 PIP     := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check types style slow fuzz golden schemas bench lock newest sbom clean help
+.PHONY: demo test robots check types style slow fuzz golden schemas bench lock newest sbom clean help
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -51,6 +51,11 @@ style:
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/python -m pytest -q tests/test_architecture.py
+
+# Beside .venv: the suite sees groundstation as it is installed, without readers of others.
+robots: $(DEV) ## tests of the plug-in benchmarks/recorded_robots, installed below build/
+	$(PIP) --upgrade --no-deps --target build/recorded_robots ./benchmarks/recorded_robots
+	PYTHONPATH=build/recorded_robots $(BIN)/python -m pytest -q benchmarks/recorded_robots/tests
 
 slow: $(DEV) ## the long Monte Carlo tests
 	$(BIN)/python -m pytest -q -n auto --dist worksteal -m slow

@@ -13,6 +13,7 @@ from groundstation.systems.cooperative.plain.sighting import sighting_of
 from groundstation.systems.cooperative.plain.split_covariance import fuse
 from groundstation.systems.cooperative.plain.steps import Event
 from groundstation.systems.cooperative.settings import CameraBelief, CooperativeSettings, OdometryBelief
+from groundstation.systems.cooperative.tracks import Track
 from groundstation.systems.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.tables.session import NO_SLOT, GroundPoint, Odometry, Ranges, Session
 
@@ -226,3 +227,25 @@ def test_fusion_is_never_too_sure_whatever_the_correlation() -> None:
         true = kept @ P @ kept.T + fused.gain @ (sensor + dependent) @ fused.gain.T
         true += -(kept @ cross @ fused.gain.T) - fused.gain @ cross.T @ kept.T
         assert np.linalg.eigvalsh(fused.P - true).min() > -1e-12
+
+
+def test_epochs_inside_a_gap_of_the_truth_are_not_judged() -> None:
+    time_s = np.arange(0.0, 10.0, 0.5)
+    track = Track("R1", time_s, np.zeros((20, 3)), np.zeros((20, 2)), np.tile(np.eye(2), (20, 1, 1)))
+    true_s = np.concatenate([np.arange(0.0, 3.1, 0.1), np.arange(7.0, 12.0, 0.1)])
+    vehicle = Odometry("R1", time_s, np.zeros(20), np.zeros(20), (0.0, 0.0), 0.0)
+    judged = judge(track, vehicle, true_s, np.zeros((len(true_s), 3)))
+    known = np.isfinite(judged.nees)
+    assert not known[(time_s > 3.0) & (time_s < 7.0)].any() and known[(time_s <= 3.0) | (time_s >= 7.0)].all()
+
+
+def test_a_gap_of_the_odometry_widens_the_sigma() -> None:
+    """Ten seconds without a reading: the motion itself may be wrong, all the gap long, and the filters know it."""
+    time_s = np.arange(0.0, 60.0, STEP_S)
+    speed, turn = np.full(len(time_s), 0.15), np.full(len(time_s), 0.2 * DEG)
+    whole = Odometry("R1", time_s, speed, turn, (0.0, 0.0), 0.0)
+    gapped = replace(whole, gap_s=np.where((time_s >= 20.0) & (time_s < 30.0), 10.0, 0.0))
+    noise = [WheeledVehicle(one, BELIEF).step(np.zeros(10), 20.0, 30.0)[2] for one in (gapped, whole)]
+    added = np.diag(noise[0] - noise[1])
+    assert np.sqrt(added[2]) == pytest.approx(0.2 * 10.0, rel=0.05), "radians: the whole turn of the gap"
+    assert np.sqrt(0.5 * (added[0] + added[1])) >= 0.15 * 10.0

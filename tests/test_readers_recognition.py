@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from groundstation.base.errors import GroundstationError, UnclaimedLogError
-from groundstation.readers import csv_profile, flat_csv, miluv, registry, rtklib_pos, sbet, utias
+from groundstation.readers import csv_profile, flat_csv, registry, rtklib_pos, sbet
 from groundstation.readers.sbet import RECORD
 from groundstation.readers.source import Source
 from tests.real_logs import REAL_LOGS, real_log
 from tests.trajectory_writer import sbet as flown
 
-READERS = (csv_profile, flat_csv, miluv, rtklib_pos, sbet, utias)
+READERS = (csv_profile, flat_csv, rtklib_pos, sbet)
 N = 60_000
 KINDS = ("i1", "u1", "<i2", "<u2", "<i4", "<u4", "<i8", "<u8", "<f4", "<f8")
 FACTORS = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 17.0)
@@ -91,7 +91,9 @@ def test_counters_behind_a_head_of_any_length(
     tmp_path_factory: pytest.TempPathFactory, start: int, kind: str, step: int, head: int
 ) -> None:
     path = tmp_path_factory.mktemp("r") / "file.bin"
-    path.write_bytes(bytes(head) + (np.arange(4000, dtype=np.float64) * step + start).astype(kind).tobytes())
+    with np.errstate(invalid="ignore"):  # a counter beyond its type is any number
+        counted = (np.arange(4000, dtype=np.float64) * step + start).astype(kind)
+    path.write_bytes(bytes(head) + counted.tobytes())
     assert claims(path) == []
 
 
@@ -159,10 +161,8 @@ def test_recorded_files_have_no_other_claims() -> None:
     """No recorded log of another format is claimed, nor a file that is none."""
     real_log("gnss/drive_0708_imu_1934.csv.tag")
     expected = {
-        **{folder: {"csv-profile"} for folder in ("g1000", "murp")},
+        "g1000": {"csv-profile"},
         **{folder: {"flat-csv"} for folder in ("fixedwing", "inertial", "reference_heading")},
-        "utias_mrclam6": {"utias"},
-        "miluv_30s": {"miluv"},
         "gnss": {"rtklib-pos"},
         **{folder: {"csv-profile", "flat-csv", "rtklib-pos"} for folder in ("cases", "reliability", "damaged")},
     }

@@ -22,12 +22,11 @@ from groundstation.base.signals import RAW_PREFIX, field_of, kind_of
 from groundstation.readers import registry
 from groundstation.readers.icd import shipped
 from tests import chapter10_packets as made
-from tests.logged_facts import ARINC_429, BAGS, DATAFLASH, G1000, HDF5, NMEA, POS, RAD, TLOG, UBX, ULOG, Fact
+from tests.logged_facts import ARINC_429, BAGS, DATAFLASH, G1000, HDF5, NMEA, POS, TLOG, UBX, ULOG, Fact
 from tests.logs_of_every_format import RNG_SEED, WRITTEN
 from tests.real_logs import REAL_LOGS, real_log
 from tests.test_g1000 import row as g1000_row
 from tests.test_g1000 import write as write_g1000
-from tests.test_utias import HEAD as UTIAS_HEAD
 
 ROUNDING = 1e-9  # relative: two factors that are multiplied in another order
 ANGLE_DEG = 1e-7
@@ -249,15 +248,6 @@ def test_values_of_a_flat_table(tmp_path: Path) -> None:
     path.write_text("\n".join((f"time_s,{','.join(names)}", *rows, "")))
     columns = {name: (at, 1.0) for at, name in enumerate(names, start=1)}
     assert assert_file_agrees(path, columns) == len(names)
-
-
-def test_values_of_wheels(tmp_path: Path) -> None:
-    """UTIAS: speed forward, and rate of turn in rad/s to the left."""
-    rng, path = np.random.default_rng(RNG_SEED), tmp_path / "Robot1_Odometry.dat"
-    rows = (f"{1_248_444_000 + at / 50:.3f} \t {rng.uniform():.3f} \t {rng.uniform():.3f}" for at in range(30))
-    path.write_text("\n".join((UTIAS_HEAD.format(kind="Odometry", columns="Time [s]    v    w"), *rows, "")))
-    columns = {"odometry.speed_mps": (1, 1.0), "odometry.turn_rate_dps": (2, -RAD)}
-    assert assert_file_agrees(path, columns, " ") == 2
 
 
 def test_values_of_bus_words(tmp_path: Path) -> None:

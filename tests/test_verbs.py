@@ -5,14 +5,18 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from groundstation.cli.main import app
+from groundstation.pipeline.verbs import synthesis
 from groundstation.simulation.scenario import scenario_names
 from groundstation.systems import systems
+from groundstation.systems.study import StudyResult, section
+from groundstation.systems.system import Study, System, Systems
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 
@@ -117,6 +121,20 @@ def test_every_study_that_is_listed_can_be_called(tmp_path: Path) -> None:
         (tmp_path / f"{name}.md").touch()  # a page that is there stops the study before its first run
         code, _, told = groundstation("study", name, "-o", str(tmp_path))
         assert (code, "a file that exists" in told) == (2, True)
+
+
+def test_a_study_that_reads_files_has_them_and_no_other_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def study(*, runs: int, seed: int, progress: Callable[[str], None], inputs: Path) -> StudyResult:
+        return StudyResult("read", (), (section(f"{inputs.name} read"),))
+
+    reading = System("reading", studies=(Study("read", "what is read", lambda: study, reads="a folder of logs"),))
+    monkeypatch.setattr(synthesis, "systems", lambda: Systems((*systems().every, reading)))
+    out = ("-o", str(tmp_path / "out"))
+    assert groundstation("study", "read", "--input", str(tmp_path / "logs"), *out)[:2] == (0, "# logs read\n\n")
+    code, _, told = groundstation("study", "read", "-o", str(tmp_path / "other"))
+    assert code == 2 and "read without --input, expected a folder of logs" in told
+    code, _, told = groundstation("study", "heading", "--input", str(tmp_path), "-o", str(tmp_path / "other"))
+    assert code == 2 and "--input with heading, which reads no files, expected read" in told
 
 
 @pytest.mark.slow

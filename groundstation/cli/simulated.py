@@ -51,20 +51,19 @@ def simulate(
 @answers_with_exit_code
 def study(
     name: Annotated[
-        Literal[
-            "heading", "crew", "installation", "forecast", "magnetic", "cooperative", "control", "landing", "approach"
-        ],
+        str,
         typer.Argument(
-            help="heading, crew, installation, forecast, magnetic, cooperative, control, landing or approach.",
+            help="heading, crew, installation, forecast, magnetic, cooperative, control, landing, approach, "
+            "or one of a plug-in.",
             metavar="NAME",
         ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the tables.", metavar="DIR")],
     runs: Annotated[int, typer.Option("--runs", help="Simulated runs of each family or case.", min=10)] = 200,
     seed: Annotated[int, typer.Option("--seed", help="Seed; those of families and cases follow from it.")] = 71,
-    recorded: Annotated[
+    inputs: Annotated[
         Path | None,
-        typer.Option("--recorded", help="Folder of recorded robots (cooperative only): run on them.", metavar="FOLDER"),
+        typer.Option("--input", help="Files or folder of a study that reads recorded data.", metavar="PATH"),
     ] = None,
     minutes: Annotated[
         float | None,
@@ -81,15 +80,13 @@ def study(
 ) -> int | None:
     """Run the Monte Carlo behind the published figures, ours beside them.
 
-    Or every algorithm on recorded robots (--recorded).
+    `groundstation list` names the studies.
     """
     from groundstation.cli.progress import listener
     from groundstation.pipeline.verbs.synthesis import study_to
 
     with listener("none" if quiet else progress) as listen:
-        text = study_to(
-            name, output, runs=runs, seed=seed, force=force, listen=listen, recorded=recorded, minutes=minutes
-        )
+        text = study_to(name, output, runs=runs, seed=seed, force=force, listen=listen, inputs=inputs, minutes=minutes)
     if not quiet:
         tell(text)
     return DONE

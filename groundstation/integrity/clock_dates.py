@@ -21,7 +21,7 @@ _YEARS: Mapping[str, int] = MappingProxyType(
     {"px4-ulog": 2016, "dataflash": 2010, "tlog": 2009, "chapter10": 2004, "csv profile garmin-g1000": 2006}
 )
 _USUAL_YEAR = 2000
-_OF_ANY_YEAR = ("flightdata-hdf5", "utias", "miluv", "sbet")  # recorders without a receiver, and dates of a file's name
+_OF_ANY_YEAR = ("flightdata-hdf5", "sbet")  # recorders without a receiver, and dates of a file's name
 
 
 def doubtful_dates(

@@ -24,13 +24,11 @@ from groundstation.readers import (
     flat_csv,
     flightdata_hdf5,
     magic,
-    miluv,
     receiver,
     rtklib_pos,
     sbet,
     tlog,
     ulog,
-    utias,
 )
 from groundstation.readers.compressed import COMPRESSIONS, compression_of
 from groundstation.readers.source import Claim, Reader, Source
@@ -40,7 +38,7 @@ if TYPE_CHECKING:
 
 ENTRY_POINT_GROUP = "groundstation.readers"
 FLAT_CSV = f"the flat CSV ({flat_csv.PAGE})"
-_OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv, miluv, rtklib_pos, utias)
+_OF_TEXT: tuple[Reader, ...] = (csv_profile, flat_csv, rtklib_pos)
 _BUILT_IN: tuple[Reader, ...] = (
     *(chapter10, dataflash, ulog, flightdata_hdf5, receiver, sbet, bags, tlog),
     *_OF_TEXT,

@@ -60,12 +60,16 @@ class Study:
         Imports the study and returns it: ``study(*, runs, seed, progress) -> StudyResult``.
     outcome : callable, optional
         Imports the type of one run and returns it, where runs are kept: the study then takes ``kept`` and ``minutes``.
+    reads : str
+        Files that it needs, in words for the user: ``a folder with recorded sets``. The study then takes ``inputs``,
+        the path given by ``--input``.
     """
 
     name: str
     title: str
     load: "Callable[[], Callable[..., StudyResult]]"
     outcome: Callable[[], type[Any]] | None = None
+    reads: str = ""
 
 
 def _no_chapters() -> "tuple[Chapter, ...]":

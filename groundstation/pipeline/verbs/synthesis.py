@@ -1,6 +1,7 @@
 """Simulated logs and Monte Carlo studies as files."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,6 +13,7 @@ from groundstation.systems import systems
 
 if TYPE_CHECKING:
     from groundstation.systems.study import StudyResult
+    from groundstation.systems.system import Study
 
 
 def simulate_to(
@@ -114,30 +116,30 @@ def study_to(
     seed: int,
     force: bool,
     listen: Listener,
-    recorded: Path | None = None,
+    inputs: Path | None = None,
     minutes: float | None = None,
 ) -> str:
     """Run a study into a folder: ``<name>.md`` and tables/*.csv; returns the page's text.
 
-    With ``recorded``, a folder with sets of recorded robots, the cooperative study runs on these. The studies of
-    the heading (heading, crew) and of the installation keep their runs in
-    ``runs/``: the same command goes on with them, ``minutes`` ends it before all are made; ``force`` makes them afresh.
+    ``inputs`` are the files of a study that reads some. Where a study keeps its runs, they are in ``runs/``: the same
+    command goes on with them, ``minutes`` ends it before all are made; ``force`` makes them afresh.
 
     Raises
     ------
     UsageError
-        When the page is there already and ``force`` is not given, or there is no such study.
+        When the page is there already and ``force`` is not given, there is no such study, it lacks its files, or it
+        reads none.
     """
     from groundstation.results.files import csv_text, write_text
 
     found = next((one for one in systems().studies if one.name == name), None)
     if found is None:
         raise UsageError("study", repr(name), f"one of {', '.join(one.name for one in systems().studies)}")
-    study = found.load() if recorded is None else _study_of(name, recorded)
     page = folder / f"{name}.md"
     kept = folder / "runs"
     if page.exists() and not force and not kept.is_dir():
         raise UsageError(str(page), "a file that exists", "a new folder", "-f overwrites it")
+    study = _with_inputs(found, inputs)
     if found.outcome is not None:
         study = _resumed(found.outcome(), study, kept, minutes, afresh=force)
     elif minutes is not None:
@@ -154,11 +156,20 @@ def study_to(
     return result.markdown
 
 
+def _with_inputs(study: "Study", inputs: Path | None) -> "Callable[..., StudyResult]":
+    """Load a study, with its files where it reads some."""
+    if study.reads and inputs is None:
+        raise UsageError("study", f"{study.name} without --input", study.reads)
+    if inputs is not None and not study.reads:
+        reading = " or ".join(one.name for one in systems().studies if one.reads)
+        raise UsageError("study", f"--input with {study.name}, which reads no files", reading)
+    return study.load() if inputs is None else partial(study.load(), inputs=inputs)
+
+
 def _resumed(
     outcome: type, study: "Callable[..., StudyResult]", folder: Path, minutes: float | None, *, afresh: bool
 ) -> "Callable[..., StudyResult]":
     """Return the study with its runs, of type ``outcome``, kept in a folder."""
-    from functools import partial
     from shutil import rmtree
 
     from groundstation.pipeline.verbs.kept_runs import KeptRuns
@@ -167,16 +178,3 @@ def _resumed(
         rmtree(folder)
     kept: KeptRuns[Any] = KeptRuns(folder, outcome)
     return partial(study, kept=kept, minutes=minutes)
-
-
-def _study_of(name: str, recorded: Path) -> "Callable[..., StudyResult]":
-    """Return the study of recorded sets as a function with the parameters of other studies."""
-    if name != "cooperative":
-        raise UsageError("study", f"--recorded with {name}", "cooperative")
-    from groundstation.pipeline.verbs.recorded import recorded_sets
-    from groundstation.systems.cooperative.study.recorded import study_recorded
-
-    def run(runs: int, seed: int, progress: Callable[[str], None]) -> "StudyResult":
-        return study_recorded(recorded_sets(recorded), progress)
-
-    return run

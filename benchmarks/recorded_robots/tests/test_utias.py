@@ -8,18 +8,21 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError, UsageError
-from groundstation.pipeline.verbs.recorded import recorded_sets
-from groundstation.readers import registry, utias
+from groundstation.readers import registry
 from groundstation.readers.source import Source
-from groundstation.systems.cooperative.consistency import judge
-from groundstation.systems.cooperative.study.recorded import SETTINGS, study_recorded
-from groundstation.systems.cooperative.tracks import Track
 from groundstation.systems.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.tables.session import Odometry
+from tests.logged_facts import RAD
+from tests.logs_of_every_format import RNG_SEED
 from tests.real_logs import real_log
 from tests.test_readers_contract import check
 from tests.test_readers_flat_csv import Read
-from tests.test_verbs import groundstation
+from tests.test_values_as_logged import assert_file_agrees
+
+pytest.importorskip("recorded_robots", reason="the plug-in is not installed: make robots")
+from recorded_robots import utias
+from recorded_robots.sets import recorded_sets
+from recorded_robots.study import SETTINGS, study_recorded
 
 HEAD = (
     "# UTIAS Multi-Robot Cooperative Localization and Mapping Dataset\n# produced by a test\n"
@@ -102,6 +105,15 @@ def test_units_signs_and_names(tmp_path: Path) -> None:
     )
 
 
+def test_values_of_wheels(tmp_path: Path) -> None:
+    """UTIAS: speed forward, and rate of turn in rad/s to the left."""
+    rng, path = np.random.default_rng(RNG_SEED), tmp_path / "Robot1_Odometry.dat"
+    rows = (f"{1_248_444_000 + at / 50:.3f} \t {rng.uniform():.3f} \t {rng.uniform():.3f}" for at in range(30))
+    path.write_text("\n".join((HEAD.format(kind="Odometry", columns="Time [s]    v    w"), *rows, "")))
+    columns = {"odometry.speed_mps": (1, 1.0), "odometry.turn_rate_dps": (2, -RAD)}
+    assert assert_file_agrees(path, columns, " ") == 2
+
+
 def test_compressed_and_under_another_name(tmp_path: Path) -> None:
     folder = write_set(tmp_path / "set")
     text = (folder / "Robot1_Odometry.dat").read_bytes()
@@ -182,16 +194,6 @@ def test_a_gap_of_the_odometry_is_told_and_widens_the_sigma(tmp_path: Path) -> N
     assert np.sqrt(0.5 * (added[0] + added[1])) >= 0.15 * 10.0
 
 
-def test_epochs_inside_a_gap_of_the_truth_are_not_judged() -> None:
-    time_s = np.arange(0.0, 10.0, 0.5)
-    track = Track("R1", time_s, np.zeros((20, 3)), np.zeros((20, 2)), np.tile(np.eye(2), (20, 1, 1)))
-    true_s = np.concatenate([np.arange(0.0, 3.1, 0.1), np.arange(7.0, 12.0, 0.1)])
-    vehicle = Odometry("R1", time_s, np.zeros(20), np.zeros(20), (0.0, 0.0), 0.0)
-    judged = judge(track, vehicle, true_s, np.zeros((len(true_s), 3)))
-    known = np.isfinite(judged.nees)
-    assert not known[(time_s > 3.0) & (time_s < 7.0)].any() and known[(time_s <= 3.0) | (time_s >= 7.0)].all()
-
-
 def test_robots_that_lack_a_file_are_left_out(tmp_path: Path) -> None:
     folder = write_set(tmp_path / "set", lambda name, text: "" if name == "Robot2_Odometry" else text)
     (found,) = recorded_sets(folder)
@@ -215,7 +217,6 @@ def test_sets_that_cannot_be_run_say_so_in_one_line(tmp_path: Path) -> None:
                 lambda name, text: "" if "_" in name and "Mark" not in name and name.startswith("Robot") else text,
             )
         )
-    assert groundstation("study", "heading", "--recorded", str(tmp_path), "-o", str(tmp_path / "out"))[0] == 2
 
 
 @pytest.mark.real_log

@@ -9,7 +9,7 @@ import numpy as np
 
 from groundstation.simulation.processes import gauss_markov
 from groundstation.tables.session import DeadReckoning
-from groundstation.tables.session_antennas import Poses
+from recorded_robots.antennas import Poses
 
 
 @dataclass(frozen=True)

@@ -7,19 +7,21 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import GroundstationError, UnreadableLogError, UsageError
-from groundstation.pipeline.verbs import recorded
-from groundstation.pipeline.verbs.recorded import recorded_sets
-from groundstation.readers import miluv, registry
+from groundstation.readers import registry
 from groundstation.readers.source import Source
-from groundstation.simulation.reckoning import ReckoningErrors, drifting_reckoning
 from groundstation.systems.cooperative.algorithms import run_algorithm
 from groundstation.systems.cooperative.consistency import judge
 from groundstation.systems.cooperative.events import prepare
-from groundstation.systems.cooperative.study.recorded import SETTINGS, study_recorded
-from groundstation.tables.session_antennas import Poses
 from tests.real_logs import real_log
 from tests.test_readers_contract import check
 from tests.test_readers_flat_csv import Read
+
+pytest.importorskip("recorded_robots", reason="the plug-in is not installed: make robots")
+from recorded_robots import miluv, sets
+from recorded_robots.antennas import Poses
+from recorded_robots.reckoning import ReckoningErrors, drifting_reckoning
+from recorded_robots.sets import recorded_sets
+from recorded_robots.study import SETTINGS, study_recorded
 
 TAGS = {"ifo001": {10: (0.2, -0.1, 0.05), 11: (-0.2, 0.1, 0.05)}, "ifo002": {20: (0.1, 0.2, 0.0)}}
 ANCHORS = {0: (3.0, 3.0, 1.5), 1: (-3.0, 3.0, 1.7), 2: (0.0, -4.0, 1.2)}
@@ -82,9 +84,9 @@ def test_ranges_fit_the_poses_with_their_lever_arms(tmp_path: Path, monkeypatch:
     """Rotations, signs and owners: with the true attitude the recorded range is that of the antennas."""
     folder = write_miluv(tmp_path / "set")
     check(list(registry.read(folder / "range_data.csv")))
-    monkeypatch.setitem(recorded.DRAWS, "miluv", 1)
+    monkeypatch.setitem(sets.DRAWS, "miluv", 1)
     exact = ReckoningErrors(0.0, 0.0, 30.0, 0.0, 100.0, 0.0)
-    monkeypatch.setattr(recorded, "drifting_reckoning", lambda poses, rng: drifting_reckoning(poses, rng, exact))
+    monkeypatch.setattr(sets, "drifting_reckoning", lambda poses, rng: drifting_reckoning(poses, rng, exact))
     (found,) = recorded_sets(folder)
     (session,) = found.sessions
     assert session.names == ("ifo001", "ifo002") and [point.name for point in session.points] == ["N0", "N1", "N2"]
@@ -155,7 +157,7 @@ def test_simulated_reckoning_drifts_as_stated() -> None:
 
 @pytest.mark.real_log
 def test_recorded_quadrotors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(recorded.DRAWS, "miluv", 1)
+    monkeypatch.setitem(sets.DRAWS, "miluv", 1)
     (found,) = recorded_sets(real_log("cooperative/miluv_30s"))
     assert len(found.sessions[0].ranges) == 2599 and found.sessions[0].names == ("ifo001", "ifo002", "ifo003")
     (table,) = study_recorded([found], algorithms=("dead_reckoning", "centralised")).tables
@@ -170,7 +172,7 @@ def test_recorded_pairs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     for path in real_log("cooperative/murp").glob("16_*.csv"):
         (tmp_path / path.name).write_text("\n".join(path.read_text().splitlines()[:41]) + "\n")
         check(list(registry.read(path)))
-    monkeypatch.setitem(recorded.DRAWS, "murp", 1)
+    monkeypatch.setitem(sets.DRAWS, "murp", 1)
     (found,) = recorded_sets(tmp_path)
     assert found.name.endswith(" 16") and found.sessions[0].names == ("M1", "M2", "M3")
     (table,) = study_recorded([found], algorithms=("dead_reckoning", "centralised")).tables

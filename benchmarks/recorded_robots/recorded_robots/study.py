@@ -28,7 +28,7 @@ from groundstation.systems.cooperative.settings import (
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 from groundstation.systems.study import StudyResult, grid, section, table
 from groundstation.tables.session import Session
-from groundstation.tables.session_robots import blinded
+from recorded_robots.robots import blinded
 
 Truth = Mapping[str, tuple[FloatArray, FloatArray]]
 Progress = Callable[[str], None]
@@ -194,7 +194,7 @@ def study_recorded(
     values = zip(*rows, strict=True) if rows else ((),) * len(COLUMNS)
     columns = dict(zip(COLUMNS, map(np.array, values), strict=True))
     data = FigureData("cooperative_recorded", columns, DIGITS)
-    return StudyResult("cooperative", (data,), _page(sets, data, remarks))
+    return StudyResult("recorded", (data,), _page(sets, data, remarks))
 
 
 def _page(sets: Sequence[RecordedSet], data: FigureData, remarks: Sequence[str]) -> tuple[Section, ...]:

@@ -12,16 +12,16 @@ from groundstation.base.findings import Finding
 from groundstation.base.records import Damage, RecordBatch
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
-from groundstation.readers import miluv, utias
 from groundstation.readers.source import Source
-from groundstation.simulation.reckoning import drifting_reckoning
 from groundstation.store.reader import read
-from groundstation.systems.cooperative.study.recorded import RecordedSet
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.session import GroundPoint, Session
-from groundstation.tables.session_antennas import Antenna, AntennaLog, antenna_ranges, poses_of, start_ns
-from groundstation.tables.session_robots import SEES, session_of_robots
 from groundstation.tables.table import Flight
+from recorded_robots import miluv, utias
+from recorded_robots.antennas import Antenna, AntennaLog, antenna_ranges, poses_of, start_ns
+from recorded_robots.reckoning import drifting_reckoning
+from recorded_robots.robots import SEES, session_of_robots
+from recorded_robots.study import RecordedSet
 
 TAGS, ANCHORS = "tags.yaml", "anchors.yaml"  # of a MILUV set
 LOG_SUFFIXES = (".csv", ".gz", ".zst")
