@@ -19,7 +19,7 @@ from groundstation.pipeline.one_flight.isolation import Isolation
 
 if TYPE_CHECKING:
     from groundstation.pipeline.one_flight.deviation_to_apply import Apply
-    from groundstation.systems.heading.installation.answer import Lesson
+    from groundstation.results.installations import Lesson
     from groundstation.systems.known import AircraftData, SiteData
     from groundstation.tables.session_settings import SessionSettings
 
@@ -305,7 +305,7 @@ def installed_as(configuration: Configuration, installation: Path | None) -> Con
     """
     if installation is None:
         return configuration
-    from groundstation.systems.heading.installation.answer import read_installations
+    from groundstation.results.installations import read_installations
 
     return replace(configuration, lessons=read_installations(installation).lessons)
 

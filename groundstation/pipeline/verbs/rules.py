@@ -20,9 +20,9 @@ from groundstation.pipeline.one_flight.configuration import Configuration, load_
 from groundstation.results.figures import FigureData
 from groundstation.results.files import SavedFlight, csv_text, load, mapping, write_text
 from groundstation.results.gates import Gate, judged_gate
+from groundstation.results.installations import InstalledFlight, installations_in
 from groundstation.results.rules import Rejudged
 from groundstation.systems import systems
-from groundstation.systems.heading.installation.answer import InstalledFlight, installations_in
 from groundstation.systems.heading.installation.outcome import verdict_of
 from groundstation.systems.heading.settings import HeadingSettings
 
