@@ -17,6 +17,7 @@ import numpy as np  # noqa: E402
 from filterpy.kalman import KalmanFilter  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 
+from groundstation.results.forecast_methods import FORECAST_METHODS  # noqa: E402
 from groundstation.systems.inertial.filter import (  # noqa: E402
     FilterRun,
     Smoothed,
@@ -24,7 +25,6 @@ from groundstation.systems.inertial.filter import (  # noqa: E402
     run_filter,
     smooth,
 )
-from groundstation.systems.inertial.forecast_answer import METHODS  # noqa: E402
 from groundstation.systems.inertial.hindcast import hindcast  # noqa: E402
 from groundstation.systems.inertial.leads import leads_of, start_epochs  # noqa: E402
 from groundstation.systems.inertial.settings import InertialSettings  # noqa: E402
@@ -78,7 +78,7 @@ def seconds_of(do: Callable[[], object], times: int = 1) -> float:
     return (time.process_time() - begin) / times
 
 
-def full_map(run: FilterRun, methods: Sequence[str] = tuple(METHODS)) -> int:
+def full_map(run: FilterRun, methods: Sequence[str] = tuple(FORECAST_METHODS)) -> int:
     """Errors from every minute's start to every minute's lead until the end of the flight, by some methods."""
     span_s = float(run.epochs.time_s[-1])
     at = start_epochs(run.epochs, GRID_S, GRID_S)
@@ -112,8 +112,8 @@ def main() -> None:
     print(f"  {theirs / ours:.0f} times as fast; largest difference {apart:.1e} sigma")
     errors = full_map(run)
     mapped = min(seconds_of(lambda: full_map(run)) for _ in range(ROUNDS))
-    print(f"full hindcast map, {errors} errors of {len(METHODS)} methods: {mapped:.2f} s on one core")
-    alone = [method for method in METHODS if method != "noise_bank"]  # that one runs filters of its own
+    print(f"full hindcast map, {errors} errors of {len(FORECAST_METHODS)} methods: {mapped:.2f} s on one core")
+    alone = [method for method in FORECAST_METHODS if method != "noise_bank"]  # that one runs filters of its own
     by_alone = min(seconds_of(lambda: full_map(run, alone)) for _ in range(ROUNDS))
     print(f"  of {len(alone)} methods, without the bank of noise sets: {by_alone:.2f} s")
     met = theirs / ours >= RATIO_GOAL and mapped <= MAP_GOAL_S and apart <= AGREE_SIGMAS

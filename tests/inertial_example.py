@@ -7,6 +7,7 @@ import numpy as np
 
 from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.results.figures import FigureData
+from groundstation.results.forecast_methods import FORECAST_HORIZONS_MIN, FORECAST_METHODS
 from groundstation.results.roles import AzimuthEstimate
 from groundstation.systems.inertial.answer import (
     ChannelResult,
@@ -18,8 +19,6 @@ from groundstation.systems.inertial.answer import (
     StateEstimate,
 )
 from groundstation.systems.inertial.forecast_answer import (
-    HORIZONS_MIN,
-    METHODS,
     CalibrationRow,
     ClassicStart,
     CoupledRow,
@@ -32,8 +31,8 @@ from tests.figure_arrays import figure
 
 SCHULER_S = 5064.0
 LONG_S = 16_000.0  # the paper's flight
-RAW_M = dict(zip(HORIZONS_MIN, (90.0, 430.0, 840.0, 2110.0, 1790.0, 1210.0, 2710.0), strict=True))
-FACTORS = dict(zip(METHODS, (1.0, 1.6, 0.6, 0.34, 0.30, 0.27, 0.31, 0.29, 0.26), strict=True))
+RAW_M = dict(zip(FORECAST_HORIZONS_MIN, (90.0, 430.0, 840.0, 2110.0, 1790.0, 1210.0, 2710.0), strict=True))
+FACTORS = dict(zip(FORECAST_METHODS, (1.0, 1.6, 0.6, 0.34, 0.30, 0.27, 0.31, 0.29, 0.26), strict=True))
 STATES = (
     ("position", "position error", "m"),
     ("velocity", "velocity error", "mps"),
@@ -252,13 +251,13 @@ def _classic(duration_s: float) -> FigureData:
 
 def forecast_figures(duration_s: float = LONG_S) -> tuple[FigureData, ...]:
     """Figures of the forecast; the classic starts where the flight is long enough for them."""
-    growth = {f"{name}_rms_m": [factor * RAW_M[h] for h in HORIZONS_MIN] for name, factor in FACTORS.items()}
+    growth = {f"{name}_rms_m": [factor * RAW_M[h] for h in FORECAST_HORIZONS_MIN] for name, factor in FACTORS.items()}
     figures = [
         _map(duration_s),
         _fan(duration_s),
         figure(
             "forecast_growth",
-            horizon_min=[float(horizon) for horizon in HORIZONS_MIN],
+            horizon_min=[float(horizon) for horizon in FORECAST_HORIZONS_MIN],
             starts=[43, 42, 41, 37, 31, 25, 19],
             **growth,
             sigma_m=[30.0, 110.0, 220.0, 520.0, 640.0, 700.0, 900.0],
@@ -277,7 +276,7 @@ def forecast_result(duration_s: float = LONG_S, **changes: Any) -> ForecastResul
             *((None, None) if method in without_band else (0.94, 0.71)),
         )
         for method, factor in FACTORS.items()
-        for horizon in HORIZONS_MIN
+        for horizon in FORECAST_HORIZONS_MIN
     )
     whole = ForecastResult(
         default_method="drift_windows",
@@ -305,8 +304,10 @@ def forecast_result(duration_s: float = LONG_S, **changes: Any) -> ForecastResul
             for method, share, nees in (("drift_windows", 0.94, 1.1), ("windows", 0.81, 2.3))
             for h in (10, 30, 60, 90, 120)
         ),
-        coupled=tuple(CoupledRow(float(h), 0.98 * FACTORS["last_estimate"] * RAW_M[h], 0.02) for h in HORIZONS_MIN),
-        best_method={str(horizon): "drift_windows" for horizon in HORIZONS_MIN},
+        coupled=tuple(
+            CoupledRow(float(h), 0.98 * FACTORS["last_estimate"] * RAW_M[h], 0.02) for h in FORECAST_HORIZONS_MIN
+        ),
+        best_method={str(horizon): "drift_windows" for horizon in FORECAST_HORIZONS_MIN},
         figures=forecast_figures(duration_s),
     )
     return replace(whole, **changes)

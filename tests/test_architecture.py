@@ -35,7 +35,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 }
 # What a file of a system may import besides files of its own system, by its role: the end of its name, or its folder.
 OF_A_ROLE: dict[str, set[str]] = {
-    "settings": {"base", "tables", "methods"},
+    "settings": {*SHARED, "methods"},
     "answer": {"base", "results"},
     "arrays": {"base", "results"},
     "chapter": PAGES,

@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.systems.inertial.estimate import Estimation, estimate_ins_errors
 from groundstation.systems.inertial.filter import Epochs, FilterRun, initial_of, run_filter
 from groundstation.systems.inertial.forecast import assess_forecast
-from groundstation.systems.inertial.forecast_answer import METHODS, ForecastResult
+from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.inertial.hindcast import hindcast
 from groundstation.systems.inertial.leads import leads_of, start_epochs
 from groundstation.systems.inertial.settings import InertialSettings
@@ -21,7 +22,7 @@ from tests.real_logs import real_log
 SETTINGS = InertialSettings()
 ROUNDING_M = 1e-6
 # RMS in metres at 10, 30, 60, 90 and 120 min on ff02 as published with the task: same starts, same protocol
-HORIZONS_MIN = (10.0, 30.0, 60.0, 90.0, 120.0)
+FORECAST_HORIZONS_MIN = (10.0, 30.0, 60.0, 90.0, 120.0)
 STARTS = (41, 37, 31, 25, 19)
 PUBLISHED = {
     "raw_ins": (842.0, 2116.0, 1788.0, 1209.0, 2710.0),
@@ -57,7 +58,7 @@ def cut(run: FilterRun, epoch: int) -> FilterRun:
     return run_filter(past, run.model, run.noise, gate=SETTINGS.gate_sigmas**2, initial=first)
 
 
-@pytest.mark.parametrize("method", [method for method in METHODS if method != "noise_bank"])
+@pytest.mark.parametrize("method", [method for method in FORECAST_METHODS if method != "noise_bank"])
 def test_a_start_uses_nothing_later_than_itself(found: Estimation, method: str) -> None:
     epoch = 9000
     whole = start_states(method, found.run, np.array([epoch]), SETTINGS)
@@ -86,7 +87,7 @@ def test_the_scale_of_the_sigma_uses_only_outages_that_were_over(found: Estimati
 
 
 def test_every_method_and_horizon_of_the_contract_is_there(forecast: ForecastResult) -> None:
-    assert {row.method for row in forecast.skill} == set(METHODS)
+    assert {row.method for row in forecast.skill} == set(FORECAST_METHODS)
     assert {row.horizon_min for row in forecast.skill} == {1.0, 5.0, 10.0, 30.0, 60.0, 90.0, 120.0}
     for row in forecast.skill:
         assert row.median_m <= row.p95_m
@@ -185,15 +186,15 @@ def real_forecast(tmp_path_factory: pytest.TempPathFactory) -> ForecastResult:
 @pytest.mark.parametrize("method", PUBLISHED)
 def test_simple_methods_agree_with_the_published_figures(real_forecast: ForecastResult, method: str) -> None:
     rows = {row.horizon_min: row for row in real_forecast.skill if row.method == method}
-    assert tuple(rows[horizon].starts for horizon in HORIZONS_MIN) == STARTS
+    assert tuple(rows[horizon].starts for horizon in FORECAST_HORIZONS_MIN) == STARTS
     digitised = 0.02  # the start of the fit, the mean latitude and the sphere are the author's own choice
-    for horizon, published in zip(HORIZONS_MIN, PUBLISHED[method], strict=True):
+    for horizon, published in zip(FORECAST_HORIZONS_MIN, PUBLISHED[method], strict=True):
         assert rows[horizon].rms_m == pytest.approx(published, rel=digitised)
 
 
 def test_the_shipped_method_beats_a_filter_tuned_on_another_flight(real_forecast: ForecastResult) -> None:
     rows = {row.horizon_min: row for row in real_forecast.skill if row.method == real_forecast.default_method}
-    for horizon, published in zip(HORIZONS_MIN, TUNED_ELSEWHERE, strict=True):
+    for horizon, published in zip(FORECAST_HORIZONS_MIN, TUNED_ELSEWHERE, strict=True):
         assert rows[horizon].rms_m < published
 
 

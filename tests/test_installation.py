@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from groundstation.systems.heading.installation.answer import InstallationResult, Lesson, Measured
+from groundstation.results.installations import Lesson, Measured
+from groundstation.systems.heading.installation.answer import InstallationResult
 from groundstation.systems.heading.installation.model import (
     doubts,
     factor_nodes,

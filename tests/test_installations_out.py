@@ -22,15 +22,10 @@ from groundstation.pipeline.verbs.rules import RulesTest, rules_test
 from groundstation.reports.flight_report import REPORT, write_flight_report
 from groundstation.results.files import load
 from groundstation.results.gates import judged_gate
+from groundstation.results.installations import INSTALLATIONS, Installations, installations_in, read_installations
 from groundstation.results.schema import installations_schema
 from groundstation.systems import systems
-from groundstation.systems.heading.installation.answer import (
-    INSTALLATIONS,
-    InstallationResult,
-    Installations,
-    installations_in,
-    read_installations,
-)
+from groundstation.systems.heading.installation.answer import InstallationResult
 from groundstation.systems.heading.installation.lesson import Stored, lesson_of
 from groundstation.systems.heading.installation.series import answer_from
 from groundstation.systems.heading.installation.settings import InstallationSettings

@@ -22,6 +22,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration, load_
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight, sentence
 from groundstation.pipeline.one_flight.log import open_log
+from groundstation.results.coefficients import LETTERS
 from groundstation.results.files import SavedFlight, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.manifest import Manifest
@@ -32,7 +33,7 @@ from groundstation.systems import systems
 from groundstation.systems.inertial.analysis import INERTIAL
 from groundstation.systems.magnetic import answer as answers
 from groundstation.systems.magnetic.analysis import MAGNETIC
-from groundstation.systems.magnetic.answer import LETTERS, MagneticResult
+from groundstation.systems.magnetic.answer import MagneticResult
 from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.tables.table import Flight
 from tests.real_logs import real_log

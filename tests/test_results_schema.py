@@ -13,6 +13,7 @@ from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.files import json_text
 from groundstation.results.flight import FlightResults, NotAssessable, Source
+from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.results.roles import AzimuthEstimate
 from groundstation.results.schema import schema_text
 from groundstation.results.summary import SCHEMA_VERSION, summary_of
@@ -157,7 +158,7 @@ def test_channels_of_the_ins_errors_stand_under_their_names() -> None:
 
 def test_methods_of_the_schema_are_those_of_the_forecast() -> None:
     for name, field in (("skill", "method"), ("forecast", "default_method")):
-        assert SCHEMA["$defs"][name]["properties"][field]["enum"] == list(outlook.METHODS)
+        assert SCHEMA["$defs"][name]["properties"][field]["enum"] == list(FORECAST_METHODS)
 
 
 def test_top_level_keys_stand_in_the_order_of_the_contract() -> None:

@@ -11,9 +11,9 @@ from groundstation.base.errors import UsageError
 from groundstation.pipeline.verbs.catalogue import catalogue
 from groundstation.pipeline.verbs.synthesis import study_to
 from groundstation.results.figures import FigureData
+from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.simulation.inertial_family import simulate_family
 from groundstation.systems import systems
-from groundstation.systems.inertial.forecast_answer import METHODS
 from groundstation.systems.inertial.hindcast import Hindcast
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.study import forecast
@@ -185,7 +185,7 @@ def test_study_writes_its_tables_and_page(monkeypatch: pytest.MonkeyPatch, left_
     tables: dict[str, FigureData] = {table.name: table for table in study.tables}
     assert len(tables) == len(study.tables)
     assert all(len(table) for table in study.tables)
-    assert set(tables["forecast_rms"]["method"]) == {*METHODS, COUPLED}
+    assert set(tables["forecast_rms"]["method"]) == {*FORECAST_METHODS, COUPLED}
     held_out = {case.name for case in cases.values() if case.is_held_out}
     assert set(tables["forecast_rms"]["case"][tables["forecast_rms"]["method"] == COUPLED]) == held_out
     assert set(tables["forecast_rms"]["starts"]) == {"all", "1.5 h", "2 h", "2.5 h", "3 h"}

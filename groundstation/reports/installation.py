@@ -8,13 +8,13 @@ between them changes.
 import re
 
 from groundstation.reports.page import render
-from groundstation.systems.heading.installation.answer import InstallationResult
+from groundstation.results.installations import LearnedHeading
 from groundstation.systems.heading.installation.chapter import parts, sentence
 
 TOP, CHAPTER = "installation-top", "installation"
 
 
-def with_installation(page: str, answer: InstallationResult | None) -> str:
+def with_installation(page: str, answer: LearnedHeading | None) -> str:
     """Return the page of a flight with a learned answer in its places; empty without one."""
     top = chapter = ""
     if answer is not None:

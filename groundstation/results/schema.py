@@ -16,7 +16,7 @@ from typing import Any
 
 from groundstation.base.serial import is_kept_apart
 from groundstation.results.document import SCHEMA_VERSION, SummaryDocument
-from groundstation.systems.heading.installation.answer import FORMAT_VERSION, Installations
+from groundstation.results.installations import FORMAT_VERSION, Installations
 
 TITLE = "summary.json of one flight"
 ABOUT = (
@@ -51,6 +51,7 @@ NAMES = {  # names of definitions that differ from the class name
     "DamagedSpan": "ledger_span",
     "RelationEntry": "clock_relation",
     "FlightDocument": "flight",
+    "LearnedHeading": "installation_result",
 }
 Schema = dict[str, Any]
 

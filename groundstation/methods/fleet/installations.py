@@ -7,12 +7,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.results.arrays.fleet import FleetInstallationFlights
-from groundstation.systems.heading.installation.answer import (
-    NAMED_PROBABILITY,
-    Installation,
-    InstallationRow,
-    InstalledFlight,
-)
+from groundstation.results.installations import NAMED_PROBABILITY, Installation, InstallationRow, InstalledFlight
 
 NUMBERS = (
     *("error_deg", "half_width_deg", "alone_error_deg", "alone_half_width_deg"),

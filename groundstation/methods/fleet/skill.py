@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.results.fleet import FleetSkill
-from groundstation.systems.inertial.forecast_answer import METHODS
+from groundstation.results.forecast_methods import FORECAST_METHODS
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ class SkillMerger:
             sums.coverage_starts += int(starts[known].sum())
 
     def rows(self) -> tuple[FleetSkill, ...]:
-        """Return what was added, by method in the order of ``METHODS``, then by horizon."""
-        order = {name: place for place, name in enumerate(METHODS)}
+        """Return what was added, by method in the order of ``FORECAST_METHODS``, then by horizon."""
+        order = {name: place for place, name in enumerate(FORECAST_METHODS)}
         keys = sorted(self._sums, key=lambda key: (order.get(key[0], len(order)), *key))
         return tuple(_row(method, horizon_min, self._sums) for method, horizon_min in keys)
 

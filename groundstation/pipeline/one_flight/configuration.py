@@ -18,8 +18,8 @@ from groundstation.integrity.limits import Thresholds, thresholds_from
 from groundstation.pipeline.one_flight.isolation import Isolation
 
 if TYPE_CHECKING:
+    from groundstation.results.installations import Lesson
     from groundstation.systems.applied import Asked
-    from groundstation.systems.heading.installation.answer import Lesson
     from groundstation.systems.known import AircraftData, SiteData
     from groundstation.tables.session_settings import SessionSettings
 
@@ -305,7 +305,7 @@ def installed_as(configuration: Configuration, installation: Path | None) -> Con
     """
     if installation is None:
         return configuration
-    from groundstation.systems.heading.installation.answer import read_installations
+    from groundstation.results.installations import read_installations
 
     return replace(configuration, lessons=read_installations(installation).lessons)
 

@@ -13,6 +13,7 @@ from groundstation.results.answer import Answer
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
+from groundstation.results.interval_parts import IntervalPart
 from groundstation.results.on_map import OnTaxi
 from groundstation.results.roles import FloatArray, HeadingByTrack, LatencyByTurns, SettingsOfHeading
 from groundstation.systems.heading.arrays import HeadingSamples
@@ -83,18 +84,6 @@ class TaxiWind:
     east_mps: float
     sigma_mps: float
     origin: str
-
-
-@dataclass(frozen=True)
-class IntervalPart:
-    """One part of the interval of the error: ``taxi``, ``wind`` or ``installation``.
-
-    The squares of the sigmas add up. ``half_width_deg`` is what the 95 % interval would be with this part alone.
-    """
-
-    name: str
-    sigma_deg: float
-    half_width_deg: float
 
 
 @dataclass(frozen=True)

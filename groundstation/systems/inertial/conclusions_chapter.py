@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 
 from groundstation.chapters.parts import Note
 from groundstation.chapters.wording import is_number, number, percent, typeset
-from groundstation.systems.inertial.forecast_answer import FEWEST_STARTS, METHODS, ForecastResult, SkillRow
+from groundstation.results.forecast_methods import FORECAST_METHODS
+from groundstation.systems.inertial.forecast_answer import FEWEST_STARTS, ForecastResult, SkillRow
 
 HONEST = (0.90, 0.98)  # shares inside the 95 % band that pass for it
 SAME = 0.03  # two RMS values closer than this are not told apart
@@ -27,7 +28,7 @@ def rows_of(answer: ForecastResult, method: str) -> dict[float, SkillRow]:
 
 def title_of(method: str) -> str:
     """Return the title of a method for people."""
-    return METHODS.get(method, method)
+    return FORECAST_METHODS.get(method, method)
 
 
 def _gain(answer: ForecastResult) -> Note | None:

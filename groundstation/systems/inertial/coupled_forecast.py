@@ -10,6 +10,7 @@ import numpy as np
 from groundstation.base.records import Int64Array
 from groundstation.methods.kalman import filter as kalman
 from groundstation.methods.kalman.arrays import REJECTED
+from groundstation.results.forecast_methods import FORECAST_HORIZONS_MIN
 from groundstation.systems.inertial.coupled import (
     CHANNELS,
     LONGEST_STEP_S,
@@ -21,7 +22,7 @@ from groundstation.systems.inertial.coupled import (
     noise_of,
 )
 from groundstation.systems.inertial.craft_motion import CraftMotion
-from groundstation.systems.inertial.forecast_answer import HORIZONS_MIN, CoupledRow
+from groundstation.systems.inertial.forecast_answer import CoupledRow
 from groundstation.systems.inertial.hindcast import Hindcast
 from groundstation.systems.inertial.model import POSITION, FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
@@ -108,7 +109,7 @@ def coupled_rows(
     separate: Hindcast,
     settings: InertialSettings,
     *,
-    horizons_min: Sequence[float] = HORIZONS_MIN,
+    horizons_min: Sequence[float] = FORECAST_HORIZONS_MIN,
     method: str = "last_estimate",
 ) -> tuple[CoupledRow, ...]:
     """Compare the coupled model with the separate channels: the gain at every horizon.

@@ -7,7 +7,7 @@ from groundstation.chapters.fleet.common import bounded, plural
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Note, Part, Section
 from groundstation.chapters.wording import clean, is_number, number, percent
 from groundstation.results.fleet import FleetResults, FleetSkill
-from groundstation.systems.inertial.forecast_answer import HORIZONS_MIN, METHODS
+from groundstation.results.forecast_methods import FORECAST_HORIZONS_MIN, FORECAST_METHODS
 
 HEADLINE_MIN = 60.0
 LEAD = (
@@ -69,12 +69,12 @@ def figures(fleet: FleetResults) -> tuple[KeyFigure, ...]:
 
 def method_title(name: str) -> str:
     """Return a method in words."""
-    return METHODS.get(name, clean(name))
+    return FORECAST_METHODS.get(name, clean(name))
 
 
 def _by_horizon(rows: list[FleetSkill], shipped: str) -> Grid:
     known = sorted({row.horizon_min for row in rows})
-    horizons = [value for value in known if value in HORIZONS_MIN] or known[: len(HORIZONS_MIN)]
+    horizons = [value for value in known if value in FORECAST_HORIZONS_MIN] or known[: len(FORECAST_HORIZONS_MIN)]
     found = {(row.method, row.horizon_min): row.rms_m for row in rows}
     heads = (Head("Method"), *(Head(f"{value:g} min", True) for value in horizons))
     table = [

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 from groundstation.base.errors import NotAssessableError
 from groundstation.results.figures import FigureData
+from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.systems.inertial import figures
 from groundstation.systems.inertial.bank import NoiseBank, run_bank
 from groundstation.systems.inertial.coupled import CoupledRun, run_coupled
 from groundstation.systems.inertial.coupled_forecast import coupled_rows, coupled_variance, hindcast_coupled
 from groundstation.systems.inertial.estimate import Estimation
 from groundstation.systems.inertial.filter import FilterRun
-from groundstation.systems.inertial.forecast_answer import METHODS, ClassicStart, ForecastResult, PhaseRow
+from groundstation.systems.inertial.forecast_answer import ClassicStart, ForecastResult, PhaseRow
 from groundstation.systems.inertial.gaps import gap_rows
 from groundstation.systems.inertial.hindcast import Hindcast, hindcast
 from groundstation.systems.inertial.leads import leads_of, start_epochs
@@ -66,10 +67,10 @@ def assess_forecast(
         raise NotAssessableError("forecast", f"{minutes:.0f} min of flight are too short for a replayed outage")
     coupled = estimation.coupled or run_coupled(estimation.compared, estimation.noise, settings)
     bank = run_bank(run, settings)
-    separate = hindcast(run, plan.at, plan.lead_s, tuple(METHODS), settings, bank)
+    separate = hindcast(run, plan.at, plan.lead_s, tuple(FORECAST_METHODS), settings, bank)
     since = slice(int(np.searchsorted(separate.start_s, plan.first_start_s - 1e-6)), None)
     replay = _with_own_variance(_of_model(separate, coupled, settings), coupled, settings)
-    claimed = {method: claimed_sigma(method, run, replay, settings) for method in METHODS}
+    claimed = {method: claimed_sigma(method, run, replay, settings) for method in FORECAST_METHODS}
     skill = skill_rows(replay, claimed, plan.horizons_min, plan.first_start_s)
     best = {
         f"{horizon:g}": min((row for row in skill if row.horizon_min == horizon), key=lambda row: row.rms_m).method
@@ -94,7 +95,9 @@ def assess_forecast(
         best_method=best,
         figures=(
             figures.map_figure(
-                _of_model(hindcast(run, grid_at, grid_lead_s, tuple(METHODS), settings, bank), coupled, settings)
+                _of_model(
+                    hindcast(run, grid_at, grid_lead_s, tuple(FORECAST_METHODS), settings, bank), coupled, settings
+                )
             ),
             figures.growth_figure(judged, default),
             figures.fan_figure(judged, settings.default_method, default),

@@ -8,23 +8,12 @@ from typing import ClassVar
 
 from groundstation.results.answer import Answer
 from groundstation.results.figures import FigureData
+from groundstation.results.forecast_methods import FORECAST_METHODS
 
 WITHIN, TOO_FEW = "within limits", "too few to judge"  # verdicts by NEES
 FEWEST_STARTS = 5  # independent ones: with fewer the limits of NEES are so wide that anything passes
 
 # Names of the contract, in the order they are shown; titles for people.
-METHODS: dict[str, str] = {
-    "raw_ins": "raw INS, no correction",
-    "hold_velocity": "last velocity error held",
-    "schuler_fit": "bias and Schuler sine fitted",
-    "last_estimate": "last estimate of the filter",
-    "windows": "long-period windows (paper)",
-    "drift_windows": "windows of the drift alone",
-    "consistent_windows": "consistent windows",
-    "smoothed_start": "smoothed start",
-    "noise_bank": "bank of noise sets",
-}
-HORIZONS_MIN = (1, 5, 10, 30, 60, 90, 120)
 
 
 @dataclass(frozen=True)
@@ -36,7 +25,7 @@ class SkillRow:
     the flight's past show.
     """
 
-    method: str = field(metadata={"one_of": tuple(METHODS)})
+    method: str = field(metadata={"one_of": tuple(FORECAST_METHODS)})
     horizon_min: float
     starts: int
     rms_m: float
@@ -82,7 +71,7 @@ class ClassicStart:
     """
 
     start_h: float
-    method: str = field(metadata={"one_of": tuple(METHODS)})
+    method: str = field(metadata={"one_of": tuple(FORECAST_METHODS)})
     horizon_min: float
     error_m: float
     east_error_m: float
@@ -97,7 +86,7 @@ class CalibrationRow:
     independent starts. ``scale`` is what the model's sigma was multiplied by (mean over the starts).
     """
 
-    method: str = field(metadata={"one_of": tuple(METHODS)})
+    method: str = field(metadata={"one_of": tuple(FORECAST_METHODS)})
     horizon_min: float
     starts: int
     independent_starts: int
@@ -146,7 +135,7 @@ class ForecastResult(Answer):
 
     analysis: ClassVar[str] = "forecast"
 
-    default_method: str = field(metadata={"one_of": tuple(METHODS)})
+    default_method: str = field(metadata={"one_of": tuple(FORECAST_METHODS)})
     first_start_s: float
     start_step_s: float
     is_calibrated: bool
@@ -157,7 +146,7 @@ class ForecastResult(Answer):
     classic_starts: tuple[ClassicStart, ...] = ()
     calibration: tuple[CalibrationRow, ...] = ()
     coupled: tuple[CoupledRow, ...] = ()
-    best_method: dict[str, str] = field(default_factory=dict, metadata={"one_of": tuple(METHODS)})
+    best_method: dict[str, str] = field(default_factory=dict, metadata={"one_of": tuple(FORECAST_METHODS)})
     figures: tuple[FigureData, ...] = ()
 
 

@@ -9,12 +9,12 @@ from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Part, Section, Tone, kept
 from groundstation.chapters.wording import clock, is_number, number, percent, words
 from groundstation.results.flight import FlightResults
+from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.inertial.claim_chapter import forecast_claim
 from groundstation.systems.inertial.conclusions_chapter import conclusions, rows_of, title_of
 from groundstation.systems.inertial.forecast_answer import (
     FEWEST_STARTS,
-    METHODS,
     CalibrationRow,
     CoupledRow,
     ForecastResult,
@@ -76,7 +76,7 @@ def _heads(first: str, titles: Iterable[str]) -> tuple[Head, ...]:
 
 def _skill(answer: ForecastResult) -> Grid | None:
     horizons = sorted({float(row.horizon_min) for row in answer.skill if is_number(row.horizon_min)})
-    methods = [name for name in METHODS if rows_of(answer, name)]
+    methods = [name for name in FORECAST_METHODS if rows_of(answer, name)]
     if not horizons or not methods:
         return None
     default = answer.default_method

@@ -10,7 +10,8 @@ from groundstation.plots.marks import AnyMark, Band, Cells, Curve, Dots, Emphasi
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import finite, thin
 from groundstation.results.flight import FlightResults
-from groundstation.systems.inertial.forecast_answer import FEWEST_STARTS, METHODS, CalibrationRow, ForecastResult
+from groundstation.results.forecast_methods import FORECAST_METHODS
+from groundstation.systems.inertial.forecast_answer import FEWEST_STARTS, CalibrationRow, ForecastResult
 from groundstation.systems.inertial.forecast_arrays import ForecastGrowth, ForecastMap
 
 OTHERS: tuple[Role, ...] = ("series 5", "series 6", "limit", "series 7", "series 4", "unused", "series 2")
@@ -27,7 +28,7 @@ def _shipped(results: FlightResults) -> str:
 
 def method_roles(default: str) -> dict[str, Role]:
     """Return a role for every method; raw INS and shipped method have roles of their own."""
-    others = (name for name in METHODS if name not in ("raw_ins", default))
+    others = (name for name in FORECAST_METHODS if name not in ("raw_ins", default))
     return {**dict(zip(others, OTHERS, strict=False)), "raw_ins": "ins", default: "answer"}
 
 
@@ -37,7 +38,7 @@ def growth(results: FlightResults) -> Plot | None:
     The line of the shipped method is thick.
     """
     data, default = results.rows_of(ForecastGrowth), _shipped(results)
-    known = [] if data is None else [name for name in METHODS if has_values(data.rms_m.get(name))]
+    known = [] if data is None else [name for name in FORECAST_METHODS if has_values(data.rms_m.get(name))]
     if data is None or not known or not has_values(data.horizon_min):
         return None
     horizon, roles = data.horizon_min, method_roles(default)
@@ -45,7 +46,7 @@ def growth(results: FlightResults) -> Plot | None:
     ordered = sorted(known, key=lambda name: (name == default, -_last(data.rms_m[name])))  # the shipped over the others
     for name in ordered:
         is_shipped = name == default
-        text = label(f"{METHODS[name]}{' (shipped)' if is_shipped else ''}")
+        text = label(f"{FORECAST_METHODS[name]}{' (shipped)' if is_shipped else ''}")
         heavy: Emphasis = "bold" if is_shipped else "usual"
         marks.append(Curve(x=horizon, y=positive(data.rms_m[name]), role=roles[name], name=text, emphasis=heavy))
     if data.sigma_m is not None and np.isfinite(data.sigma_m).any():
@@ -134,7 +135,9 @@ def hindcast_map(results: FlightResults) -> Plot | None:
     for name, cells in zip(names, cubes, strict=True):
         mark = Cells(x=hours, y=minutes, values=cells, low=0.0, high=top, title="radial error, m")
         y = Axis("" if panels else HORIZON)
-        panels.append(Panel((mark,), Axis("start, h of flight time"), y, title=METHODS.get(name, name), legend=""))
+        panels.append(
+            Panel((mark,), Axis("start, h of flight time"), y, title=FORECAST_METHODS.get(name, name), legend="")
+        )
     return Plot(
         "forecast.hindcast_map",
         "Hindcast map",

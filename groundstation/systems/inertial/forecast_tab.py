@@ -11,8 +11,9 @@ from groundstation.base.normal import NORMAL_95
 from groundstation.base.timescales import duration_text
 from groundstation.chapters.markdown import markdown
 from groundstation.results.flight import FlightResults
+from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.systems.inertial.arrays import InertialStates
-from groundstation.systems.inertial.forecast_answer import METHODS, ForecastResult
+from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.inertial.forecast_arrays import ForecastFan, ForecastMap
 from groundstation.systems.inertial.forecast_chapter import forecast as chapter
 from groundstation.viewer import colours
@@ -142,7 +143,7 @@ def _map(recorder: Recorder, results: FlightResults, answer: ForecastResult) -> 
         return []
     starts, horizons = np.unique(figure.start_s), np.unique(figure.horizon_min)
     shape = (len(starts), len(horizons))
-    known = [name for name in METHODS if name in figure.radial_m]
+    known = [name for name in FORECAST_METHODS if name in figure.radial_m]
     if shape[0] * shape[1] != len(figure) or not known:
         return []
     cubes = {name: figure.radial_m[name].reshape(shape) for name in known}

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.records import Int64Array
+from groundstation.results.forecast_methods import FORECAST_HORIZONS_MIN
 from groundstation.systems.inertial.filter import FilterRun
-from groundstation.systems.inertial.forecast_answer import HORIZONS_MIN
 from groundstation.systems.inertial.leads import PAST_FROM_S, built_up, leads_of, start_epochs
 from groundstation.systems.inertial.model import FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
@@ -68,7 +68,9 @@ def plan_replay(run: FilterRun, settings: InertialSettings) -> Plan:
             f"({run.model.schuler_period_min:.1f} min): the sigma depends on the class"
         )
     past = int(max(first - begin - PAST_FROM_S, 0.0) / step)
-    horizons = tuple(float(horizon) for horizon in HORIZONS_MIN if _judged(run, first, step, horizon) >= LEAST_STARTS)
+    horizons = tuple(
+        float(horizon) for horizon in FORECAST_HORIZONS_MIN if _judged(run, first, step, horizon) >= LEAST_STARTS
+    )
     lead_s = leads_of(LEAD_STEP_S, 60.0 * max(horizons, default=1.0))
     at = start_epochs(run.epochs, first - past * step, step)
     return Plan(first, step, at, horizons, lead_s, not reason, reason)

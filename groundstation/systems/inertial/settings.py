@@ -5,7 +5,7 @@ from typing import Literal
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import number
-from groundstation.systems.inertial.forecast_answer import METHODS
+from groundstation.results.forecast_methods import FORECAST_METHODS
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class InertialSettings:
     azimuth_sigma_max_deg: float = number(0.1, 0.0)
 
     def __post_init__(self) -> None:
-        if self.default_method not in METHODS:
-            raise SettingsError("default_method", repr(self.default_method), f"one of {', '.join(METHODS)}")
+        if self.default_method not in FORECAST_METHODS:
+            raise SettingsError("default_method", repr(self.default_method), f"one of {', '.join(FORECAST_METHODS)}")
         if not self.use_position and not self.use_velocity:
             raise SettingsError("use_position", "false, and use_velocity too", "at least one of them")

@@ -50,7 +50,7 @@ def start_states(method: str, run: FilterRun, at: Int64Array, settings: Inertial
     Parameters
     ----------
     method : str
-        A name of results.forecast.METHODS.
+        A name of results.forecast_methods.
     run : FilterRun
     at : ndarray of int, shape (s,)
         Epochs at which GNSS is lost; nothing later is looked at.

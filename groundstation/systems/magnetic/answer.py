@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from groundstation.results.answer import Answer
+from groundstation.results.coefficients import LETTERS
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
 from groundstation.results.roles import CompassCoefficients
@@ -21,7 +22,6 @@ MethodState = Literal["fitted", "refused"]
 TurnState = Literal["used", "rejected"]
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
-LETTERS = ("A", "B", "C", "D", "E")
 METHOD_TITLES: dict[MethodName, str] = {
     "compass_table": "branch table",
     "poisson_attitude": "iron fit",

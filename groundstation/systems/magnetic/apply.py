@@ -6,7 +6,8 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.methods import harmonics
-from groundstation.systems.magnetic.answer import LETTERS, PoissonParameters
+from groundstation.results.coefficients import LETTERS
+from groundstation.systems.magnetic.answer import PoissonParameters
 from groundstation.systems.magnetic.attitude import levelled_heading_deg
 from groundstation.systems.magnetic.compass_table import CENTRES_DEG
 from groundstation.systems.magnetic.iron import iron_of

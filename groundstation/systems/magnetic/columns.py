@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Mapping
 
+from groundstation.results.coefficients import LETTERS
 from groundstation.results.columns import AnswerColumn
-from groundstation.systems.magnetic.answer import LETTERS, MagneticResult, Method
+from groundstation.systems.magnetic.answer import MagneticResult, Method
 
 
 def _recommended(magnetic: MagneticResult) -> Method:

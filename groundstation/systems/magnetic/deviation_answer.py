@@ -12,17 +12,12 @@ from numpy.typing import NDArray
 
 from groundstation.base.errors import UsageError
 from groundstation.base.serial import MismatchError
+from groundstation.results.coefficients import LETTERS
 from groundstation.results.figures import FigureData
 from groundstation.results.files import csv_text, mapping
 from groundstation.results.flight import FlightResults
 from groundstation.results.restore import restored_answer
-from groundstation.systems.magnetic.answer import (
-    LETTERS,
-    METHOD_TITLES,
-    MagneticResult,
-    MagneticVerdict,
-    PoissonParameters,
-)
+from groundstation.systems.magnetic.answer import METHOD_TITLES, MagneticResult, MagneticVerdict, PoissonParameters
 from groundstation.systems.magnetic.arrays import MagneticCurves, MagneticTable
 
 DEVIATION_CSV, STEER_CARD = "deviation.csv", "steer_card.pdf"  # in the folder of a flight that has one

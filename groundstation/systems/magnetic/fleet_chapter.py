@@ -3,8 +3,9 @@
 from groundstation.chapters.fleet.common import aircraft_name, bounded
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Part, Section
 from groundstation.chapters.wording import ABSENT, number
+from groundstation.results.coefficients import LETTERS
 from groundstation.results.fleet import DeviationRow, FleetResults
-from groundstation.systems.magnetic.answer import ADVISORY, LETTERS, METHOD_TITLES
+from groundstation.systems.magnetic.answer import ADVISORY, METHOD_TITLES
 from groundstation.systems.magnetic.chapter import TONES
 
 TITLE = "Magnetic deviation by aircraft"

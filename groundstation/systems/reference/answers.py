@@ -6,10 +6,11 @@ from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.signals import kind_of
 from groundstation.results.arrays.typed import found_in
+from groundstation.results.forecast_methods import FORECAST_HORIZONS_MIN
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.arrays import HeadingSamples
 from groundstation.systems.inertial.answer import InertialResult
-from groundstation.systems.inertial.forecast_answer import HORIZONS_MIN, ForecastResult
+from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.inertial.forecast_arrays import ForecastFan
 from groundstation.systems.reference.answer import ForecastCheck, HeadingCheck
 from groundstation.systems.reference.errors import Errors
@@ -62,7 +63,7 @@ def forecast_checks(forecast: ForecastResult, inertial: InertialResult, errors: 
     if fan is None or inertial.ins_topic != errors.subject or kind_of(errors.subject) != "ins":
         return ()
     rows = []
-    for horizon_min in HORIZONS_MIN:
+    for horizon_min in FORECAST_HORIZONS_MIN:
         row = _forecast_row(fan, forecast.default_method, float(horizon_min), errors)
         if row is not None:
             rows.append(row)

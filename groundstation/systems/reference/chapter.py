@@ -8,7 +8,7 @@ from groundstation.chapters.gates import setting_facts
 from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, kept
 from groundstation.chapters.wording import ABSENT, interval, number, percent, significant, typeset, unit_sign
 from groundstation.results.flight import FlightResults
-from groundstation.systems.inertial.forecast_answer import METHODS
+from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.systems.reference.answer import (
     ClaimRow,
     ClaimState,
@@ -195,7 +195,7 @@ def _forecasts(answer: ReferenceResult) -> Grid | None:
         )
         for row in answer.forecasts
     ]
-    method = METHODS.get(answer.forecasts[0].method, "") if answer.forecasts else ""
+    method = FORECAST_METHODS.get(answer.forecasts[0].method, "") if answer.forecasts else ""
     caption = (
         f"Replayed outages, method: {method}. Errors against the reference, not against the GNSS that was withheld."
     )

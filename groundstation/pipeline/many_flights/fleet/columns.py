@@ -15,8 +15,8 @@ from groundstation.methods.fleet.skill import SkillOfFlight
 from groundstation.reports.index import IndexRow
 from groundstation.results.columns import FlightColumn
 from groundstation.results.flight import FlightResults
+from groundstation.results.installations import Lesson
 from groundstation.systems import systems
-from groundstation.systems.heading.installation.answer import Lesson
 
 BEFORE = (
     FlightColumn("flight_id", "text", "name of the flight and of its folder"),

@@ -17,19 +17,19 @@ from groundstation.pipeline.one_flight.sealing import note
 from groundstation.reports.flight_report import REPORT
 from groundstation.reports.installation import with_installation
 from groundstation.results.files import load, write_text
-from groundstation.systems import systems
-from groundstation.systems.heading.installation.analysis import sentence_of
-from groundstation.systems.heading.installation.answer import (
+from groundstation.results.installations import (
     INSTALLATIONS,
     METHOD_VERSION,
     Installation,
-    InstallationResult,
     Installations,
+    LearnedHeading,
     LeftOut,
     Lesson,
     installations_in,
     installations_text,
 )
+from groundstation.systems import systems
+from groundstation.systems.heading.installation.analysis import sentence_of
 from groundstation.systems.heading.installation.series import Series, installation_of, series_of
 from groundstation.systems.heading.installation.settings import InstallationSettings
 
@@ -119,13 +119,13 @@ def _text(path: Path) -> str:
         return ""
 
 
-def answers_in(found: Installations | None) -> dict[str, InstallationResult]:
+def answers_in(found: Installations | None) -> dict[str, LearnedHeading]:
     """The learned answers by flight id."""
     flights = (flight for one in found.installations for flight in one.flights) if found is not None else ()
     return {flight.lesson.flight_id: flight.answer for flight in flights if flight.answer is not None}
 
 
-def show_answers(out: Path, answers: Mapping[str, InstallationResult], names: Iterable[str]) -> list[str]:
+def show_answers(out: Path, answers: Mapping[str, LearnedHeading], names: Iterable[str]) -> list[str]:
     """Fill learned answers into the reports of some flights.
 
     Returns the flights whose report changed.

@@ -28,8 +28,8 @@ from groundstation.reports.fleet_report import PDF as FLEET_PDF
 from groundstation.reports.fleet_report import write_fleet_report
 from groundstation.reports.index import IndexRow
 from groundstation.results.file_names import INDEX_CSV, INDEX_JSON
+from groundstation.results.installations import INSTALLATIONS
 from groundstation.systems import systems
-from groundstation.systems.heading.installation.answer import INSTALLATIONS
 
 FLEET_RECORDING = "fleet.rrd"
 FLEET_FILES = (

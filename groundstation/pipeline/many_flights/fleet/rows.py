@@ -25,13 +25,13 @@ from groundstation.reports.index import index_row, reasons_of
 from groundstation.results.columns import Kind
 from groundstation.results.files import SavedFlight, load, mapping, utf8_text
 from groundstation.results.fleet import SessionRow
+from groundstation.results.installations import Lesson
 from groundstation.systems import systems
 from groundstation.systems.cooperative.answer import CooperativeResult
 from groundstation.systems.cooperative.chapter import REFERENCE, trusted
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.arrays import HeadingSamples
 from groundstation.systems.heading.figures import IN_PAUSE
-from groundstation.systems.heading.installation.answer import Lesson
 from groundstation.systems.heading.installation.lesson import lesson_of_flight
 from groundstation.systems.heading.references import REFERENCE_SIGMA_DEG, logged_reference
 from groundstation.systems.inertial.forecast_answer import TOO_FEW, WITHIN, CalibrationRow, ForecastResult, honesty

@@ -34,8 +34,8 @@ from groundstation.results.figures import FigureData
 from groundstation.results.file_names import INDEX_JSON, SUMMARY
 from groundstation.results.files import load, write_bytes
 from groundstation.results.fleet import FleetResults, NotInFleet, SessionRow
+from groundstation.results.installations import installations_in
 from groundstation.systems import systems
-from groundstation.systems.heading.installation.answer import installations_in
 
 FLEET_PARQUET = "fleet.parquet"
 SKILL_COLUMNS = {

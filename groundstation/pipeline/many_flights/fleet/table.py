@@ -17,7 +17,7 @@ from groundstation.reports.index import IndexRow
 from groundstation.results.columns import FlightColumn
 from groundstation.results.figures import FigureData
 from groundstation.results.files import parquet_bytes, utf8_text
-from groundstation.systems.heading.installation.answer import Lesson
+from groundstation.results.installations import Lesson
 
 MOST_WIDE_CHARACTERS = 10_000_000  # of a column of texts as wide as its longest; beyond it each is an object
 

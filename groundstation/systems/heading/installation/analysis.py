@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from groundstation.base.findings import Finding
 from groundstation.base.serial import from_json, to_json
 from groundstation.results.answer import Answers, answer_of
+from groundstation.results.installations import LearnedHeading
 from groundstation.systems.analysis import Analysis, Found
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.installation.answer import InstallationResult
@@ -45,7 +46,7 @@ def _finding(found: InstallationResult) -> Finding:
     return Finding("info", f"installation.{found.verdict}", sentence_of(found))
 
 
-def sentence_of(found: InstallationResult) -> str:
+def sentence_of(found: LearnedHeading) -> str:
     """A learned answer in a line."""
     if found.why_not:
         return f"nothing learned of the installation: {found.why_not}"

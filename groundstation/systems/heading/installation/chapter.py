@@ -7,9 +7,11 @@ from groundstation.chapters.parts import Claim, Facts, Grid, Head, Note, Part, R
 from groundstation.chapters.verdict import VERDICTS
 from groundstation.chapters.wording import ABSENT, clean, interval, is_number, number, step_places, typeset
 from groundstation.results.flight import FlightResults
-from groundstation.systems.heading.answer import HeadingResult, IntervalPart
+from groundstation.results.installations import Installed, LearnedHeading
+from groundstation.results.interval_parts import IntervalPart
+from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.claim_chapter import ADVICE, PARTS
-from groundstation.systems.heading.installation.answer import InstallationResult, Installed
+from groundstation.systems.heading.installation.answer import InstallationResult
 
 TITLE = "Installation, learned"
 LEAD = "What earlier flights of the same INS in the same aircraft say of its mounting and of the aircraft's crab."
@@ -38,24 +40,24 @@ def installation(results: FlightResults) -> Section | None:
     return Section("installation", TITLE, LEAD, parts(answer), told.headline, claim=told)
 
 
-def parts(answer: InstallationResult) -> tuple[Part, ...]:
+def parts(answer: LearnedHeading) -> tuple[Part, ...]:
     """Return the parts of a report on a learned answer."""
     if answer.why_not:
         return (nothing_learned(answer),)
     return kept((Note(sentence(answer)), _both(answer), _installed(answer.installed), _doubts(answer)))
 
 
-def not_learned(answer: InstallationResult) -> str:
+def not_learned(answer: LearnedHeading) -> str:
     """Return in one line why nothing was learned."""
     return f"Nothing learned of the installation: {typeset(answer.why_not)}"
 
 
-def nothing_learned(answer: InstallationResult) -> Note:
+def nothing_learned(answer: LearnedHeading) -> Note:
     """Return why nothing was learned, as a note."""
     return Note(f"{not_learned(answer)}.", "unknown")
 
 
-def what_to_enter(answer: InstallationResult, step_deg: float) -> str:
+def what_to_enter(answer: LearnedHeading, step_deg: float) -> str:
     """Return the number to type, or what to do instead."""
     if answer.verdict == "advisory":
         return f"Good to ± {_arcmin(answer.half_width_deg)} only: taxi the other way, or state the wind"
@@ -66,7 +68,7 @@ def what_to_enter(answer: InstallationResult, step_deg: float) -> str:
     return f"Nothing to enter: the error is below half the entry step of {number(step_deg, step_places(step_deg), '°')}"
 
 
-def sources(answer: InstallationResult) -> str:
+def sources(answer: LearnedHeading) -> str:
     """Return the parts of the interval in words.
 
     For example "this taxi ± 6′, wind ± 4′, installation of serial S from 7 flights ± 3′".
@@ -74,7 +76,7 @@ def sources(answer: InstallationResult) -> str:
     return _parts(answer.interval_parts, answer)
 
 
-def sentence(answer: InstallationResult) -> str:
+def sentence(answer: LearnedHeading) -> str:
     """Return the learned answer in a sentence or two: verdict, number, half width, parts."""
     what = f"{VERDICTS[answer.verdict].text}: heading error {number(answer.error_deg, 3, '°', signed=True)}"
     enter = f", enter {number(answer.correction_deg, 2, '°', signed=True)}" if is_number(answer.correction_deg) else ""
@@ -88,7 +90,7 @@ def sentence(answer: InstallationResult) -> str:
     )
 
 
-def _parts(listed: Sequence[IntervalPart], answer: InstallationResult) -> str:
+def _parts(listed: Sequence[IntervalPart], answer: LearnedHeading) -> str:
     names = {**PARTS, "installation": f"installation of serial {clean(answer.ins_serial)} from {answer.flights} "}
     names["installation"] += _flights(answer.flights)
     return ", ".join(f"{names.get(one.name, one.name)} ± {_arcmin(one.half_width_deg)}" for one in listed)
@@ -102,7 +104,7 @@ def _arcmin(value_deg: float) -> str:
     return number(value_deg * ARCMIN_PER_DEG, 0, "′")
 
 
-def _both(answer: InstallationResult) -> Grid:
+def _both(answer: LearnedHeading) -> Grid:
     platform = answer.platform_confidence95_deg
     rows = [
         (
@@ -148,7 +150,7 @@ def _with_sigma(value: float, sigma: float) -> str:
     return f"{number(value, 3, '°', signed=True)} (σ {number(sigma, 3, '°')})"
 
 
-def _doubts(answer: InstallationResult) -> Note | None:
+def _doubts(answer: LearnedHeading) -> Note | None:
     told = []
     if answer.changed:
         told.append(f"From {', '.join(map(clean, answer.changed))} on the unit sits otherwise, under the same serial.")

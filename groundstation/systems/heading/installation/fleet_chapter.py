@@ -15,7 +15,7 @@ from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Note, P
 from groundstation.chapters.verdict import VERDICTS
 from groundstation.chapters.wording import ABSENT, clean, is_number, number
 from groundstation.results.fleet import FleetResults
-from groundstation.systems.heading.installation.answer import InstallationRow
+from groundstation.results.installations import InstallationRow
 
 TITLE = "Installations"
 LEAD = (

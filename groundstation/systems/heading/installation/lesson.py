@@ -10,9 +10,9 @@ from groundstation.base.normal import NORMAL_95
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.results.answer import Answers, answer_meeting
 from groundstation.results.flight import FlightResults
+from groundstation.results.installations import Lesson, Measured, as_stored
 from groundstation.results.roles import AzimuthByTurns, CompassCoefficients, Delays
 from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.heading.installation.answer import Lesson, Measured, as_stored
 from groundstation.systems.heading.installation.settings import (
     MOUNTING_DEG,
     ORDINARY_WIND_MPS,

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
-from groundstation.systems.heading.installation.answer import Installed, Lesson
+from groundstation.results.installations import Installed, Lesson
 from groundstation.systems.heading.installation.settings import GROSS_DEG, InstallationSettings
 
 FloatArray = NDArray[np.float64]

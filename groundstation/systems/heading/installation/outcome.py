@@ -10,8 +10,9 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.normal import NORMAL_95
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.methods.intervals import mixture_quantile
-from groundstation.systems.heading.answer import IntervalPart
-from groundstation.systems.heading.installation.answer import InstallationResult, Lesson
+from groundstation.results.installations import Lesson
+from groundstation.results.interval_parts import IntervalPart
+from groundstation.systems.heading.installation.answer import InstallationResult
 from groundstation.systems.heading.installation.model import Belief, Mixture, doubts, installed, predict
 from groundstation.systems.heading.installation.settings import InstallationSettings
 from groundstation.systems.heading.verdict import WHOLE, is_mostly_steady, round_to_step

@@ -4,13 +4,8 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from groundstation.systems.heading.installation.answer import (
-    Installation,
-    InstallationResult,
-    InstalledFlight,
-    Lesson,
-    Pooled,
-)
+from groundstation.results.installations import Installation, InstalledFlight, Lesson, Pooled
+from groundstation.systems.heading.installation.answer import InstallationResult
 from groundstation.systems.heading.installation.model import Belief, doubts, first_belief, installed, learn
 from groundstation.systems.heading.installation.outcome import alone_answer, learned_answer, named
 from groundstation.systems.heading.installation.settings import POOLED_SIGMA, InstallationSettings

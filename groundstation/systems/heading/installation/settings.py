@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from groundstation.systems.heading.installation.answer import NAMED_PROBABILITY
+from groundstation.results.installations import NAMED_PROBABILITY
 
 ALIGNMENTS: Mapping[str, float] = {"gyrocompass": 0.1, "stored": 1.0}  # sigma of the heading error, deg, by kind
 UNKNOWN_ALIGNMENT_DEG = 3.0  # wide enough to teach nothing and to move nothing

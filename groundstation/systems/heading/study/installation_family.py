@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.normal import NORMAL_95
-from groundstation.systems.heading.installation.answer import Lesson
+from groundstation.results.installations import Lesson
 from groundstation.systems.heading.installation.settings import (
     MOUNTING_DEG,
     ORDINARY_WIND_MPS,

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from groundstation.chapters.parts import Grid, Section
 from groundstation.results.figures import FigureData
-from groundstation.systems.inertial.forecast_answer import METHODS
+from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.systems.inertial.study.cases import Case
 from groundstation.systems.inertial.study.runs import COUPLED, METHOD_NAMES, SETS_OF_STARTS, STUDY_HORIZONS_MIN
 from groundstation.systems.inertial.study.tables import BETTER, COMPARED, REFERENCE, UNDECIDED, WORSE
@@ -57,7 +57,7 @@ def _windows(cases: Sequence[Case], ratios: FigureData) -> Section:
         chosen = _rows(ratios, starts="all", method="windows") & np.isin(ratios["case"], group)
         said.append(f"Where {title} ({', '.join(group)}): {_tally(ratios['finding'][chosen])}.")
     for method in COMPARED[:2]:
-        said.append(f"{METHODS[method].capitalize()} against the last estimate, all starts:")
+        said.append(f"{FORECAST_METHODS[method].capitalize()} against the last estimate, all starts:")
         said += [f"{case.name}: {_in_words(ratios, case.name, method)}" for case in cases]
     cells = [
         [case.name, method, *(_cell(ratios, "ratio", 2, case=case.name, method=method, starts="all"))]

@@ -12,11 +12,11 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import frozen
+from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.simulation.inertial_family import ErrorBatch, simulate_family
 from groundstation.systems.inertial.coupled import run_coupled
 from groundstation.systems.inertial.coupled_forecast import coupled_variance, hindcast_coupled
 from groundstation.systems.inertial.filter import Epochs, FilterRun, run_filter
-from groundstation.systems.inertial.forecast_answer import METHODS
 from groundstation.systems.inertial.hindcast import Hindcast, hindcast
 from groundstation.systems.inertial.leads import MEMORY_S, built_up
 from groundstation.systems.inertial.replay import plan_replay
@@ -27,7 +27,7 @@ from groundstation.systems.inertial.study.cases import Case, differences_of, epo
 Progress = Callable[[str], None]
 
 COUPLED = "coupled"  # the last estimate of the coupled model; the others are those of two separate channels
-METHOD_NAMES = (*METHODS, COUPLED)
+METHOD_NAMES = (*FORECAST_METHODS, COUPLED)
 JUDGED_NAMES = (*WITH_SIGMA, COUPLED)
 STUDY_HORIZONS_MIN = (10.0, 30.0, 60.0, 84.0, 120.0)
 CLASSIC_START_H = (1.5, 2.0, 2.5, 3.0)
@@ -144,7 +144,7 @@ def replay_flight(case: Case, batch: ErrorBatch, row: int, is_calibrated: bool, 
     epochs = epochs_of(case, batch, row)
     run = run_filter(epochs, model_of(case, batch, row), case.noise, gate=case.gate)
     plan = plan_replay(run, settings)
-    replay = hindcast(run, plan.at, plan.lead_s, tuple(METHODS), settings)
+    replay = hindcast(run, plan.at, plan.lead_s, tuple(FORECAST_METHODS), settings)
     if case.is_held_out:
         replay = _with_coupled(replay, case, batch, row, settings)
     since = slice(int(np.searchsorted(replay.start_s, settings.first_start_s - 1e-6)), None)

@@ -12,6 +12,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.methods import harmonics
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.arrays.typed import found_in
+from groundstation.results.coefficients import LETTERS
 from groundstation.simulation.deviation import deviation_truth, levelled_heading_deg
 from groundstation.simulation.magnetometer import sensed_nt
 from groundstation.simulation.scenario import MagnetometerSettings, Scenario
@@ -19,7 +20,7 @@ from groundstation.simulation.trajectory import ANGLE_OF_ATTACK_DEG, Trajectory,
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.on_ground import Estimator
 from groundstation.systems.latency.answer import Latencies
-from groundstation.systems.magnetic.answer import LETTERS, MagneticResult, MethodName, PoissonParameters
+from groundstation.systems.magnetic.answer import MagneticResult, MethodName, PoissonParameters
 from groundstation.systems.magnetic.apply import corrected_by_iron, corrected_by_table
 from groundstation.systems.magnetic.arrays import MagneticSamples, MagneticTable
 from groundstation.systems.magnetic.compass_table import CENTRES_DEG, filled_on_circle

@@ -1,0 +1,3 @@
+"""Letters of the coefficients of a compass deviation, A to E."""
+
+LETTERS = ("A", "B", "C", "D", "E")
