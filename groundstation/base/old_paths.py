@@ -120,7 +120,6 @@ FILES = {
     "studies.magnetic_tables": "systems.magnetic.study.tables",
     "studies.magnetic_taxis": "systems.magnetic.study.taxis",
     "studies.page": "systems.study",
-    "studies.recorded": "systems.cooperative.study.recorded",
     "studies.shipped_plans": "systems.shipped_plans",
     "viewer.tabs.control": "systems.planning.session.tab",
     "viewer.tabs.cooperative": "systems.cooperative.tab",

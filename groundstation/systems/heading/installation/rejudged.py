@@ -5,9 +5,9 @@ from pathlib import Path
 
 from groundstation.base.digits import digits_of
 from groundstation.results.gates import judged_gate
+from groundstation.results.installations import InstalledFlight, installations_in
 from groundstation.results.rules import Rejudged
 from groundstation.systems.analysis import RejudgeAlso
-from groundstation.systems.heading.installation.answer import InstalledFlight, installations_in
 from groundstation.systems.heading.installation.outcome import verdict_of
 from groundstation.systems.heading.settings import HeadingSettings
 
