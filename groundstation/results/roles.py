@@ -127,6 +127,11 @@ class HeadingByTrack:
     verdict_reason: str
 
     @property
+    def azimuth(self) -> tuple[float, float]:
+        """Error of the platform's azimuth and its standard error, deg; the mounting taken off."""
+        raise NotImplementedError
+
+    @property
     def begins_s(self) -> float | None:
         """Flight second of the first straight part it rests on, None where there is none."""
         raise NotImplementedError

@@ -12,12 +12,10 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding, Severity
 from groundstation.base.records import Column, RecordBatch
 from groundstation.results.flight import FlightResults
+from groundstation.results.roles import AzimuthByTurns, Delays, HeadingByTrack, KindOfIns
 from groundstation.systems.applied import APPLIED as APPLIED_END
 from groundstation.systems.applied import Applied, ApplyStep, Derived
-from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.known import Known
-from groundstation.systems.latency.answer import Latencies
 from groundstation.systems.magnetic.answer import MagneticResult
 from groundstation.systems.magnetic.arrays import CorrectedHeadingRows
 from groundstation.systems.magnetic.deviation_answer import (
@@ -76,7 +74,7 @@ def apply_deviation(flight: Flight, results: FlightResults, asked: Apply, known:
         return _not_applied(results, f"{whose} is rejected{why}", "warn")
     try:
         corrected = correct_heading(
-            flight, deviation, settings=known.settings_of(MagneticSettings), latencies=results.answer(Latencies)
+            flight, deviation, settings=known.settings_of(MagneticSettings), latencies=results.answer_meeting(Delays)
         )
     except NotAssessableError as error:
         return _not_applied(results, str(error).removeprefix("magnetic: "), "info")
@@ -129,12 +127,12 @@ def _judged(flight: Flight, results: FlightResults, corrected: "CorrectedHeading
     """
     from groundstation.systems.magnetic.corrected import judge
 
-    inertial = results.answer(InertialResult)
+    known_ins = results.answer_meeting(KindOfIns)
     found = judge(
         flight,
         corrected,
         known.phases,
-        kinds={inertial.ins_topic: inertial.kind} if inertial else {},
+        kinds=known_ins.kinds if known_ins else {},
         ins_error_deg=ins_error_deg(results, corrected.ins_topic),
         aircraft=known.aircraft,
         settings=known.settings_of(MagneticSettings),
@@ -158,14 +156,14 @@ def ins_error_deg(results: FlightResults, ins_topic: str) -> float:
     """
     from groundstation.systems.magnetic.alignment import refused
 
-    magnetic, heading = results.answer(MagneticResult), results.answer(HeadingResult)
+    magnetic, heading = results.answer(MagneticResult), results.answer_meeting(HeadingByTrack)
     if magnetic is not None and magnetic.ins_topic == ins_topic:
         return magnetic.alignment.error_deg
     if heading is not None and heading.ins_topic == ins_topic and not refused(heading):
         error_deg, _sigma_deg = heading.azimuth
         return error_deg if np.isfinite(error_deg) else 0.0
-    inertial = results.answer(InertialResult)
-    azimuth = inertial.azimuth if inertial is not None and inertial.ins_topic == ins_topic else None
+    flown = results.answer_meeting(AzimuthByTurns)
+    azimuth = flown.azimuth if flown is not None and flown.ins_topic == ins_topic else None
     return azimuth.error_deg or 0.0 if azimuth is not None else 0.0
 
 
