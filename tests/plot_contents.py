@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.chapters.parts import Figure
-from groundstation.chapters.plots.comparison import COMPARED, sides_of
+from groundstation.chapters.plots.comparison import sides_of
 from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.verbs.compare import compare
@@ -29,7 +29,7 @@ from groundstation.results.manifest import Manifest
 from groundstation.systems import systems
 from tests import plot_cases, viewer_example
 from tests.saved import load
-from tests.told import PLOTS
+from tests.told import COMPARED, PLOTS
 
 Contents = dict[str, dict[str, list[str]]]  # lines by plot and panel
 KEPT = Path(__file__).parent / "references" / "plots.json"

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from groundstation.base.errors import UnreadableLogError, UsageError
 from groundstation.base.normal import NORMAL_95
-from groundstation.chapters.plots.comparison import COMPARED, sides_of
+from groundstation.chapters.plots.comparison import sides_of
 from groundstation.cli.main import app
 from groundstation.pipeline.many_flights.inputs import collect
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -24,7 +24,6 @@ from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.verbs.alignment import align, events_of
 from groundstation.pipeline.verbs.clip import Wanted, clip
 from groundstation.pipeline.verbs.compare import compare, compare_to, deltas_of
-from groundstation.reports.comparison import comparison_html
 from groundstation.results.answer import by_analysis
 from groundstation.results.comparison import Comparison, Delta
 from groundstation.results.figures import FigureData
@@ -35,10 +34,11 @@ from groundstation.simulation.samples import write_scenario
 from groundstation.systems import systems
 from groundstation.systems.inertial.answer import InertialResult, RealOutage
 from groundstation.systems.inertial.arrays import InertialStates
-from groundstation.viewer.comparison import COOPERATIVE, FORECAST, HEADING, INERTIAL, OVER_TIME, write_comparison
+from groundstation.viewer.comparison import OVER_TIME
 from tests.inertial_example import inertial_result
 from tests.recording_contents import Contents
 from tests.saved import load
+from tests.told import COMPARED, comparison_html, write_comparison
 from tests.viewer_example import make_flight, make_results
 from tests.viewer_shots import ALL_OR_SOME, chosen, colourful, pages, picture
 
@@ -309,7 +309,7 @@ def test_every_figure_of_every_analysis_is_laid_over(tmp_path: Path) -> None:
 
 
 def test_every_figure_of_the_page_has_its_place_in_the_recording() -> None:
-    rows = (*OVER_TIME, *HEADING, *INERTIAL, *COOPERATIVE, *FORECAST)
+    rows = (*OVER_TIME, *(row for one in systems().compared for row in one.rows))
     assert {"tracks", *(name for row in rows for name in row)} == set(COMPARED)
 
 

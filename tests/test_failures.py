@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, cast
 
 import pytest
 import rerun.blueprint as rrb
@@ -16,7 +16,7 @@ from groundstation.chapters import by_answer
 from groundstation.chapters.chapter import Chapters
 from groundstation.chapters.parts import Figure, Note, Section
 from groundstation.chapters.plots.acceptance import JUDGED
-from groundstation.chapters.plots.comparison import COMPARED
+from groundstation.chapters.plots.comparison import COMPARED, Compared
 from groundstation.cli.main import main
 from groundstation.pipeline.many_flights.fleet import publishing
 from groundstation.pipeline.many_flights.runs.batch import run_many
@@ -315,11 +315,7 @@ def test_a_tab_of_a_flight_that_fails_leaves_the_others(
 
 @pytest.mark.parametrize(
     ("tabs", "name"),
-    [
-        (one, name)
-        for one in (viewer_fleet.TABS, viewer_fleet.TABS_BEHIND, viewer_comparison.TABS, OF_PLANS)
-        for name in one
-    ],
+    [(one, name) for one in (viewer_fleet.TABS, viewer_fleet.TABS_BEHIND, OF_PLANS) for name in one],
     ids=lambda one: one if isinstance(one, str) else "",
 )
 def test_a_tab_of_another_recording_that_fails_leaves_the_others(
@@ -333,13 +329,32 @@ def test_a_tab_of_another_recording_that_fails_leaves_the_others(
     with gathered_failures():
         if tabs in (viewer_fleet.TABS, viewer_fleet.TABS_BEHIND):
             viewer_fleet.write_fleet_recording(path, fleet, systems())
-        elif tabs is OF_PLANS:
+        else:
             planned = shipped_but(tabs=tuple(Tab((one,), tab) for one, tab in made.items()))
             viewer_plan.write_plan_recording(path, replace(ANSWERED, answers={}, figures=()), planned)
-        else:
-            saved = load(folder)
-            compared = _compared(folder)
-            viewer_comparison.write_comparison(path, compared, saved, saved)
+        assert codes() == [f"internal.tab.{name}"]
+    assert path.is_file()
+
+
+@pytest.mark.parametrize("name", ["overview", "heading", "inertial"])
+def test_a_tab_of_a_comparison_that_fails_leaves_the_others(
+    name: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if name == "overview":
+        monkeypatch.setattr(viewer_comparison, "_overview", fails)
+    broken = tuple(
+        Compared(one, one, {"a": fails if one == name else lambda _: None}, (("a",),))
+        for one in ("heading", "inertial")
+    )
+    saved, path = load(folder), tmp_path / "a.rrd"
+    with gathered_failures():
+        viewer_comparison.write_comparison(
+            path,
+            _compared(folder),
+            saved,
+            saved,
+            systems() if name == "overview" else shipped_but(compared=broken),
+        )
         assert codes() == [f"internal.tab.{name}"]
     assert path.is_file()
 
@@ -352,11 +367,12 @@ def _compared(folder: Path) -> Any:
 
 def test_a_figure_of_a_comparison_that_fails_leaves_the_others(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     saved, compared = load(folder), _compared(folder)
-    for name in COMPARED:
-        with monkeypatch.context() as patch, gathered_failures():
-            patch.setitem(COMPARED, name, fails)
-            assert "Answers" in comparison.comparison_html(compared, saved, saved)
-            assert codes() == [f"internal.figure.{name}"]
+    for figures in (COMPARED, *(one.figures for one in systems().compared)):
+        for name in figures:
+            with monkeypatch.context() as patch, gathered_failures():
+                patch.setitem(cast(dict[str, Any], figures), name, fails)
+                assert "Answers" in comparison.comparison_html(compared, saved, saved, systems())
+                assert codes() == [f"internal.figure.{name}"]
 
 
 # ------------------------------------------------------------------------------------------------ a whole run

@@ -9,7 +9,6 @@ import pytest
 from groundstation.pipeline.verbs.acceptance import accept
 from groundstation.pipeline.verbs.compare import compare
 from groundstation.reports.acceptance import write_acceptance_report
-from groundstation.reports.comparison import comparison_html
 from groundstation.reports.fleet_report import write_fleet_report
 from groundstation.results.files import save
 from groundstation.systems import systems
@@ -20,6 +19,7 @@ from tests.report_example import MANIFEST
 from tests.saved import write_flight_report
 from tests.test_compare import saved_example
 from tests.test_fleet_report import fleet_of
+from tests.told import comparison_html
 
 # A picture becomes live where it is seen: the page is gone through from top to bottom.
 SEE_ALL = """(async () => {

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from groundstation.chapters.plots.comparison import COMPARED
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.systems import systems
 from tests.plot_contents import CASES, KEPT, RUN, Contents, differences, of_flight
 from tests.saved import load
-from tests.told import PLOTS
+from tests.told import COMPARED, PLOTS
 
 MOST_BYTES = 150_000
 ANEW = "reviewed and wanted? make golden"

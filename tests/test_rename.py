@@ -22,7 +22,7 @@ CHECKED = (
     *("systems/heading/outcome.py", "systems/inertial/estimate.py"),
     *("systems/heading/chapter.py", "systems/inertial/chapter.py", "cli/check_table.py"),
     *("systems/heading/arrays.py", "systems/heading/figures.py"),
-    *("systems/heading/plots.py", "systems/heading/tab.py", "chapters/plots/comparison.py"),
+    *("systems/heading/plots.py", "systems/heading/tab.py", "systems/heading/comparison_plots.py"),
 )
 ARRAYS = ("systems/heading/arrays.py", "systems/heading/figures.py")
 # Field, and the files that define and make it; those that read it keep the old name.
@@ -34,7 +34,7 @@ RENAMED = (
         "systems/inertial/chapter.py",
     ),
     ("honest_half_width_deg", ARRAYS, "systems/heading/plots.py"),
-    ("honest_half_width_deg", ARRAYS, "chapters/plots/comparison.py"),
+    ("honest_half_width_deg", ARRAYS, "systems/heading/comparison_plots.py"),
     ("longest_s", ("base/ledger.py", "integrity/ledger.py"), "cli/check_table.py"),
 )
 

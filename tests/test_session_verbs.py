@@ -8,9 +8,10 @@ import pytest
 
 from groundstation.cli.main import main
 from groundstation.pipeline.many_flights.inputs import flight_folders, session_folders
-from groundstation.pipeline.verbs.compare import compare, session_errors
+from groundstation.pipeline.verbs.compare import compare
 from groundstation.pipeline.verbs.serve import recordings_in
 from groundstation.simulation.session_log import write_session
+from groundstation.systems.cooperative.errors_arrays import session_errors
 from groundstation.viewer.fleet_catalog import SESSIONS, catalog_server
 from tests.recording_contents import Contents
 from tests.saved import load
@@ -84,7 +85,7 @@ def test_a_session_is_run_again_with_other_settings(session: Path, tmp_path: Pat
     entities = Contents(tmp_path / "c" / "compare.rrd").batches
     drawn = {f"/comparison/session_errors-{name}" for name in ("two_sigma_r_m", "rms_error_m")}
     assert all(any(entity.startswith(one) for entity in entities) for one in drawn), entities
-    assert saved.figure("session_errors") is not None
+    assert session_errors(saved) is not None
 
 
 def test_the_curves_of_a_comparison_are_those_of_the_tracks(session: Path) -> None:

@@ -10,19 +10,24 @@ from groundstation.chapters import by_answer
 from groundstation.chapters.front import front as top
 from groundstation.chapters.next_steps import next_steps as steps
 from groundstation.chapters.parts import Document, Front, Section
+from groundstation.chapters.plots.comparison import COMPARED as OF_ALL
+from groundstation.reports import comparison as comparing
 from groundstation.reports import flight_report, sections
 from groundstation.results.answer import Answer
+from groundstation.results.comparison import Comparison
 from groundstation.results.files import SavedFlight
 from groundstation.results.fleet import FleetResults
 from groundstation.results.flight import FlightResults
 from groundstation.systems import systems
 from groundstation.systems.system import Systems
 from groundstation.tables.table import Flight
+from groundstation.viewer import comparison as recorded
 from groundstation.viewer import fleet as viewer_fleet
 from groundstation.viewer import recording
 from groundstation.viewer.recorder import Recorder
 
 PLOTS = systems().plots
+COMPARED = {**OF_ALL, **{name: tell for one in systems().compared for name, tell in one.figures.items()}}
 
 
 def front(results: FlightResults) -> Front:
@@ -63,6 +68,16 @@ def flight_document(saved: SavedFlight) -> Document:
 def flight_sections(saved: SavedFlight) -> tuple[Section, ...]:
     """Return the chapters of the report of a saved flight."""
     return sections.flight_sections(saved, systems())
+
+
+def comparison_html(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> str:
+    """Return the page of a comparison."""
+    return comparing.comparison_html(comparison, a, b, systems())
+
+
+def write_comparison(path: Path, comparison: Comparison, a: SavedFlight, b: SavedFlight) -> None:
+    """Write the recording of a comparison."""
+    recorded.write_comparison(path, comparison, a, b, systems())
 
 
 def recorder_of(stream: rr.RecordingStream, start_ns: int, has_utc: bool) -> Recorder:

@@ -1,23 +1,23 @@
 """Page of a comparison: the differences of two flights, and their figures over each other."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from groundstation.base.failures import attempt
 from groundstation.chapters.comparison import answers, findings, opening, settings
 from groundstation.chapters.parts import Section, kept
-from groundstation.chapters.plots.comparison import COMPARED, Side, sides_of
-from groundstation.plots.plot import Plot
+from groundstation.chapters.plots.comparison import COMPARED, Side, Tell, sides_of
 from groundstation.reports.drawing import Drawing, drawing_of
 from groundstation.reports.page import TEMPLATES, render
 from groundstation.results.comparison import Comparison
 from groundstation.results.files import SavedFlight
+from groundstation.systems.system import Systems
 
 
-def comparison_html(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> str:
+def comparison_html(comparison: Comparison, a: SavedFlight, b: SavedFlight, systems: Systems) -> str:
     """Render the page of a comparison as a complete HTML document, without parts that fail."""
     sections = (
         attempt("chapter", "answers", answers, comparison),
-        attempt("chapter", "figures", _figures, comparison, a, b),
+        attempt("chapter", "figures", _figures, comparison, a, b, systems),
         attempt("chapter", "settings", settings, comparison),
         attempt("chapter", "findings", findings, comparison),
     )
@@ -30,10 +30,11 @@ def comparison_html(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> s
     )
 
 
-def _figures(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> Section | None:
+def _figures(comparison: Comparison, a: SavedFlight, b: SavedFlight, systems: Systems) -> Section | None:
     """Return figures of both flights over each other, without those that fail."""
     sides = sides_of(comparison, a, b)
-    parts = kept(attempt("figure", name, _drawn, tell, sides) for name, tell in COMPARED.items())
+    every = (COMPARED, *(one.figures for one in systems.compared))
+    parts = kept(attempt("figure", name, _drawn, tell, sides) for figures in every for name, tell in figures.items())
     return (
         Section("figures", "Figures", "A blue, B orange; the shade about a line is its 95 % band.", parts)
         if parts
@@ -41,5 +42,5 @@ def _figures(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> Section 
     )
 
 
-def _drawn(tell: Callable[[Sequence[Side]], Plot | None], sides: Sequence[Side]) -> Drawing | None:
+def _drawn(tell: Tell, sides: Sequence[Side]) -> Drawing | None:
     return drawing_of(tell(sides))

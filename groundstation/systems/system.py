@@ -16,6 +16,7 @@ from groundstation.systems.plan import Plan
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Adviser, Chapter, Chapters
     from groundstation.chapters.fleet.chapter import FleetChapter
+    from groundstation.chapters.plots.comparison import Compared
     from groundstation.plots.plot import Describe
     from groundstation.results.fleet import FleetResults
     from groundstation.results.flight import FlightResults
@@ -92,6 +93,10 @@ def _no_fleet_tabs() -> tuple[FleetTab, ...]:
     return ()
 
 
+def _no_comparison() -> "tuple[Compared, ...]":
+    return ()
+
+
 @dataclass(frozen=True)
 class System:
     """System of the ground station.
@@ -121,6 +126,8 @@ class System:
         Descriptions of their figures, by the name that a chapter gives.
     fleet_tabs : callable
         Tabs of the recording of all flights.
+    compared : callable
+        Figures of two flights over each other, each with its tab of the recording.
     advice : callable, optional
         What the chapter on what to do next says for it.
     apply : callable, optional
@@ -143,6 +150,7 @@ class System:
     advice: "Callable[[], Adviser] | None" = None
     apply: "Callable[[], ApplyStep] | None" = None
     join: "Callable[[], JoinStep] | None" = None
+    compared: "Callable[[], tuple[Compared, ...]]" = _no_comparison
 
 
 @dataclass(frozen=True)
@@ -246,6 +254,11 @@ class Systems:
     def fleet_tabs(self) -> tuple[FleetTab, ...]:
         """Tabs of the recording of all flights."""
         return tuple(tab for one in self.every for tab in one.fleet_tabs())
+
+    @cached_property
+    def compared(self) -> "tuple[Compared, ...]":
+        """Figures of two flights over each other."""
+        return tuple(compared for one in self.every for compared in one.compared())
 
     @cached_property
     def tabs(self) -> tuple[Tab, ...]:

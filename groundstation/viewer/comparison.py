@@ -1,6 +1,6 @@
 """Recording of two saved flights: the plots of their page, B on the clock of A."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -9,14 +9,15 @@ import rerun.blueprint as rrb
 
 from groundstation.base.failures import attempt
 from groundstation.base.timescales import iso_to_utc_ns
-from groundstation.chapters.plots.comparison import COMPARED, Side, sides_of
+from groundstation.chapters.plots.comparison import COMPARED, Side, Tell, sides_of
 from groundstation.results.comparison import Comparison
 from groundstation.results.files import SavedFlight
+from groundstation.systems.system import Systems
 from groundstation.viewer.comparison_text import comparison_text
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.plot_views import panels_of
 from groundstation.viewer.recorder import Recorder
-from groundstation.viewer.recording import save_stream, send_layout
+from groundstation.viewer.recording import NamedTab, save_stream, send_layout
 from groundstation.viewer.views import document
 
 Rows = tuple[tuple[str, ...], ...]  # names of plots, side by side in rows
@@ -27,18 +28,12 @@ OVER_TIME: Rows = (
     ("overview-heading_deg",),
     ("phases",),
 )
-HEADING: Rows = (("heading_running-mean_deg",), ("heading_samples-ground_speed_mps",))
-INERTIAL: Rows = (
-    ("inertial_states-north_position_m", "inertial_states-east_position_m"),
-    ("inertial_states-north_velocity_mps", "inertial_states-east_velocity_mps"),
-    ("inertial_track-ins_error_m",),
-)
-COOPERATIVE: Rows = (("session_errors-two_sigma_r_m",), ("session_errors-rms_error_m",))
-FORECAST: Rows = (("growth",),)
 
 
-def write_comparison(path: Path, comparison: Comparison, a: SavedFlight, b: SavedFlight) -> None:
+def write_comparison(path: Path, comparison: Comparison, a: SavedFlight, b: SavedFlight, systems: Systems) -> None:
     """Write the recording that holds both flights.
+
+    ``systems`` are those whose figures it shows.
 
     Raises
     ------
@@ -46,11 +41,11 @@ def write_comparison(path: Path, comparison: Comparison, a: SavedFlight, b: Save
         When Rerun refused the data or the file could not be written.
     """
     identity = f"compare {comparison.a.flight_id} {comparison.b.flight_id}"
-    save_stream(path, identity, lambda stream: send_comparison(stream, comparison, a, b))
+    save_stream(path, identity, lambda stream: send_comparison(stream, comparison, a, b, systems))
 
 
 def send_comparison(
-    stream: rr.RecordingStream, comparison: Comparison, a: SavedFlight, b: SavedFlight
+    stream: rr.RecordingStream, comparison: Comparison, a: SavedFlight, b: SavedFlight, systems: Systems
 ) -> rrb.Blueprint:
     """Log both flights to a stream that has its sink, send the layout; returns it.
 
@@ -58,37 +53,33 @@ def send_comparison(
     """
     has_utc = comparison.alignment.event == "utc" and comparison.a.start_utc is not None
     start_ns = iso_to_utc_ns(str(comparison.a.start_utc))[0] if has_utc else 0
-    recorder = Recorder(stream, start_ns, has_utc)
+    recorder = Recorder(stream, start_ns, has_utc, systems)
     stream.send_recording_name(clean_text(f"{comparison.a.flight_id} | {comparison.b.flight_id}"))
     sides = sides_of(comparison, a, b)
     recorder.document("comparison", comparison_text(comparison))
-    tabs = (attempt("tab", name, tab, recorder, sides) for name, tab in TABS.items())
+    tabs = (attempt("tab", name, tab) for name, tab in _tabs(recorder, sides))
     return send_layout(stream, [tab for tab in tabs if tab is not None])
+
+
+def _tabs(recorder: Recorder, sides: Sequence[Side]) -> Iterator[NamedTab]:
+    """Tabs in their order: the name of each and what logs it."""
+    yield "overview", partial(_overview, recorder, sides)
+    for one in recorder.systems.compared:
+        yield one.name, partial(_grid, one.rows, one.title, recorder, sides, one.figures)
 
 
 def _overview(recorder: Recorder, sides: Sequence[Side]) -> rrb.Container:
     text = document("A and B", "comparison")
     ground = panels_of(recorder, COMPARED["tracks"](sides), of="Tracks")
     left = rrb.Vertical(contents=[*ground, text]) if ground else text
-    right = _grid(OVER_TIME, "", recorder, sides)
+    right = _grid(OVER_TIME, "", recorder, sides, COMPARED)
     return rrb.Horizontal(contents=[left, *([] if right is None else [right])], name="Overview of A and B")
 
 
-def _grid(rows: Rows, name: str, recorder: Recorder, sides: Sequence[Side]) -> rrb.Container | None:
+def _grid(
+    rows: Rows, name: str, recorder: Recorder, sides: Sequence[Side], figures: Mapping[str, Tell]
+) -> rrb.Container | None:
     """Log plots, and show each row of them side by side; None where there is none."""
-    drawn = [[view for plot in row for view in _views(recorder, sides, plot)] for row in rows]
+    drawn = [[view for plot in row for view in panels_of(recorder, figures[plot](sides))] for row in rows]
     lines = [rrb.Horizontal(contents=views) if len(views) > 1 else views[0] for views in drawn if views]
     return rrb.Vertical(contents=lines, name=name) if lines else None
-
-
-def _views(recorder: Recorder, sides: Sequence[Side], name: str) -> list[rrb.View]:
-    return panels_of(recorder, COMPARED[name](sides))
-
-
-TABS: dict[str, Callable[[Recorder, Sequence[Side]], rrb.Container | None]] = {
-    "overview": _overview,
-    "heading": partial(_grid, HEADING, "Heading"),
-    "inertial": partial(_grid, INERTIAL, "INS errors"),
-    "cooperative": partial(_grid, COOPERATIVE, "Cooperative"),
-    "forecast": partial(_grid, FORECAST, "Forecast"),
-}

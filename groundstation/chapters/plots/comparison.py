@@ -1,51 +1,33 @@
 """Plots of a comparison: curves of two flights over each other."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Generic, Protocol
+from typing import Any, Generic, NamedTuple
 
 import numpy as np
 
 from groundstation.base.geodesy import north_east_m, on_earth, plan_north_east_m
-from groundstation.base.normal import NORMAL_95
-from groundstation.chapters.plots.common import M_PER_KM, has_values, label, positive
+from groundstation.chapters.plots.common import M_PER_KM, has_values
 from groundstation.plots.axes import time_axis
-from groundstation.plots.marks import AnyMark, Band, Curve, Dash, Emphasis, Floats, Lanes, Role, Told
+from groundstation.plots.marks import AnyMark, Band, Curve, Emphasis, Floats, Lanes, Role, Told
 from groundstation.plots.plot import Axis, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import broken_at_gaps, broken_at_wrap, finite, padded
-from groundstation.results.arrays.cooperative import SessionErrors
 from groundstation.results.arrays.flight import Overview, PhaseSpans
 from groundstation.results.arrays.typed import T
 from groundstation.results.comparison import Comparison
 from groundstation.results.files import SavedFlight
-from groundstation.systems.heading.arrays import HeadingRunning, HeadingSamples
-from groundstation.systems.inertial.arrays import InertialStates, InertialTrack
-from groundstation.systems.inertial.forecast_answer import ForecastResult
-from groundstation.systems.inertial.forecast_arrays import ForecastGrowth
-from groundstation.systems.inertial.forecast_chapter import short
 
 NEAR_M = 200_000.0  # flights that begin no further apart share one map
 LANE_MM = 4.0
 
 
-class HasRows(Protocol):
-    """A flight with its arrays."""
-
-    def rows_of(self, kind: type[T]) -> T | None:
-        """Return the typed arrays of a figure, None when the flight has none."""
-
-
 @dataclass(frozen=True)
 class Side:
-    """One of two flights: its letter, its forecast method, and its start.
-
-    The letter is A or B, the start is in seconds after that of A.
-    """
+    """One of two flights: its letter, A or B, and its start in seconds after that of A."""
 
     letter: str
-    flight: HasRows
-    default_method: str = ""
+    flight: SavedFlight
     offset_s: float = 0.0
 
     @property
@@ -61,12 +43,22 @@ class Side:
 
 def sides_of(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> tuple[Side, Side]:
     """Both flights as plots take them."""
-    methods = (_default_method(one.results.answer(ForecastResult)) for one in (a, b))
-    return Side("A", a, next(methods)), Side("B", b, next(methods), comparison.alignment.offset_s)
+    return Side("A", a), Side("B", b, comparison.alignment.offset_s)
 
 
-def _default_method(forecast: ForecastResult | None) -> str:
-    return "" if forecast is None else forecast.default_method
+Tell = Callable[[Sequence[Side]], Plot | None]  # describes a figure of both flights, None where neither has it
+
+
+class Compared(NamedTuple):
+    """Figures of a system in a comparison, by name in the order of the page.
+
+    ``rows`` are those of its tab in the recording, ``name`` and ``title``: names of figures, side by side.
+    """
+
+    name: str
+    title: str
+    figures: Mapping[str, Tell]
+    rows: tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -82,15 +74,26 @@ class TimeLine:
 
 
 class Overlay(Generic[T]):
-    """Curve that both flights have: its figure, its columns, its axis and title."""
+    """Curve that both flights have: its figure, its columns, its axis and title.
 
-    def __init__(self, kind: type[T], key: str, read: Callable[[T], TimeLine], axis: str, title: str) -> None:
+    ``rows`` gives the columns of a flight where they are made of others.
+    """
+
+    def __init__(
+        self,
+        kind: type[T],
+        key: str,
+        read: Callable[[T], TimeLine],
+        axis: str,
+        title: str,
+        rows: Callable[[SavedFlight], T | None] | None = None,
+    ) -> None:
         self.name, self.axis, self.title = f"{kind.figure}-{key}", axis, title
-        self._kind, self._read = kind, read
+        self._kind, self._read, self._rows = kind, read, rows
 
-    def of(self, flight: HasRows) -> TimeLine | None:
+    def of(self, flight: SavedFlight) -> TimeLine | None:
         """Return the line of a flight, None where it has no number."""
-        rows = flight.rows_of(self._kind)
+        rows = flight.rows_of(self._kind) if self._rows is None else self._rows(flight)
         line = None if rows is None else self._read(rows)
         return line if line is not None and has_values(line.values) else None
 
@@ -109,67 +112,6 @@ def _speed(data: Overview) -> TimeLine:
 
 def _heading(data: Overview) -> TimeLine:
     return TimeLine(*broken_at_wrap(data.time_s, data.heading_deg))
-
-
-def _mean(data: HeadingRunning) -> TimeLine:
-    return TimeLine(data.time_s, data.mean_deg, data.honest_half_width_deg)
-
-
-def _speed_at_samples(data: HeadingSamples) -> TimeLine:
-    return TimeLine(data.time_s, data.ground_speed_mps)
-
-
-def _radial(data: InertialTrack) -> TimeLine:
-    return TimeLine(data.time_s, data.ins_error_m)
-
-
-def _north(data: InertialStates) -> TimeLine:
-    return TimeLine(data.time_s, data.north.position_m, NORMAL_95 * data.north.position_sigma_m)
-
-
-def _east(data: InertialStates) -> TimeLine:
-    return TimeLine(data.time_s, data.east.position_m, NORMAL_95 * data.east.position_sigma_m)
-
-
-def _north_velocity(data: InertialStates) -> TimeLine:
-    return TimeLine(data.time_s, data.north.velocity_mps, NORMAL_95 * data.north.velocity_sigma_mps)
-
-
-def _east_velocity(data: InertialStates) -> TimeLine:
-    return TimeLine(data.time_s, data.east.velocity_mps, NORMAL_95 * data.east.velocity_sigma_mps)
-
-
-def _computed(data: SessionErrors) -> TimeLine:
-    return TimeLine(data.time_s, data.two_sigma_r_m)
-
-
-def _error(data: SessionErrors) -> TimeLine:
-    return TimeLine(data.time_s, data.rms_error_m)
-
-
-OVERLAYS: tuple[Overlay[Any], ...] = (
-    Overlay(Overview, "altitude_m", _altitude, "altitude, m", "Altitude"),
-    Overlay(Overview, "pressure_altitude_m", _pressure_altitude, "pressure altitude, m", "Pressure altitude"),
-    Overlay(Overview, "ground_speed_mps", _speed, "ground speed, m/s", "Ground speed"),
-    Overlay(Overview, "heading_deg", _heading, "true heading, °", "INS heading"),
-    Overlay(HeadingRunning, "mean_deg", _mean, "mean heading error, °", "Heading error, running mean"),
-    Overlay(
-        HeadingSamples,
-        "ground_speed_mps",
-        _speed_at_samples,
-        "speed at the samples, m/s",
-        "Ground speed at the samples",
-    ),
-    Overlay(InertialTrack, "ins_error_m", _radial, "radial error, m", "Radial error of the INS against GNSS"),
-    Overlay(InertialStates, "north_position_m", _north, "north position error, m", "North position error"),
-    Overlay(InertialStates, "east_position_m", _east, "east position error, m", "East position error"),
-    Overlay(InertialStates, "north_velocity_mps", _north_velocity, "north velocity error, m/s", "North velocity error"),
-    Overlay(InertialStates, "east_velocity_mps", _east_velocity, "east velocity error, m/s", "East velocity error"),
-    Overlay(SessionErrors, "two_sigma_r_m", _computed, "2σ_r as computed, m", "2σ_r as computed, worst aircraft"),
-    Overlay(
-        SessionErrors, "rms_error_m", _error, "RMS error, m", "Horizontal error against the truth, RMS of all aircraft"
-    ),
-)
 
 
 def tracks(sides: Sequence[Side]) -> Plot | None:
@@ -265,35 +207,18 @@ def phases(sides: Sequence[Side]) -> Plot | None:
     )
 
 
-def growth(sides: Sequence[Side]) -> Plot | None:
-    """Return the RMS of the forecast by horizon, the shipped method and the INS without one."""
-    marks = []
-    for side in sides:
-        data = side.flight.rows_of(ForecastGrowth)
-        for method in (side.default_method, "raw_ins"):
-            rms_m = None if data is None else data.rms_m.get(method)
-            if data is None or rms_m is None or not has_values(rms_m):
-                continue
-            name = f"{side.letter}: {label(short(method))}"
-            is_raw = method == "raw_ins"
-            dash: Dash = "dotted" if is_raw else ""
-            heavy: Emphasis = "thin" if is_raw else side.emphasis
-            x, y = data.horizon_min, positive(rms_m)
-            marks.append(Curve(x=x, y=y, role=side.role, name=name, dash=dash, emphasis=heavy))
-    if not marks:
-        return None
-    return Plot(
-        "comparison.growth",
-        "Forecast",
-        "Root mean square of the radial error over all replayed starts; dotted: the INS without a forecast.",
-        "RMS of the forecast error of A and B by horizon.",
-        one_panel(Panel(marks, Axis("horizon, min", "log"), Axis("RMS radial error, m", "log")), 52.0),
-    )
+def overlaid(*overlays: Overlay[Any]) -> dict[str, Tell]:
+    """Return the figures of some curves, by name."""
+    return {one.name: partial(overlay, told=one) for one in overlays}
 
 
-COMPARED: dict[str, Callable[[Sequence[Side]], Plot | None]] = {
+COMPARED: dict[str, Tell] = {  # of all flights
     "tracks": tracks,
     "phases": phases,
-    **{one.name: partial(overlay, told=one) for one in OVERLAYS},
-    "growth": growth,
+    **overlaid(
+        Overlay(Overview, "altitude_m", _altitude, "altitude, m", "Altitude"),
+        Overlay(Overview, "pressure_altitude_m", _pressure_altitude, "pressure altitude, m", "Pressure altitude"),
+        Overlay(Overview, "ground_speed_mps", _speed, "ground speed, m/s", "Ground speed"),
+        Overlay(Overview, "heading_deg", _heading, "true heading, °", "INS heading"),
+    ),
 }

@@ -8,8 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from groundstation.base.angles import wrap_180
 from groundstation.base.errors import UsageError
 from groundstation.base.findings import SEVERITIES, Finding
@@ -19,14 +17,12 @@ from groundstation.chapters.wording import is_number
 from groundstation.pipeline.many_flights.inputs import COMPARISON_MARKS, COMPARISON_RECORDING, is_ours, is_session
 from groundstation.pipeline.verbs.alignment import align
 from groundstation.pipeline.verbs.clip import CUT_SHA256
-from groundstation.results.arrays.cooperative import CooperativeTracks, SessionErrors
 from groundstation.results.comparison import Comparison, Delta, Event, SettingPair, Side, Value
 from groundstation.results.file_names import MANIFEST
 from groundstation.results.files import SavedFlight, csv_text, load, mapping, write_text
 from groundstation.results.flight import NotAssessable
 from groundstation.results.grouped_findings import grouped
 from groundstation.systems import systems
-from groundstation.systems.cooperative.answer import CooperativeResult
 
 (PAGE, TABLE), RECORDING = COMPARISON_MARKS, COMPARISON_RECORDING
 IDENTITY = (  # what tells the rows of a table in the results apart
@@ -118,8 +114,8 @@ def compare_to(a: Path, b: Path, folder: Path, event: Event | None = None, *, fo
     comparison, saved_a, saved_b = compare(a, b, event)
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / TABLE, csv_text(comparison.to_figure()))
-    write_comparison(folder / RECORDING, comparison, saved_a, saved_b)
-    write_text(folder / PAGE, comparison_html(comparison, saved_a, saved_b))
+    write_comparison(folder / RECORDING, comparison, saved_a, saved_b, systems())
+    write_text(folder / PAGE, comparison_html(comparison, saved_a, saved_b, systems()))
     return comparison
 
 
@@ -127,28 +123,7 @@ def _load(folder: Path) -> SavedFlight:
     if not folder.is_dir() or not (folder / MANIFEST).is_file():
         found = "no such folder" if not folder.exists() else "no results"
         raise UsageError(str(folder), found, "a flight folder that `run` made")
-    saved = load(folder, systems().answer_types)
-    errors = session_errors(saved)
-    return saved if errors is None else replace(saved, figures={**saved.figures, errors.name: errors})
-
-
-def session_errors(saved: SavedFlight) -> SessionErrors | None:
-    """Return the worst computed 2 sigma_r and the RMS error of all aircraft with time.
-
-    The algorithm is the default one; None for a flight.
-    """
-    answer, tracks = saved.results.answer(CooperativeResult), saved.rows_of(CooperativeTracks)
-    if answer is None or tracks is None:
-        return None
-    rows = tracks.algorithm == answer.default_algorithm
-    time_s, epoch = np.unique(np.round(tracks.time_s[rows], 3), return_inverse=True)
-    worst_m, error_m = np.full(len(time_s), np.nan), tracks.error_m[rows]
-    np.fmax.at(worst_m, epoch, tracks.two_sigma_r_m[rows])
-    known = np.isfinite(error_m)
-    counts = np.bincount(epoch[known], minlength=len(time_s))
-    squares = np.bincount(epoch[known], error_m[known] ** 2, minlength=len(time_s))
-    rms_m = np.sqrt(np.divide(squares, counts, out=np.full(len(time_s), np.nan), where=counts > 0))
-    return SessionErrors(time_s=time_s, two_sigma_r_m=worst_m, rms_error_m=rms_m)
+    return load(folder, systems().answer_types)
 
 
 def _side(saved: SavedFlight) -> Side:

@@ -9,6 +9,7 @@ from groundstation.systems.system import Study, System, Tab
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter
     from groundstation.chapters.fleet.chapter import FleetChapter
+    from groundstation.chapters.plots.comparison import Compared
     from groundstation.plots.plot import Describe
     from groundstation.systems.study import StudyResult
 
@@ -32,6 +33,12 @@ def _plots() -> "Mapping[str, Describe]":
     from groundstation.systems.cooperative import plots as cooperative
 
     return cooperative.PLOTS
+
+
+def _compared() -> "tuple[Compared, ...]":
+    from groundstation.systems.cooperative import comparison_plots
+
+    return (comparison_plots.COMPARED,)
 
 
 def _tabs() -> tuple[Tab, ...]:
@@ -60,4 +67,5 @@ SYSTEM = System(
     plots=_plots,
     tabs=_tabs,
     fleet_chapters=_fleet_chapters,
+    compared=_compared,
 )

@@ -10,6 +10,7 @@ from groundstation.systems.system import Study, System, Tab
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Adviser, Chapter
     from groundstation.chapters.fleet.chapter import FleetChapter
+    from groundstation.chapters.plots.comparison import Compared
     from groundstation.plots.plot import Describe
     from groundstation.systems.study import StudyResult
 
@@ -65,6 +66,12 @@ def _plots() -> "Mapping[str, Describe]":
     from groundstation.systems.heading import standstill_plots as standstill
 
     return {**heading.PLOTS, **standstill.PLOTS}
+
+
+def _compared() -> "tuple[Compared, ...]":
+    from groundstation.systems.heading import comparison_plots
+
+    return (comparison_plots.COMPARED,)
 
 
 def _tabs() -> tuple[Tab, ...]:
@@ -144,5 +151,6 @@ SYSTEM = System(
     tabs=_tabs,
     fleet_chapters=_fleet_chapters,
     fleet_plots=_fleet_plots,
+    compared=_compared,
     advice=_advice,
 )

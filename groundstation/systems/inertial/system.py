@@ -9,6 +9,7 @@ from groundstation.systems.system import FleetTab, Study, System, Tab
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Adviser, Chapter
     from groundstation.chapters.fleet.chapter import FleetChapter
+    from groundstation.chapters.plots.comparison import Compared
     from groundstation.plots.plot import Describe
     from groundstation.systems.study import StudyResult
 
@@ -64,6 +65,12 @@ def _plots() -> "Mapping[str, Describe]":
     return {**forecast.PLOTS, **inertial.PLOTS}
 
 
+def _compared() -> "tuple[Compared, ...]":
+    from groundstation.systems.inertial import comparison_plots
+
+    return (comparison_plots.COMPARED, comparison_plots.COMPARED_FORECAST)
+
+
 def _tabs() -> tuple[Tab, ...]:
     from groundstation.systems.inertial.forecast_tab import forecast
     from groundstation.systems.inertial.tab import inertial
@@ -99,5 +106,6 @@ SYSTEM = System(
     fleet_chapters=_fleet_chapters,
     fleet_plots=_fleet_plots,
     fleet_tabs=_fleet_tabs,
+    compared=_compared,
     advice=_advice,
 )
