@@ -48,6 +48,10 @@ OF_A_ROLE: dict[str, set[str]] = {
 OF_PAGES = ("answer", "arrays", "chapter", "plots")  # of a system; they import files of these roles alone
 PARTS_OF_THE_PIPELINE = ("one_flight", "many_flights", "verbs", "")  # each imports those before it; "": the Python API
 FLOORS_OF_MANY_FLIGHTS = 5
+ALLOWED_TO_NAME = {
+    "pipeline/notebook.py": "the Python API has a method for each answer",
+    "pipeline/verbs/acceptance.py": "the verb holds an INS against a standard, by its errors and its heading",
+}
 STILL_NAMED = Path(__file__).parent / "references" / "systems_named.txt"
 ONLY_ROOM_OF = {"mcap": "store", "google": "store", "foxglove_schemas_protobuf": "store", "rerun": "viewer"}
 NOT_PUBLIC = re.compile(r"/?(rerun_|rerun-[a-z]+-|re_viewer|RERUN_|rerun\.(.*\.)?_)")
@@ -190,7 +194,8 @@ def test_a_system_is_named_by_no_file_outside_its_folder() -> None:
             if system_of(name) not in ("", system_of(_name(path))):
                 named.setdefault(str(path.relative_to(PACKAGE)), []).append(f"{path}:{line}: {name}")
     listed = set(STILL_NAMED.read_text(encoding="utf-8").split())
-    new = [line for path, lines in named.items() if path not in listed for line in lines]
+    assert not listed & ALLOWED_TO_NAME.keys() and ALLOWED_TO_NAME.keys() <= named.keys()
+    new = [line for path, lines in named.items() if path not in {*listed, *ALLOWED_TO_NAME} for line in lines]
     assert not new
     assert not listed - named.keys(), "no longer names a system: take it off tests/references/systems_named.txt"
 

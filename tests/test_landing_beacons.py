@@ -8,6 +8,15 @@ import pytest
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.errors import NotAssessableError, SettingsError
+from groundstation.methods.bearings import (
+    BearingFix,
+    distance_from_bearing_m,
+    distance_sigma_m,
+    relative_bearings,
+    side_from_difference_m,
+    side_sigma_m,
+    solve_bearings,
+)
 from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import load_configuration
 from groundstation.pipeline.verbs.synthesis import simulate_to
@@ -19,15 +28,6 @@ from groundstation.systems.known import Beacon, Ground, Runway, SiteData
 from groundstation.systems.landing.beacons.analysis import LANDING_BEACONS
 from groundstation.systems.landing.beacons.answer import BeaconLanding
 from groundstation.systems.landing.beacons.approach import Deviations, over_known_ground
-from groundstation.systems.landing.beacons.geometry import (
-    BearingFix,
-    distance_from_bearing_m,
-    distance_sigma_m,
-    relative_bearings,
-    side_from_difference_m,
-    side_sigma_m,
-    solve_bearings,
-)
 from groundstation.systems.landing.beacons.settings import LandingBeaconsSettings
 from tests.landing_example import BEACONS, approach_scenario, flown, known_of
 from tests.recording_contents import Contents

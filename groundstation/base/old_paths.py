@@ -54,6 +54,7 @@ FILES = {
     "estimators.installation.answer": "systems.heading.installation.outcome",
     "estimators.known": "systems.known",
     "estimators.landing_beacons.answer": "systems.landing.beacons.outcome",
+    "estimators.landing_beacons.geometry": "methods.bearings",
     "estimators.landing_ranges.answer": "systems.planning.landing.outcome",
     "estimators.overview": "methods.overview",
     "estimators.plan": "systems.plan",

@@ -1,6 +1,6 @@
-"""Arrays of the approaches, by guidance, by beacons and by ranges."""
+"""Arrays of the approaches, by guidance and by beacons."""
 
-from groundstation.results.arrays.typed import Arrays, Counts, Floats, Texts, column
+from groundstation.results.arrays.typed import Arrays, Counts, Floats
 
 _THREE = {"*_s": 3, "*_m": 3, "*_mps": 3, "*_deg": 3}
 
@@ -74,44 +74,3 @@ class BeaconsPath(Arrays, figure="landing_beacons_path", digits=_THREE):
     glide_path_sigma_m: Floats
     height_m: Floats
     off_course_deg: Floats
-
-
-class RangesPath(Arrays, figure="landing_ranges_path", digits=_THREE):
-    """Accuracy of a landing by ranges along the approach."""
-
-    time_s: Floats
-    before_threshold_m: Floats
-    height_m: Floats
-    sigma_along_m: Floats
-    sigma_right_m: Floats
-    sigma_up_m: Floats
-    lateral_95_m: Floats
-    horizontal_95_m: Floats
-    vertical_95_m: Floats
-    determinant: Floats
-
-
-class RangesSpace(Arrays, figure="landing_ranges_space", digits=_THREE):
-    """Positions of the aircraft and of the points in a landing by ranges."""
-
-    time_s: Floats
-    label: Texts = column("name")
-    along_m: Floats
-    right_m: Floats
-    up_m: Floats
-    speed_mps: Floats
-
-
-class RangesErrors(Arrays, figure="landing_ranges_errors", digits=_THREE):
-    """Errors of the trials of a landing by ranges, with the sigmas of their filter."""
-
-    time_s: Floats
-    filter: Texts
-    trial: Counts
-    before_threshold_m: Floats
-    error_along_m: Floats
-    sigma_along_m: Floats
-    error_right_m: Floats
-    sigma_right_m: Floats
-    error_up_m: Floats
-    sigma_up_m: Floats

@@ -6,8 +6,8 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180, wrap_360
 from groundstation.base.records import BoolArray, frozen
+from groundstation.methods.bearings import BearingFix, solve_bearings
 from groundstation.systems.known import Runway
-from groundstation.systems.landing.beacons.geometry import BearingFix, solve_bearings
 from groundstation.systems.landing.beacons.settings import LandingBeaconsSettings
 
 WELL_KNOWN_M = 300.0  # sigma of a distance that may say something about the speed

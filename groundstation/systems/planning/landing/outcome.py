@@ -14,7 +14,6 @@ from groundstation.results.landing_categories import (
     axis_category_met,
     category_met,
 )
-from groundstation.systems.landing.arrays import RangesErrors, RangesPath, RangesSpace
 from groundstation.systems.planning.landing.answer import (
     ALL_AXES,
     HONEST,
@@ -26,6 +25,7 @@ from groundstation.systems.planning.landing.answer import (
     ReferencePointRow,
     TrialRow,
 )
+from groundstation.systems.planning.landing.arrays import RangesErrors, RangesPath, RangesSpace
 from groundstation.systems.planning.landing.filter import ApproachTrack, covariance_along
 from groundstation.systems.planning.landing.moving_point import MovingTrack, fly_moving_point, measure
 from groundstation.systems.planning.landing.scenario import RangeApproach

@@ -13,8 +13,8 @@ from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row
 from groundstation.results.arrays.typed import T
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing_categories import CATEGORIES, LINEAR_95
-from groundstation.systems.landing.arrays import RangesErrors, RangesPath, RangesSpace
 from groundstation.systems.planning.landing.answer import HONEST, WHITE, RangeLanding
+from groundstation.systems.planning.landing.arrays import RangesErrors, RangesPath, RangesSpace
 
 MOST_TRIALS = 30
 LEAST_SHOWN_M = 0.1

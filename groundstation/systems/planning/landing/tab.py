@@ -10,8 +10,8 @@ import rerun.blueprint as rrb
 from groundstation.chapters.markdown import markdown
 from groundstation.results.flight import FlightResults
 from groundstation.results.landing_categories import CATEGORIES, LINEAR_95
-from groundstation.systems.landing.arrays import RangesPath, RangesSpace
 from groundstation.systems.planning.landing.answer import RangeLanding
+from groundstation.systems.planning.landing.arrays import RangesPath, RangesSpace
 from groundstation.systems.planning.landing.chapter import landing_ranges as chapter
 from groundstation.viewer import colours
 from groundstation.viewer.names import clean_text, path_parts

@@ -6,9 +6,7 @@ Errors along the approach by propagation and by drawn bearings.
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.results.figures import FigureData
-from groundstation.results.landing_categories import CATEGORIES, LINEAR_95, axis_category_met
-from groundstation.systems.landing.beacons.geometry import (
+from groundstation.methods.bearings import (
     distance_from_bearing_m,
     distance_sigma_m,
     relative_bearings,
@@ -16,6 +14,8 @@ from groundstation.systems.landing.beacons.geometry import (
     side_sigma_m,
     solve_bearings,
 )
+from groundstation.results.figures import FigureData
+from groundstation.results.landing_categories import CATEGORIES, LINEAR_95, axis_category_met
 from groundstation.systems.planning.landing.study.tables import table
 
 OUTER_M, INNER_M, SIDE_M = 4000.0, 1000.0, 500.0
