@@ -100,17 +100,6 @@ def test_a_bag_with_odd_times(tmp_path: Path, log_ns: int, second: int) -> None:
     read_in_silence(path)
 
 
-def test_a_table_of_ranges_with_odd_numbers(tmp_path: Path) -> None:
-    lines = ["timestamp,from_id,to_id,range,r_iw_a_ifo001,q_ai_ifo001"]
-    for row in range(40):
-        odd, other = ODD[row % len(ODD)], ODD[(row * 3) % len(ODD)]
-        place, turn = f'"[{odd} {other} {odd}]"', f'"[{other} {odd} 0 1]"'
-        lines.append(f"{1_700_000_000 + row},{odd},{other},{odd},{place},{turn}")
-    path = tmp_path / "range_data.csv"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    read_in_silence(path)
-
-
 def test_directions_that_are_infinite_give_nan() -> None:
     odd = np.array([np.inf, -np.inf, np.nan, 90.0])
     with warnings.catch_warnings():
