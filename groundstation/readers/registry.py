@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from groundstation.base.errors import GroundstationError, UnclaimedLogError, UnreadableLogError
+from groundstation.base.plug_ins import load_plug_ins
 from groundstation.base.records import Item, RecordBatch, Remark
 from groundstation.readers import (
     bags,
@@ -57,26 +58,20 @@ class Format:
 @cache
 def _plug_ins() -> tuple[dict[str, Reader], tuple[str, ...]]:
     """Third-party readers by name, and one line for each that could not be loaded."""
-    from importlib.metadata import entry_points
-
     readers: dict[str, Reader] = {}
-    failures: list[str] = []
-    for entry in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda entry: entry.name):
-        if entry.value.startswith("groundstation.readers."):
-            continue
-        try:
-            reader = entry.load()
-            name = str(reader.NAME)
-            if not (callable(reader.sniff) and callable(reader.read)):
-                raise TypeError("sniff and read must be functions")
-        except Exception as error:  # a stranger's code: whatever it raises must not stop a run
-            failures.append(_one_line(f"reader plug-in {entry.name!r} ({entry.value}) cannot be used: {_named(error)}"))
-            continue
-        if name in {built_in.NAME for built_in in _BUILT_IN} | readers.keys():
-            failures.append(f"reader plug-in {entry.name!r} ({entry.value}) is left out: {name!r} is taken")
-            continue
+    taken = {built_in.NAME for built_in in _BUILT_IN}
+
+    def take(reader: Any) -> str:
+        name = str(reader.NAME)
+        if not (callable(reader.sniff) and callable(reader.read)):
+            raise TypeError("sniff and read must be functions")
+        if name in taken | readers.keys():
+            return f"{name!r} is taken"
         readers[name] = reader
-    return readers, tuple(failures)
+        return ""
+
+    failures = load_plug_ins(ENTRY_POINT_GROUP, "reader", take)
+    return readers, failures
 
 
 def _named(error: BaseException) -> str:

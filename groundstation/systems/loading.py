@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 from importlib import import_module
+from typing import Any
 
+from groundstation.base.plug_ins import load_plug_ins
 from groundstation.systems.system import System, Systems
 
 
@@ -13,27 +15,21 @@ def load_systems(ours: Sequence[str], group: str) -> Systems:
     -------
     Systems
         With a line for each stranger's system that cannot be used: it raised, is no :class:`System`, or has a name
-        that is taken, by a system or by one of its analyses, plans, studies or settings.
+        that is taken, by a system or by one of its analyses, plans, studies, settings or steps.
     """
-    from importlib.metadata import entry_points
-
     every: list[System] = [import_module(path).SYSTEM for path in ours]
-    failures: list[str] = []
-    for entry in sorted(entry_points(group=group), key=lambda entry: entry.name):
-        where = f"system plug-in {entry.name!r} ({entry.value})"
-        try:
-            system = entry.load()
-            if not isinstance(system, System):
-                raise TypeError(f"{type(system).__name__} is no System")
-            taken = _names(system) & set().union(*map(_names, every))
-            if taken:
-                failures.append(f"{where} is left out: {', '.join(sorted(taken))} is taken")
-            else:
-                every.append(system)
-        except Exception as error:  # a stranger's code: whatever it raises must not stop a run
-            told = " ".join(f"{type(error).__name__}: {error}".split())
-            failures.append(f"{where} cannot be used: {told}")
-    return Systems(tuple(every), tuple(failures))
+
+    def take(system: Any) -> str:
+        if not isinstance(system, System):
+            raise TypeError(f"{type(system).__name__} is no System")
+        taken = _names(system) & set().union(*map(_names, every))
+        if taken:
+            return f"{', '.join(sorted(taken))} is taken"
+        every.append(system)
+        return ""
+
+    failures = load_plug_ins(group, "system", take)
+    return Systems(tuple(every), failures)
 
 
 def _names(system: System) -> set[str]:
@@ -46,4 +42,5 @@ def _names(system: System) -> set[str]:
         *(f"column {column.name}" for one in analyses for column in one.columns),
         *(f"plan {one.name}" for one in system.plans),
         *(f"study {one.name}" for one in system.studies),
+        *(f"step --{step}" for step, made in (("apply", system.apply), ("together", system.join)) if made is not None),
     }
