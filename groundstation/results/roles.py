@@ -6,7 +6,7 @@ An answer that plays a role is derived from it. A reader finds it with
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,6 +125,7 @@ class HeadingByTrack:
     gates: tuple[Gate, ...]
     verdict: str
     verdict_reason: str
+    settings: Mapping[str, float | str | bool]
 
     @property
     def azimuth(self) -> tuple[float, float]:
@@ -168,14 +169,18 @@ class CompassCoefficients:
     coefficients_sigma_deg: Mapping[str, float]
 
 
-class SettingsOfHeading:
-    """Role of an answer with the heading error of an INS and the settings used.
+class OnTaxi:
+    """Role of an answer that rests on stretches of the taxi: the map of the track marks them.
 
-    It is the INS whose heading is shown for the flight.
+    ``taxi_serves`` says what they are used for: "the heading error".
     """
 
-    ins_topic: str
-    settings: Mapping[str, float | str | bool]
+    taxi_serves: ClassVar[str]
+
+    @property
+    def taxi_used_s(self) -> tuple[tuple[float, float], ...]:
+        """Ends of the stretches, flight seconds."""
+        raise NotImplementedError
 
 
 class Outage(Protocol):

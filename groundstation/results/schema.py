@@ -234,11 +234,16 @@ def _about(cls: type) -> str:
 
 
 def _told(cls: type) -> dict[str, str]:
-    """Return the descriptions of a class's fields in its docstring, by name.
+    """Return the descriptions of a class's fields, by name, where its docstring or a base's has them."""
+    told: dict[str, str] = {}
+    for base in reversed(cls.__mro__):
+        told |= _told_in(base.__doc__ or "")
+    return told
 
-    They stand in the numpydoc section Parameters.
-    """
-    _, _, listed = (cls.__doc__ or "").partition("Parameters\n    ----------\n")
+
+def _told_in(doc: str) -> dict[str, str]:
+    """Return the descriptions of fields in the numpydoc section Parameters of a docstring."""
+    _, _, listed = doc.partition("Parameters\n    ----------\n")
     told: dict[str, str] = {}
     names: list[str] = []
     for line in listed.splitlines():

@@ -4,7 +4,7 @@ Every part is optional. What costs an import is given as a function that imports
 page the chapters and plots, a recording the tabs, a study its own simulation.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -73,28 +73,12 @@ class Study:
     reads: str = ""
 
 
-def _no_chapters() -> "tuple[Chapter, ...]":
+def _none() -> tuple[Any, ...]:
     return ()
 
 
 def _no_plots() -> "Mapping[str, Describe]":
     return {}
-
-
-def _no_fleet_chapters() -> "tuple[FleetChapter, ...]":
-    return ()
-
-
-def _no_tabs() -> tuple[Tab, ...]:
-    return ()
-
-
-def _no_fleet_tabs() -> tuple[FleetTab, ...]:
-    return ()
-
-
-def _no_comparison() -> "tuple[Compared, ...]":
-    return ()
 
 
 @dataclass(frozen=True)
@@ -141,16 +125,16 @@ class System:
     session_analyses: tuple[Analysis, ...] = ()
     plans: tuple[Plan[Any], ...] = ()
     studies: tuple[Study, ...] = ()
-    chapters: "Callable[[], tuple[Chapter, ...]]" = _no_chapters
+    chapters: "Callable[[], tuple[Chapter, ...]]" = _none
     plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
-    tabs: Callable[[], tuple[Tab, ...]] = _no_tabs
-    fleet_chapters: "Callable[[], tuple[FleetChapter, ...]]" = _no_fleet_chapters
+    tabs: Callable[[], tuple[Tab, ...]] = _none
+    fleet_chapters: "Callable[[], tuple[FleetChapter, ...]]" = _none
     fleet_plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
-    fleet_tabs: Callable[[], tuple[FleetTab, ...]] = _no_fleet_tabs
+    fleet_tabs: Callable[[], tuple[FleetTab, ...]] = _none
     advice: "Callable[[], Adviser] | None" = None
     apply: "Callable[[], ApplyStep] | None" = None
     join: "Callable[[], JoinStep] | None" = None
-    compared: "Callable[[], tuple[Compared, ...]]" = _no_comparison
+    compared: "Callable[[], tuple[Compared, ...]]" = _none
 
 
 @dataclass(frozen=True)
@@ -216,13 +200,13 @@ class Systems:
         from groundstation.chapters.chapter import Chapters
 
         every = [chapter for one in self.every for chapter in one.chapters()]
-        plans = tuple(_of(every, PlanAnswer))
-        sessions = tuple(_of(every, SessionAnswer))
+
+        def of(kind: type[Answer] | None) -> "tuple[Chapter, ...]":
+            return tuple(one for one in every if _is_of(one.answers[0], kind))
+
         titles = {one.name: one.title_of_pages for one in (*self.analyses, *self.session_analyses)}
         advisers = tuple(one.advice() for one in self.every if one.advice is not None)
-        return Chapters(
-            tuple(one for one in every if one not in (*plans, *sessions)), sessions, plans, titles, advisers
-        )
+        return Chapters(of(None), of(SessionAnswer), of(PlanAnswer), titles, advisers)
 
     @cached_property
     def plots(self) -> "Mapping[str, Describe]":
@@ -267,12 +251,9 @@ class Systems:
 
     def tabs_of(self, kind: type[Answer] | None) -> Iterator[Tab]:
         """Tabs that show answers of a kind: plans, sessions; None: of flights."""
-        special = (PlanAnswer, SessionAnswer)
-        for tab in self.tabs:
-            shown = self.answer_types.get(tab.shows[0], Answer)
-            if issubclass(shown, kind) if kind is not None else not issubclass(shown, special):
-                yield tab
+        return (tab for tab in self.tabs if _is_of(self.answer_types.get(tab.shows[0], Answer), kind))
 
 
-def _of(chapters: "Iterable[Chapter]", kind: type[Answer]) -> "Iterator[Chapter]":
-    return (one for one in chapters if issubclass(one.answers[0], kind))
+def _is_of(answer: type[Answer], kind: type[Answer] | None) -> bool:
+    """Tell whether an answer is one of a kind; None: one of a flight."""
+    return issubclass(answer, kind) if kind is not None else not issubclass(answer, (PlanAnswer, SessionAnswer))

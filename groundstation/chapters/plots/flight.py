@@ -16,7 +16,7 @@ from groundstation.results.arrays.flight import GnssLanes, Overview, PhaseSpans,
 from groundstation.results.arrays.typed import Flags
 from groundstation.results.corrected_position import CorrectedPosition, corrected_position
 from groundstation.results.flight import FlightResults
-from groundstation.results.on_map import on_taxi
+from groundstation.results.roles import OnTaxi
 
 SMALLEST_TAXI_M = 10.0  # less is no taxi worth enlarging: a receiver at rest, or a start by hand
 SMALLEST_MAP_M = 2.0  # side of the map of an aircraft that did not move
@@ -38,7 +38,7 @@ def track_map(results: FlightResults) -> Plot | None:
         return None
     origin = float(latitude[known[0]]), float(longitude[known[0]])
     north, east = plan_north_east_m(latitude, longitude, *origin)
-    answer = on_taxi(results.answers)
+    answer = results.answer_meeting(OnTaxi)
     stretches = () if answer is None else answer.taxi_used_s
     time = data.time_s
     used = _used_rows(time, stretches)

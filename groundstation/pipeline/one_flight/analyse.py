@@ -30,7 +30,7 @@ from groundstation.results.answer import Answers, answer_meeting
 from groundstation.results.chosen import chosen_intervals
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
-from groundstation.results.roles import SettingsOfHeading
+from groundstation.results.roles import HeadingByTrack
 from groundstation.systems import systems
 from groundstation.systems.analysis import Analysis, Found, in_order_of_need
 from groundstation.systems.known import Known
@@ -283,7 +283,7 @@ def _general_figures(
 def _heading_for_overview(flight: Flight, answers: Answers) -> tuple[NDArray[np.float64] | None, str | None]:
     from groundstation.tables.headings import true_heading
 
-    heading = answer_meeting(answers, SettingsOfHeading)
+    heading = answer_meeting(answers, HeadingByTrack)
     topic = heading.ins_topic if heading else overview.first_of_kind(flight, "ins", "true_heading_deg")
     topic = topic or overview.first_of_kind(flight, "ins", "magnetic_heading_deg")
     if topic is None:

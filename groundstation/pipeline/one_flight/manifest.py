@@ -13,7 +13,7 @@ from groundstation.base.version import __version__
 from groundstation.pipeline.one_flight.resume import versions
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import Host, Manifest, PartOfRun, PowerUpOfRun, Resume, SourceOfRun
-from groundstation.results.roles import SettingsOfHeading
+from groundstation.results.roles import HeadingByTrack
 
 
 def manifest_of(
@@ -43,7 +43,7 @@ def manifest_of(
     parts : sequence of PartOfRun
         The consecutive logs of the flight.
     """
-    source, heading = results.source, results.answer_meeting(SettingsOfHeading)
+    source, heading = results.source, results.answer_meeting(HeadingByTrack)
     return Manifest(
         groundstation=__version__,
         flight_id=results.flight_id,

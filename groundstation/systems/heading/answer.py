@@ -14,8 +14,7 @@ from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
 from groundstation.results.interval_parts import IntervalPart
-from groundstation.results.on_map import OnTaxi
-from groundstation.results.roles import FloatArray, HeadingByTrack, LatencyByTurns, SettingsOfHeading
+from groundstation.results.roles import FloatArray, HeadingByTrack, LatencyByTurns, OnTaxi
 from groundstation.systems.heading.arrays import HeadingSamples
 
 Verdict = Literal["accept", "advisory", "reject", "extend", "undecided"]
@@ -118,7 +117,7 @@ class OnboardComparison:
 
 
 @dataclass(frozen=True)
-class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns, SettingsOfHeading):
+class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns):
     """INS heading error found on straight taxi (error = INS heading - true heading).
 
     Parameters

@@ -122,10 +122,7 @@ def _outcome_installation() -> type:
 
 SYSTEM = System(
     name="heading",
-    analyses=(
-        HEADING,
-        INSTALLATION,
-    ),
+    analyses=(HEADING, INSTALLATION),
     studies=(
         Study(
             "heading",

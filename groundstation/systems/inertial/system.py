@@ -89,10 +89,7 @@ def _study_forecast() -> "Callable[..., StudyResult]":
 
 SYSTEM = System(
     name="inertial",
-    analyses=(
-        INERTIAL,
-        FORECAST,
-    ),
+    analyses=(INERTIAL, FORECAST),
     studies=(
         Study(
             "forecast",

@@ -58,10 +58,7 @@ def _study_approach() -> "Callable[..., StudyResult]":
 
 SYSTEM = System(
     name="landing",
-    analyses=(
-        LANDING,
-        LANDING_BEACONS,
-    ),
+    analyses=(LANDING, LANDING_BEACONS),
     studies=(
         Study(
             "approach",

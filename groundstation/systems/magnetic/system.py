@@ -22,10 +22,7 @@ def _chapters() -> "tuple[Chapter, ...]":
 
     return (
         Chapter(
-            (
-                MagneticResult,
-                GroundDeviation,
-            ),
+            (MagneticResult, GroundDeviation),
             magnetic,
         ),
     )
@@ -62,10 +59,7 @@ def _tabs() -> tuple[Tab, ...]:
 
     return (
         Tab(
-            (
-                "magnetic",
-                "magnetic_ground",
-            ),
+            ("magnetic", "magnetic_ground"),
             magnetic,
         ),
     )
@@ -85,10 +79,7 @@ def _apply() -> "ApplyStep":
 
 SYSTEM = System(
     name="magnetic",
-    analyses=(
-        MAGNETIC,
-        MAGNETIC_GROUND,
-    ),
+    analyses=(MAGNETIC, MAGNETIC_GROUND),
     studies=(
         Study(
             "magnetic",

@@ -63,10 +63,7 @@ def _study_landing() -> "Callable[..., StudyResult]":
 
 SYSTEM = System(
     name="planning",
-    plans=(
-        SESSION_PLAN,
-        LANDING_PLAN,
-    ),
+    plans=(SESSION_PLAN, LANDING_PLAN),
     studies=(
         Study(
             "control",
