@@ -1,20 +1,16 @@
 """A system can be taken out: without its folder and its line everything else runs."""
 
-import os
 import re
 import shutil
-import subprocess
-import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
 from groundstation.systems import OURS, systems
+from tests.test_extending import ROOT, groundstation
 
-ROOT = Path(__file__).parents[1]
 SAMPLE = ROOT / "sample_logs" / "taxi-short.csv"
-LONGEST_S = 300
 NAMES = tuple(path.split(".")[2] for path in OURS)
 # Systems that files of tests/references/systems_named.txt still import: the rows of a fleet, the steer card, exports.
 NOT_YET = ("heading", "inertial", "magnetic", "reference", "cooperative")
@@ -45,19 +41,6 @@ def _requiring(name: str) -> list[str]:
     return [one.name for one in others if any(own & set(analysis.requires) for analysis in one.analyses)]
 
 
-def _groundstation(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "groundstation", *arguments],
-        cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(folder)},
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        timeout=LONGEST_S,
-        check=False,
-    )
-
-
 def _marks(name: str) -> list[pytest.MarkDecorator]:
     named = [pytest.mark.xfail(strict=True, reason="files outside still import it")] if name in NOT_YET else []
     return named if name == TODAY else [*named, pytest.mark.slow]
@@ -66,11 +49,11 @@ def _marks(name: str) -> list[pytest.MarkDecorator]:
 @pytest.mark.parametrize("name", [pytest.param(one, marks=_marks(one)) for one in NAMES])
 def test_everything_else_runs_without_a_system(name: str, tmp_path: Path) -> None:
     gone = taken_out(tmp_path, name)
-    listed = _groundstation(tmp_path, "list")
+    listed = groundstation(tmp_path, "list")
     assert listed.returncode == 0, listed.stderr
-    done = _groundstation(tmp_path, "run", str(SAMPLE), "-o", "out", "-j", "1")
+    done = groundstation(tmp_path, "run", str(SAMPLE), "-o", "out", "-j", "1")
     assert done.returncode == 0, done.stdout + done.stderr
-    again = _groundstation(tmp_path, "report", "out")
+    again = groundstation(tmp_path, "report", "out")
     assert again.returncode == 0, again.stdout + again.stderr
     (summary,) = (tmp_path / "out").glob("*/summary.json")
     results = summary.read_text(encoding="utf-8")
