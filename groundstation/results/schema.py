@@ -234,7 +234,7 @@ def _about(cls: type) -> str:
 
 
 def _told(cls: type) -> dict[str, str]:
-    """Return the descriptions of a class's fields, by name, where its docstring or a base's has them."""
+    """Return the descriptions of fields in the docstrings of a class and its bases, by name."""
     told: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         told |= _told_in(base.__doc__ or "")
