@@ -24,6 +24,29 @@ def test_a_module_in_a_folder_that_moved_is_found() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("old", "names"),
+    [
+        ("results.heading", ("HeadingResult", "Gate", "judged_gate", "Bound", "IntervalPart")),
+        ("results.inertial", ("InertialResult", "EarlyAzimuth")),
+        ("results.installation", ("InstallationResult", "Lesson", "Installations", "read_installations")),
+        ("results.arrays.landing", ("LandingPath", "RangesPath")),
+        ("estimators.two_clocks.relation", ("LogRelation", "NotOneFlightError")),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_names_that_went_to_other_modules_are_there(old: str, names: tuple[str, ...]) -> None:
+    module = importlib.import_module(f"groundstation.{old}")
+    assert not [name for name in names if not hasattr(module, name)]
+
+
+def test_a_folder_within_one_that_moved_is_found() -> None:
+    with pytest.warns(DeprecationWarning, match=r"now groundstation\.systems\.cooperative\.plain\.pairwise"):
+        old = importlib.import_module("groundstation.estimators.cooperative.plain.pairwise")
+    new = importlib.import_module("groundstation.systems.cooperative.plain.pairwise")
+    assert vars(old).items() >= {name: value for name, value in vars(new).items() if not name.startswith("__")}.items()
+
+
 @pytest.mark.parametrize("new", sorted({*FILES.values(), *FOLDERS.values()}))
 def test_every_new_path_is_there(new: str) -> None:
     assert find_spec(f"groundstation.{new}") is not None

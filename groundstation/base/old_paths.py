@@ -3,11 +3,12 @@
 They answer for one release.
 
 ``from groundstation.results.heading import HeadingResult`` gives the module at its new path, with a warning that names
-it. Remove this file, its test and the call in groundstation/__init__.py with the release after 0.9.
+it. Remove this file, its test and the call in groundstation/__init__.py one release after the first that has it.
 """
 
 import importlib
 import warnings
+from collections.abc import Sequence
 from types import ModuleType
 
 TYPE_CHECKING = False
@@ -20,6 +21,13 @@ FILES = {
     "chapters.aided_ins": "systems.inertial.aided_chapter",
     "chapters.control": "systems.planning.session.chapter",
     "chapters.cooperative": "systems.cooperative.chapter",
+    "chapters.fleet.aircraft": "systems.inertial.fleet_drift_chapter",
+    "chapters.fleet.calibration": "systems.reference.fleet_chapter",
+    "chapters.fleet.densities": "systems.heading.fleet_densities_chapter",
+    "chapters.fleet.deviation": "systems.magnetic.fleet_chapter",
+    "chapters.fleet.installations": "systems.heading.installation.fleet_chapter",
+    "chapters.fleet.sessions": "systems.cooperative.fleet_chapter",
+    "chapters.fleet.skill": "systems.inertial.fleet_chapter",
     "chapters.forecast": "systems.inertial.forecast_chapter",
     "chapters.forecast_conclusions": "systems.inertial.conclusions_chapter",
     "chapters.heading": "systems.heading.chapter",
@@ -35,6 +43,12 @@ FILES = {
     "chapters.placement": "systems.planning.session.placement_chapter",
     "chapters.plots.control": "systems.planning.session.plots",
     "chapters.plots.cooperative": "systems.cooperative.plots",
+    "chapters.plots.fleet.aircraft": "systems.heading.fleet_plots",
+    "chapters.plots.fleet.calibration": "systems.reference.fleet_plots",
+    "chapters.plots.fleet.densities": "systems.heading.fleet_densities_plots",
+    "chapters.plots.fleet.deviation": "systems.magnetic.fleet_plots",
+    "chapters.plots.fleet.installations": "systems.heading.installation.fleet_plots",
+    "chapters.plots.fleet.skill": "systems.inertial.fleet_plots",
     "chapters.plots.forecast": "systems.inertial.forecast_plots",
     "chapters.plots.heading": "systems.heading.plots",
     "chapters.plots.inertial": "systems.inertial.plots",
@@ -50,6 +64,7 @@ FILES = {
     "chapters.reference": "systems.reference.chapter",
     "chapters.together": "systems.several_logs.chapter",
     "estimators.analysis": "systems.analysis",
+    "estimators.damage": "pipeline.one_flight.damage",
     "estimators.heading.answer": "systems.heading.outcome",
     "estimators.installation.answer": "systems.heading.installation.outcome",
     "estimators.known": "systems.known",
@@ -58,6 +73,10 @@ FILES = {
     "estimators.landing_ranges.answer": "systems.planning.landing.outcome",
     "estimators.overview": "methods.overview",
     "estimators.plan": "systems.plan",
+    "estimators.two_clocks.places": "systems.several_logs.relate",
+    "methods.taxi.intervals": "tables.intervals",
+    "pipeline.one_flight.apply_deviation": "systems.magnetic.apply_deviation",
+    "pipeline.one_flight.deviation_to_apply": "systems.magnetic.deviation_to_apply",
     "results.arrays.forecast": "systems.inertial.forecast_arrays",
     "results.arrays.heading": "systems.heading.arrays",
     "results.arrays.inertial": "systems.inertial.arrays",
@@ -71,7 +90,7 @@ FILES = {
     "results.forecast": "systems.inertial.forecast_answer",
     "results.heading": "systems.heading.answer",
     "results.inertial": "systems.inertial.answer",
-    "results.installation": "systems.heading.installation.answer",
+    "results.installation": "results.installations",
     "results.landing": "systems.landing.answer",
     "results.landing_beacons": "systems.landing.beacons.answer",
     "results.landing_ranges": "systems.planning.landing.answer",
@@ -143,6 +162,7 @@ FOLDERS = {
     "estimators.approaches": "systems.landing",
     "estimators.control": "systems.planning.session",
     "estimators.cooperative": "systems.cooperative",
+    "estimators.cooperative.plain": "systems.cooperative.plain",
     "estimators.fleet": "methods.fleet",
     "estimators.heading": "systems.heading",
     "estimators.inertial": "systems.inertial",
@@ -154,6 +174,14 @@ FOLDERS = {
     "estimators.reference": "systems.reference",
     "estimators.together": "systems.several_logs",
     "estimators.two_clocks": "systems.several_logs",
+}
+# Further modules that have names of the old one.
+ALSO = {
+    "estimators.two_clocks.relation": ("systems.joining",),
+    "results.arrays.landing": ("systems.planning.landing.arrays",),
+    "results.heading": ("results.gates", "results.interval_parts"),
+    "results.inertial": ("results.roles",),
+    "results.installation": ("systems.heading.installation.answer",),
 }
 
 
@@ -189,19 +217,20 @@ class _Loader:
         old = spec.name.removeprefix(PACKAGE)
         if old in EMPTY or old in FOLDERS:
             return None
-        new = PACKAGE + new_path(old)
-        warnings.warn(f"{spec.name} is now {new}", DeprecationWarning, stacklevel=2)
-        return _alias(importlib.import_module(new))
+        new = [PACKAGE + path for path in (new_path(old), *ALSO.get(old, ()))]
+        warnings.warn(f"{spec.name} is now {', '.join(new)}", DeprecationWarning, stacklevel=2)
+        return _alias([importlib.import_module(path) for path in new])
 
     def exec_module(self, module: ModuleType) -> None:
         """Run nothing, as the module at the new path has run."""
 
 
-def _alias(module: ModuleType) -> ModuleType:
-    """Return a module with the contents of another.
+def _alias(modules: Sequence[ModuleType]) -> ModuleType:
+    """Return a module with the contents of others, those of the first before the rest.
 
-    The import system names it anew and leaves the other alone.
+    The import system names it anew and leaves the others alone.
     """
-    alias = ModuleType(module.__name__, module.__doc__)
-    alias.__dict__.update({name: value for name, value in vars(module).items() if not name.startswith("__")})
+    alias = ModuleType(modules[0].__name__, modules[0].__doc__)
+    for module in reversed(modules):
+        alias.__dict__.update({name: value for name, value in vars(module).items() if not name.startswith("__")})
     return alias
