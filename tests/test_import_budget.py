@@ -17,7 +17,7 @@ from tests.ulog_writer import small_flight
 SAMPLE = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv"
 NOT_NEEDED = (  # to look at a log, check or convert it
     *("numba", "scipy", "pandas", "matplotlib", "jinja2", "typst", "rerun", "h5py", "distributed"),
-    *("groundstation.estimators", "groundstation.tables.phases", "groundstation.reports", "groundstation.viewer"),
+    *("groundstation.systems.system", "groundstation.tables.phases", "groundstation.reports", "groundstation.viewer"),
     *("groundstation.simulation", "groundstation.chapters.by_answer", "groundstation.pipeline.many_flights.runs.batch"),
 )
 BY_VERB = """
@@ -49,7 +49,7 @@ def test_a_table_is_read_without_what_it_does_not_need(verb: str, tmp_path: Path
 def test_a_purpose_is_answered_without_estimating() -> None:
     asked = ["check", str(SAMPLE), "--for", "heading"]
     CliRunner().invoke(app, asked)  # compiles, where that was not done before
-    used = ("groundstation.estimators", "groundstation.tables.phases", "scipy")  # a quantile at standstill
+    used = ("groundstation.systems.system", "groundstation.tables.phases", "scipy")  # a quantile at standstill
     not_needed = tuple(name for name in NOT_NEEDED if name not in used)
     assert loaded(BY_VERB, *asked, names=(*not_needed, "groundstation.systems.heading.solution")) == []
 

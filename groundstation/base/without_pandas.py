@@ -16,14 +16,15 @@ from types import ModuleType
 
 
 @cache
-def _has_readers_of_others() -> bool:
-    """Tell whether somebody added a log format.
+def _has_code_of_others() -> bool:
+    """Tell whether somebody added a log format or a system.
 
-    Its reader may hand pyarrow data from pandas.
+    Such code may hand pyarrow data from pandas.
     """
     from importlib.metadata import entry_points
 
-    return any(not one.value.startswith("groundstation.") for one in entry_points(group="groundstation.readers"))
+    added = (entry_points(group=group) for group in ("groundstation.readers", "groundstation.systems"))
+    return any(not one.value.startswith("groundstation.") for found in added for one in found)
 
 
 class _NoPandas:
@@ -40,7 +41,7 @@ def spare_pandas() -> None:
 
     A pandas that is loaded or asked for already stays.
     """
-    if "pandas" in sys.modules or _has_readers_of_others():
+    if "pandas" in sys.modules or _has_code_of_others():
         return
     import pyarrow as pa
 

@@ -137,13 +137,12 @@ def run(
 
     An OUT of an earlier run is continued: what it finished with the same logs and settings is not repeated.
     """
-    with importing():
-        from groundstation.cli import printing
-        from groundstation.cli.progress import listener
-        from groundstation.pipeline.many_flights.runs.batch import run_many, run_together
-        from groundstation.pipeline.many_flights.runs.dry_run import plan_many
-        from groundstation.pipeline.many_flights.runs.references import judged_by
-        from groundstation.pipeline.one_flight.configuration import applying, installed_as, load_configuration
+    from groundstation.cli import printing
+    from groundstation.cli.progress import listener
+    from groundstation.pipeline.many_flights.runs.batch import run_many, run_together
+    from groundstation.pipeline.many_flights.runs.dry_run import plan_many
+    from groundstation.pipeline.many_flights.runs.references import judged_by
+    from groundstation.pipeline.one_flight.configuration import applying, installed_as, load_configuration
 
     refuse_pdf_of_results(only, pdf=pdf)
     settings = load_configuration(config, aircraft, site, intervals, profile, thresholds, icd, weather)
@@ -354,6 +353,8 @@ def main(arguments: Any = None) -> None:
     if is_own_process and sys.argv[1:2] and sys.argv[1] in DRAWING:
         with importing():
             spare_pandas()  # what Dask imports is Dask's affair
+            if sys.argv[1] == "run":
+                import groundstation.pipeline.many_flights.runs.batch  # noqa: F401  # the most of what a run imports
     _application_for(sys.argv[1:] if arguments is None else arguments)(arguments)
 
 
