@@ -48,6 +48,11 @@ class Figure(Part):
     of: str = ""
     instead: Part | None = None
 
+    @property
+    def full_name(self) -> str:
+        """Name with which of several alike it is: "inertial.state.position"."""
+        return ".".join(filter(None, (self.name, self.of)))
+
 
 @dataclass(frozen=True)
 class Head:

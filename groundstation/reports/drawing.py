@@ -60,5 +60,5 @@ def _drawn(plots: Mapping[str, Callable[..., Plot | None]], part: Part, results:
     """Return a figure as a drawing, by its name in the chapter; any other part as it is."""
     if not isinstance(part, Figure):
         return part
-    name = ".".join(filter(None, (part.name, part.of)))
+    name = part.full_name
     return attempt("figure", name, lambda: drawing_of(plot_of(plots, part, results), name))

@@ -92,13 +92,12 @@ class FlightResults(Tabular):
     @property
     def is_plan(self) -> bool:
         """Tell whether the results are those of a plan and not of something flown."""
-        return any(isinstance(answer, PlanAnswer) for answer in self.answers.values())
+        return self.answer_meeting(PlanAnswer) is not None
 
     @property
     def is_session(self) -> bool:
         """Tell whether the results are those of a session of several aircraft."""
-        is_answered = any(isinstance(answer, SessionAnswer) for answer in self.answers.values())
-        return is_answered or self.figure("session_clocks") is not None
+        return self.answer_meeting(SessionAnswer) is not None or self.figure("session_clocks") is not None
 
     def answer(self, kind: type[A]) -> A | None:
         """The answer of that type, None where its analysis has none."""

@@ -137,10 +137,6 @@ class HeadingByTrack:
         """Flight second of the first straight part it rests on, None where there is none."""
         raise NotImplementedError
 
-    def times_used_s(self) -> FloatArray | None:
-        """Flight seconds of the epochs used, shape (n,); None where they are not known."""
-        raise NotImplementedError
-
     def seconds_used(self) -> float:
         """Seconds that the epochs used stand for."""
         raise NotImplementedError

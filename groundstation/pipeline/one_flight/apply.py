@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from groundstation.base.ledger import Ledger
 from groundstation.base.records import MAX_BATCH_ROWS
 from groundstation.integrity.limits import Thresholds
+from groundstation.pipeline.one_flight.analyse import known_of, seen_by_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import census_of, recounted
 from groundstation.results.file_names import CORRECTED
@@ -29,16 +30,11 @@ def apply_step(flight: Flight, results: FlightResults, configuration: Configurat
 
     Nothing is done where nothing is asked for.
     """
-    from groundstation.systems.known import Known
-    from groundstation.tables.phases import flight_phases
-
-    asked, step = configuration.apply, systems().apply
-    if asked is None or step is None:
+    asked = configuration.apply
+    step = systems().apply if asked is not None else None
+    if step is None:
         return Applied(results)
-    settings = configuration.settings
-    known = Known(
-        phases=flight_phases(flight), aircraft=settings.aircraft, site=settings.site, settings=settings.analyses
-    )
+    known = known_of(seen_by_analyses(flight, configuration), configuration)
     return step.run(flight, results, asked, replace(known, answers=results.answers))
 
 

@@ -48,5 +48,4 @@ def name_of(figure: Figure) -> str:
 
 
 def _told(figure: Figure, saved: SavedFlight, systems: Systems) -> Plot | None:
-    name = ".".join(filter(None, (figure.name, figure.of)))
-    return attempt("figure", name, plot_of, systems.plots, figure, saved.results)
+    return attempt("figure", figure.full_name, plot_of, systems.plots, figure, saved.results)

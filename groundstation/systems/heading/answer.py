@@ -14,7 +14,7 @@ from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
 from groundstation.results.interval_parts import IntervalPart
-from groundstation.results.roles import FloatArray, HeadingByTrack, LatencyByTurns, OnTaxi
+from groundstation.results.roles import HeadingByTrack, LatencyByTurns, OnTaxi
 from groundstation.systems.heading.arrays import HeadingSamples
 
 Verdict = Literal["accept", "advisory", "reject", "extend", "undecided"]
@@ -259,11 +259,6 @@ class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns):
     def begins_s(self) -> float | None:
         """Flight second of the first straight segment, None where there is none."""
         return self.segments[0].start_s if self.segments else None
-
-    def times_used_s(self) -> FloatArray | None:
-        """Flight seconds of the epochs used, shape (n,); None where the samples are not kept."""
-        samples = found_in(self.figures, HeadingSamples)
-        return None if samples is None else samples.time_s[samples.is_used]
 
     def seconds_used(self) -> float:
         """Seconds that the epochs used stand for."""

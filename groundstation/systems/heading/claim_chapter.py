@@ -41,18 +41,23 @@ def claim(heading: HeadingResult) -> Claim:
 
 
 def what_to_enter(heading: HeadingResult) -> str:
+    """Return the number to type, or words instead of it where nothing is to be typed."""
+    width = half_width(heading.confidence95_deg)
+    return to_enter(heading.verdict, heading.correction_deg, width, heading.entry_step_deg)
+
+
+def to_enter(verdict: str, correction_deg: float | None, half_width: str, step_deg: float) -> str:
     """Return the number to type, with its sign and the digits of the entry step.
 
-    Words instead of a number where nothing is to be typed.
+    Words instead of a number where nothing is to be typed. ``half_width`` is in words: "± 12′".
     """
-    if heading.verdict == "advisory":
-        return f"Good to {half_width(heading.confidence95_deg)} only: taxi the other way, or state the wind"
-    if heading.verdict != "accept":
-        return ADVICE[heading.verdict]
-    step, correction = heading.entry_step_deg, heading.correction_deg
-    if is_number(correction) and correction:
-        return f"Enter {number(correction, step_places(step), '°', signed=True)}"
-    return f"Nothing to enter: the error is below half the entry step of {number(step, step_places(step), '°')}"
+    if verdict == "advisory":
+        return f"Good to {half_width} only: taxi the other way, or state the wind"
+    if verdict != "accept":
+        return ADVICE[verdict]
+    if is_number(correction_deg) and correction_deg:
+        return f"Enter {number(correction_deg, step_places(step_deg), '°', signed=True)}"
+    return f"Nothing to enter: the error is below half the entry step of {number(step_deg, step_places(step_deg), '°')}"
 
 
 def reasons(heading: HeadingResult) -> tuple[str, ...]:

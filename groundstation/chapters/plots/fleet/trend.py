@@ -36,6 +36,7 @@ def charts(fleet: FleetResults, quantity: str) -> Plot | None:
     first = sorted(names, key=lambda name: (-changed[name], -outside[name], -len(rows[name]), name))
     shown = sorted(first[:MOST_PANELS])
     dates = date_axis(fleet.trend.start_utc[fleet.trend.quantity == quantity])
+    places = _dates_of(fleet)
     panels = [
         replace(
             told,
@@ -43,7 +44,7 @@ def charts(fleet: FleetResults, quantity: str) -> Plot | None:
             legend="above" if name == shown[0] else "",
         )
         for name in shown
-        if (told := chart(fleet, quantity, name, dates, _dates_of(fleet))) is not None
+        if (told := chart(fleet, quantity, name, dates, places)) is not None
     ]
     more = ""
     if len(shown) < len(names):

@@ -141,8 +141,6 @@ def _stations_beside(group: Sequence[Member]) -> tuple[Stations, tuple[Finding, 
 
 def sweep_sessions(done: Sequence[tuple[SessionJob, Outcome]]) -> None:
     """Remove sessions that an earlier run found of the same flights, and that are others now."""
-    if not done:
-        return
     placed = {outcome.flight_id for _, outcome in done}
     logs = {log.source.sha256 for job, outcome in done if outcome.flight_id for log in job.logs}
     for folder, manifest in sessions_of(done[0][0].out):

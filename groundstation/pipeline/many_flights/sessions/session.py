@@ -205,7 +205,8 @@ def _results(
     start_utc_ns = assembled.start_ns if assembled.has_utc else None
     identity = flight_id(start_utc_ns, {"aircraft": "session", "flight": joined_names(names)}, job.sha256)
     title = f"session of {names_or_count(names)}"
-    analyses = ", ".join(one.name for one in systems().session_analyses)
+    tried = {*found.answers, *found.reasons}
+    analyses = ", ".join(one.name for one in systems().session_analyses if one.name in tried)
     size = sum(log.source.size_bytes for log in job.logs)
     told = sorted({flight.metadata.get("flight", "") for flight in flights} - {""})
     return FlightResults(

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.chapters.parts import Claim, Facts, Grid, Head, Note, Part, Rank, Section, kept
 from groundstation.chapters.verdict import VERDICTS
-from groundstation.chapters.wording import ABSENT, clean, interval, is_number, number, step_places, typeset
+from groundstation.chapters.wording import ABSENT, clean, interval, is_number, number, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.results.installations import Installed, LearnedHeading
 from groundstation.results.interval_parts import IntervalPart
 from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.heading.claim_chapter import ADVICE, PARTS
+from groundstation.systems.heading.claim_chapter import PARTS, to_enter
 from groundstation.systems.heading.installation.answer import InstallationResult
 
 TITLE = "Installation, learned"
@@ -59,13 +59,8 @@ def nothing_learned(answer: LearnedHeading) -> Note:
 
 def what_to_enter(answer: LearnedHeading, step_deg: float) -> str:
     """Return the number to type, or what to do instead."""
-    if answer.verdict == "advisory":
-        return f"Good to ± {_arcmin(answer.half_width_deg)} only: taxi the other way, or state the wind"
-    if answer.verdict != "accept":
-        return ADVICE[answer.verdict]
-    if is_number(answer.correction_deg) and answer.correction_deg:
-        return f"Enter {number(answer.correction_deg, step_places(step_deg), '°', signed=True)}"
-    return f"Nothing to enter: the error is below half the entry step of {number(step_deg, step_places(step_deg), '°')}"
+    width = f"± {_arcmin(answer.half_width_deg)}"
+    return to_enter(answer.verdict, answer.correction_deg, width, step_deg)
 
 
 def sources(answer: LearnedHeading) -> str:
