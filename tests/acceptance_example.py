@@ -14,8 +14,8 @@ from groundstation.results.flight import FlightResults
 from groundstation.systems.heading.answer import HeadingResult
 from tests.figure_arrays import filled
 from tests.fleet_example import DAY_NS, START_NS
-from tests.inertial_example import inertial_result
 from tests.report_example import MANIFEST, example
+from tests.systems.inertial.example import inertial_result
 
 ROWS = 61
 

@@ -11,8 +11,8 @@ from groundstation.results.roles import AzimuthEstimate, EarlyAzimuth
 from groundstation.systems.heading.answer import HeadingResult, TaxiWind
 from groundstation.systems.inertial.answer import InertialResult
 from tests.fleet_example import DAY_NS, START_NS
-from tests.inertial_example import inertial_result
 from tests.report_example import MANIFEST, example, heading_result
+from tests.systems.inertial.example import inertial_result
 
 PARTS = (IntervalPart("taxi", 0.07, 0.14), IntervalPart("wind", 0.05, 0.1), IntervalPart("installation", 0.05, 0.1))
 

@@ -35,7 +35,7 @@ from groundstation.systems.reference.answer import ReferenceResult
 from groundstation.systems.several_logs.answer import Together
 from groundstation.tables.table import Flight
 from tests import report_example, viewer_example
-from tests.inertial_example import aided_figures, forecast_result, inertial_result
+from tests.systems.inertial.example import aided_figures, forecast_result, inertial_result
 
 MOST_GENERIC = 3  # figures of an answer without a chapter: all are told alike
 LAKE = KeepOut("lake", ((-1800.0, 500.0), (-1800.0, 1400.0), (-1000.0, 1400.0)))
@@ -69,7 +69,7 @@ def bare() -> FlightResults:
 @cache
 def flown() -> FlightResults:
     """A whole simulated flight with everything that is asked of one: latency, spectrum, reference."""
-    from tests.test_latency import flown
+    from tests.systems.latency.test_estimate import flown
 
     return analysed(flown(0.2))
 
@@ -91,7 +91,7 @@ def joined() -> FlightResults:
 @cache
 def magnetic() -> FlightResults:
     """A figure of eight."""
-    from tests.test_magnetic_run import figure_eight
+    from tests.systems.magnetic.test_run import figure_eight
 
     return figure_eight()
 
@@ -99,7 +99,7 @@ def magnetic() -> FlightResults:
 @cache
 def ground() -> FlightResults:
     """Ground runs on many headings."""
-    from tests.test_magnetic_ground import whole
+    from tests.systems.magnetic.test_ground import whole
 
     return whole()
 
@@ -107,7 +107,7 @@ def ground() -> FlightResults:
 @cache
 def landing() -> FlightResults:
     """Approaches by an ILS, the threshold given; its receiver tells protection levels."""
-    from tests.test_viewer_landing import results
+    from tests.systems.landing.test_tab import results
 
     found = results(True)
     path = found.rows_of(LandingPath)
@@ -127,7 +127,7 @@ def landing() -> FlightResults:
 @cache
 def landing_without_site() -> FlightResults:
     """Approaches by an ILS whose threshold is found."""
-    from tests.test_viewer_landing import results
+    from tests.systems.landing.test_tab import results
 
     return results(False)
 
@@ -135,8 +135,8 @@ def landing_without_site() -> FlightResults:
 @cache
 def beacons() -> FlightResults:
     """An approach by locators."""
-    from tests.landing_example import approach_scenario
-    from tests.test_landing_beacons import analysed
+    from tests.systems.landing.example import approach_scenario
+    from tests.systems.landing.test_beacons import analysed
 
     return of_answers(analysed(approach_scenario()).answer)
 
@@ -144,7 +144,7 @@ def beacons() -> FlightResults:
 @cache
 def ranges() -> FlightResults:
     """A landing by ranges as planned."""
-    from tests.test_landing_ranges import FOUR
+    from tests.systems.planning.test_landing import FOUR
 
     return of_answers(*LANDING_PLAN.run(replace(FOUR, trials=12)).answers.values())
 
@@ -152,7 +152,7 @@ def ranges() -> FlightResults:
 @cache
 def control() -> FlightResults:
     """A planned session."""
-    from tests.test_control import mixed
+    from tests.systems.planning.test_control import mixed
 
     planned = plan_session(mixed())
     return replace(of_answers(*planned.answers.values()), figures=figures_of(planned))
@@ -161,7 +161,7 @@ def control() -> FlightResults:
 @cache
 def placement() -> FlightResults:
     """Points placed for an approach, one area kept out."""
-    from tests.test_placement_of_points import approach
+    from tests.systems.planning.test_placement import approach
 
     planned = plan_session(approach(keep_out=(LAKE,), iterations=10))
     return replace(of_answers(*planned.answers.values()), figures=figures_of(planned))
@@ -170,8 +170,8 @@ def placement() -> FlightResults:
 @cache
 def session() -> FlightResults:
     """A session of three aircraft."""
-    from tests.cooperative_example import believed
     from tests.session_example import SHORT, simulated
+    from tests.systems.cooperative.example import believed
 
     given = SessionKnown(settings={"cooperative": believed(SHORT)})
     return of_answers(*run_analyses((COOPERATIVE,), simulated(SHORT).session, given).answers.values())
@@ -180,8 +180,8 @@ def session() -> FlightResults:
 @cache
 def crowd() -> FlightResults:
     """A session of more aircraft than there are roles of a series."""
-    from tests.cooperative_example import believed
     from tests.session_example import SEED, SHORT
+    from tests.systems.cooperative.example import believed
 
     aircraft = tuple(
         replace(SHORT.aircraft[0], name=f"V{number}", north_m=9000.0 * number, east_m=2000.0 * number**2, turns=())

@@ -17,7 +17,7 @@ from groundstation.simulation.session_log import session_flights
 from groundstation.simulation.session_scenario import SessionScenario
 from groundstation.tables.session_settings import Station, Stations
 from groundstation.tables.table import Flight, Table
-from tests.cooperative_example import GLOBAL, LOCAL, POINTS
+from tests.systems.cooperative.example import GLOBAL, LOCAL, POINTS
 
 SEED = 9100
 WITH_POINTS = replace(GLOBAL, points=POINTS)

@@ -25,8 +25,8 @@ from groundstation.systems.magnetic.answer import DeclinationUsed, MagneticResul
 from groundstation.systems.magnetic.chapter import magnetic as magnetic_chapter
 from groundstation.systems.magnetic.estimate import estimate_deviation
 from groundstation.systems.magnetic.ground_answer import GroundDeviation, GroundRun
-from tests.inertial_example import inertial_result
-from tests.magnetic_example import make, taxi_heading
+from tests.systems.inertial.example import inertial_result
+from tests.systems.magnetic.example import make, taxi_heading
 
 EXACT_DEG = 1e-9
 

@@ -25,8 +25,8 @@ from groundstation.systems.heading.chapter import heading
 from groundstation.systems.heading.claim_chapter import claim
 from groundstation.systems.latency.answer import Latencies, Latency
 from tests.figure_arrays import filled
-from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import example, heading_result
+from tests.systems.inertial.example import forecast_result, inertial_result
 from tests.told import PLOTS, front, next_steps
 
 BARE = FlightResults("NOTIME_00000000", Source("a.csv", "00" * 32, 0, "flat-csv"), {}, None, 0.0, "failed")

@@ -28,10 +28,10 @@ from groundstation.store.writer import StoreWriter
 from groundstation.systems import systems
 from groundstation.tables.headings import true_heading
 from groundstation.tables.table import Flight
-from tests.inertial_flights import batch_of, flight_of, without_rows
-from tests.landing_example import approach_scenario, flown
-from tests.magnetic_example import START_NS, make, table
 from tests.real_logs import real_log
+from tests.systems.inertial.flights import batch_of, flight_of, without_rows
+from tests.systems.landing.example import approach_scenario, flown
+from tests.systems.magnetic.example import START_NS, make, table
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 SEED = 20260504

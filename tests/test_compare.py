@@ -35,9 +35,9 @@ from groundstation.systems import systems
 from groundstation.systems.inertial.answer import InertialResult, RealOutage
 from groundstation.systems.inertial.arrays import InertialStates
 from groundstation.viewer.comparison import OVER_TIME
-from tests.inertial_example import inertial_result
 from tests.recording_contents import Contents
 from tests.saved import load
+from tests.systems.inertial.example import inertial_result
 from tests.told import COMPARED, comparison_html, write_comparison
 from tests.viewer_example import make_flight, make_results
 from tests.viewer_shots import ALL_OR_SOME, chosen, colourful, pages, picture

@@ -32,7 +32,7 @@ from groundstation.viewer.tabs import track as track_tab
 from groundstation.viewer.tabs.track import MAP_LATITUDE_DEG, zoom_of
 from tests.figure_arrays import filled
 from tests.recording_contents import Contents
-from tests.test_approaches import EXACT, PLAIN, only
+from tests.systems.landing.test_approaches import EXACT, PLAIN, only
 from tests.told import write_recording
 from tests.viewer_example import make_flight, make_results
 from tests.viewer_shots import SATURATED, colourful, picture, settled

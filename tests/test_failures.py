@@ -462,7 +462,7 @@ def test_a_summary_without_failures_is_left_as_it_is(tmp_path: Path) -> None:
 
 def test_a_plan_with_failures_has_all_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from groundstation.pipeline.verbs.plan import run_plan
-    from tests.test_plan import scenario
+    from tests.systems.planning.test_plan import scenario
 
     tabs = tuple(tab._replace(log=fails) if "placement" in tab.shows else tab for tab in systems().tabs)
     monkeypatch.setitem(systems().__dict__, "tabs", tabs)

@@ -28,8 +28,9 @@ from groundstation.results.manifest import Manifest
 from groundstation.results.summary import summary_of
 from groundstation.systems import systems
 from groundstation.viewer import inline
-from tests import inertial_example, report_example
+from tests import report_example
 from tests.saved import load
+from tests.systems.inertial import example as inertial_example
 from tests.told import PLOTS
 
 ROOT = Path(__file__).parents[1]

@@ -6,7 +6,7 @@ import pytest
 from groundstation.base.records import Column
 from groundstation.tables.own_filter import own_innovations
 from groundstation.tables.table import Flight, Table
-from tests.inertial_flights import table_of
+from tests.systems.inertial.flights import table_of
 
 TIME_S = np.arange(5.0)
 PX4 = ("gps_hpos[0]", "gps_hpos[1]", "gps_hvel[0]", "gps_hvel[1]")

@@ -22,7 +22,7 @@ from groundstation.pipeline.verbs.plan import run_plan
 from groundstation.pipeline.verbs.watching import watch
 from groundstation.reports import sections
 from groundstation.results.files import load_manifest
-from tests.test_plan import scenario
+from tests.systems.planning.test_plan import scenario
 from tests.test_resume import SHORT, copied, flight_in, stages, times
 
 PDFS = {"report.pdf", "summary.pdf"}

@@ -25,9 +25,9 @@ from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, NotAssessable, Source
 from groundstation.results.gates import Gate
 from groundstation.systems.heading.answer import HeadingResult
-from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import MANIFEST, example, figure, heading_result
 from tests.saved import load, write_flight_report
+from tests.systems.inertial.example import forecast_result, inertial_result
 from tests.told import flight_document
 
 LARGEST_REPORT_BYTES = 2_000_000  # mailed and opened on old machines

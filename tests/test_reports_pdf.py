@@ -23,9 +23,9 @@ from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
 from tests import test_reports as html
-from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import MANIFEST, example, heading_result
 from tests.saved import load, write_flight_report
+from tests.systems.inertial.example import forecast_result, inertial_result
 from tests.told import flight_document
 
 A4_POINTS = (595.3, 841.9)

@@ -21,10 +21,10 @@ from groundstation.systems import systems
 from groundstation.systems.heading import answer as answers
 from groundstation.systems.inertial import answer as errors
 from groundstation.systems.inertial import forecast_answer as outlook
-from tests.inertial_example import forecast_result, inertial_result
 from tests.real_logs import real_log
 from tests.report_example import example, heading_result
 from tests.saved import load
+from tests.systems.inertial.example import forecast_result, inertial_result
 
 SCHEMA_FILE = Path(__file__).parents[1] / "schemas" / "summary.schema.json"
 SCHEMA = json.loads(SCHEMA_FILE.read_text(encoding="utf-8"))

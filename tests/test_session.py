@@ -28,10 +28,10 @@ from groundstation.systems.cooperative.chapter import TITLES, cooperative, sessi
 from groundstation.systems.cooperative.estimate import estimate_session
 from groundstation.systems.cooperative.settings import ALGORITHMS, CooperativeSettings, InsBelief
 from groundstation.systems.known import SessionKnown
-from tests.cooperative_example import believed, truth_of
 from tests.recording_contents import Contents
 from tests.saved import load
 from tests.session_example import SEED, SHORT, simulated
+from tests.systems.cooperative.example import believed, truth_of
 from tests.told import front
 
 IDENTITY = "20180305T120000Z_session_A-B-C"

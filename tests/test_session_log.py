@@ -18,8 +18,8 @@ from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.tables.session import DeadReckoning
 from groundstation.tables.session_assemble import session_from_flights
 from groundstation.tables.session_settings import SessionSettings, Stations
-from tests.cooperative_example import believed
 from tests.session_example import LOCAL, SEED, WITH_POINTS, through_the_log
+from tests.systems.cooperative.example import believed
 
 LOGGED_M, LOGGED_MPS = 2e-4, 2e-5  # steps of 1e-9 deg, 0.1 mm and 0.01 mm/s, in three axes
 TOML = """

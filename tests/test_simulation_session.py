@@ -22,7 +22,7 @@ from groundstation.simulation.session_errors import integrated_gauss_markov
 from groundstation.simulation.session_motion import fly
 from groundstation.simulation.session_scenario import load_session, session_names
 from groundstation.tables.session import DeadReckoning
-from tests.cooperative_example import GLOBAL, LOCAL
+from tests.systems.cooperative.example import GLOBAL, LOCAL
 
 START_NS, _ = iso_to_utc_ns("2018-03-05T12:00:00Z")
 

@@ -27,11 +27,11 @@ from groundstation.systems.heading.examine import OF_DATA
 from groundstation.systems.heading.wording import told
 from groundstation.tables.session_settings import Stations
 from groundstation.tables.table import Flight
-from tests.inertial_flights import batch_of, flight_of, without_rows
-from tests.landing_example import approach_scenario, flown
-from tests.magnetic_example import EIGHT, LEVEL, make
 from tests.real_logs import real_log
 from tests.session_example import SHORT, recorded, stations_of
+from tests.systems.inertial.flights import batch_of, flight_of, without_rows
+from tests.systems.landing.example import approach_scenario, flown
+from tests.systems.magnetic.example import EIGHT, LEVEL, make
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 ORDINARY = Configuration()

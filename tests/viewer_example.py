@@ -15,7 +15,7 @@ from groundstation.results.gates import Gate
 from groundstation.systems.heading.answer import HeadingResult, OnboardComparison, Standstill, TaxiSegment
 from groundstation.tables.table import Flight, Table
 from tests.figure_arrays import figure
-from tests.inertial_example import forecast_result, inertial_result
+from tests.systems.inertial.example import forecast_result, inertial_result
 
 START_NS = iso_to_utc_ns("2026-05-04T06:00:00Z")[0]
 ERROR_DEG = 1.23

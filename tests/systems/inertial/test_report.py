@@ -21,9 +21,9 @@ from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.inertial.chapter import inertial
 from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.inertial.forecast_chapter import forecast
-from tests.inertial_example import AIDED, aided_figures, forecast_result, inertial_result
 from tests.report_example import MANIFEST, example
 from tests.saved import load
+from tests.systems.inertial.example import AIDED, aided_figures, forecast_result, inertial_result
 from tests.told import PLOTS, flight_document
 
 INERTIAL = (

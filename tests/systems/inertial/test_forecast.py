@@ -16,8 +16,8 @@ from groundstation.systems.inertial.leads import leads_of, start_epochs
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import claimed_sigma
 from groundstation.systems.inertial.starts import start_states
-from tests.inertial_flights import batch_of, flight_of, without_rows
 from tests.real_logs import real_log
+from tests.systems.inertial.flights import batch_of, flight_of, without_rows
 
 SETTINGS = InertialSettings()
 ROUNDING_M = 1e-6

@@ -21,7 +21,7 @@ from groundstation.systems.planning.session.scenario import SessionPlan
 from groundstation.systems.shipped_plans import load_plan, plan_names
 from tests.recording_contents import Contents
 
-SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
+SCHEMA = json.loads((Path(__file__).parents[3] / "schemas" / "summary.schema.json").read_text(encoding="utf-8"))
 LEAST = """
 title = "short"
 duration_s = 4
@@ -149,7 +149,7 @@ def test_a_wrong_scenario_is_told_in_a_line(tmp_path: Path, change: tuple[str, s
 
 
 def test_the_scenario_of_the_documentation_is_read(tmp_path: Path) -> None:
-    page = (Path(__file__).parents[1] / "docs" / "control.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "control.md").read_text(encoding="utf-8")
     (text,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     loaded = load_plan(systems().plans[0], scenario(tmp_path, text)).scenario
     assert loaded.user.control == ("speed",) and loaded.placement.keep_out[0].name == "lake"

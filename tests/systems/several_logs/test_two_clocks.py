@@ -14,7 +14,7 @@ from groundstation.systems.several_logs.gnss_time import GnssStretch, GnssTime, 
 from groundstation.systems.several_logs.relate import relate
 from groundstation.systems.several_logs.relation import LogRelation, Stretch, TimedLog
 from groundstation.tables.table import Flight
-from tests.two_clocks_example import RECEIVER_TIME, UTC_NS, Twice, recorded_twice, retimed, with_gnss_time
+from tests.systems.several_logs.example import RECEIVER_TIME, UTC_NS, Twice, recorded_twice, retimed, with_gnss_time
 
 FLIGHT, TAXI, OTHER = 1, 3, 2  # draws
 LIVELY_S = 0.02  # of a flight with turns: largest error at its middle

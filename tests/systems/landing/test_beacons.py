@@ -29,9 +29,9 @@ from groundstation.systems.landing.beacons.analysis import LANDING_BEACONS
 from groundstation.systems.landing.beacons.answer import BeaconLanding
 from groundstation.systems.landing.beacons.approach import Deviations, over_known_ground
 from groundstation.systems.landing.beacons.settings import LandingBeaconsSettings
-from tests.landing_example import BEACONS, approach_scenario, flown, known_of
 from tests.recording_contents import Contents
 from tests.saved import load
+from tests.systems.landing.example import BEACONS, approach_scenario, flown, known_of
 from tests.told import write_recording
 
 PLACES = np.array([(-one.before_threshold_m, one.right_m) for one in BEACONS])

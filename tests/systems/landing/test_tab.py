@@ -13,7 +13,7 @@ from groundstation.simulation.approach import load_approach, simulate_approach
 from groundstation.systems.landing.answer import LandingResult
 from groundstation.systems.landing.chapter import landing
 from tests.recording_contents import Contents
-from tests.test_approaches import found, site
+from tests.systems.landing.test_approaches import found, site
 from tests.told import PLOTS, write_recording
 
 SCENARIO = load_approach("ils-approach")

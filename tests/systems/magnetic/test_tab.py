@@ -14,7 +14,7 @@ from groundstation.systems.magnetic.answer import ADVISORY, MagneticResult
 from groundstation.systems.magnetic.chapter import magnetic
 from groundstation.systems.magnetic.deviation_answer import STEER_CARD
 from tests.recording_contents import Contents
-from tests.test_magnetic_run import figure_eight, simulated
+from tests.systems.magnetic.test_run import figure_eight, simulated
 from tests.told import write_recording
 
 

@@ -16,7 +16,7 @@ from groundstation.systems.inertial.seams import FACTOR_MAX, PATIENCE_S, factor_
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.study.cases import NO_GATE, differences_of, epochs_of, full_case, model_of
 from groundstation.tables.table import Flight
-from tests.inertial_flights import changed, flight_of, without_rows
+from tests.systems.inertial.flights import changed, flight_of, without_rows
 
 CASE = full_case("manoeuvring", "", "navigation", "manoeuvring", 2500)
 SETTINGS = InertialSettings()

@@ -10,9 +10,9 @@ from groundstation.results.flight import NotAssessable
 from groundstation.results.roles import AzimuthEstimate
 from groundstation.systems.inertial.answer import ChannelResult, RealOutage
 from groundstation.systems.inertial.chapter import inertial
-from tests.inertial_example import AIDED, inertial_result
 from tests.report_example import example
 from tests.section_contents import every_text, facts, grid, notes, row, rows, titles, tones
+from tests.systems.inertial.example import AIDED, inertial_result
 
 FIGURES = "The INS in figures"
 

@@ -21,7 +21,7 @@ from groundstation.systems.magnetic.modulus import fit_modulus
 from groundstation.systems.magnetic.poisson import EarthField
 from groundstation.systems.magnetic.readings import Readings
 from groundstation.systems.magnetic.settings import MagneticSettings
-from tests.magnetic_example import correlated, taxi_heading
+from tests.systems.magnetic.example import correlated, taxi_heading
 
 EARTH = EarthField(11.0, 17_000.0, 50_000.0)
 ROUNDING_DEG = 1e-9

@@ -19,8 +19,8 @@ from groundstation.systems.inertial.estimate import Estimation, estimate_ins_err
 from groundstation.systems.known import AircraftData
 from groundstation.tables.table import Flight
 from tests.acceptance_example import save_fleet, save_flight
-from tests.inertial_flights import batch_of, changed, flight_of, with_table, without_rows
 from tests.real_logs import real_log
+from tests.systems.inertial.flights import batch_of, changed, flight_of, with_table, without_rows
 
 LENGTH_S = 5400.0
 STAND_S = 120.0

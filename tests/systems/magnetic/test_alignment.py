@@ -48,9 +48,9 @@ from groundstation.systems.magnetic.gyros import EARTH_DEG_PER_H, GyroDrift, gyr
 from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.tables.phases import Interval, Phases, flight_phases
 from groundstation.tables.table import Flight
-from tests.inertial_example import inertial_result
-from tests.magnetic_example import START_NS, table, taxi_heading
 from tests.simulated_flights import QUIET_GNSS, QUIET_GROUND, QUIET_INS, scenario
+from tests.systems.inertial.example import inertial_result
+from tests.systems.magnetic.example import START_NS, table, taxi_heading
 
 EXACT_DEG = 0.002  # INS heading and velocities are rounded to 0.001 deg and 0.001 m/s
 SIGMAS = 4.0  # of a single draw

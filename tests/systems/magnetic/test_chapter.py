@@ -20,7 +20,7 @@ from groundstation.systems.magnetic.chapter import magnetic
 from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD
 from tests.report_example import example
 from tests.saved import load
-from tests.test_magnetic_run import figure_eight
+from tests.systems.magnetic.test_run import figure_eight
 from tests.test_reports import Page, report
 from tests.told import PLOTS, flight_sections
 

@@ -16,7 +16,7 @@ from groundstation.systems.inertial.hindcast import hindcast
 from groundstation.systems.inertial.leads import leads_of, past_mean, start_epochs
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import claimed_sigma
-from tests.inertial_flights import batch_of, flight_of
+from tests.systems.inertial.flights import batch_of, flight_of
 
 SETTINGS = InertialSettings()
 ALONE = BankFactors((1.0,), (1.0,), (1.0,), (1.0,), (1.0,))

@@ -17,7 +17,7 @@ from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.known import AircraftData, Known
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight
-from tests.inertial_flights import batch_of, changed, flight_of, table_of, with_table, without_rows
+from tests.systems.inertial.flights import batch_of, changed, flight_of, table_of, with_table, without_rows
 
 DURATION_S = 7200.0
 ONE_SIGMA = 1.0

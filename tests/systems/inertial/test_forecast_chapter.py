@@ -10,9 +10,9 @@ from groundstation.chapters.parts import Section
 from groundstation.results.flight import NotAssessable
 from groundstation.systems.inertial.forecast_answer import SkillRow
 from groundstation.systems.inertial.forecast_chapter import forecast
-from tests.inertial_example import forecast_result, inertial_result
 from tests.report_example import example
 from tests.section_contents import every_text, grid, notes, row, rows, titles, tones
+from tests.systems.inertial.example import forecast_result, inertial_result
 
 SKILL = "Skill by method and horizon"
 HONEST = "Is the claimed σ honest? Drift windows"

@@ -34,7 +34,7 @@ from groundstation.systems.cooperative.settings import (
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 from groundstation.systems.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.tables.session import NO_SLOT, DeadReckoning, GroundPoint, Heights, Odometry, Ranges, Session
-from tests.cooperative_example import GLOBAL, LOCAL, believed, full_nees, truth_of
+from tests.systems.cooperative.example import GLOBAL, LOCAL, believed, full_nees, truth_of
 
 SEEDS = range(7000, 7024)  # written down before the first run; no other is used here
 TAIL = 0.0005  # either side: seven tests of this kind fail by chance once in a hundred and fifty suites

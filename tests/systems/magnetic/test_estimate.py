@@ -23,7 +23,7 @@ from groundstation.systems.magnetic.answer import MagneticResult
 from groundstation.systems.magnetic.estimate import estimate_deviation
 from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.tables.table import Flight, Table
-from tests.magnetic_example import EIGHT, HARD_NT, LEVEL, SOFT, Made, make, table, taxi_heading
+from tests.systems.magnetic.example import EIGHT, HARD_NT, LEVEL, SOFT, Made, make, table, taxi_heading
 
 EXACT_DEG = 1e-9
 FROM_GRID_DEG = 1e-3  # A to E are read off a curve sampled every half degree

@@ -60,10 +60,10 @@ from groundstation.systems.magnetic.deviation_to_apply import Apply, asked_for
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
-from tests import magnetic_example
 from tests.recording_contents import Contents
 from tests.saved import load
-from tests.test_magnetic_run import analysed, figure_eight, simulated, system_3_alone
+from tests.systems.magnetic import example as magnetic_example
+from tests.systems.magnetic.test_run import analysed, figure_eight, simulated, system_3_alone
 from tests.test_reports import HOSTILE
 from tests.told import write_recording
 
@@ -452,7 +452,7 @@ def test_what_cannot_be_read_is_told_in_one_line(first: Path, tmp_path: Path) ->
             asked_for(str(tmp_path / name))
         text = str(caught.value)
         assert reason in text and name in text and "\n" not in text, text
-    log, out = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv", tmp_path / "out"
+    log, out = Path(__file__).parents[3] / "sample_logs" / "taxi-short.csv", tmp_path / "out"
     done = CliRunner().invoke(app, ["run", str(log), "-o", str(out), "--apply", str(tmp_path / "k.csv")])
     assert (done.exit_code, done.stderr.count("\n")) == (2, 1)
     assert not out.exists()

@@ -18,8 +18,8 @@ from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.tables.table import Flight
 from groundstation.viewer.chart import Axis, Chart
 from groundstation.viewer.recorder import Line, Recorder
-from tests.inertial_example import AIDED, aided_figures, inertial_result
 from tests.recording_contents import Contents
+from tests.systems.inertial.example import AIDED, aided_figures, inertial_result
 from tests.told import write_recording
 from tests.viewer_example import START_NS, make_flight, make_results
 
