@@ -64,6 +64,8 @@ FILES = {
     "chapters.reference": "systems.reference.chapter",
     "chapters.together": "systems.several_logs.chapter",
     "estimators.analysis": "systems.analysis",
+    "estimators.cooperative.alone_arrays": "systems.cooperative.alone_types",
+    "estimators.cooperative.arrays": "systems.cooperative.loop_types",
     "estimators.damage": "pipeline.one_flight.damage",
     "estimators.heading.answer": "systems.heading.outcome",
     "estimators.installation.answer": "systems.heading.installation.outcome",
