@@ -79,6 +79,7 @@ FILES = {
     "methods.taxi.intervals": "tables.intervals",
     "pipeline.one_flight.apply_deviation": "systems.magnetic.apply_deviation",
     "pipeline.one_flight.deviation_to_apply": "systems.magnetic.deviation_to_apply",
+    "results.arrays.cooperative": "systems.cooperative.arrays",
     "results.arrays.forecast": "systems.inertial.forecast_arrays",
     "results.arrays.heading": "systems.heading.arrays",
     "results.arrays.inertial": "systems.inertial.arrays",
@@ -180,11 +181,19 @@ FOLDERS = {
 # Further modules that have names of the old one.
 ALSO = {
     "estimators.two_clocks.relation": ("systems.joining",),
+    "results.arrays.cooperative": (
+        "results.arrays.session",
+        "systems.planning.session.arrays",
+        "systems.planning.session.placement_arrays",
+    ),
     "results.arrays.landing": ("systems.planning.landing.arrays",),
     "results.heading": ("results.gates", "results.interval_parts"),
     "results.inertial": ("results.roles",),
     "results.installation": ("systems.heading.installation.answer",),
 }
+
+# Names that left a module that stays.
+NAMES = {"results.arrays.flight": {"LatencySearch": "systems.latency.arrays"}}
 
 
 def new_path(old: str) -> str:
@@ -209,6 +218,22 @@ def spec_of(name: str) -> "ModuleSpec | None":
     from importlib.machinery import ModuleSpec
 
     return ModuleSpec(name, _Loader(), is_package=old in EMPTY or old in FOLDERS)  # type: ignore[arg-type]
+
+
+def name_that_left(module: str, name: str) -> object:
+    """Return what a module that stays once had; its ``__getattr__`` asks.
+
+    Raises
+    ------
+    AttributeError
+        It never had the name.
+    """
+    new = NAMES[module.removeprefix(PACKAGE)].get(name)
+    if new is None:
+        raise AttributeError(f"module {module!r} has no attribute {name!r}")
+    warnings.warn(f"{module}.{name} is now in {PACKAGE}{new}", DeprecationWarning, stacklevel=3)
+    found: object = getattr(importlib.import_module(PACKAGE + new), name)
+    return found
 
 
 class _Loader:

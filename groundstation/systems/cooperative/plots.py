@@ -25,15 +25,11 @@ from groundstation.plots.marks import (
 )
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import broken_at_gaps, finite, thin
-from groundstation.results.arrays.cooperative import (
-    CooperativeGeometry,
-    CooperativeLinks,
-    CooperativeTracks,
-    SessionPoints,
-)
+from groundstation.results.arrays.session import SessionPoints
 from groundstation.results.arrays.typed import Flags
 from groundstation.results.flight import FlightResults
 from groundstation.systems.cooperative.answer import CooperativeResult
+from groundstation.systems.cooperative.arrays import CooperativeGeometry, CooperativeLinks, CooperativeTracks
 from groundstation.systems.cooperative.chapter import REFERENCE, title_of, trusted
 
 ELLIPSES = 8  # of each track
