@@ -1,4 +1,4 @@
-"""Old paths of modules that moved into the folders of the systems.
+"""Old paths of modules that moved into the folders of the systems, or into another module.
 
 They answer for one release.
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 PACKAGE = "groundstation."
 EMPTY = ("estimators", "studies")  # rooms that are no more
 FILES = {
+    "base.normal": "base.quantiles",
     "chapters.aided_ins": "systems.inertial.aided_chapter",
     "chapters.control": "systems.planning.session.chapter",
     "chapters.cooperative": "systems.cooperative.chapter",
@@ -76,7 +77,7 @@ FILES = {
     "estimators.overview": "methods.overview",
     "estimators.plan": "systems.plan",
     "estimators.two_clocks.places": "systems.several_logs.relate",
-    "methods.taxi.intervals": "tables.intervals",
+    "methods.taxi.intervals": "results.chosen",
     "pipeline.one_flight.apply_deviation": "systems.magnetic.apply_deviation",
     "pipeline.one_flight.deviation_to_apply": "systems.magnetic.deviation_to_apply",
     "results.arrays.cooperative": "systems.cooperative.arrays",
@@ -87,6 +88,7 @@ FILES = {
     "results.arrays.magnetic": "systems.magnetic.arrays",
     "results.arrays.reference": "systems.reference.arrays",
     "results.arrays.together": "systems.several_logs.arrays",
+    "results.coefficients": "results.roles",
     "results.control": "systems.planning.session.answer",
     "results.cooperative": "systems.cooperative.answer",
     "results.deviation": "systems.magnetic.deviation_answer",
@@ -102,6 +104,7 @@ FILES = {
     "results.magnetic_ground": "systems.magnetic.ground_answer",
     "results.placement": "systems.planning.session.placement_answer",
     "results.plan": "results.answer",
+    "results.reasons": "results.gates",
     "results.reference": "systems.reference.answer",
     "results.together": "systems.several_logs.answer",
     "studies.approach": "systems.landing.study",
@@ -144,6 +147,7 @@ FILES = {
     "studies.magnetic_taxis": "systems.magnetic.study.taxis",
     "studies.page": "systems.study",
     "studies.shipped_plans": "systems.shipped_plans",
+    "tables.ins_kind": "tables.sources",
     "viewer.tabs.control": "systems.planning.session.tab",
     "viewer.tabs.cooperative": "systems.cooperative.tab",
     "viewer.tabs.distribution": "systems.heading.distribution_tab",

@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.base.ellipse import magnified, outlines
 from groundstation.base.local_frame import plane_through
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.plots.common import M_PER_KM, label
 from groundstation.plots.axes import time_axis
 from groundstation.plots.marks import (

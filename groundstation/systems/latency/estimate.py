@@ -14,7 +14,7 @@ from groundstation.results.figures import FigureData
 from groundstation.systems.latency.answer import Latencies, Latency, Quantity
 from groundstation.systems.latency.arrays import LatencySearch
 from groundstation.systems.latency.signals import NotComparableError, compare, pairs_of
-from groundstation.tables.ins_kind import AIDED, is_mostly_aided
+from groundstation.tables.sources import AIDED, is_mostly_aided
 from groundstation.tables.table import Flight, Table
 
 Pair = tuple[str, str, Quantity]
