@@ -6,8 +6,7 @@ from typing import Any
 
 from groundstation.base.timescales import utc_ns_to_stamp
 from groundstation.results.files import save
-from groundstation.results.interval_parts import IntervalPart
-from groundstation.results.roles import AzimuthEstimate, EarlyAzimuth
+from groundstation.results.roles import AzimuthEstimate, EarlyAzimuth, IntervalPart
 from groundstation.systems.heading.answer import HeadingResult, TaxiWind
 from groundstation.systems.inertial.answer import InertialResult
 from tests.fleet_example import DAY_NS, START_NS

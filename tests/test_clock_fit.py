@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from groundstation.base.clock import Clock
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import Column, LogHeader, RecordBatch
 from groundstation.base.serial import from_json, to_json_exactly
 from groundstation.base.timescales import iso_to_utc_ns

@@ -15,7 +15,7 @@ from rerun.experimental import ViewerClient
 from typer.testing import CliRunner
 
 from groundstation.base.errors import UnreadableLogError, UsageError
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.plots.comparison import sides_of
 from groundstation.cli.main import app
 from groundstation.pipeline.many_flights.inputs import collect

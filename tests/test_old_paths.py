@@ -30,6 +30,7 @@ def test_a_module_in_a_folder_that_moved_is_found() -> None:
         ("results.heading", ("HeadingResult", "Gate", "judged_gate", "Bound", "IntervalPart")),
         ("results.inertial", ("InertialResult", "EarlyAzimuth")),
         ("results.installation", ("InstallationResult", "Lesson", "Installations", "read_installations")),
+        ("results.arrays.cooperative", ("CooperativeTracks", "SessionClocks", "ControlPaths", "PlacementMap")),
         ("results.arrays.landing", ("LandingPath", "RangesPath")),
         ("estimators.two_clocks.relation", ("LogRelation", "NotOneFlightError")),
     ],
@@ -38,6 +39,15 @@ def test_a_module_in_a_folder_that_moved_is_found() -> None:
 def test_names_that_went_to_other_modules_are_there(old: str, names: tuple[str, ...]) -> None:
     module = importlib.import_module(f"groundstation.{old}")
     assert not [name for name in names if not hasattr(module, name)]
+
+
+def test_a_name_that_left_a_module_that_stays_is_there() -> None:
+    from groundstation.results.arrays import flight
+    from groundstation.systems.latency.arrays import LatencySearch
+
+    with pytest.warns(DeprecationWarning, match=r"flight\.LatencySearch is now in groundstation\.systems\.latency"):
+        assert vars(flight)["__getattr__"]("LatencySearch") is LatencySearch
+    assert not hasattr(flight, "NoSuchArrays")
 
 
 def test_a_folder_within_one_that_moved_is_found() -> None:

@@ -1,4 +1,4 @@
-"""Old paths of modules that moved into the folders of the systems.
+"""Old paths of modules that moved into the folders of the systems, or into another module.
 
 They answer for one release.
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 PACKAGE = "groundstation."
 EMPTY = ("estimators", "studies")  # rooms that are no more
 FILES = {
+    "base.normal": "base.quantiles",
     "chapters.aided_ins": "systems.inertial.aided_chapter",
     "chapters.control": "systems.planning.session.chapter",
     "chapters.cooperative": "systems.cooperative.chapter",
@@ -64,6 +65,8 @@ FILES = {
     "chapters.reference": "systems.reference.chapter",
     "chapters.together": "systems.several_logs.chapter",
     "estimators.analysis": "systems.analysis",
+    "estimators.cooperative.alone_arrays": "systems.cooperative.alone_types",
+    "estimators.cooperative.arrays": "systems.cooperative.loop_types",
     "estimators.damage": "pipeline.one_flight.damage",
     "estimators.heading.answer": "systems.heading.outcome",
     "estimators.installation.answer": "systems.heading.installation.outcome",
@@ -74,9 +77,10 @@ FILES = {
     "estimators.overview": "methods.overview",
     "estimators.plan": "systems.plan",
     "estimators.two_clocks.places": "systems.several_logs.relate",
-    "methods.taxi.intervals": "tables.intervals",
+    "methods.taxi.intervals": "results.chosen",
     "pipeline.one_flight.apply_deviation": "systems.magnetic.apply_deviation",
     "pipeline.one_flight.deviation_to_apply": "systems.magnetic.deviation_to_apply",
+    "results.arrays.cooperative": "systems.cooperative.arrays",
     "results.arrays.forecast": "systems.inertial.forecast_arrays",
     "results.arrays.heading": "systems.heading.arrays",
     "results.arrays.inertial": "systems.inertial.arrays",
@@ -84,6 +88,7 @@ FILES = {
     "results.arrays.magnetic": "systems.magnetic.arrays",
     "results.arrays.reference": "systems.reference.arrays",
     "results.arrays.together": "systems.several_logs.arrays",
+    "results.coefficients": "results.roles",
     "results.control": "systems.planning.session.answer",
     "results.cooperative": "systems.cooperative.answer",
     "results.deviation": "systems.magnetic.deviation_answer",
@@ -99,6 +104,7 @@ FILES = {
     "results.magnetic_ground": "systems.magnetic.ground_answer",
     "results.placement": "systems.planning.session.placement_answer",
     "results.plan": "results.answer",
+    "results.reasons": "results.gates",
     "results.reference": "systems.reference.answer",
     "results.together": "systems.several_logs.answer",
     "studies.approach": "systems.landing.study",
@@ -141,6 +147,7 @@ FILES = {
     "studies.magnetic_taxis": "systems.magnetic.study.taxis",
     "studies.page": "systems.study",
     "studies.shipped_plans": "systems.shipped_plans",
+    "tables.ins_kind": "tables.sources",
     "viewer.tabs.control": "systems.planning.session.tab",
     "viewer.tabs.cooperative": "systems.cooperative.tab",
     "viewer.tabs.distribution": "systems.heading.distribution_tab",
@@ -178,11 +185,19 @@ FOLDERS = {
 # Further modules that have names of the old one.
 ALSO = {
     "estimators.two_clocks.relation": ("systems.joining",),
+    "results.arrays.cooperative": (
+        "results.arrays.session",
+        "systems.planning.session.arrays",
+        "systems.planning.session.placement_arrays",
+    ),
     "results.arrays.landing": ("systems.planning.landing.arrays",),
     "results.heading": ("results.gates", "results.interval_parts"),
     "results.inertial": ("results.roles",),
     "results.installation": ("systems.heading.installation.answer",),
 }
+
+# Names that left a module that stays.
+NAMES = {"results.arrays.flight": {"LatencySearch": "systems.latency.arrays"}}
 
 
 def new_path(old: str) -> str:
@@ -207,6 +222,22 @@ def spec_of(name: str) -> "ModuleSpec | None":
     from importlib.machinery import ModuleSpec
 
     return ModuleSpec(name, _Loader(), is_package=old in EMPTY or old in FOLDERS)  # type: ignore[arg-type]
+
+
+def name_that_left(module: str, name: str) -> object:
+    """Return what a module that stays once had; its ``__getattr__`` asks.
+
+    Raises
+    ------
+    AttributeError
+        It never had the name.
+    """
+    new = NAMES[module.removeprefix(PACKAGE)].get(name)
+    if new is None:
+        raise AttributeError(f"module {module!r} has no attribute {name!r}")
+    warnings.warn(f"{module}.{name} is now in {PACKAGE}{new}", DeprecationWarning, stacklevel=3)
+    found: object = getattr(importlib.import_module(PACKAGE + new), name)
+    return found
 
 
 class _Loader:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
+NORMAL_95 = 1.96  # an error of one axis stays within so many sigma in 95 % of cases
 
 
 def chi_square_quantile(probability: float, freedom: ArrayLike) -> FloatArray:

@@ -5,7 +5,7 @@ from groundstation.chapters.generic import titled
 from groundstation.chapters.parts import Note, Section
 from groundstation.chapters.wording import typeset, words
 from groundstation.results.flight import FlightResults
-from groundstation.results.reasons import in_plain_words
+from groundstation.results.gates import in_plain_words
 
 
 def reason_of(results: FlightResults, analysis: str) -> str:

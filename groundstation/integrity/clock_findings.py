@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from groundstation.base.findings import Finding, Severity
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import FIRST_NS, ClockModel

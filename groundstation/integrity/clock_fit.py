@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock_relation import ClockBreak, ClockSegment

@@ -53,7 +53,7 @@ class InsKinds:
 
     It goes by the log and by the user's statement.
 
-    ``find(flight)`` gives the kind (:mod:`groundstation.tables.ins_kind`) of each INS topic that can be judged.
+    ``find(flight)`` gives the kind (:mod:`groundstation.tables.sources`) of each INS topic that can be judged.
     """
 
     find: Callable[[Flight], dict[str, str]]

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 
 AGREE_SIGMAS, CONTRADICT_SIGMAS = 2.0, 3.0
 

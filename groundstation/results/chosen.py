@@ -1,11 +1,14 @@
 """Intervals that the user left out of the estimates, or forced into them.
 
-They come from the configuration of a run.
+They come from the configuration of a run, and are given to the methods in flight seconds.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
+
+from groundstation.base.errors import SettingsError
 
 Use = Literal["exclude", "force"]
 USES: tuple[Use, ...] = ("exclude", "force")
@@ -19,6 +22,19 @@ class ChosenInterval:
     start: str
     end: str
     reason: str = ""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Flight seconds that a file excludes from the estimate, or forces into it."""
+
+    start_s: float
+    end_s: float
+    use: Use = "exclude"
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.start_s) and math.isfinite(self.end_s)):
+            raise SettingsError("interval", f"{self.start_s:g} to {self.end_s:g} s", "finite flight seconds")
 
 
 def chosen_intervals(configuration: Mapping[str, Any]) -> tuple[ChosenInterval, ...]:

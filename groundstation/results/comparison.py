@@ -7,7 +7,7 @@ from typing import Any, Literal, TypeAlias, TypeGuard
 import numpy as np
 
 from groundstation.base.findings import Finding
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import NotAssessable
 

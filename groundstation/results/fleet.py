@@ -13,10 +13,10 @@ from groundstation.base.records import frozen
 from groundstation.base.serial import to_json
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.results.arrays.fleet import FleetChecks, FleetInstallationFlights, FleetSkillFlights, FleetTrend
-from groundstation.results.coefficients import LETTERS
 from groundstation.results.figures import FigureData
 from groundstation.results.frames import row_fields, rows_frame
 from groundstation.results.installations import InstallationRow
+from groundstation.results.roles import LETTERS
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,4 +1,7 @@
-"""Acceptance gates, as the verdicts of all systems rest on them: figure, limit, state."""
+"""Acceptance gates, as the verdicts of all systems rest on them: figure, limit, state.
+
+Reasons that name gates are put in plain words for readers who do not know the method.
+"""
 
 import math
 from dataclasses import dataclass
@@ -10,6 +13,7 @@ GateState = Literal["passed", "failed", "not_measured"]
 Sense = Literal["at_most", "at_least", "between"]
 Bound = tuple[float | None, float | None]  # lowest and highest value with which a gate passes
 STORED_STEP = 1e-6  # limits in summary.json are rounded to it
+NO_CONTACT = "no GNSS epoch with ground contact proven"
 
 
 @dataclass(frozen=True)
@@ -70,3 +74,14 @@ def judged_gate(
         return Gate(name, title, None, limit, unit, "not_measured", required, reason or "not measurable", sense)
     passed = (low is None or value >= low) and (high is None or value <= high)
     return Gate(name, title, float(value), limit, unit, "passed" if passed else "failed", required, reason, sense)
+
+
+def in_plain_words(reason: str) -> str:
+    """Return the reason with the names of gates in plain words.
+
+    Examples
+    --------
+    >>> in_plain_words("no straight taxi: of 9 epochs above 6 m/s before lift-off: not proven ground 9")
+    'no straight taxi: of 9 epochs above 6 m/s before lift-off: ground contact not proven for 9'
+    """
+    return reason.replace("not proven ground ", "ground contact not proven for ")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.serial import MismatchError, from_json, to_json
-from groundstation.results.interval_parts import IntervalPart
+from groundstation.results.roles import IntervalPart
 
 INSTALLATIONS = "installations.json"
 FORMAT_VERSION = 1

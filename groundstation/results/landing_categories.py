@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import frozen
 
 LINEAR_95 = NORMAL_95  # 95 % of one Gaussian error lie within so many sigma

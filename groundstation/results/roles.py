@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from groundstation.results.gates import Gate
 
 FloatArray = NDArray[np.float64]
+LETTERS = ("A", "B", "C", "D", "E")  # of the coefficients of a compass deviation
 
 
 class Delay:
@@ -38,7 +39,7 @@ class Delays:
 class KindOfIns:
     """Role of an answer that tells whether GNSS corrects an INS.
 
-    ``kind`` is that of ``ins_topic``; the kinds stand in :mod:`groundstation.tables.ins_kind`.
+    ``kind`` is that of ``ins_topic``; the kinds stand in :mod:`groundstation.tables.sources`.
     """
 
     ins_topic: str
@@ -105,6 +106,18 @@ class AzimuthByTurns:
 
     ins_topic: str
     azimuth: AzimuthEstimate | None
+
+
+@dataclass(frozen=True)
+class IntervalPart:
+    """One part of the interval of the error: ``taxi``, ``wind`` or ``installation``.
+
+    The squares of the sigmas add up. ``half_width_deg`` is what the 95 % interval would be with this part alone.
+    """
+
+    name: str
+    sigma_deg: float
+    half_width_deg: float
 
 
 class HeadingByTrack:

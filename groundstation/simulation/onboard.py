@@ -3,7 +3,7 @@
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, wrap_180
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.simulation.readings import Readings, quantised

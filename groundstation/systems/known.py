@@ -13,8 +13,8 @@ from groundstation.base.errors import GroundstationError, SettingsError
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.toml_settings import check_ranges, number, required_number
 from groundstation.results.answer import A, Answers, answer_meeting, answer_of
+from groundstation.results.chosen import Interval
 from groundstation.results.installations import Lesson
-from groundstation.tables.intervals import Interval
 from groundstation.tables.phases import Phases
 
 if TYPE_CHECKING:

@@ -1,4 +1,7 @@
-"""Choice of a source: by the order of several logs, and by what a method needs."""
+"""Choice of a source: by the order of several logs, and by what a method needs.
+
+The kind of an INS, by its log: whether GNSS corrects it, and how often its mode says so.
+"""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -10,7 +13,6 @@ from groundstation.base.records import HEADING_IS_TRACK
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.tables.gaps import seconds_covered
-from groundstation.tables.ins_kind import AIDED, HALF
 from groundstation.tables.table import Flight, Table
 
 TOGETHER = "together"  # key of the metadata of a flight of several logs
@@ -21,6 +23,9 @@ NEEDS = {"gnss": ("velocity_north_mps", "velocity_east_mps"), "ins": ("roll_deg"
 FIX_FIELDS = ("latitude_deg", "velocity_north_mps", "ground_speed_mps")  # a receiver with a fix logs one of them
 NEVER_A_FIX = "GNSS never had a fix"
 LONGEST_STEP_S = 10.0  # between samples for a source to count as there
+UNAIDED, AIDED, UNKNOWN = "unaided", "gnss_aided", "unknown"  # kinds of INS
+STATED = (UNAIDED, AIDED)  # kinds that an aircraft file or the head of a log may state
+HALF = 0.5
 
 
 @dataclass(frozen=True)
@@ -249,3 +254,15 @@ def _ranked(table: Table, kind: str, said: str) -> Ranked:
         float(np.median(sigma)) if sigma.size else np.nan,
         1.0 / usual_s,
     )
+
+
+def aided_share(table: Table) -> float:
+    """Share of the samples with a mode whose mode is ``gnss_aided``; 0 where none has a mode."""
+    modes = table.text("mode")
+    stated = modes != ""
+    return float(np.mean(modes[stated] == AIDED)) if stated.any() else 0.0
+
+
+def is_mostly_aided(table: Table) -> bool:
+    """Tell whether the logged mode of an INS is ``gnss_aided`` for more than half of the time."""
+    return aided_share(table) > HALF

@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
 from groundstation.methods.harmonics import OVER_CIRCLE
-from groundstation.results.coefficients import LETTERS
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import DeviationRow
+from groundstation.results.roles import LETTERS
 
 FloatArray = NDArray[np.float64]
 NOT_COMPARED = "reject"

@@ -10,7 +10,7 @@ from groundstation.base.angles import wrap_180
 from groundstation.base.records import BoolArray
 from groundstation.methods.taxi.samples import GATE_TEXT, USED, Samples
 from groundstation.methods.taxi.settings import TaxiLimits
-from groundstation.tables.intervals import Interval
+from groundstation.results.chosen import Interval
 from groundstation.tables.phases import Phases
 
 NOT_TAXI = ("take-off run", "landing roll")  # phases, and reasons: power and wind crab the aircraft

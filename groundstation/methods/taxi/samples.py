@@ -17,7 +17,7 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.methods.moving_lines import fitted_lines, window_bounds
 from groundstation.methods.taxi.settings import TaxiLimits
-from groundstation.results.reasons import NO_CONTACT
+from groundstation.results.gates import NO_CONTACT
 from groundstation.tables.epochs import MOVING_MPS, distinct_epochs
 from groundstation.tables.table import Flight, Table
 

@@ -27,14 +27,13 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.damage import damage_finding
 from groundstation.pipeline.one_flight.intervals import seconds_of
 from groundstation.results.answer import Answers, answer_meeting
-from groundstation.results.chosen import chosen_intervals
+from groundstation.results.chosen import Interval, chosen_intervals
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, NotAssessable, Source, Status
 from groundstation.results.roles import HeadingByTrack
 from groundstation.systems import systems
 from groundstation.systems.analysis import Analysis, Found, in_order_of_need
 from groundstation.systems.known import Known
-from groundstation.tables.intervals import Interval
 from groundstation.tables.phases import ALWAYS_ON_GROUND, flight_phases
 from groundstation.tables.table import Flight
 

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.errors import GroundstationError, UsageError
-from groundstation.base.normal import NORMAL_95
-from groundstation.base.quantiles import length_quantile
+from groundstation.base.quantiles import NORMAL_95, length_quantile
 from groundstation.base.shipped_toml import ShippedToml, TomlFile
 from groundstation.base.toml_settings import settings_from
 from groundstation.base.units import M_PER_NAUTICAL_MILE

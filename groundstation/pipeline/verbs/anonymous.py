@@ -29,8 +29,8 @@ from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.methods.ins_noise import class_names
 from groundstation.tables.headings import positions_for
-from groundstation.tables.ins_kind import STATED
 from groundstation.tables.phases import ALWAYS_ON_GROUND, YES
+from groundstation.tables.sources import STATED
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:

@@ -3,6 +3,9 @@
 Times are flight seconds.
 """
 
+from typing import TYPE_CHECKING
+
+from groundstation.base.old_paths import name_that_left
 from groundstation.results.arrays.typed import Arrays, Counts, Floats, Texts
 
 
@@ -95,11 +98,7 @@ class GapRows(Arrays, figure="gaps", digits={"start_s": 2, "length_s": 2}):
     length_s: Floats
 
 
-class LatencySearch(Arrays, figure="latency_search", digits={"latency_s": 3, "residual": 6}):
-    """Residual against delay of every pair of sources."""
+if not TYPE_CHECKING:  # which would no longer miss a name
 
-    reference: Texts
-    other: Texts
-    quantity: Texts
-    latency_s: Floats
-    residual: Floats
+    def __getattr__(name: str) -> object:
+        return name_that_left(__name__, name)

@@ -12,7 +12,8 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
 from groundstation.methods.link_dynamics import ROOMS
-from groundstation.systems.cooperative.arrays import (
+from groundstation.systems.cooperative.judging import LEAP_M
+from groundstation.systems.cooperative.loop_types import (
     AXES,
     EPOCH_COLUMNS,
     FORCE,
@@ -29,7 +30,6 @@ from groundstation.systems.cooperative.arrays import (
     Fleet,
     Numbers,
 )
-from groundstation.systems.cooperative.judging import LEAP_M
 from groundstation.systems.cooperative.motion import place, step
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.vehicles import Step, View

@@ -7,7 +7,7 @@ import numpy as np
 
 from groundstation.base.compile import in_place
 from groundstation.base.records import Int64Array
-from groundstation.systems.cooperative.alone_arrays import (
+from groundstation.systems.cooperative.alone_types import (
     EXACT,
     MODIFIED,
     NOBODY,
@@ -21,7 +21,9 @@ from groundstation.systems.cooperative.alone_arrays import (
     Room,
 )
 from groundstation.systems.cooperative.alone_update import split_update, update
-from groundstation.systems.cooperative.arrays import (
+from groundstation.systems.cooperative.joint import SAME_TIME_S
+from groundstation.systems.cooperative.judging import count_rejection, write_down
+from groundstation.systems.cooperative.loop_types import (
     HEIGHT,
     LOST,
     OUTPUTS,
@@ -36,8 +38,6 @@ from groundstation.systems.cooperative.arrays import (
     Points,
     Rows,
 )
-from groundstation.systems.cooperative.joint import SAME_TIME_S
-from groundstation.systems.cooperative.judging import count_rejection, write_down
 from groundstation.systems.cooperative.motion import place, position, step, turn_covariance, turn_rows
 from groundstation.systems.cooperative.observation import observe
 from groundstation.tables.session import NO_SLOT

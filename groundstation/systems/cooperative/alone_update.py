@@ -6,7 +6,7 @@ Two sources may share noise; covariances may be split.
 import numpy as np
 
 from groundstation.base.compile import in_place
-from groundstation.systems.cooperative.alone_arrays import (
+from groundstation.systems.cooperative.alone_types import (
     EXACT,
     MODIFIED,
     NOBODY,
@@ -16,7 +16,7 @@ from groundstation.systems.cooperative.alone_arrays import (
     Own,
     Room,
 )
-from groundstation.systems.cooperative.arrays import (
+from groundstation.systems.cooperative.loop_types import (
     PEER,
     Events,
     Fleet,

@@ -30,8 +30,8 @@ def _examine(session: "Session", _known: SessionKnown, settings: CooperativeSett
 
     Those that cannot be used are left out first.
     """
-    from groundstation.systems.cooperative.arrays import PEER, POINT
     from groundstation.systems.cooperative.events import prepare, require_vehicles
+    from groundstation.systems.cooperative.loop_types import PEER, POINT
 
     prepared = prepare(session, settings)
     require_vehicles(prepared)

@@ -21,9 +21,9 @@ measurements: Maybeck, Stochastic Models, Estimation, and Control, volume 1, 197
 
 import numpy as np
 
-from groundstation.systems.cooperative.arrays import POINT, SATELLITE, Rules
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.joint import Joint, work
+from groundstation.systems.cooperative.loop_types import POINT, SATELLITE, Rules
 from groundstation.systems.cooperative.messages import report_bytes
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.timeline import SAME_TIME_S, timeline

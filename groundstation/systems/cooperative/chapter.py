@@ -19,7 +19,7 @@ from groundstation.chapters.wording import (
     with_full_stop,
     words,
 )
-from groundstation.results.arrays.cooperative import SessionClocks
+from groundstation.results.arrays.session import SessionClocks
 from groundstation.results.fleet import SessionRow
 from groundstation.results.flight import FlightResults
 from groundstation.systems.cooperative.answer import AlgorithmRow, CooperativeResult, LinkRow

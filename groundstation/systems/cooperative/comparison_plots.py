@@ -1,7 +1,7 @@
 """Plots of the navigation between aircraft of two sessions over each other."""
 
 from groundstation.chapters.plots.comparison import Compared, Overlay, TimeLine, overlaid
-from groundstation.results.arrays.cooperative import SessionErrors
+from groundstation.systems.cooperative.arrays import SessionErrors
 from groundstation.systems.cooperative.errors_arrays import session_errors
 
 

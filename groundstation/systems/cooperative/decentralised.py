@@ -22,7 +22,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.methods.link_dynamics import ROOMS
 from groundstation.systems.cooperative.alone import run_alone
-from groundstation.systems.cooperative.alone_arrays import (
+from groundstation.systems.cooperative.alone_types import (
     EXACT,
     MODIFIED,
     NOBODY,
@@ -35,9 +35,9 @@ from groundstation.systems.cooperative.alone_arrays import (
     Past,
     Room,
 )
-from groundstation.systems.cooperative.arrays import Items, Log, rows_for
 from groundstation.systems.cooperative.error_map import blocks, spectral_radius, unit_rows, windows
 from groundstation.systems.cooperative.events import Prepared
+from groundstation.systems.cooperative.loop_types import Items, Log, rows_for
 from groundstation.systems.cooperative.messages import Broadcast
 from groundstation.systems.cooperative.plain.split_covariance import WEIGHTS
 from groundstation.systems.cooperative.settings import CooperativeSettings

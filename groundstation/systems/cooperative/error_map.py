@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.systems.cooperative.arrays import Fleet, Items
+from groundstation.systems.cooperative.loop_types import Fleet, Items
 
 
 def unit_rows(fleet: Fleet, window_s: float) -> FloatArray:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from groundstation.results.arrays.cooperative import CooperativeTracks, SessionErrors
 from groundstation.results.files import SavedFlight
 from groundstation.systems.cooperative.answer import CooperativeResult
+from groundstation.systems.cooperative.arrays import CooperativeTracks, SessionErrors
 
 
 def session_errors(saved: SavedFlight) -> SessionErrors | None:

@@ -11,10 +11,10 @@ from groundstation.methods.intervals import nees_limits
 from groundstation.systems.cooperative import figures
 from groundstation.systems.cooperative.algorithms import run_algorithm
 from groundstation.systems.cooperative.answer import AlgorithmRow, CooperativeResult, GeometryRow, LinkRow, VehicleRow
-from groundstation.systems.cooperative.arrays import KINDS, PEER, POINT, USED
 from groundstation.systems.cooperative.consistency import Judgement, judge
 from groundstation.systems.cooperative.events import Prepared, prepare, require_vehicles
 from groundstation.systems.cooperative.geometry import Geometry, Truth, bound_of, geometry_of
+from groundstation.systems.cooperative.loop_types import KINDS, PEER, POINT, USED
 from groundstation.systems.cooperative.settings import ALGORITHMS, CooperativeSettings
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 from groundstation.tables.session import Session

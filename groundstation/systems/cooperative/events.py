@@ -11,7 +11,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.systems.cooperative.aircraft import Aircraft, aircraft_of, fleet_of
-from groundstation.systems.cooperative.arrays import (
+from groundstation.systems.cooperative.loop_types import (
     HEIGHT,
     PEER,
     POINT,

@@ -4,18 +4,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from groundstation.results.arrays.cooperative import (
+from groundstation.results.arrays.typed import joined
+from groundstation.systems.cooperative.arrays import (
     CooperativeGeometry,
     CooperativeLinks,
     CooperativeMap,
     CooperativeTracks,
     CooperativeTraffic,
 )
-from groundstation.results.arrays.typed import joined
-from groundstation.systems.cooperative.arrays import KINDS, PEER, POINT
 from groundstation.systems.cooperative.consistency import Judgement
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.geometry import Geometry
+from groundstation.systems.cooperative.loop_types import KINDS, PEER, POINT
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 
 

@@ -17,8 +17,8 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import frozen
 from groundstation.systems.cooperative.algorithms import run_algorithm
-from groundstation.systems.cooperative.arrays import HEIGHT, PEER, SATELLITE, Events
 from groundstation.systems.cooperative.events import prepare
+from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, SATELLITE, Events
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.tracks import AlgorithmRun, Track
 from groundstation.systems.cooperative.vehicles import Vehicle

@@ -9,7 +9,8 @@ from groundstation.base.records import Int64Array
 from groundstation.methods.kalman.arrays import Pattern
 from groundstation.methods.kalman.kernels import predict_covariance, predicted_variance, update_covariance
 from groundstation.methods.link_dynamics import ROOMS
-from groundstation.systems.cooperative.arrays import (
+from groundstation.systems.cooperative.judging import count_rejection, write_down
+from groundstation.systems.cooperative.loop_types import (
     HEIGHT,
     LOST,
     OUTPUTS,
@@ -25,7 +26,6 @@ from groundstation.systems.cooperative.arrays import (
     Rules,
     rows_for,
 )
-from groundstation.systems.cooperative.judging import count_rejection, write_down
 from groundstation.systems.cooperative.motion import place, position, step
 from groundstation.systems.cooperative.observation import observe
 

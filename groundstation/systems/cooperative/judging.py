@@ -2,7 +2,7 @@
 
 from groundstation.base.compile import in_place
 from groundstation.base.records import Int64Array
-from groundstation.systems.cooperative.arrays import CLOCK_LEAPS, GATED, JUDGED, USED, Fleet, FloatArray, Log
+from groundstation.systems.cooperative.loop_types import CLOCK_LEAPS, GATED, JUDGED, USED, Fleet, FloatArray, Log
 
 PATIENCE = 30  # rejections of a vehicle in a row: then its clock has leapt, or it is not where it thinks
 LEAP_M = 1e5

@@ -9,7 +9,7 @@ import numpy as np
 from groundstation.base.compile import in_place
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.methods.link_dynamics import fill_step
-from groundstation.systems.cooperative.arrays import (
+from groundstation.systems.cooperative.loop_types import (
     AXES,
     FORCE,
     GLOBAL,

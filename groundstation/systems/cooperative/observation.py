@@ -7,7 +7,7 @@ import numpy as np
 
 from groundstation.base.compile import in_place
 from groundstation.base.geodesy import EARTH_RATE_RADPS
-from groundstation.systems.cooperative.arrays import HEIGHT, POINT, SATELLITE, Events, Fleet, FloatArray, Rows
+from groundstation.systems.cooperative.loop_types import HEIGHT, POINT, SATELLITE, Events, Fleet, FloatArray, Rows
 
 LIGHT_MPS = 299_792_458.0
 NEAREST_M = 1e-3  # a source on top of the receiver has no direction

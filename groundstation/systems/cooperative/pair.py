@@ -8,7 +8,9 @@ from groundstation.base.compile import in_place
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.methods.link_dynamics import ROOMS
 from groundstation.systems.cooperative.alone_update import solve
-from groundstation.systems.cooperative.arrays import (
+from groundstation.systems.cooperative.joint import SAME_TIME_S
+from groundstation.systems.cooperative.judging import count_rejection, write_down
+from groundstation.systems.cooperative.loop_types import (
     LOST,
     OUTPUTS,
     PEER,
@@ -21,8 +23,6 @@ from groundstation.systems.cooperative.arrays import (
     Points,
     Rows,
 )
-from groundstation.systems.cooperative.joint import SAME_TIME_S
-from groundstation.systems.cooperative.judging import count_rejection, write_down
 from groundstation.systems.cooperative.motion import place, position, step, turn_covariance, turn_rows
 from groundstation.systems.cooperative.observation import observe
 

@@ -14,9 +14,9 @@ asynchronous pairwise communication, International Journal of Robotics Research 
 
 import numpy as np
 
-from groundstation.systems.cooperative.arrays import PEER, rows_for
 from groundstation.systems.cooperative.error_map import blocks, spectral_radius, unit_rows, windows
 from groundstation.systems.cooperative.events import Prepared
+from groundstation.systems.cooperative.loop_types import PEER, rows_for
 from groundstation.systems.cooperative.messages import pairwise_bytes
 from groundstation.systems.cooperative.pair import Members, room_for, run_pairs
 from groundstation.systems.cooperative.settings import CooperativeSettings

@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.base.ellipse import magnified, outlines
 from groundstation.base.local_frame import plane_through
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.plots.common import M_PER_KM, label
 from groundstation.plots.axes import time_axis
 from groundstation.plots.marks import (
@@ -25,15 +25,11 @@ from groundstation.plots.marks import (
 )
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import broken_at_gaps, finite, thin
-from groundstation.results.arrays.cooperative import (
-    CooperativeGeometry,
-    CooperativeLinks,
-    CooperativeTracks,
-    SessionPoints,
-)
+from groundstation.results.arrays.session import SessionPoints
 from groundstation.results.arrays.typed import Flags
 from groundstation.results.flight import FlightResults
 from groundstation.systems.cooperative.answer import CooperativeResult
+from groundstation.systems.cooperative.arrays import CooperativeGeometry, CooperativeLinks, CooperativeTracks
 from groundstation.systems.cooperative.chapter import REFERENCE, title_of, trusted
 
 ELLIPSES = 8  # of each track

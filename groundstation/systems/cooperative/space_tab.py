@@ -7,10 +7,11 @@ import rerun.blueprint as rrb
 from groundstation.base.ellipse import principal_axes
 from groundstation.base.local_frame import LocalFrame, plane_through
 from groundstation.base.records import Int64Array
-from groundstation.results.arrays.cooperative import CooperativeLinks, CooperativeTracks, SessionPoints
+from groundstation.results.arrays.session import SessionPoints
 from groundstation.results.arrays.typed import Texts
 from groundstation.results.flight import FlightResults
 from groundstation.systems.cooperative.answer import CooperativeResult
+from groundstation.systems.cooperative.arrays import CooperativeLinks, CooperativeTracks
 from groundstation.systems.cooperative.chapter import trusted
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour

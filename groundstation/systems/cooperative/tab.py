@@ -8,10 +8,10 @@ import rerun.blueprint as rrb
 
 from groundstation.chapters.front import front
 from groundstation.chapters.markdown import front_markdown, markdown
-from groundstation.results.arrays.cooperative import CooperativeGeometry, CooperativeLinks
 from groundstation.results.arrays.typed import Counts, Texts
 from groundstation.results.flight import FlightResults
 from groundstation.systems.cooperative.answer import CooperativeResult
+from groundstation.systems.cooperative.arrays import CooperativeGeometry, CooperativeLinks
 from groundstation.systems.cooperative.chapter import cooperative as chapter
 from groundstation.systems.cooperative.chapter import worst_first
 from groundstation.systems.cooperative.space_tab import space

@@ -3,8 +3,8 @@
 import numpy as np
 
 from groundstation.base.records import Int64Array
-from groundstation.systems.cooperative.arrays import Items
 from groundstation.systems.cooperative.events import Prepared
+from groundstation.systems.cooperative.loop_types import Items
 from groundstation.systems.cooperative.settings import CooperativeSettings
 
 SAME_TIME_S = 1e-9

@@ -6,7 +6,8 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import Int64Array, frozen
-from groundstation.systems.cooperative.arrays import (
+from groundstation.systems.cooperative.events import Prepared
+from groundstation.systems.cooperative.loop_types import (
     CLOCK_LEAPS,
     COUNTS,
     GATED,
@@ -17,7 +18,6 @@ from groundstation.systems.cooperative.arrays import (
     Items,
     Log,
 )
-from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.motion import positions
 
 

@@ -5,8 +5,7 @@ from collections.abc import Iterator, Mapping
 from groundstation.chapters.chapter import Advice, NextLine, Remedies
 from groundstation.chapters.wording import number, significant
 from groundstation.results.flight import FlightResults
-from groundstation.results.gates import Gate
-from groundstation.results.reasons import NO_CONTACT, in_plain_words
+from groundstation.results.gates import NO_CONTACT, Gate, in_plain_words
 from groundstation.systems.heading.answer import HeadingResult
 
 PURPOSE = "heading correction"

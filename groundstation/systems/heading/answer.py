@@ -13,8 +13,7 @@ from groundstation.results.answer import Answer
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
-from groundstation.results.interval_parts import IntervalPart
-from groundstation.results.roles import HeadingByTrack, LatencyByTurns, OnTaxi
+from groundstation.results.roles import HeadingByTrack, IntervalPart, LatencyByTurns, OnTaxi
 from groundstation.systems.heading.arrays import HeadingSamples
 
 Verdict = Literal["accept", "advisory", "reject", "extend", "undecided"]

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import unwrap
-from groundstation.base.normal import NORMAL_95
-from groundstation.base.quantiles import chi_square_quantile
+from groundstation.base.quantiles import NORMAL_95, chi_square_quantile
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.methods.intervals import effective_samples
 from groundstation.methods.moving_lines import fitted_lines, window_bounds

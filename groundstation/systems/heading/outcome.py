@@ -5,10 +5,10 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from groundstation.base.angles import wrap_180
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.methods.taxi_error.posterior import ErrorPosterior
 from groundstation.results.figures import FigureData
-from groundstation.results.interval_parts import IntervalPart
+from groundstation.results.roles import IntervalPart
 from groundstation.systems.heading import figures as drawn
 from groundstation.systems.heading.answer import HeadingResult, Standstill
 from groundstation.systems.heading.checks import disagreement, held_seconds, variance_ratio

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.plots.common import label, lane_roles, positive
 from groundstation.chapters.wording import clock, is_number, number
 from groundstation.plots.axes import broken_time_axis

@@ -6,7 +6,7 @@ from typing import Literal
 from groundstation.base.errors import SettingsError
 from groundstation.base.toml_settings import check_ranges, number
 from groundstation.methods.taxi.settings import RateKind
-from groundstation.tables.intervals import Interval
+from groundstation.results.chosen import Interval
 
 Runs = Literal["auto", "before_take_off", "all_ground"]
 UseLatency = Literal["when_observed", "never"]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.methods.taxi.gating import NOT_TAXI, is_straight_and_fast
 from groundstation.methods.taxi.samples import VELOCITY_SIGMA, Samples

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from groundstation.base.findings import Finding
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.signals import topics_of_kind
 from groundstation.systems.inertial.answer import CHANNELS, Difference, InertialResult, OwnInnovation
 from groundstation.systems.inertial.differences import Differences, differences
@@ -19,8 +19,8 @@ from groundstation.systems.inertial.kind import WHY_NOT
 from groundstation.systems.inertial.model import FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.tables.gaps import seconds_covered
-from groundstation.tables.ins_kind import AIDED, UNKNOWN
 from groundstation.tables.own_filter import OwnInnovations, own_innovations
+from groundstation.tables.sources import AIDED, UNKNOWN
 from groundstation.tables.table import Flight
 
 ANY_JUMP_M = 1e5  # no jump is too large to be shown

@@ -35,7 +35,7 @@ def _run(flight: "Flight", known: Known, settings: InertialSettings) -> Found[In
     from groundstation.systems.inertial.aided import compare_aided
     from groundstation.systems.inertial.estimate import estimate_compared
     from groundstation.systems.inertial.examine import compared_with_kind
-    from groundstation.tables.ins_kind import UNAIDED
+    from groundstation.tables.sources import UNAIDED
 
     compared, kind = compared_with_kind(flight, known, settings)
     if kind[0] != UNAIDED:
@@ -68,7 +68,7 @@ def _run_forecast(_flight: "Flight", known: Known, settings: InertialSettings) -
     from groundstation.systems.inertial.estimate import Estimation
     from groundstation.systems.inertial.forecast import assess_forecast
     from groundstation.systems.inertial.kind import WHY_NOT
-    from groundstation.tables.ins_kind import AIDED
+    from groundstation.tables.sources import AIDED
 
     estimation = known.workings_of(Estimation)
     if estimation is None:

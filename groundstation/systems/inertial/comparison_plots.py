@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.plots.common import has_values, label, positive
 from groundstation.chapters.plots.comparison import Compared, Overlay, Side, TimeLine, overlaid
 from groundstation.plots.marks import Curve, Dash, Emphasis

@@ -16,9 +16,8 @@ from groundstation.systems.inertial.filter import Epochs
 from groundstation.systems.inertial.model import FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.tables.gaps import seconds_covered
-from groundstation.tables.ins_kind import aided_share
 from groundstation.tables.resample import join
-from groundstation.tables.sources import Need, PairNeed, choose_pair
+from groundstation.tables.sources import Need, PairNeed, aided_share, choose_pair
 from groundstation.tables.table import Flight, Table
 
 POSITION_FIELDS = ("latitude_deg", "longitude_deg")

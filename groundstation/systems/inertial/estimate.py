@@ -34,8 +34,7 @@ from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import QUANTILES
 from groundstation.systems.inertial.tracks import corrected_tracks
 from groundstation.tables.gaps import seconds_covered
-from groundstation.tables.ins_kind import UNAIDED
-from groundstation.tables.sources import said_of
+from groundstation.tables.sources import UNAIDED, said_of
 from groundstation.tables.table import Flight, Table
 
 TITLES = {

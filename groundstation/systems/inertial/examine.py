@@ -10,8 +10,7 @@ from groundstation.systems.inertial.kind import WHY_NOT, kind_of, stated_kind
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.known import Known
 from groundstation.tables.gaps import seconds_covered
-from groundstation.tables.ins_kind import UNAIDED
-from groundstation.tables.sources import said_of
+from groundstation.tables.sources import UNAIDED, said_of
 from groundstation.tables.table import Flight
 
 LEAST_COVERED = 0.95  # of the time of the INS: more without GNSS is worth a word

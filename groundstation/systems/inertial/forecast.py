@@ -23,7 +23,7 @@ from groundstation.systems.inertial.model import POSITION, FloatArray
 from groundstation.systems.inertial.replay import LEAST_STARTS, Plan, map_grid, plan_replay
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import calibration_rows, claimed_sigma, skill_rows
-from groundstation.tables.ins_kind import UNKNOWN
+from groundstation.tables.sources import UNKNOWN
 
 PhaseOf = Callable[[FloatArray], NDArray[np.str_]]
 

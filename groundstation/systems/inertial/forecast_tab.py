@@ -7,7 +7,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.timescales import duration_text
 from groundstation.chapters.markdown import markdown
 from groundstation.results.flight import FlightResults

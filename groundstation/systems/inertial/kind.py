@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.systems.inertial.differences import Differences
 from groundstation.systems.inertial.settings import InertialSettings
-from groundstation.tables.ins_kind import AIDED, HALF, STATED, UNAIDED, UNKNOWN
+from groundstation.tables.sources import AIDED, HALF, STATED, UNAIDED, UNKNOWN
 
 WHY_NOT = {AIDED: "GNSS corrects this INS already", UNKNOWN: "it is not known whether GNSS corrects this INS"}
 MINUTE_S, LEAST_MINUTES = 60.0, 5.0

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.plots.common import has_values, positive, span
 from groundstation.plots.axes import ZERO, time_axis
 from groundstation.plots.marks import AnyMark, Band, Curve, Dots, Floats, Limit, Spans, series

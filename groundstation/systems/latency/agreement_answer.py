@@ -1,6 +1,6 @@
 """Latency of GNSS by motion beside that by the turns of the taxi."""
 
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.results.agreement import Agreement, OneFinding
 from groundstation.results.answer import Answers, answer_meeting, answer_of
 from groundstation.results.roles import LatencyByTurns

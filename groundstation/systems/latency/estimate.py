@@ -10,11 +10,11 @@ from groundstation.methods.intervals import BOUND95
 from groundstation.methods.lag.fit import DelayFit, fit_delay
 from groundstation.methods.lag.settings import LatencySettings
 from groundstation.methods.lag.windows import cut_windows, too_few_windows
-from groundstation.results.arrays.flight import LatencySearch
 from groundstation.results.figures import FigureData
 from groundstation.systems.latency.answer import Latencies, Latency, Quantity
+from groundstation.systems.latency.arrays import LatencySearch
 from groundstation.systems.latency.signals import NotComparableError, compare, pairs_of
-from groundstation.tables.ins_kind import AIDED, is_mostly_aided
+from groundstation.tables.sources import AIDED, is_mostly_aided
 from groundstation.tables.table import Flight, Table
 
 Pair = tuple[str, str, Quantity]

@@ -7,9 +7,9 @@ import numpy as np
 from groundstation.chapters.plots.common import label
 from groundstation.plots.marks import SERIES, AnyMark, Curve, Spans
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, one_panel
-from groundstation.results.arrays.flight import LatencySearch
 from groundstation.results.flight import FlightResults
 from groundstation.systems.latency.answer import Latencies
+from groundstation.systems.latency.arrays import LatencySearch
 
 MOST_PAIRS = len(SERIES)
 

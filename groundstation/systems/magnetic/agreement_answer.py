@@ -4,7 +4,7 @@ import math
 
 from groundstation.results.agreement import Agreement, OneFinding
 from groundstation.results.answer import Answers, answer_of
-from groundstation.results.coefficients import LETTERS
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import MagneticResult
 from groundstation.systems.magnetic.ground_answer import GroundDeviation, GroundRun
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from groundstation.results.answer import Answer
-from groundstation.results.coefficients import LETTERS
 from groundstation.results.figures import FigureData
 from groundstation.results.gates import Gate
-from groundstation.results.roles import CompassCoefficients
+from groundstation.results.roles import LETTERS, CompassCoefficients
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.methods import harmonics
-from groundstation.results.coefficients import LETTERS
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import PoissonParameters
 from groundstation.systems.magnetic.attitude import levelled_heading_deg
 from groundstation.systems.magnetic.compass_table import CENTRES_DEG

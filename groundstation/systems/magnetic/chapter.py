@@ -22,8 +22,8 @@ from groundstation.chapters.parts import (
     kept,
 )
 from groundstation.chapters.wording import ABSENT, clock, is_number, number, sentence, significant, typeset
-from groundstation.results.coefficients import LETTERS
 from groundstation.results.flight import FlightResults
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.agreement_answer import deviation_agreement
 from groundstation.systems.magnetic.answer import (
     ADVISORY,

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Mapping
 
-from groundstation.results.coefficients import LETTERS
 from groundstation.results.columns import AnswerColumn
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import MagneticResult, Method
 
 

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from groundstation.base.errors import UsageError
 from groundstation.base.serial import MismatchError
-from groundstation.results.coefficients import LETTERS
 from groundstation.results.figures import FigureData
 from groundstation.results.files import csv_text, mapping
 from groundstation.results.flight import FlightResults
 from groundstation.results.restore import restored_answer
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import METHOD_TITLES, MagneticResult, MagneticVerdict, PoissonParameters
 from groundstation.systems.magnetic.arrays import MagneticCurves, MagneticTable
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.records import BoolArray
 from groundstation.methods import harmonics
-from groundstation.results.coefficients import LETTERS
 from groundstation.results.figures import FigureData
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import Method, MethodName
 from groundstation.systems.magnetic.apply import corrected_by_table
 from groundstation.systems.magnetic.arrays import (

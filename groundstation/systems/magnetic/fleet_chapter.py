@@ -3,8 +3,8 @@
 from groundstation.chapters.fleet.common import aircraft_name, bounded
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Part, Section
 from groundstation.chapters.wording import ABSENT, number
-from groundstation.results.coefficients import LETTERS
 from groundstation.results.fleet import DeviationRow, FleetResults
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import ADVISORY, METHOD_TITLES
 from groundstation.systems.magnetic.chapter import TONES
 

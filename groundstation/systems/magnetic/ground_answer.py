@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from groundstation.results.answer import Answer
-from groundstation.results.coefficients import LETTERS
 from groundstation.results.figures import FigureData
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import DeclinationUsed
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null

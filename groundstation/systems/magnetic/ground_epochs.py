@@ -15,6 +15,7 @@ from groundstation.methods.taxi.delay import known_delay
 from groundstation.methods.taxi.gating import gate_samples
 from groundstation.methods.taxi.samples import USED, HeadingValues, OnGround, Samples, pair_samples
 from groundstation.methods.taxi.settings import GroundLimits
+from groundstation.results.chosen import Interval
 from groundstation.results.roles import Delays
 from groundstation.systems.known import AircraftData
 from groundstation.systems.magnetic.answer import DeclinationUsed
@@ -23,7 +24,6 @@ from groundstation.systems.magnetic.ground_settings import MagneticGroundSetting
 from groundstation.systems.magnetic.readings import NO_DATE, PLACE_WANTED
 from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.headings import FARTHEST_POSITION_S
-from groundstation.tables.intervals import Interval
 from groundstation.tables.phases import ground_mask
 from groundstation.tables.resample import join
 from groundstation.tables.sources import GNSS_VELOCITY, Need, PairNeed

@@ -7,7 +7,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, mean_heading, wrap_180, wrap_360
 from groundstation.methods import harmonics
-from groundstation.results.coefficients import LETTERS
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.ground_answer import AlongAxis, GroundCoefficient, GroundRun, Repeat
 from groundstation.systems.magnetic.ground_settings import MagneticGroundSettings
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.methods import harmonics
-from groundstation.results.coefficients import LETTERS
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import Method, MethodName
 from groundstation.systems.magnetic.compass_table import CompassTable, fit_to_circle
 from groundstation.systems.magnetic.held_out import (

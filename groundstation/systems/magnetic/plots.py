@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from groundstation.base.geodesy import on_earth, plan_north_east_m
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.plots.common import M_PER_KM
 from groundstation.chapters.wording import number
 from groundstation.plots.axes import ZERO, broken_time_axis, time_axis

@@ -14,9 +14,8 @@ from groundstation.results.roles import Delays
 from groundstation.systems.magnetic.attitude import levelled_heading_deg
 from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.tables.headings import FARTHEST_POSITION_S
-from groundstation.tables.ins_kind import AIDED, is_mostly_aided
 from groundstation.tables.resample import join, values_at
-from groundstation.tables.sources import Need, choose_source
+from groundstation.tables.sources import AIDED, Need, choose_source, is_mostly_aided
 from groundstation.tables.table import Flight, Table
 
 FIELD = ("field_forward_nt", "field_right_nt", "field_down_nt")

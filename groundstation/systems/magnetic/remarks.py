@@ -10,7 +10,7 @@ from groundstation.systems.magnetic.answer import MagneticResult
 from groundstation.systems.magnetic.arrays import MagneticTable
 from groundstation.systems.magnetic.entered import corrections_entered
 from groundstation.systems.magnetic.settings import MagneticSettings
-from groundstation.tables.ins_kind import UNAIDED
+from groundstation.tables.sources import UNAIDED
 from groundstation.tables.table import Flight
 
 WORTH_TELLING_DEG, LATENCY_TOLD_S = 0.1, 0.001

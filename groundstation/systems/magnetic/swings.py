@@ -5,7 +5,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray, wrap_180, wrap_360
 from groundstation.base.records import BoolArray
 from groundstation.methods import harmonics
-from groundstation.results.coefficients import LETTERS
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import CardRow, Swing
 from groundstation.systems.magnetic.apply import corrected_by_table
 from groundstation.systems.magnetic.compass_table import CENTRES_DEG, bin_of, build_table

@@ -3,7 +3,7 @@
 import numpy as np
 
 from groundstation.base.angles import FloatArray, wrap_180
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.signals import kind_of
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.forecast_methods import FORECAST_HORIZONS_MIN

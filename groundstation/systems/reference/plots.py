@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.plots.common import label
 from groundstation.chapters.wording import MINUS
 from groundstation.plots.axes import ZERO, time_axis

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.normal import NORMAL_95
-from groundstation.base.quantiles import chi_square_quantile, student_quantile
+from groundstation.base.quantiles import NORMAL_95, chi_square_quantile, student_quantile
 from groundstation.base.records import BoolArray
 from groundstation.methods.intervals import effective_samples, share_interval
 from groundstation.systems.reference.answer import ClaimState, Spread

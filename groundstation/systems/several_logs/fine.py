@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, unwrap
-from groundstation.base.normal import NORMAL_95
-from groundstation.base.quantiles import student_quantile
+from groundstation.base.quantiles import NORMAL_95, student_quantile
 from groundstation.methods.lag.fit import DelayFit, fit_delay
 from groundstation.methods.lag.motion import SLOW_MPS, rotation_n_from_b
 from groundstation.methods.lag.settings import LatencySettings

@@ -8,7 +8,7 @@ import numpy as np
 
 from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.serial import to_json_exactly
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.joining import JoinStep, PlacedLog, Told, name_in_flight

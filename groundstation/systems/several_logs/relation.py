@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.several_logs.gnss_time import GnssTime

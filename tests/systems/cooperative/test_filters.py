@@ -14,10 +14,10 @@ from groundstation.simulation.session_scenario import SessionScenario, load_sess
 from groundstation.systems.cooperative import plain
 from groundstation.systems.cooperative.aircraft import Aircraft, aircraft_of, fleet_of
 from groundstation.systems.cooperative.algorithms import run_algorithm
-from groundstation.systems.cooperative.arrays import KINDS, PEER, Events, rows_for
 from groundstation.systems.cooperative.centralised import is_about_reckoning
 from groundstation.systems.cooperative.estimate import estimate_session
 from groundstation.systems.cooperative.events import Prepared, prepare
+from groundstation.systems.cooperative.loop_types import KINDS, PEER, Events, rows_for
 from groundstation.systems.cooperative.messages import Broadcast, decode, pairwise_bytes, report_bytes
 from groundstation.systems.cooperative.motion import place
 from groundstation.systems.cooperative.observation import observe

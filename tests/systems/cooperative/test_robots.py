@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from groundstation.systems.cooperative.algorithms import run_algorithm
-from groundstation.systems.cooperative.arrays import PEER
 from groundstation.systems.cooperative.consistency import judge
 from groundstation.systems.cooperative.events import prepare
+from groundstation.systems.cooperative.loop_types import PEER
 from groundstation.systems.cooperative.plain.sighting import sighting_of
 from groundstation.systems.cooperative.plain.split_covariance import fuse
 from groundstation.systems.cooperative.plain.steps import Event

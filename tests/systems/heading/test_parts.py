@@ -16,6 +16,7 @@ from groundstation.methods.intervals import effective_samples
 from groundstation.methods.taxi.gating import gate_samples, intervals_without_epoch
 from groundstation.methods.taxi.samples import Samples, pair_samples, window_slope, without_arm
 from groundstation.methods.taxi.settings import GroundLimits
+from groundstation.results.chosen import Interval
 from groundstation.results.gates import Gate
 from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.taxi import TaxiCase, noiseless, simulate_taxi, table_of, taxi_flight
@@ -38,7 +39,6 @@ from groundstation.systems.heading.steps import heading_steps
 from groundstation.systems.heading.verdict import decide, explain
 from groundstation.systems.known import AircraftData, Runway, SiteData, Stand
 from groundstation.tables.epochs import distinct_epochs
-from groundstation.tables.intervals import Interval
 from groundstation.tables.table import Flight, Table
 
 SETTINGS = HeadingSettings()

@@ -14,7 +14,7 @@ from groundstation.base.records import Column
 from groundstation.base.serial import to_json
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
-from groundstation.results.coefficients import LETTERS
+from groundstation.results.roles import LETTERS
 from groundstation.simulation.flight import simulate
 from groundstation.simulation.scenario import load_scenario
 from groundstation.systems.heading.estimate import estimate_heading_error

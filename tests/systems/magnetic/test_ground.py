@@ -29,10 +29,10 @@ from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight, sentence
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.reports.drawing import Drawing, drawn_by
-from groundstation.results.coefficients import LETTERS
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.manifest import Manifest
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic import ground_answer as answers
 from groundstation.systems.magnetic.analysis import MAGNETIC_GROUND
 from groundstation.systems.magnetic.chapter import magnetic

@@ -22,10 +22,10 @@ from groundstation.pipeline.one_flight.configuration import Configuration, load_
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.flight import read_flight, sentence
 from groundstation.pipeline.one_flight.log import open_log
-from groundstation.results.coefficients import LETTERS
 from groundstation.results.files import SavedFlight, save
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.manifest import Manifest
+from groundstation.results.roles import LETTERS
 from groundstation.simulation.deviation import BIN_MIDDLES_DEG, scenario_deviation
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.scenario import load_scenario

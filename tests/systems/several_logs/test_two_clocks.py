@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from groundstation.base.clock import Clock, RelationEntry, SegmentEntry
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.joining import NotOneFlightError

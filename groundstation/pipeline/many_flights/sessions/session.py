@@ -33,7 +33,7 @@ from groundstation.pipeline.one_flight.outcome import Outcome, State, reason_of
 from groundstation.pipeline.one_flight.progress import Listener, silent
 from groundstation.pipeline.one_flight.sealing import seal
 from groundstation.reports.flight_report import write_flight_report
-from groundstation.results.arrays.cooperative import SessionClocks, SessionPoints
+from groundstation.results.arrays.session import SessionClocks, SessionPoints
 from groundstation.results.figures import FigureData
 from groundstation.results.file_names import MANIFEST
 from groundstation.results.files import load_document, load_manifest, put_failures, save

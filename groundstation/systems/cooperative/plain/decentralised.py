@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.systems.cooperative.arrays import HEIGHT, PEER, POINT
 from groundstation.systems.cooperative.error_map import spectral_radius
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.judging import PATIENCE
+from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, POINT
 from groundstation.systems.cooperative.messages import Broadcast, decode
 from groundstation.systems.cooperative.plain.error_map import Other, corrected_rows, unit_rows
 from groundstation.systems.cooperative.plain.observation import Row, rows_of

@@ -6,10 +6,10 @@ The method stands in cooperative/pairwise.py.
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.systems.cooperative.arrays import PEER, POINT
 from groundstation.systems.cooperative.error_map import spectral_radius
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.judging import PATIENCE
+from groundstation.systems.cooperative.loop_types import PEER, POINT
 from groundstation.systems.cooperative.messages import pairwise_bytes
 from groundstation.systems.cooperative.plain.error_map import unit_rows
 from groundstation.systems.cooperative.plain.observation import Row, rows_of

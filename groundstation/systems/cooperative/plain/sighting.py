@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.systems.cooperative.arrays import PEER
+from groundstation.systems.cooperative.loop_types import PEER
 from groundstation.systems.cooperative.observation import NEAREST_M
 from groundstation.systems.cooperative.plain.observation import Row
 from groundstation.systems.cooperative.plain.steps import Event

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.systems.cooperative.arrays import GATED, USED
 from groundstation.systems.cooperative.events import Prepared
+from groundstation.systems.cooperative.loop_types import GATED, USED
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.timeline import timeline
 from groundstation.systems.cooperative.tracks import AlgorithmRun, Judged, Track
@@ -21,7 +21,7 @@ Output = tuple[float, int]
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """One measurement: a row of ``arrays.Events``, and its number there."""
+    """One measurement: a row of ``loop_types.Events``, and its number there."""
 
     time_s: float
     kind: int

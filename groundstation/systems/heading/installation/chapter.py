@@ -8,7 +8,7 @@ from groundstation.chapters.verdict import VERDICTS
 from groundstation.chapters.wording import ABSENT, clean, interval, is_number, number, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.results.installations import Installed, LearnedHeading
-from groundstation.results.interval_parts import IntervalPart
+from groundstation.results.roles import IntervalPart
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.claim_chapter import PARTS, to_enter
 from groundstation.systems.heading.installation.answer import InstallationResult

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.chapters.fleet.common import aircraft_name, bounded, day, plural
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Note, Part, Section

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.plots.marks import Band, Curve, Dots, Floats
 from groundstation.plots.plot import Axis, Panel, Plot, Row
 from groundstation.results.fleet import FleetResults

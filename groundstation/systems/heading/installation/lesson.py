@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from groundstation.base.angles import wrap_180
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.results.answer import Answers, answer_meeting
 from groundstation.results.flight import FlightResults

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.methods.intervals import mixture_quantile
 from groundstation.results.installations import Lesson
-from groundstation.results.interval_parts import IntervalPart
+from groundstation.results.roles import IntervalPart
 from groundstation.systems.heading.installation.answer import InstallationResult
 from groundstation.systems.heading.installation.model import Belief, Mixture, doubts, installed, predict
 from groundstation.systems.heading.installation.settings import InstallationSettings

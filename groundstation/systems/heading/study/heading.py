@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.parts import Section
 from groundstation.results.figures import FigureData
 from groundstation.simulation.taxi import Family

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.results.installations import Lesson
 from groundstation.systems.heading.installation.settings import (
     MOUNTING_DEG,

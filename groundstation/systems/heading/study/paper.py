@@ -6,7 +6,7 @@ The simulation is vectorised.
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.results.figures import FigureData
 from groundstation.simulation.processes import damped_oscillation, gauss_markov

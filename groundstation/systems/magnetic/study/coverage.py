@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from groundstation.base.normal import NORMAL_95
-from groundstation.results.coefficients import LETTERS
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.results.figures import FigureData
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.study.cases import Setup, Sweep
 from groundstation.systems.magnetic.study.judge import METHODS, Judged, Outcome
 from groundstation.systems.magnetic.study.tables import IRON, TABLE, Sample

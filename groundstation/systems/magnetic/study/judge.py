@@ -6,13 +6,13 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray, unwrap, wrap_180
 from groundstation.base.errors import NotAssessableError
-from groundstation.base.normal import NORMAL_95
+from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import frozen
 from groundstation.base.units import NS_PER_S
 from groundstation.methods import harmonics
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.arrays.typed import found_in
-from groundstation.results.coefficients import LETTERS
+from groundstation.results.roles import LETTERS
 from groundstation.simulation.deviation import deviation_truth, levelled_heading_deg
 from groundstation.simulation.magnetometer import sensed_nt
 from groundstation.simulation.scenario import MagnetometerSettings, Scenario

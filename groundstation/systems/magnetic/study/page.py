@@ -6,8 +6,8 @@ import numpy as np
 
 from groundstation.base.records import BoolArray
 from groundstation.chapters.parts import Grid, Section
-from groundstation.results.coefficients import LETTERS
 from groundstation.results.figures import FigureData
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import METHOD_TITLES
 from groundstation.systems.magnetic.study.cases import BANK_DEG, CLAIM, PUBLISHED_FIELD_NT, SWEEPS, SWEPT, Sweep
 from groundstation.systems.magnetic.study.judge import JUDGED_METHODS, LIMITS, METHODS

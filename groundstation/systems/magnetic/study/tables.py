@@ -13,8 +13,8 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray, frozen
 from groundstation.methods.intervals import share_interval
-from groundstation.results.coefficients import LETTERS
 from groundstation.results.figures import FigureData
+from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.study.bias import bank_at, power_law, power_law_above_floor
 from groundstation.systems.magnetic.study.cases import BANK, CLAIM, EXACT_BANKS_DEG, PUBLISHED_BIAS_DEG, Setup, Sweep
 from groundstation.systems.magnetic.study.judge import JUDGED_METHODS, LIMITS, METHODS, NOT_ASSESSABLE, Judged, Outcome

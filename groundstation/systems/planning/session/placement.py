@@ -6,11 +6,16 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.findings import Finding
-from groundstation.results.arrays.cooperative import PlacementAccuracy, PlacementKeepOut, PlacementMap, PlacementPoints
 from groundstation.results.figures import FigureData
 from groundstation.systems.planning.session.accuracy import PLACE, AccuracyModel
 from groundstation.systems.planning.session.measures import Geometry, geometry_of
 from groundstation.systems.planning.session.placement_answer import GIVEN, DesignRow, PlacementPlan, PlaceRow
+from groundstation.systems.planning.session.placement_arrays import (
+    PlacementAccuracy,
+    PlacementKeepOut,
+    PlacementMap,
+    PlacementPoints,
+)
 from groundstation.systems.planning.session.placing import PlaceLoss, Site, place, starts_of
 from groundstation.systems.planning.session.scenario import NEAREST_M, Criterion, Over, SessionPlan
 

@@ -9,9 +9,14 @@ from groundstation.plots.axes import time_axis
 from groundstation.plots.marks import AnyMark, Cells, Curve, Emphasis, Limit, Outlines, Points, Role, Symbol, series
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import finite, padded
-from groundstation.results.arrays.cooperative import PlacementAccuracy, PlacementKeepOut, PlacementMap, PlacementPoints
 from groundstation.results.flight import FlightResults
 from groundstation.systems.planning.session.placement_answer import GIVEN, PlacementPlan
+from groundstation.systems.planning.session.placement_arrays import (
+    PlacementAccuracy,
+    PlacementKeepOut,
+    PlacementMap,
+    PlacementPoints,
+)
 from groundstation.systems.planning.session.placement_chapter import design_title
 
 PANEL_MM = 32.0

@@ -8,9 +8,14 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.chapters.markdown import markdown
-from groundstation.results.arrays.cooperative import PlacementAccuracy, PlacementKeepOut, PlacementMap, PlacementPoints
 from groundstation.results.flight import FlightResults
 from groundstation.systems.planning.session.placement_answer import PlacementPlan
+from groundstation.systems.planning.session.placement_arrays import (
+    PlacementAccuracy,
+    PlacementKeepOut,
+    PlacementMap,
+    PlacementPoints,
+)
 from groundstation.systems.planning.session.placement_chapter import placement as chapter
 from groundstation.viewer import colours
 from groundstation.viewer.names import clean_text

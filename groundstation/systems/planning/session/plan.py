@@ -8,11 +8,11 @@ from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.errors import GroundstationError
 from groundstation.base.findings import Finding
 from groundstation.results.answer import by_analysis
-from groundstation.results.arrays.cooperative import ControlMeasures, ControlPaths, ControlPoints
 from groundstation.results.figures import FigureData
 from groundstation.systems.plan import Planned
 from groundstation.systems.planning.session.accuracy import PLACE, Accuracy
 from groundstation.systems.planning.session.answer import UNCONTROLLED, ControlPlan, ControlRow, Horizon, LawRow
+from groundstation.systems.planning.session.arrays import ControlMeasures, ControlPaths, ControlPoints
 from groundstation.systems.planning.session.laws import Law, Session, integral_law, local_law, random_starts
 from groundstation.systems.planning.session.measures import Geometry
 from groundstation.systems.planning.session.motion import Paths

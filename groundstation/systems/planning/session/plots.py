@@ -10,10 +10,10 @@ from groundstation.plots.axes import time_axis
 from groundstation.plots.marks import AnyMark, Curve, Dots, Emphasis, Floats, Limit, Points, Role, Told, series
 from groundstation.plots.plot import Axis, Describe, Panel, Plot, Row, one_panel
 from groundstation.plots.ranges import finite, padded
-from groundstation.results.arrays.cooperative import ControlMeasures, ControlPaths, ControlPoints
 from groundstation.results.arrays.typed import Flags, T
 from groundstation.results.flight import FlightResults
 from groundstation.systems.planning.session.answer import UNCONTROLLED, ControlPlan, ControlRow
+from groundstation.systems.planning.session.arrays import ControlMeasures, ControlPaths, ControlPoints
 from groundstation.systems.planning.session.chapter import title_of
 
 PANEL_MM = 34.0

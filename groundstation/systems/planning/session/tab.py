@@ -8,9 +8,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from groundstation.chapters.markdown import markdown
-from groundstation.results.arrays.cooperative import ControlPaths, ControlPoints
 from groundstation.results.flight import FlightResults
 from groundstation.systems.planning.session.answer import UNCONTROLLED, ControlPlan
+from groundstation.systems.planning.session.arrays import ControlPaths, ControlPoints
 from groundstation.systems.planning.session.chapter import control as chapter
 from groundstation.systems.planning.session.chapter import title_of
 from groundstation.viewer import colours

@@ -6,10 +6,10 @@ Source: O. N. Skrypnik, thesis on navigation between aircraft, 2010, chapters 5 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from groundstation.results.arrays.cooperative import ControlMeasures
 from groundstation.results.arrays.typed import found_in
 from groundstation.systems.planning.session.analysis import SESSION_PLAN
 from groundstation.systems.planning.session.answer import UNCONTROLLED, ControlPlan
+from groundstation.systems.planning.session.arrays import ControlMeasures
 from groundstation.systems.planning.session.scenario import Placement, SessionPlan
 from groundstation.systems.shipped_plans import load_plan
 

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from groundstation.base.records import Int64Array
-from groundstation.systems.cooperative.arrays import FloatArray
+from groundstation.systems.cooperative.loop_types import FloatArray
 
 EXACT, RANKED, MODIFIED, SPLIT = 0, 1, 2, 3
 NOBODY = -1
