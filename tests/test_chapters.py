@@ -118,7 +118,9 @@ def test_words_say_the_sense_of_the_error(error_deg: float, word: str) -> None:
 
 def test_flight_without_heading_says_why_on_the_front() -> None:
     told = front(example(None, not_assessable=(NotAssessable("heading", "no GNSS velocity in the log"),)))
-    assert told.verdict == Mark("unknown", "No answer") and not told.to_sign
+    assert (
+        told.verdict == Mark("plain", "Recorded") and told.headline == "No signals; nothing lost" and not told.to_sign
+    )
     assert told.missing == (("Heading correction", "no GNSS velocity in the log"),)
 
 
@@ -134,7 +136,7 @@ def test_the_best_answer_stands_first_and_the_others_beside_it() -> None:
 
 def test_an_answer_that_came_to_nothing_is_told_among_what_could_not_be_assessed() -> None:
     told = front(example(latency_result(latency_s=None, state="not_observable")))
-    assert told.verdict == Mark("unknown", "No answer")
+    assert told.verdict == Mark("plain", "Recorded")
     assert told.missing[0] == ("Latency between sensors", "not observable for gnss: too little motion")
 
 

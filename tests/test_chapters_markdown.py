@@ -94,8 +94,9 @@ def test_a_line_begins_no_markup(text: str) -> None:
 def test_a_front_tells_flight_verdict_and_why() -> None:
     text = front_markdown(front(example(heading_result()))).split("\n\n")
     assert text[0] == "# A12 · flight 17"
-    assert text[1] == "## ✓ Accept · Enter −1.05°" and text[3] == "Every required gate passed."
-    assert "| Status | **✓ ok** |" in text[2]
+    assert text[1] == "## ✓ Accept · Enter −1.05°" and text[4] == "Every required gate passed."
+    assert text[2] == "No signals; nothing lost"
+    assert "| Status | **✓ ok** |" in text[3]
     assert any("| Precision e |" in part for part in text)
     assert "## Not assessable" in text
 

@@ -329,7 +329,7 @@ def test_what_cannot_be_opened_is_one_line(folder: Path, tmp_path: Path) -> None
     assert len(one.tables["ins"].to_frame()) == 1
     with pytest.raises(NotAssessableError):
         one.heading()
-    assert "No answer" in one._repr_html_()
+    assert "Recorded" in one._repr_html_()
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,11 @@ def answer_chapters(results: FlightResults, chapters: Chapters) -> tuple[Section
     """Build the chapters of a flight that have an answer, the best first."""
     listed = [chapter for chapter in chapters.flight if any(map(results.answer, chapter.answers))]
     every = (one for one in (*_built(listed, results), *_generic(results, chapters)) if one is not None)
-    return tuple(sorted(every, key=lambda one: Rank.OTHER if one.claim is None else one.claim.rank))
+    return tuple(sorted(every, key=_place))
+
+
+def _place(section: Section) -> tuple[bool, Rank]:
+    return (True, Rank.OTHER) if section.claim is None else section.claim.place
 
 
 def chapters_of(results: FlightResults, chapters: Chapters) -> tuple[Section, ...]:

@@ -1,14 +1,14 @@
 """Top of the report: which flight, its best answer, others as tiles, what is not assessed."""
 
-from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.assessed import not_assessed
 from groundstation.chapters.by_answer import answer_chapters
 from groundstation.chapters.chapter import Chapters
 from groundstation.chapters.parts import Cell, Front, Mark, Tile
 from groundstation.chapters.plan import plan_front
-from groundstation.chapters.wording import ABSENT, clock, is_number
+from groundstation.chapters.wording import ABSENT, clock, is_number, typeset
 from groundstation.results.flight import FlightResults, Status
+from groundstation.results.recorded import great_loss, recorded
 
 HOUR_S = 3599.5  # rounds to an hour
 STATUS: dict[Status, Mark] = {
@@ -16,8 +16,9 @@ STATUS: dict[Status, Mark] = {
     "degraded": Mark("warn", "degraded: data were lost"),
     "failed": Mark("bad", "failed: nothing could be computed"),
 }
-NO_ANSWER = Mark("unknown", "No answer")
-NOTHING = "Recorded, but nothing could be assessed"
+RECORDED = Mark("plain", "Recorded")
+DAMAGED = Mark("warn", "Recorded")
+DATA_LOST = Mark("bad", "Data lost")
 
 
 def front(results: FlightResults, chapters: Chapters) -> Front:
@@ -28,13 +29,17 @@ def front(results: FlightResults, chapters: Chapters) -> Front:
     title = " · ".join(filter(None, (names[0], names[1] and f"flight {names[1]}"))) or results.flight_id
     if results.is_session:
         tops = (one.front(results, _pairs(results)) for one in chapters.session if one.front is not None)
-        return next(tops, Front(title, _pairs(results), NO_ANSWER, NOTHING))
+        return next(tops, Front(title, _pairs(results), RECORDED, _told(recorded(results))))
     sections = answer_chapters(results, chapters)
     tiles = [Tile(one.title, one.key, one.claim) for one in sections if one.claim is not None]
     left_open = tuple((one.title, one.headline) for one in sections if one.is_open)
     pairs, missing = _pairs(results), (*left_open, *not_assessed(results, chapters))
+    line, loss = _told(recorded(results)), great_loss(results)
+    if loss and not (tiles and tiles[0].claim.is_danger):
+        return Front(title, pairs, DATA_LOST, _told(loss), others=tiles, missing=missing, recorded=line)
     if not tiles:
-        return Front(title, pairs, NO_ANSWER, NOTHING, _recorded(results), missing=missing)
+        mark = RECORDED if results.status == "ok" else DAMAGED
+        return Front(title, pairs, mark, line, missing=missing)
     best, *others = tiles
     told = best.claim
     return Front(
@@ -49,13 +54,13 @@ def front(results: FlightResults, chapters: Chapters) -> Front:
         key=best.key,
         others=others,
         missing=missing,
+        recorded=line,
     )
 
 
-def _recorded(results: FlightResults) -> tuple[str, ...]:
-    """Return a sentence that names the topics of the log, except raw data; none without any."""
-    topics = sorted(topic for topic in results.completeness if not topic.startswith(RAW_PREFIX))
-    return (f"In the log: {', '.join(topics)}.",) if topics else ()
+def _told(line: str) -> str:
+    """Return a line with a capital and the signs of a page."""
+    return typeset(f"{line[:1].upper()}{line[1:]}")
 
 
 def _pairs(results: FlightResults) -> tuple[tuple[str, Cell], ...]:

@@ -81,6 +81,8 @@ def front_markdown(front: Front) -> str:
     parts = [f"# {escaped(front.title)}"]
     if front.headline:
         parts.append(f"## {escaped(front.line)}")  # before the rest: a small panel shows it without scrolling
+    if front.recorded:
+        parts.append(escaped(front.recorded))
     if front.others:
         rows = [(front.subject, front.line), *((tile.title, tile.claim.line) for tile in front.others)]
         parts.append(table(("Answer", "Found"), [(escaped(title), escaped(line)) for title, line in rows]))

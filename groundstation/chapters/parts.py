@@ -117,7 +117,7 @@ def kept(parts: Iterable[Part | None]) -> tuple[Part, ...]:
 
 
 class Rank(IntEnum):
-    """Order of claims: a report opens with the lowest that the flight has."""
+    """Order of claims: a report opens with danger, then with the lowest that the flight has."""
 
     HEADING = 0  # decided: accept, advisory, reject, extend
     MAGNETIC = 1  # decided
@@ -125,12 +125,15 @@ class Rank(IntEnum):
     FORECAST = 3
     LANDING = 4
     REFERENCE = 5
-    HEADING_OPEN = 6  # undecided, or partly from taxi after the flight
-    GROUND_RUNS = 7
-    MAGNETIC_OPEN = 8
-    INERTIAL_OPEN = 9  # aided by GNSS, or not known whether
-    LATENCY = 10
-    OTHER = 11
+    HEALTH = 6  # of an autopilot and its filter
+    HEADING_OPEN = 7  # undecided, too little taxi, or partly from taxi after the flight
+    GROUND_RUNS = 8
+    MAGNETIC_OPEN = 9
+    GNSS = 10  # reception
+    INERTIAL_OPEN = 11  # aided by GNSS, or not known whether
+    LATENCY = 12
+    LANDING_OPEN = 13  # flown, but no gate height passed
+    OTHER = 14
 
 
 @dataclass(frozen=True)
@@ -154,6 +157,8 @@ class Claim:
         Label, value, remark.
     to_sign : bool
         Whether room is left for a name and a signature.
+    is_danger : bool
+        Whether it tells of something that endangers a flight: it then stands before every good number.
     """
 
     rank: Rank
@@ -164,6 +169,12 @@ class Claim:
     sentences: Sequence[str] = ()
     figures: Sequence[tuple[str, str, str]] = ()
     to_sign: bool = False
+    is_danger: bool = False
+
+    @property
+    def place(self) -> tuple[bool, Rank]:
+        """Place among the claims of a flight: danger first, then by rank."""
+        return not self.is_danger, self.rank
 
     @property
     def line(self) -> str:
@@ -212,6 +223,8 @@ class Front:
     Parameters
     ----------
     title : str
+    recorded : str
+        What was recorded and how whole it is, in one line.
     pairs : sequence of (str, Cell)
         Label and value; a label that is the key of a section leads there.
     verdict : Mark, optional
@@ -239,6 +252,7 @@ class Front:
     key: str = ""
     others: Sequence[Tile] = ()
     missing: Sequence[tuple[str, str]] = ()
+    recorded: str = ""
 
     @property
     def line(self) -> str:

@@ -212,3 +212,15 @@ class ErrorsAlongTheFlight:
 
     ins_topic: str
     outages: Sequence[Outage]
+
+
+class WordsOfRecord:
+    """Role of an answer with words on a kind of signals for the line on the recording.
+
+    ``words_of_record``: by kind of topic, ``{"gnss": "RTK fixed 65 %"}``.
+    """
+
+    @property
+    def words_of_record(self) -> Mapping[str, str]:
+        """Words by kind of topic."""
+        raise NotImplementedError

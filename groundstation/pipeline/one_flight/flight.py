@@ -32,6 +32,7 @@ from groundstation.reports.steer_card import write_exports
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import PartOfRun, PowerUpOfRun, Resume
+from groundstation.results.recorded import recorded
 from groundstation.systems import systems
 from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD
 from groundstation.tables.table import Flight
@@ -351,10 +352,10 @@ def sentence(results: FlightResults) -> str:
     if found:
         return "; ".join(found)
     if not results.not_assessable:
-        return "not assessable: no analysis applies"
+        return recorded(results)
     first, *others = results.not_assessable
-    more = f" (and {len(others)} more: see the report)" if others else ""
-    return f"not assessable: {first.analysis}: {first.reason}{more}"
+    more = f" and {len(others)} more" if others else ""
+    return f"{recorded(results)}; not assessable: {first.analysis} ({first.reason}){more}"
 
 
 def is_made(name: str, identity: str) -> bool:

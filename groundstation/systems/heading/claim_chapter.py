@@ -18,6 +18,7 @@ SAME_EVERYWHERE = (
 )
 UNEVEN_POWER = "Uneven power is stated: what it may add is in the interval, under installation."
 GOOD_TO = "good to +-"  # what the reason of an advisory begins with; the headline says it
+OPEN = ("before_take_off", "taxi_seconds")  # gates without which a verdict decides nothing about a flight
 ADVICE: Mapping[str, str] = {
     "reject": "Enter no correction",
     "extend": "No correction yet: measure longer",
@@ -27,9 +28,9 @@ ADVICE: Mapping[str, str] = {
 
 def claim(heading: HeadingResult) -> Claim:
     """Return the verdict with the number to type, or why there is none."""
-    is_late = any(gate.name == "before_take_off" and gate.state == "failed" for gate in heading.gates)
+    is_open = any(gate.name in OPEN and gate.state == "failed" for gate in heading.gates)
     return Claim(
-        Rank.HEADING_OPEN if heading.verdict == "undecided" or is_late else Rank.HEADING,
+        Rank.HEADING_OPEN if heading.verdict == "undecided" or is_open else Rank.HEADING,
         VERDICTS[heading.verdict],
         what_to_enter(heading),
         value=number(heading.error_deg, 2, "°", signed=True),

@@ -37,7 +37,8 @@ from groundstation.systems.landing.answer import Approach, HeightError, LandingR
 
 LEAD = "How each approach was flown against its runway, and where it touched down."
 TITLE = "Approaches"
-TONES: dict[str, Tone] = {"stabilised": "good", "not stabilised": "warn", "not measured": "unknown"}
+NOT_STABILISED, NOT_MEASURED = "not stabilised", "not measured"
+TONES: dict[str, Tone] = {"stabilised": "good", NOT_STABILISED: "warn", NOT_MEASURED: "unknown"}
 MOST_TOLD = 6
 HOW = (
     "How computed: a final leads straight to a touchdown, or follows the guidance down to a height where a climb "
@@ -78,13 +79,14 @@ def _claim(answer: LandingResult) -> Claim | None:
     others = len(answer.approaches) - 1
     also = f" {others} more {'approach' if others == 1 else 'approaches'} in the log." if others else ""
     return Claim(
-        Rank.LANDING,
+        Rank.LANDING_OPEN if state.text == NOT_MEASURED else Rank.LANDING,
         Mark(state.tone, state.text.capitalize()),
         f"{_name(one).capitalize()}: {state.text}",
         value=state.text.capitalize(),
         remark=_name(one),
         sentences=(f"{_why(one)}{also}",),
         figures=_figures(one),
+        is_danger=state.text == NOT_STABILISED,
     )
 
 
@@ -131,7 +133,7 @@ def _course(one: Approach) -> str:
 def _verdict(one: Approach) -> Mark:
     """Return the worst of both gates."""
     verdicts = [row.verdict for row in one.stabilised]
-    worst = next((word for word in ("not stabilised", "stabilised") if word in verdicts), "not measured")
+    worst = next((word for word in (NOT_STABILISED, "stabilised") if word in verdicts), NOT_MEASURED)
     return Mark(TONES[worst], worst)
 
 

@@ -1,0 +1,189 @@
+"""Line on a recording as a person would say it: what it holds and how whole it is."""
+
+from collections.abc import Iterable, Mapping
+
+from groundstation.base.ledger import Ledger, TopicEntry
+from groundstation.base.signals import RAW_PREFIX, is_canonical, kind_of
+from groundstation.results.flight import FlightResults
+from groundstation.results.roles import WordsOfRecord
+
+# Kinds of signals in the order they are named, and their names for people; others are counted.
+NAMES: Mapping[str, str] = {
+    "gnss": "GNSS",
+    "ins": "INS",
+    "odometry": "odometry",
+    "magnetometer": "magnetometer",
+    "baro": "barometer",
+    "air": "air data",
+    "radio_altimeter": "radio altimeter",
+    "guidance": "guidance",
+    "link": "ranges",
+    "adf": "bearings",
+}
+MOST_NAMED = 4
+MOST_RAW = 2
+ATTITUDE = frozenset(("roll_deg", "pitch_deg"))
+HEADINGS = frozenset(("true_heading_deg", "magnetic_heading_deg"))
+MOVES = frozenset(("latitude_deg", "velocity_north_mps", "north_m", "position_north_m"))
+FEW_S = 120.0  # below it a length is told in seconds
+GREAT_LOSS = 0.05  # share of the time of GNSS or INS, from which a loss is what a report opens with
+
+
+def recorded(results: FlightResults) -> str:
+    """Return what was recorded and how whole it is.
+
+    Examples
+    --------
+    >>> from groundstation.results.flight import Source
+    >>> nothing = FlightResults("NOTIME", Source("a.csv", "0" * 64, 1, "flat-csv"), {}, None, 0.0, "ok")
+    >>> recorded(nothing)
+    'no signals; nothing lost'
+    """
+    return f"{contents(results)}; {wholeness(results)}"
+
+
+def contents(results: FlightResults) -> str:
+    """Return the length and the kinds of signals with their rates, the telling ones first."""
+    ledger, told = results.ledger, words(results)
+    kinds = [found for kind in NAMES if (found := _kind(ledger, kind, told.get(kind, "")))]
+    if not kinds:
+        return _raw(results)
+    length = max((one.span_s for name, one in ledger.topics.items() if is_canonical(name)), default=0.0)
+    listed = ", ".join(_by_rate(kinds[:MOST_NAMED]))
+    more = len(kinds) - MOST_NAMED
+    also = f", beside {more} more" if more > 0 else ""
+    return f"{_length(length)} of {listed}{also}" if length else f"{listed}{also}"
+
+
+def words(results: FlightResults) -> Mapping[str, str]:
+    """Return what answers say of the signals themselves, by kind: "RTK fixed 65 %"."""
+    role = results.answer_meeting(WordsOfRecord)
+    return {} if role is None else role.words_of_record
+
+
+def wholeness(results: FlightResults) -> str:
+    """Return what was lost, or that nothing was."""
+    ledger = results.ledger
+    places = sum(1 for one in ledger.damages if one.loses_data and one.kind != "truncated")
+    lost = (
+        "its end is cut off" if ledger.truncated is not None else "",
+        _counted(places, "damaged place") if places else "",
+        _gaps(ledger),
+        f"the recorder paused for {ledger.dropouts.total_s:.3g} s" if ledger.dropouts.count else "",
+    )
+    found = [text for text in lost if text]
+    return "; ".join(found) if found else "nothing lost" if results.status != "degraded" else "some of it lost"
+
+
+def great_loss(results: FlightResults) -> str:
+    """Return the loss that comes before every answer, empty where there is none.
+
+    It is one of a log that is damaged, and takes at least 5 % of the time of its GNSS or INS.
+    """
+    if results.status == "ok":
+        return ""
+    topic, share = max(
+        ((name, _share(one)) for name, one in results.ledger.topics.items() if kind_of(name) in ("gnss", "ins")),
+        key=lambda one: one[1],
+        default=("", 0.0),
+    )
+    if share < GREAT_LOSS:
+        return ""
+    gaps, percent = results.ledger.topics[topic].gaps, 100.0 * share
+    return (
+        f"{_length(gaps.total_s)} of {_name(topic)} missing ({percent:.0f} %), {_longest(gaps.count, gaps.longest_s)}"
+    )
+
+
+def _kind(ledger: Ledger, kind: str, told: str) -> tuple[str, str] | None:
+    """Return a kind and its rate in words; None where the log has no values of it."""
+    topics = {name: one for name, one in ledger.topics.items() if kind_of(name) == kind and _present(one)}
+    if not topics:
+        return None
+    first = next(iter(topics.values()))
+    name = NAMES[kind] if kind != "ins" else _of_ins(topics.values())
+    several = f"{len(topics)} x {name}" if len(topics) > 1 else name
+    rate = first.nominal_rate_hz
+    return f"{several} ({told})" if told else several, f"at {_hertz(rate)} Hz" if rate else _counted(first.rows, "row")
+
+
+def _by_rate(kinds: list[tuple[str, str]]) -> list[str]:
+    """Return the kinds, those of one rate together, in the order of the first of them."""
+    by_rate: dict[str, list[str]] = {}
+    for name, rate in kinds:
+        by_rate.setdefault(rate, []).append(name)
+    return [
+        f"{_listed(names)} {rate}" if rate.startswith("at ") else f"{_listed(names)} ({rate})"
+        for rate, names in by_rate.items()
+    ]
+
+
+def _hertz(rate: float) -> str:
+    """Return a rate: whole where it is within 1 % of a whole one."""
+    whole = round(rate)
+    return f"{whole}" if whole and abs(rate - whole) < 0.01 * whole else f"{rate:.2g}" if rate < 10.0 else f"{whole}"
+
+
+def _of_ins(topics: Iterable[TopicEntry]) -> str:
+    """Return what the topics of an INS hold: a whole INS, attitude, or heading alone."""
+    fields = frozenset(name for one in topics for name in _present(one))
+    if fields & MOVES:
+        return NAMES["ins"]
+    return "attitude" if fields & ATTITUDE else "heading" if fields & HEADINGS else "inertial sensors"
+
+
+def _present(topic: TopicEntry) -> tuple[str, ...]:
+    return tuple(name for name, one in topic.fields.items() if one.present)
+
+
+def _raw(results: FlightResults) -> str:
+    """Return the messages of a log without signals, those with most rows first."""
+    topics = sorted(
+        ((name, one) for name, one in results.ledger.topics.items() if name.startswith(RAW_PREFIX)),
+        key=lambda pair: -pair[1].rows,
+    )
+    if not topics:
+        return "no signals"
+    named = [f"{name.removeprefix(RAW_PREFIX)} ({one.rows})" for name, one in topics[:MOST_RAW]]
+    more = len(topics) - len(named)
+    listed = _listed([*named, _counted(more, "more kind")] if more > 0 else named)
+    length = f"{_length(results.duration_s)} of " if results.duration_s else ""
+    return f"{length}messages without navigation: {listed}"
+
+
+def _gaps(ledger: Ledger) -> str:
+    """Return the gaps of the GNSS or INS that misses most; empty where none has any."""
+    known = {name: one for name, one in ledger.topics.items() if is_canonical(name) and one.gaps.count}
+    if not known:
+        return ""
+    name, one = max(known.items(), key=lambda pair: (kind_of(pair[0]) in ("gnss", "ins"), pair[1].gaps.total_s))
+    return f"{_length(one.gaps.total_s)} of {_name(name)} missing, {_longest(one.gaps.count, one.gaps.longest_s)}"
+
+
+def _longest(count: int, longest_s: float) -> str:
+    return "in one gap" if count == 1 else f"{count} gaps, the longest {_length(longest_s)}"
+
+
+def _share(topic: TopicEntry) -> float:
+    return topic.gaps.total_s / topic.span_s if topic.span_s else 0.0
+
+
+def _name(topic: str) -> str:
+    kind = kind_of(topic)
+    return NAMES.get(kind, kind) + topic.removeprefix(kind).replace(".", " ")
+
+
+def _length(seconds: float) -> str:
+    """Return a length of time for people: "26 s", "2:14 min", "1:05:10 h"."""
+    if seconds < FEW_S:
+        return f"{seconds:.0f} s" if seconds >= 10.0 else f"{seconds:.2g} s"
+    hours, rest = divmod(round(seconds), 3600)
+    return f"{hours}:{rest // 60:02d}:{rest % 60:02d} h" if hours else f"{rest // 60}:{rest % 60:02d} min"
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _listed(parts: list[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"

@@ -1,0 +1,93 @@
+"""The line on a recording: what it holds, how whole it is, and when a loss comes before every answer."""
+
+from dataclasses import replace
+
+import pytest
+
+from groundstation.base.ledger import DamageEntry, FieldEntry, Ledger, TopicEntry, TopicGaps, Truncation
+from groundstation.chapters.front import front
+from groundstation.chapters.parts import Mark, Rank
+from groundstation.results.flight import FlightResults
+from groundstation.results.gates import Gate
+from groundstation.results.recorded import contents, great_loss, recorded, wholeness
+from groundstation.systems import systems
+from groundstation.systems.heading.claim_chapter import claim
+from tests.report_example import example, heading_result
+
+MADE = example(None)
+
+
+def topic(rate_hz: float | None, span_s: float, *fields: str, gaps: tuple[float, ...] = ()) -> TopicEntry:
+    return TopicEntry(
+        actual_rate_hz=rate_hz,
+        backward_steps=0,
+        coverage=None,
+        duplicates=0,
+        fields={name: FieldEntry(present=3) for name in fields},
+        first="",
+        gaps=TopicGaps(count=len(gaps), longest_s=max(gaps, default=0.0), total_s=sum(gaps)),
+        last="",
+        nominal_rate_hz=rate_hz,
+        rows=3,
+        span_s=span_s,
+        stray_rows=0,
+    )
+
+
+def flight(status: str = "ok", **topics: TopicEntry) -> FlightResults:
+    named = {name.replace("_2", ".2").replace("raw_", "raw."): one for name, one in topics.items()}
+    return replace(MADE, ledger=Ledger(topics=named), status=status, duration_s=90.0)
+
+
+@pytest.mark.parametrize(
+    ("topics", "line"),
+    [
+        ({"gnss": topic(4.0, 134.0, "latitude_deg")}, "2:14 min of GNSS at 4 Hz"),
+        (
+            {"gnss": topic(0.999, 4000.0, "latitude_deg"), "ins": topic(1.0, 3990.0, "roll_deg")},
+            "1:06:40 h of GNSS and attitude at 1 Hz",
+        ),
+        (
+            {"ins": topic(50.0, 61.2, "latitude_deg"), "ins_2": topic(50.0, 61.0, "roll_deg")},
+            "61 s of 2 x INS at 50 Hz",
+        ),
+        ({"ins": topic(50.0, 61.2, "true_heading_deg")}, "61 s of heading at 50 Hz"),
+        ({"gnss": topic(5.0, 9.0)}, "no signals"),  # a topic all of whose values are absent
+        ({"gnss": topic(None, 0.0, "latitude_deg")}, "GNSS (3 rows)"),
+        ({"raw_chatter": topic(9.0, 9.0, "data")}, "90 s of messages without navigation: chatter (3)"),
+    ],
+)
+def test_contents_are_told_as_a_person_would(topics: dict[str, TopicEntry], line: str) -> None:
+    assert contents(flight(**topics)) == line
+
+
+def test_wholeness_names_the_end_the_places_and_the_gaps() -> None:
+    assert wholeness(flight(gnss=topic(1.0, 90.0, "latitude_deg"))) == "nothing lost"
+    gaps = flight(gnss=topic(1.0, 200.0, "latitude_deg", gaps=(9.0, 4.0)))
+    assert wholeness(gaps) == "13 s of GNSS missing, 2 gaps, the longest 9 s"
+    damage = DamageEntry(count=7, kind="corrupt", loses_data=True, place="byte 3", topic="", what="bytes")
+    cut = Ledger(damages=(damage,), truncated=Truncation(count=1, place="", what=""))
+    assert recorded(replace(MADE, ledger=cut, status="degraded")).endswith("its end is cut off; 1 damaged place")
+    assert wholeness(replace(MADE, status="degraded")) == "some of it lost", "never whole where data were lost"
+
+
+def test_a_great_loss_comes_before_a_good_number() -> None:
+    chapters = systems().chapters
+    kept = replace(example(heading_result()), ledger=Ledger(topics={"gnss": topic(1.0, 80.0, "latitude_deg")}))
+    lost = replace(
+        kept, ledger=Ledger(topics={"gnss": topic(1.0, 80.0, "latitude_deg", gaps=(21.0,))}), status="degraded"
+    )
+    small = replace(
+        kept, ledger=Ledger(topics={"gnss": topic(1.0, 800.0, "latitude_deg", gaps=(21.0,))}), status="degraded"
+    )
+    assert great_loss(lost) == "21 s of GNSS missing (26 %), in one gap"
+    top = front(lost, chapters)
+    assert (top.verdict, top.others[0].claim.mark.text) == (Mark("bad", "Data lost"), "Accept")
+    assert front(kept, chapters).verdict == Mark("good", "Accept")
+    assert great_loss(small) == "" and front(small, chapters).verdict == Mark("good", "Accept")
+
+
+def test_too_little_taxi_decides_nothing() -> None:
+    short = Gate("taxi_seconds", "straight taxi", 3.0, 20.0, "s", "failed", sense="at_least")
+    assert claim(heading_result(verdict="reject", gates=(short,))).rank is Rank.HEADING_OPEN
+    assert claim(heading_result(verdict="reject")).rank is Rank.HEADING
