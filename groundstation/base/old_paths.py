@@ -191,7 +191,7 @@ ALSO = {
         "systems.planning.session.placement_arrays",
     ),
     "results.arrays.landing": ("systems.planning.landing.arrays",),
-    "results.heading": ("results.gates", "results.interval_parts"),
+    "results.heading": ("results.gates", "results.roles"),
     "results.inertial": ("results.roles",),
     "results.installation": ("systems.heading.installation.answer",),
 }
