@@ -19,7 +19,10 @@ from groundstation.exports.sbet import write_sbet
 from groundstation.exports.tracks import HALF_WIDTH, MSL, Track, tracks_of
 from groundstation.pipeline.verbs.export import WRITERS_OF_ONE, _written_alone, export
 from groundstation.pipeline.verbs.export_figures import export_figures
+from groundstation.results.answer import by_analysis
+from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults, Source
+from groundstation.systems.inertial.answer import InertialResult
 from groundstation.tables.table import Flight, Table
 from tests.figure_arrays import filled
 from tests.fleet_example import save_flight
@@ -78,6 +81,12 @@ def flight(has_utc: bool = True, **left_out: None) -> Flight:
     return Flight(tables, {}, START_NS, has_utc, "a<b>.csv")
 
 
+def estimated(figures: tuple[FigureData, ...], ins_topic: str = "ins") -> FlightResults:
+    """Results with the answer on the errors of an INS."""
+    answer = InertialResult(ins_topic, "gnss", "unaided", "", epochs=3, gnss_seconds=10.0)
+    return replace(BARE, answers=by_analysis(answer), figures=figures)
+
+
 def track_of(name: str, **options: bool) -> Track:
     (found,) = (one for one in tracks_of(flight(**options), None) if one.name == name)
     return found
@@ -108,14 +117,14 @@ def test_the_corrected_track_has_its_interval() -> None:
     place = {"corrected_latitude_deg": at_s * 1e-4, "corrected_longitude_deg": at_s * 0.0}
     sigmas = {"north_position_sigma_m": np.full(3, 3.0), "east_position_sigma_m": np.array([4.0, 1.0, 4.0])}
     figures = filled("inertial_track", time_s=at_s, **place), filled("inertial_states", time_s=at_s, **sigmas)
-    (track,) = (one for one in tracks_of(flight(), replace(BARE, figures=figures)) if one.name == "corrected")
+    (track,) = (one for one in tracks_of(flight(), estimated(figures)) if one.name == "corrected")
     assert np.allclose(track.column(HALF_WIDTH), math.sqrt(-2.0 * math.log(0.05)) * np.array([4.0, 3.0, 4.0]))
 
 
 def test_the_smoothed_track_is_not_called_as_the_reference_that_judges_is() -> None:
     place = {"reference_latitude_deg": np.array([1.0, 2.0]), "reference_longitude_deg": np.array([3.0, 4.0])}
     figures = (filled("inertial_track", time_s=np.array([0.0, 5.0]), **place),)
-    (track,) = (one for one in tracks_of(flight(), replace(BARE, figures=figures)) if one.name == "smoothed")
+    (track,) = (one for one in tracks_of(flight(), estimated(figures)) if one.name == "smoothed")
     assert track.latitude_deg.tolist() == [1.0, 2.0]
 
 
@@ -262,9 +271,7 @@ def test_a_made_track_has_the_height_of_its_ins_and_no_other() -> None:
     figures = (filled("inertial_track", time_s=at_s, **place),)
 
     def made(ins_topic: str) -> Track:
-        (track,) = (
-            one for one in tracks_of(flight(), replace(BARE, figures=figures), ins_topic) if one.name == "corrected"
-        )
+        (track,) = (one for one in tracks_of(flight(), estimated(figures, ins_topic)) if one.name == "corrected")
         return track
 
     height_m = made("ins").column("altitude_ellipsoid_m")

@@ -1,4 +1,4 @@
-"""Tracks to export: those logged, and those that the estimator of INS errors made."""
+"""Tracks to export: those logged, and those that an analysis made of an INS."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ from groundstation.base.ellipse import ELLIPSE_95, principal_axes
 from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
+from groundstation.results.corrected_position import BestTrack, MadeTrack
 from groundstation.results.flight import FlightResults
-from groundstation.systems.inertial.arrays import InertialStates, InertialTrack
 from groundstation.tables.motion import horizontal_speed_mps
 from groundstation.tables.table import Flight, Table
 
@@ -23,13 +23,8 @@ MOVES = ("velocity_north_mps", "velocity_east_mps", "velocity_down_mps", "roll_d
 DIRECTIONS = ("track_deg", "true_heading_deg")
 OF_THE_FIX = ("hdop", "satellites_used")
 BRIDGED_S = 0.25  # altitude, attitude and velocity of other rows are interpolated over at most so long
-EPOCH_BRIDGED_S = 1.5  # altitude of the INS at the epochs of the estimator, which bridges as much
+EPOCH_BRIDGED_S = 1.5  # altitude of the INS at the epochs of a track made of it, which are as far apart
 SPEED, HALF_WIDTH = "ground_speed_mps", "horizontal95_m"
-CORRECTED, SMOOTHED = "corrected", "smoothed"
-MADE = {  # tracks of the estimator
-    CORRECTED: "INS less its estimated error, height of the INS",
-    SMOOTHED: "INS less its smoothed error, height of the INS",
-}
 NORTH_SIGMA, EAST_SIGMA = "north_sigma_m", "east_sigma_m"
 
 
@@ -40,7 +35,7 @@ class Track:
     Parameters
     ----------
     name : str
-        Topic of the log, or ``corrected`` and ``smoothed`` of the estimator.
+        Topic of the log, or the name that the analysis gives its track: ``corrected``.
     title : str
         For people.
     time_ns : ndarray of int64, shape (n,)
@@ -79,16 +74,18 @@ class Track:
         return tuple(slice(first, last) for first, last in pairwise((0, *crossings, len(self))))
 
 
-def tracks_of(flight: Flight, results: FlightResults | None, ins_topic: str = "") -> tuple[Track, ...]:
-    """Return the tracks of a flight: every receiver's and INS's, then the estimator's.
+def tracks_of(flight: Flight, results: FlightResults | None) -> tuple[Track, ...]:
+    """Return the tracks of a flight: every receiver's and INS's, then those made of an INS.
 
-    They are the tracks that have positions. ``ins_topic`` is the INS whose errors were estimated: its altitude stands
-    beside the estimator's positions.
+    They are the tracks that have positions. The altitude of the INS stands beside the positions made of it.
     """
     topics = [topic for kind in ("gnss", "ins", "truth") for topic in topics_of_kind(kind, flight.topics())]
     logged = [_logged(flight, flight[topic].unique_times()) for topic in topics]
-    made = [_made(flight, results, name, ins_topic) for name in MADE]
-    return tuple(track for track in (*logged, *made) if track is not None and len(track))
+    tracks = [track for track in logged if track is not None]
+    best = None if results is None else results.answer_meeting(BestTrack)
+    if results is not None and best is not None:
+        tracks += [_made(flight, made, best.ins_topic) for made in best.tracks(results)]
+    return tuple(track for track in tracks if len(track))
 
 
 def _logged(flight: Flight, table: Table) -> Track | None:
@@ -133,32 +130,20 @@ def _bridged(
     return np.where(near, between, np.nan)
 
 
-def _made(flight: Flight, results: FlightResults | None, name: str, ins_topic: str) -> Track | None:
-    """Return a track of the estimator, at the times its figures have.
+def _made(flight: Flight, made: MadeTrack, ins_topic: str) -> Track:
+    """Return a track that an analysis made of an INS, at its own times.
 
     Half of the 95 % ellipse's major axis is its width. No error of height is estimated: the altitude is that of the
     INS, as logged.
     """
-    data = None if results is None else results.rows_of(InertialTrack)
-    if results is None or data is None:
-        return None
-    latitude, longitude = data.corrected_latitude_deg, data.corrected_longitude_deg
-    if name == SMOOTHED:
-        latitude, longitude = data.reference_latitude_deg, data.reference_longitude_deg
-    if latitude is None or longitude is None:
-        return None
-    known = np.isfinite(latitude) & np.isfinite(longitude)
-    time_s = data.time_s[known]
-    columns = _altitudes(flight, ins_topic, time_s)
-    states = results.rows_of(InertialStates)
-    if name == CORRECTED and states is not None:
-        sigmas = states.north.position_sigma_m, states.east.position_sigma_m
-        north, east = (np.interp(time_s, states.time_s, sigma) for sigma in sigmas)
+    columns = _altitudes(flight, ins_topic, made.time_s)
+    north, east = made.sigma_north_m, made.sigma_east_m
+    if north is not None and east is not None:
         major = principal_axes(north, east, np.zeros(len(north)))[0]
         columns |= {NORTH_SIGMA: north, EAST_SIGMA: east, HALF_WIDTH: ELLIPSE_95 * major}
-    time_ns = flight.start_ns + np.rint(time_s * NS_PER_S).astype(np.int64)
-    place = (latitude[known], longitude[known])
-    return Track(name, MADE[name], time_ns, flight.start_ns, flight.has_utc, *place, columns)
+    time_ns = flight.start_ns + np.rint(made.time_s * NS_PER_S).astype(np.int64)
+    title, place = f"{made.title}, height of the INS", (made.latitude_deg, made.longitude_deg)
+    return Track(made.name, title, time_ns, flight.start_ns, flight.has_utc, *place, columns)
 
 
 def _altitudes(flight: Flight, ins_topic: str, at_s: FloatArray) -> dict[str, FloatArray]:

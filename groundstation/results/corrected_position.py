@@ -1,4 +1,4 @@
-"""Corrected position of an unaided INS with its sigmas, as pages and recordings draw it."""
+"""Corrected position of an unaided INS, as pages and recordings draw it, and its tracks."""
 
 from dataclasses import dataclass
 
@@ -35,8 +35,30 @@ class CorrectedPosition:
         return magnified(side_m, float(np.median(half_m)))
 
 
+@dataclass(frozen=True)
+class MadeTrack:
+    """Track that an analysis made of an INS, arrays of shape (n,), every row with a place.
+
+    ``title`` says for people how it was made. The sigmas are None where the track has none.
+    """
+
+    name: str
+    title: str
+    time_s: FloatArray
+    latitude_deg: FloatArray
+    longitude_deg: FloatArray
+    sigma_north_m: FloatArray | None = None
+    sigma_east_m: FloatArray | None = None
+
+
 class BestTrack:
     """Role of an answer that corrects the position of an INS along the flight."""
+
+    ins_topic: str
+
+    def tracks(self, results: FlightResults) -> tuple[MadeTrack, ...]:
+        """Return the tracks made of the INS, each with its own rows."""
+        raise NotImplementedError
 
     def best_track(self, results: FlightResults) -> CorrectedPosition | None:
         """The rows with a place and sigmas; None of an INS that was not corrected."""

@@ -16,7 +16,6 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import as_log, open_log
 from groundstation.pipeline.one_flight.outcome import Outcome
-from groundstation.results.roles import ErrorsAlongTheFlight
 from groundstation.tables.table import Flight
 
 if TYPE_CHECKING:
@@ -53,8 +52,7 @@ def export(
     require_suffix(target, (*WRITERS, *WRITERS_OF_ONE))
     require_place(path, target, force)
     flight, saved, has_lost = _read(path, configuration or Configuration())
-    results, ins_topic = (None, "") if saved is None else (saved.results, _compared_ins(saved))
-    tracks = _wanted(tracks_of(flight, results, ins_topic), names, path.name)
+    tracks = _wanted(tracks_of(flight, None if saved is None else saved.results), names, path.name)
     with told_in_a_line(str(target)):
         target.parent.mkdir(parents=True, exist_ok=True)
         if suffix in WRITERS:
@@ -127,12 +125,6 @@ def saved_flight(folder: Path) -> "SavedFlight":
     if not (folder / FLIGHT_FOLDER_MARK).is_file():
         raise no_log(folder)
     return load(folder, systems().answer_types)
-
-
-def _compared_ins(saved: "SavedFlight") -> str:
-    """Return the INS whose errors were estimated; empty where none was."""
-    found = saved.results.answer_meeting(ErrorsAlongTheFlight)
-    return "" if found is None else found.ins_topic
 
 
 def _wanted(tracks: tuple[Track, ...], names: Sequence[str], source: str) -> tuple[Track, ...]:

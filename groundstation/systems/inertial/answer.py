@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from groundstation.base.angles import FloatArray
 from groundstation.results.answer import Answer
-from groundstation.results.corrected_position import BestTrack, CorrectedPosition
+from groundstation.results.corrected_position import BestTrack, CorrectedPosition, MadeTrack
 from groundstation.results.figures import FigureData
 from groundstation.results.flight import FlightResults
 from groundstation.results.frames import rows_frame
@@ -242,6 +243,24 @@ class InertialResult(Answer, KindOfIns, AzimuthByTurns, BestTrack, ErrorsAlongTh
         known = np.isfinite(columns).all(axis=0) & (np.abs(columns[3:]) < LARGEST_SIGMA_M).all(axis=0)
         return CorrectedPosition(*(column[known] for column in columns)) if known.any() else None
 
+    def tracks(self, results: FlightResults) -> tuple[MadeTrack, ...]:
+        """Return the INS less its estimated error, with sigmas, and less its smoothed error."""
+        track, states = results.rows_of(InertialTrack), results.rows_of(InertialStates)
+        if track is None:
+            return ()
+        made = []
+        if track.corrected_latitude_deg is not None and track.corrected_longitude_deg is not None:
+            rows = _placed(track.time_s, track.corrected_latitude_deg, track.corrected_longitude_deg)
+            sigmas: tuple[FloatArray, ...] = ()
+            if states is not None:
+                both = states.north.position_sigma_m, states.east.position_sigma_m
+                sigmas = tuple(np.interp(rows[0], states.time_s, sigma) for sigma in both)
+            made.append(MadeTrack("corrected", "INS less its estimated error", *rows, *sigmas))
+        if track.reference_latitude_deg is not None and track.reference_longitude_deg is not None:
+            rows = _placed(track.time_s, track.reference_latitude_deg, track.reference_longitude_deg)
+            made.append(MadeTrack("smoothed", "INS less its smoothed error", *rows))
+        return tuple(made)
+
     def table_names(self) -> tuple[str, ...]:
         """Names that :meth:`to_frame` takes."""
         return ("states", "channels", *super().table_names())
@@ -259,6 +278,14 @@ class InertialResult(Answer, KindOfIns, AzimuthByTurns, BestTrack, ErrorsAlongTh
         frame = rows_frame(StateEstimate, [state for _, state in rows])
         frame.insert(0, "channel", [name for name, _ in rows])
         return frame
+
+
+def _placed(
+    time_s: FloatArray, latitude_deg: FloatArray, longitude_deg: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Times and places of the rows that have a place."""
+    known = np.isfinite(latitude_deg) & np.isfinite(longitude_deg)
+    return time_s[known], latitude_deg[known], longitude_deg[known]
 
 
 def is_left_alone(name: str, sigma: Any, observability: Any, settings: Mapping[str, Any]) -> bool:
