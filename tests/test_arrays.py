@@ -14,11 +14,11 @@ from typer.testing import CliRunner
 import groundstation
 from groundstation.base.failures import failures, gathered_failures
 from groundstation.cli.main import app
-from groundstation.pipeline.many_flights.fleet.rows import heading_samples
 from groundstation.results.arrays.typed import Arrays, MissingColumnError, joined
 from groundstation.results.figures import FigureData
 from groundstation.results.files import OLD_COLUMNS
 from groundstation.systems.heading.arrays import HeadingSamples, StandstillVelocity
+from groundstation.systems.heading.fleet_share import heading_samples
 from groundstation.systems.inertial.arrays import DifferencesOfChannel, InertialDifferences
 from groundstation.systems.magnetic.arrays import GroundRunCurve
 from groundstation.systems.reference.arrays import ReferenceErrors

@@ -24,13 +24,14 @@ from groundstation.methods.fleet.changes import ChangeSettings
 from groundstation.methods.fleet.density import densities_of, histogram_of
 from groundstation.methods.fleet.deviation import deviations
 from groundstation.methods.fleet.moments import moments_of
-from groundstation.methods.fleet.skill import SkillMerger, SkillOfFlight
+from groundstation.methods.fleet.skill import SkillMerger
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
 from groundstation.pipeline.many_flights.fleet.statistics import gather
 from groundstation.reports.fleet_report import MOST_ROWS_ON_PAPER, PAGE, write_fleet_report
 from groundstation.results.arrays.fleet import FleetChecks, FleetSkillFlights
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet import FleetResults, NotInFleet
+from groundstation.results.fleet_share import SkillOfFlight
 from groundstation.systems import systems
 from groundstation.systems.heading import fleet_densities_plots as densities
 from tests.browser import Browser

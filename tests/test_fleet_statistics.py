@@ -13,10 +13,11 @@ from groundstation.methods.fleet.density import MOST_BINS, densities_of, histogr
 from groundstation.methods.fleet.deviation import deviations
 from groundstation.methods.fleet.moments import Moments, merged, moments_of
 from groundstation.methods.fleet.outliers import find_outliers
-from groundstation.methods.fleet.skill import SkillMerger, SkillOfFlight
+from groundstation.methods.fleet.skill import SkillMerger
 from groundstation.methods.intervals import share_interval
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
 from groundstation.results.figures import FigureData
+from groundstation.results.fleet_share import SkillOfFlight
 from tests.fleet_example import flights_table
 
 LUCK_SIGMAS = 4.0  # of a share counted over simulated series: a right rate is outside once in sixteen thousand tests

@@ -9,17 +9,17 @@ import re
 
 from groundstation.reports.page import render
 from groundstation.results.installations import LearnedHeading
-from groundstation.systems.heading.installation.chapter import parts, sentence
+from groundstation.systems.learning import LearnStep
 
 TOP, CHAPTER = "installation-top", "installation"
 
 
-def with_installation(page: str, answer: LearnedHeading | None) -> str:
+def with_installation(page: str, answer: LearnedHeading | None, learn: LearnStep) -> str:
     """Return the page of a flight with a learned answer in its places; empty without one."""
     top = chapter = ""
     if answer is not None:
-        top = "" if answer.why_not else render("installation-top.html.j2", text=sentence(answer))
-        chapter = render("installation.html.j2", told=parts(answer))
+        top = "" if answer.why_not else render("installation-top.html.j2", text=learn.sentence(answer))
+        chapter = render("installation.html.j2", told=learn.parts(answer))
     return _filled(_filled(page, TOP, top), CHAPTER, chapter)
 
 

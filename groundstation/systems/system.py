@@ -18,10 +18,13 @@ if TYPE_CHECKING:
     from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.chapters.plots.comparison import Compared
     from groundstation.plots.plot import Describe
-    from groundstation.results.fleet import FleetResults
+    from groundstation.results.files import SavedFlight
+    from groundstation.results.fleet import FleetResults, SessionRow
+    from groundstation.results.fleet_share import SystemShare
     from groundstation.results.flight import FlightResults
     from groundstation.systems.applied import ApplyStep
     from groundstation.systems.joining import JoinStep
+    from groundstation.systems.learning import LearnStep
     from groundstation.systems.study import StudyResult
 
 
@@ -45,6 +48,17 @@ class FleetTab(NamedTuple):
 
     name: str
     log: Callable[[Any, "FleetResults"], Any]
+
+
+class InFleet(NamedTuple):
+    """Contribution of a system to the tables of all flights and sessions.
+
+    ``share(saved)`` is what one flight adds besides the columns of its analyses. ``row(saved, row)`` is the row of a
+    session with what the system found.
+    """
+
+    share: "Callable[[SavedFlight], SystemShare] | None" = None
+    row: "Callable[[SavedFlight, SessionRow], SessionRow] | None" = None
 
 
 @dataclass(frozen=True)
@@ -110,6 +124,8 @@ class System:
         Descriptions of their figures, by the name that a chapter gives.
     fleet_tabs : callable
         Tabs of the recording of all flights.
+    in_fleet : callable, optional
+        Imports what it adds to the tables of all flights and sessions, and returns it.
     compared : callable
         Figures of two flights over each other, each with its tab of the recording.
     advice : callable, optional
@@ -118,6 +134,8 @@ class System:
         Imports what ``run --apply`` does behind the analyses and returns it; that of the first system that has one.
     join : callable, optional
         Imports what relates the clocks of several logs for ``run --together``, and returns it.
+    learn : callable, optional
+        Imports what earlier flights teach later ones of, and returns it; that of the first system that has one.
     """
 
     name: str
@@ -131,9 +149,11 @@ class System:
     fleet_chapters: "Callable[[], tuple[FleetChapter, ...]]" = _none
     fleet_plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
     fleet_tabs: Callable[[], tuple[FleetTab, ...]] = _none
+    in_fleet: Callable[[], InFleet] | None = None
     advice: "Callable[[], Adviser] | None" = None
     apply: "Callable[[], ApplyStep] | None" = None
     join: "Callable[[], JoinStep] | None" = None
+    learn: "Callable[[], LearnStep] | None" = None
     compared: "Callable[[], tuple[Compared, ...]]" = _none
 
 
@@ -187,6 +207,11 @@ class Systems:
         """Step of ``run --together``; None where no system has one."""
         return next((one.join() for one in self.every if one.join is not None), None)
 
+    @property
+    def learn(self) -> "LearnStep | None":
+        """Step across the flights of a folder; None where no system has one."""
+        return next((one.learn() for one in self.every if one.learn is not None), None)
+
     @cached_property
     def answer_types(self) -> Mapping[str, type[Answer]]:
         """Types of the answers of a saved flight, session or plan, by the name of their analysis."""
@@ -238,6 +263,11 @@ class Systems:
     def fleet_tabs(self) -> tuple[FleetTab, ...]:
         """Tabs of the recording of all flights."""
         return tuple(tab for one in self.every for tab in one.fleet_tabs())
+
+    @cached_property
+    def in_fleet(self) -> tuple[InFleet, ...]:
+        """Contributions to the tables of all flights and sessions."""
+        return tuple(one.in_fleet() for one in self.every if one.in_fleet is not None)
 
     @cached_property
     def compared(self) -> "tuple[Compared, ...]":

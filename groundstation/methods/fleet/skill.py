@@ -10,23 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.results.fleet import FleetSkill
+from groundstation.results.fleet_share import SkillOfFlight
 from groundstation.results.forecast_methods import FORECAST_METHODS
-
-
-@dataclass(frozen=True)
-class SkillOfFlight:
-    """Forecast skill of one method at one horizon on one flight.
-
-    ``coverage95`` is NaN where there is no band. ``is_within`` says whether NEES of the flight is within its 95 %
-    limits, None where it has too few starts to judge.
-    """
-
-    method: str
-    horizon_min: float
-    starts: int
-    rms_m: float
-    coverage95: float
-    is_within: bool | None = None
 
 
 @dataclass

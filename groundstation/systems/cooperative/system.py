@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from groundstation.systems.cooperative.analysis import COOPERATIVE
-from groundstation.systems.system import Study, System, Tab
+from groundstation.systems.system import InFleet, Study, System, Tab
 
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter
@@ -27,6 +27,12 @@ def _fleet_chapters() -> "tuple[FleetChapter, ...]":
     from groundstation.systems.cooperative.fleet_chapter import build
 
     return (FleetChapter("sessions", 100, build, "flights"),)
+
+
+def _in_fleet() -> InFleet:
+    from groundstation.systems.cooperative.fleet_share import IN_FLEET
+
+    return IN_FLEET
 
 
 def _plots() -> "Mapping[str, Describe]":
@@ -67,5 +73,6 @@ SYSTEM = System(
     plots=_plots,
     tabs=_tabs,
     fleet_chapters=_fleet_chapters,
+    in_fleet=_in_fleet,
     compared=_compared,
 )

@@ -5,13 +5,14 @@ from typing import TYPE_CHECKING
 
 from groundstation.systems.heading.analysis import HEADING
 from groundstation.systems.heading.installation.analysis import INSTALLATION
-from groundstation.systems.system import Study, System, Tab
+from groundstation.systems.system import InFleet, Study, System, Tab
 
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Adviser, Chapter
     from groundstation.chapters.fleet.chapter import FleetChapter
     from groundstation.chapters.plots.comparison import Compared
     from groundstation.plots.plot import Describe
+    from groundstation.systems.learning import LearnStep
     from groundstation.systems.study import StudyResult
 
 
@@ -52,6 +53,18 @@ def _fleet_plots() -> "Mapping[str, Describe]":
         "fleet.densities_by_aircraft": densities.by_aircraft,
         "fleet.installation": installations.over_time,
     }
+
+
+def _in_fleet() -> InFleet:
+    from groundstation.systems.heading.fleet_share import IN_FLEET
+
+    return IN_FLEET
+
+
+def _learn() -> "LearnStep":
+    from groundstation.systems.heading.installation.learned import STEP
+
+    return STEP
 
 
 def _advice() -> "Adviser":
@@ -148,6 +161,8 @@ SYSTEM = System(
     tabs=_tabs,
     fleet_chapters=_fleet_chapters,
     fleet_plots=_fleet_plots,
+    in_fleet=_in_fleet,
     compared=_compared,
     advice=_advice,
+    learn=_learn,
 )

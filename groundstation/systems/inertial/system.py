@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from groundstation.systems.inertial.analysis import FORECAST, INERTIAL
-from groundstation.systems.system import FleetTab, Study, System, Tab
+from groundstation.systems.system import FleetTab, InFleet, Study, System, Tab
 
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Adviser, Chapter
@@ -49,6 +49,12 @@ def _fleet_tabs() -> tuple[FleetTab, ...]:
     from groundstation.systems.inertial.fleet_tab import forecast
 
     return (FleetTab("forecast", forecast),)
+
+
+def _in_fleet() -> InFleet:
+    from groundstation.systems.inertial.fleet_share import IN_FLEET
+
+    return IN_FLEET
 
 
 def _advice() -> "Adviser":
@@ -103,6 +109,7 @@ SYSTEM = System(
     fleet_chapters=_fleet_chapters,
     fleet_plots=_fleet_plots,
     fleet_tabs=_fleet_tabs,
+    in_fleet=_in_fleet,
     compared=_compared,
     advice=_advice,
 )

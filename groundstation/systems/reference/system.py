@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from groundstation.systems.reference.analysis import REFERENCE
-from groundstation.systems.system import System, Tab
+from groundstation.systems.system import InFleet, System, Tab
 
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Chapter
@@ -34,6 +34,12 @@ def _fleet_plots() -> "Mapping[str, Describe]":
     return {"fleet.calibration": checks}
 
 
+def _in_fleet() -> InFleet:
+    from groundstation.systems.reference.fleet_share import IN_FLEET
+
+    return IN_FLEET
+
+
 def _plots() -> "Mapping[str, Describe]":
     from groundstation.systems.reference import plots as reference
 
@@ -54,4 +60,5 @@ SYSTEM = System(
     tabs=_tabs,
     fleet_chapters=_fleet_chapters,
     fleet_plots=_fleet_plots,
+    in_fleet=_in_fleet,
 )

@@ -10,7 +10,7 @@ from groundstation.base.geodesy import latitude_longitude_deg
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
 from groundstation.chapters.markdown import markdown
-from groundstation.pipeline.many_flights.fleet.rows import checks_of
+from groundstation.pipeline.many_flights.fleet.rows import shares_of
 from groundstation.pipeline.one_flight.analyse import Answered, answers_of
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.files import save
@@ -353,7 +353,7 @@ def test_the_chapter_tells_claimed_against_seen_and_a_fleet_counts_it(tmp_path: 
     assert "Claimed against seen" in text
     figures = found.answers["reference"].figures
     save(tmp_path, replace(results, figures=figures), Manifest())
-    checks = checks_of(load(tmp_path))
+    checks = [check for share in shares_of(load(tmp_path)) for check in share.checks]
     claim = judged(flight).claim("gnss", "position", "horizontal")
     assert claim is not None
     assert {check.quantity for check in checks} == {"truth_gnss"}

@@ -4,16 +4,15 @@ Every flight has some columns; between them stand those that each analysis gives
 """
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 from groundstation.methods.fleet.density import SampleHistogram
-from groundstation.methods.fleet.skill import SkillOfFlight
 from groundstation.reports.index import IndexRow
 from groundstation.results.columns import FlightColumn
+from groundstation.results.fleet_share import Check, SkillOfFlight
 from groundstation.results.flight import FlightResults
 from groundstation.results.installations import Lesson
 from groundstation.systems import systems
@@ -74,23 +73,6 @@ DETAILS = {
     "sample_count": "how many samples each of them holds",
     "lesson": "JSON: what the flight says of the installation of its INS; empty without a serial",
 }
-
-
-@dataclass(frozen=True)
-class Check:
-    """Comparison of an estimate with something independent of it.
-
-    It has the residual, the sigma claimed for it, and whether it is inside 95 %.
-
-    ``z`` is the residual over the sigma. ``verdict`` is that on the estimate; empty where it was not judged.
-    """
-
-    quantity: str
-    z: float
-    is_inside: bool
-    residual_deg: float = math.nan
-    sigma_deg: float = math.nan
-    verdict: str = ""
 
 
 @dataclass(frozen=True)

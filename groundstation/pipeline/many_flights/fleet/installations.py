@@ -20,7 +20,6 @@ from groundstation.results.files import load, write_text
 from groundstation.results.installations import (
     INSTALLATIONS,
     METHOD_VERSION,
-    Installation,
     Installations,
     LearnedHeading,
     LeftOut,
@@ -29,9 +28,7 @@ from groundstation.results.installations import (
     installations_text,
 )
 from groundstation.systems import systems
-from groundstation.systems.heading.installation.analysis import sentence_of
-from groundstation.systems.heading.installation.series import Series, installation_of, series_of
-from groundstation.systems.heading.installation.settings import InstallationSettings
+from groundstation.systems.learning import LearnStep
 
 
 def refresh_installations(out: Path, found: Scan, remade: Iterable[str]) -> list[str]:
@@ -52,7 +49,7 @@ def refresh_installations(out: Path, found: Scan, remade: Iterable[str]) -> list
     Returns
     -------
     list of str
-        Flights whose report changed.
+        Flights whose report changed; none where no system learns.
 
     Raises
     ------
@@ -61,14 +58,16 @@ def refresh_installations(out: Path, found: Scan, remade: Iterable[str]) -> list
     DamagedMonthError
         When a file of the dataset of flights cannot be read.
     """
-    path = out / INSTALLATIONS
+    path, learn = out / INSTALLATIONS, systems().learn
+    if learn is None:
+        return []
     before = installations_in(out)
-    after = _from_flights(out, found, before)
+    after = _from_flights(out, found, before, learn)
     text = "" if after is None else installations_text(after)
     rounded = None if after is None else from_json(Installations, json.loads(text))  # taken over or made: the same
     old, new = answers_in(before), answers_in(rounded)
     changed = {name for name in {*old, *new} if old.get(name) != new.get(name)} | {*remade}.intersection(new)
-    shown = show_answers(out, new, sorted(changed))
+    shown = _show_answers(out, new, sorted(changed), learn)
     if after is None:
         path.unlink(missing_ok=True)
     elif _text(path) != text:
@@ -76,24 +75,18 @@ def refresh_installations(out: Path, found: Scan, remade: Iterable[str]) -> list
     return shown
 
 
-def _from_flights(out: Path, found: Scan, before: Installations | None) -> Installations | None:
+def _from_flights(out: Path, found: Scan, before: Installations | None, learn: LearnStep) -> Installations | None:
     """All installations; None where no flight states a serial."""
     lessons = sorted(_lessons(out, found), key=lambda one: one.flight_id)
     if not lessons:
         return None
     is_usable = before is not None and before.method_version == METHOD_VERSION
-    known = {} if before is None or not is_usable else {_key(one): one for one in before.installations}
-    settings = InstallationSettings()
-    installations = tuple(known.get(_key(one)) or installation_of(one, settings) for one in series_of(lessons))
+    installations = learn.installations(lessons, before.installations if before is not None and is_usable else ())
     listed = {lesson.flight_id for one in installations for lesson in one.lessons}
     left_out = (LeftOut(one.flight_id, one.not_taught) for one in lessons if one.flight_id not in listed)
     return Installations(
         without_serial=len(found) - len(lessons), left_out=tuple(left_out), installations=installations
     )
-
-
-def _key(one: Series | Installation) -> tuple[str, str, tuple[Lesson, ...]]:
-    return one.ins_serial, one.aircraft, one.lessons
 
 
 def _lessons(out: Path, found: Scan) -> Iterator[Lesson]:
@@ -125,7 +118,9 @@ def answers_in(found: Installations | None) -> dict[str, LearnedHeading]:
     return {flight.lesson.flight_id: flight.answer for flight in flights if flight.answer is not None}
 
 
-def show_answers(out: Path, answers: Mapping[str, LearnedHeading], names: Iterable[str]) -> list[str]:
+def _show_answers(
+    out: Path, answers: Mapping[str, LearnedHeading], names: Iterable[str], learn: LearnStep
+) -> list[str]:
     """Fill learned answers into the reports of some flights.
 
     Returns the flights whose report changed.
@@ -133,8 +128,8 @@ def show_answers(out: Path, answers: Mapping[str, LearnedHeading], names: Iterab
     changed = []
     for name in names:
         page = out / name / REPORT
-        before = _text(page)
-        after = with_installation(before, answers.get(name)) if before else before
+        before, answer = _text(page), answers.get(name)
+        after = with_installation(before, answer, learn) if before else before
         if after != before:
             write_text(page, after, is_synced=False)  # note syncs it
             note(out / name, [page])
@@ -144,13 +139,18 @@ def show_answers(out: Path, answers: Mapping[str, LearnedHeading], names: Iterab
 
 def show_installation(folder: Path) -> None:
     """Fill what was learned into the report of one flight folder, from the file beside it."""
-    show_answers(folder.parent, answers_in(installations_in(folder.parent)), [folder.name])
+    learn = systems().learn
+    if learn is not None:
+        _show_answers(folder.parent, answers_in(installations_in(folder.parent)), [folder.name], learn)
 
 
 def told(outcomes: Iterable[Outcome], out: Path) -> tuple[Outcome, ...]:
     """Outcomes of flights with what was learned behind their answers."""
+    learn = systems().learn
+    if learn is None:
+        return tuple(outcomes)
     answers = answers_in(installations_in(out))
     return tuple(
-        replace(one, text=f"{one.text}; {sentence_of(answers[one.flight_id])}") if one.flight_id in answers else one
+        replace(one, text=f"{one.text}; {learn.line(answers[one.flight_id])}") if one.flight_id in answers else one
         for one in outcomes
     )

@@ -6,18 +6,15 @@ import json
 import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
-from numpy.typing import NDArray
 
 from groundstation.base.units import NS_PER_S
-from groundstation.methods.fleet.density import SampleHistogram
-from groundstation.methods.fleet.moments import Moments
 from groundstation.results.files import write_bytes
+from groundstation.results.fleet_share import FleetSamples
 
 SAMPLES = "samples.parquet"
 UNKNOWN = "unknown"
@@ -37,20 +34,6 @@ MEANINGS = {
     "gate": "why not",
     "weight": "in the estimate, 1 on average over the used samples",
 }
-
-
-@dataclass(frozen=True)
-class FleetSamples:
-    """Heading samples of a flight, without the rows that only break lines.
-
-    ``error_deg`` is NaN below walking pace.
-
-    ``moments`` and ``histogram`` are of the used ones, about the flight's estimate, so that none is cut at 180 deg.
-    """
-
-    columns: Mapping[str, NDArray[Any]]
-    moments: Moments
-    histogram: SampleHistogram
 
 
 class SampleStore:
