@@ -7,7 +7,7 @@ import pytest
 
 from groundstation.methods.fleet import answer
 from groundstation.methods.fleet.aircraft import mean_over_flights
-from groundstation.methods.fleet.calibration import calibrate
+from groundstation.methods.fleet.answer import calibrate
 from groundstation.methods.fleet.changes import ChangeSettings, control_chart, find_changes
 from groundstation.methods.fleet.density import MOST_BINS, densities_of, histogram_of
 from groundstation.methods.fleet.deviation import deviations

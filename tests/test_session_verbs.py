@@ -11,7 +11,7 @@ from groundstation.pipeline.many_flights.inputs import flight_folders, session_f
 from groundstation.pipeline.verbs.compare import compare
 from groundstation.pipeline.verbs.serve import recordings_in
 from groundstation.simulation.session_log import write_session
-from groundstation.systems.cooperative.errors_arrays import session_errors
+from groundstation.systems.cooperative.comparison_plots import session_errors
 from groundstation.viewer.fleet_catalog import SESSIONS, catalog_server
 from tests.recording_contents import Contents
 from tests.saved import load

@@ -1,11 +1,17 @@
-"""Top of the report: which flight, its best answer, others as tiles, what is not assessed."""
+"""Top of the report: which flight, its best answer, others as tiles, what is not assessed.
 
+Of a plan: what is planned, and what its chapters say above all.
+"""
+
+from collections.abc import Sequence
+
+from groundstation.base.failures import attempt
+from groundstation.base.findings import worst
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.chapters.assessed import not_assessed
 from groundstation.chapters.by_answer import answer_chapters
-from groundstation.chapters.chapter import Chapters
-from groundstation.chapters.parts import Cell, Front, Mark, Tile
-from groundstation.chapters.plan import plan_front
+from groundstation.chapters.chapter import Chapter, Chapters, Pairs
+from groundstation.chapters.parts import Cell, Facts, Front, Mark, Note, Tile
 from groundstation.chapters.wording import ABSENT, clock, is_number, typeset
 from groundstation.results.flight import FlightResults, Status
 from groundstation.results.recorded import great_loss, recorded
@@ -19,6 +25,12 @@ STATUS: dict[Status, Mark] = {
 RECORDED = Mark("plain", "Recorded")
 DAMAGED = Mark("warn", "Recorded")
 DATA_LOST = Mark("bad", "Data lost")
+OF_PLANS = {
+    None: Mark("good", "Planned"),
+    "info": Mark("good", "Planned"),
+    "warn": Mark("warn", "Planned, with warnings"),
+    "fail": Mark("bad", "No usable plan"),
+}
 
 
 def front(results: FlightResults, chapters: Chapters) -> Front:
@@ -92,3 +104,21 @@ def _duration(results: FlightResults) -> tuple[str, str]:
 def _counts(results: FlightResults) -> str:
     counts = [finding.severity for finding in results.findings]
     return " · ".join(f"{counts.count(name)} {name}" for name in ("fail", "warn", "info") if name in counts) or "none"
+
+
+def plan_front(results: FlightResults, pairs: Pairs, chapters: Sequence[Chapter]) -> Front:
+    """Build the top of a plan's report.
+
+    It has the headline of the first chapter, and the parts that each chapter puts above its own.
+    """
+    built = (attempt("chapter", chapter.name, chapter.build, results) for chapter in chapters)
+    sections = [section for section in built if section is not None]
+    above = [part for section in sections for part in section.above]
+    return Front(
+        results.metadata.get("title", "") or results.flight_id,
+        pairs,
+        verdict=OF_PLANS[worst(results.findings)],
+        headline=sections[0].headline if sections else "",
+        sentences=tuple(part.text for part in above if isinstance(part, Note)),
+        figures=tuple(pair for part in above if isinstance(part, Facts) for pair in part.pairs),
+    )

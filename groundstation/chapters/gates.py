@@ -1,4 +1,4 @@
-"""Gates and settings of an answer, in the same form in every chapter."""
+"""Gates, verdicts and settings of an answer, in the same form in every chapter."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -16,6 +16,14 @@ STATES = {
 HEADS = (Head("State"), Head("Gate"), Head("Figure", True), Head("Limit", True), Head("Reason"))
 INFORMS = "informs"
 CAPTION = "Accept requires every gate except those that only inform."
+VERDICTS: Mapping[str, Mark] = {
+    "accept": Mark("good", "Accept"),
+    "advisory": Mark("warn", "Advisory"),
+    "reject": Mark("bad", "Reject"),
+    "extend": Mark("warn", "Extend"),
+    "undecided": Mark("unknown", "Undecided"),
+}
+NOT_ASSESSABLE = Mark("unknown", "Not assessable")
 
 
 def gate_grid(gates: Sequence[Gate]) -> Grid | None:

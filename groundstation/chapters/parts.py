@@ -1,13 +1,15 @@
 """Parts of a page without any markup: a front, sections, figures, tables, facts, notes.
 
 A chapter builds them from the answers, once. HTML, typst, Markdown and the terminal are renderers of them; they alone
-escape.
+escape. Where long tables are no help, on paper and in panels that are laid out again and again, they are cut.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import ClassVar, Literal, TypeAlias
+
+from groundstation.chapters.wording import number
 
 Tone = Literal["good", "bad", "warn", "unknown", "plain"]
 
@@ -272,3 +274,18 @@ class Document:
     label: str
     front: Front
     sections: Sequence[Section]
+
+
+def shortened(section: Section, most: int, where: str) -> Section:
+    """Return the section with its long tables cut.
+
+    A cut table says how many rows more there are, and where.
+    """
+    return replace(section, parts=tuple(_cut(part, most, where) for part in section.parts))
+
+
+def _cut(part: Part, most: int, where: str) -> Part:
+    if not isinstance(part, Grid) or len(part.rows) <= most:
+        return part
+    more = f"The first {most}; {number(len(part.rows) - most, 0)} more in {where}."
+    return replace(part, rows=part.rows[:most], caption=f"{part.caption} {more}".strip())

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from groundstation.base.failures import attempt, gathered_failures
 from groundstation.chapters.fleet import flights, front
-from groundstation.chapters.parts import Document, Front
-from groundstation.chapters.shortened import shortened
+from groundstation.chapters.parts import Document, Front, shortened
 from groundstation.reports.drawing import drawn_by
 from groundstation.reports.flight_report import Written, write_pages
 from groundstation.reports.page import TEMPLATES, digest_of, render

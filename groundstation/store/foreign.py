@@ -2,7 +2,7 @@
 
 It reads the messages of every intact chunk, and those outside chunks, as far as they go. A cut file gives what stands
 before the cut, and the beginning of its last chunk. Where no record can be recognised the next chunk is searched for; a
-chunk whose checksum is wrong is lost.
+chunk whose checksum is wrong is lost. The sequence numbers of a channel show whether a chunk is missing.
 """
 
 import re
@@ -16,6 +16,7 @@ import zstandard
 from mcap.opcode import Opcode
 from mcap.records import Channel, Header, Schema
 
+from groundstation.base.records import Int64Array
 from groundstation.store.framing import (
     MAX_CHUNK_BYTES,
     MAX_RECORD_BYTES,
@@ -31,7 +32,6 @@ from groundstation.store.framing import (
 )
 from groundstation.store.marks import MAGIC, RECORD_PREFIX, SEARCH_BYTES
 from groundstation.store.messages import HEAD, ByteArray, Messages
-from groundstation.store.sequences import Sequences
 from groundstation.store.walk import find_messages
 
 PEEK_BYTES = 64
@@ -39,6 +39,9 @@ MOST_EXPANDED, FREE_BYTES = 200, 64 << 20  # chunks expand to so many times the 
 _CHUNK = re.compile(rb"\x06(?=[\0-\xff]{5}\0{3})")  # opcode and a length below 2**40
 _MESSAGE = re.compile(rb"\x05(?=[\0-\xff]{3}\0{5})")
 _KNOWN_OPCODES = frozenset(range(Opcode.HEADER, Opcode.DATA_END + 1))
+FEWEST_STEPS = 10
+LONGEST_JUMP = 1_000_000
+_WRAP = 1 << 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,3 +318,41 @@ def _beginning(compression: str, data: bytes, size: int) -> ByteArray:
     except (zstandard.ZstdError, RuntimeError, ValueError, EOFError):
         pass  # the data before the damage are kept
     return np.frombuffer(bytes(raw[:limit]), np.uint8)
+
+
+@dataclass
+class Sequences:
+    """Check of the sequence numbers of one channel, block by block.
+
+    Attributes
+    ----------
+    count : int
+        Messages met.
+    steps : int
+        From one message to the next inside of blocks.
+    missing : int
+        Numbers left out between blocks; 0 where any is left out inside of one, for then they tell no missing block.
+    """
+
+    count: int = 0
+    steps: int = 0
+    _last: int = -1
+    _missing: int = 0
+    _is_counting: bool = True
+
+    def take(self, numbers: Int64Array) -> None:
+        """Take in the messages of a block, shape (n,), at least one."""
+        inside = np.diff(numbers) % _WRAP
+        self._is_counting &= bool((inside == 1).all())
+        self.steps += len(inside)
+        if self.count:
+            jump = (int(numbers[0]) - self._last) % _WRAP
+            self._is_counting &= 1 <= jump <= LONGEST_JUMP
+            self._missing += jump - 1
+        self.count += len(numbers)
+        self._last = int(numbers[-1])
+
+    @property
+    def missing(self) -> int:
+        """Sequence numbers missing between blocks, where all others are consecutive."""
+        return self._missing if self._is_counting and self.steps >= FEWEST_STEPS else 0

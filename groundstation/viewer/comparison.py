@@ -9,11 +9,13 @@ import rerun.blueprint as rrb
 
 from groundstation.base.failures import attempt
 from groundstation.base.timescales import iso_to_utc_ns
+from groundstation.chapters.comparison import answers, findings, opening, settings
+from groundstation.chapters.markdown import markdown, part_markdown
+from groundstation.chapters.parts import shortened
 from groundstation.chapters.plots.comparison import COMPARED, Side, Tell, sides_of
 from groundstation.results.comparison import Comparison
 from groundstation.results.files import SavedFlight
 from groundstation.systems.system import Systems
-from groundstation.viewer.comparison_text import comparison_text
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.plot_views import panels_of
 from groundstation.viewer.recorder import Recorder
@@ -28,6 +30,7 @@ OVER_TIME: Rows = (
     ("overview-heading_deg",),
     ("phases",),
 )
+MOST_ROWS = 100  # of a table: the viewer lays out the whole text again and again
 
 
 def write_comparison(path: Path, comparison: Comparison, a: SavedFlight, b: SavedFlight, systems: Systems) -> None:
@@ -83,3 +86,10 @@ def _grid(
     drawn = [[view for plot in row for view in panels_of(recorder, figures[plot](sides))] for row in rows]
     lines = [rrb.Horizontal(contents=views) if len(views) > 1 else views[0] for views in drawn if views]
     return rrb.Vertical(contents=lines, name=name) if lines else None
+
+
+def comparison_text(comparison: Comparison) -> str:
+    """Return Markdown of the panel."""
+    sections = (answers(comparison), settings(comparison), findings(comparison))
+    told = (markdown(shortened(one, MOST_ROWS, "compare.html"), level=2) for one in sections if one is not None)
+    return "\n\n".join([*map(part_markdown, opening(comparison)), *told])

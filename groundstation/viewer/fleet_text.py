@@ -13,8 +13,7 @@ from groundstation.base.failures import attempt
 from groundstation.chapters.fleet import flights, rest
 from groundstation.chapters.fleet.common import aircraft_name, plural
 from groundstation.chapters.markdown import markdown
-from groundstation.chapters.parts import Note, Section
-from groundstation.chapters.shortened import shortened
+from groundstation.chapters.parts import Note, Section, shortened
 from groundstation.results.fleet import FleetResults
 from groundstation.systems.system import Systems
 from groundstation.viewer.fleet_recorder import FleetRecorder

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 from groundstation.base import unit_names
 from groundstation.base.printable import printable
+from groundstation.chapters.markdown import escaped
 
 MAX_LABEL_CHARACTERS = 80
 
@@ -136,3 +137,16 @@ def topic_label(topic: str) -> str:
     ('INS 2', 'radio altimeter')
     """
     return clean_text(" ".join(words(part) for part in topic.split(".")))
+
+
+def markdown_text(text: str, limit: int = 400) -> str:
+    """Return text from a log made safe for a Markdown document.
+
+    No markup of its own, no link, no picture, no table cell.
+
+    Examples
+    --------
+    >>> print(markdown_text("a|b ![x](http://y)"))
+    a\\|b !\\[x\\](http\\://y)
+    """
+    return escaped(clean_text(text, limit))

@@ -17,8 +17,7 @@ from groundstation.plots.marks import Band, Curve, Dots, Lanes, Limit, Mark, Spa
 from groundstation.plots.plot import Panel, Plot
 from groundstation.results.flight import FlightResults
 from groundstation.viewer import colours
-from groundstation.viewer.markdown import markdown_text
-from groundstation.viewer.names import clean_text, path_parts
+from groundstation.viewer.names import clean_text, markdown_text, path_parts
 from groundstation.viewer.plot_chart import HEIGHT, chart_view
 from groundstation.viewer.recorder import Line, Recorder
 from groundstation.viewer.series import FloatArray, gap_after

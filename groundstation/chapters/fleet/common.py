@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from groundstation.chapters.verdict import VERDICTS
+from groundstation.chapters.gates import VERDICTS
 from groundstation.chapters.wording import ABSENT, clean, is_number, named_quantity, number
 
 NOT_NAMED = "not named"

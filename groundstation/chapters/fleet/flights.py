@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.chapters.fleet.common import aircraft_name, bounded, minute, plural, title_of
+from groundstation.chapters.gates import VERDICTS
 from groundstation.chapters.parts import Cell, Grid, Head, Mark, Note, Section, Tone
-from groundstation.chapters.verdict import VERDICTS
 from groundstation.chapters.wording import clean, number, typeset
 from groundstation.results.fleet import FleetResults
 

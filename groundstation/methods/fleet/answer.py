@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.methods.fleet.aircraft import mean_over_flights
-from groundstation.methods.fleet.calibration import calibrate
 from groundstation.methods.fleet.changes import ChangeSettings, Chart, control_chart
-from groundstation.methods.fleet.moments import Moments, merged
+from groundstation.methods.fleet.moments import Moments, merged, moments_of
 from groundstation.methods.fleet.outliers import FALSE_OUTLIERS, FEWEST, find_outliers
+from groundstation.methods.intervals import share_interval
 from groundstation.results.arrays.fleet import FleetChecks, FleetTrend
 from groundstation.results.arrays.typed import joined
 from groundstation.results.figures import FigureData
@@ -25,6 +25,7 @@ from groundstation.results.fleet import (
 )
 
 FloatArray = NDArray[np.float64]
+PIT_BINS = 10
 
 # Figures that are positive and skewed are judged by their logarithm.
 POSITIVE = {"standard_error_deg", "estimate_sd_deg", "radial_error_rate_fit_nmiph", "forecast_60min_rms_m"}
@@ -210,3 +211,39 @@ def calibrations(checks: FleetChecks) -> tuple[FleetCalibration, ...]:
         own = (checks.quantity == quantity) & (checks.verdict != "reject")
         found.append(calibrate(quantity, title, checks.z[own], checks.is_inside[own]))
     return tuple(one for one in found if one is not None)
+
+
+def calibrate(quantity: str, title: str, z: FloatArray, is_inside: NDArray[np.bool_]) -> FleetCalibration | None:
+    """Judge the sigmas of one kind of check.
+
+    Parameters
+    ----------
+    quantity, title : str
+    z : ndarray, shape (n,)
+        Residual / sigma of each check, finite.
+    is_inside : ndarray of bool, shape (n,)
+        Whether the residual was inside the stated 95 % interval.
+
+    Returns
+    -------
+    FleetCalibration or None
+        None without checks.
+    """
+    from scipy.special import ndtr
+
+    if not len(z):
+        return None
+    found = moments_of(z)
+    place = np.minimum((ndtr(z) * PIT_BINS).astype(np.int64), PIT_BINS - 1)
+    inside = int(np.sum(is_inside))
+    return FleetCalibration(
+        quantity,
+        title,
+        checks=len(z),
+        inside=inside,
+        share_inside=inside / len(z),
+        confidence95=share_interval(inside, len(z)),
+        z_mean=found.mean,
+        z_sigma=None if math.isnan(found.sigma) else found.sigma,
+        pit=tuple(np.bincount(place, minlength=PIT_BINS).tolist()),
+    )

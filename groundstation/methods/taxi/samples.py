@@ -19,6 +19,7 @@ from groundstation.methods.moving_lines import fitted_lines, window_bounds
 from groundstation.methods.taxi.settings import TaxiLimits
 from groundstation.results.gates import NO_CONTACT
 from groundstation.tables.epochs import MOVING_MPS, distinct_epochs
+from groundstation.tables.sources import GNSS_VELOCITY, Need, PairNeed
 from groundstation.tables.table import Flight, Table
 
 FloatArray = NDArray[np.float64]
@@ -29,6 +30,11 @@ GATE_TEXT = "U20"
 GEOMETRY_FIELDS = ("gdop", "pdop", "hdop")
 GEOMETRY_NAMES = {"gdop": "GDOP", "pdop": "PDOP", "hdop": "HDOP"}
 VELOCITY_SIGMA = "velocity sigma"
+HEADING_AND_VELOCITY = PairNeed(  # needs of a straight taxi
+    "heading",
+    Need("ins", "INS heading", ("true_heading_deg",), or_else=("magnetic_heading_deg",), is_nose=True),
+    GNSS_VELOCITY,
+)
 
 
 class GroundContact(Protocol):

@@ -6,8 +6,8 @@ How good it is, and on what it rests.
 from collections.abc import Mapping
 
 from groundstation.chapters.assessed import reason_of, without_answer
+from groundstation.chapters.gates import NOT_ASSESSABLE
 from groundstation.chapters.parts import Cell, Facts, Figure, Front, Grid, Head, Mark, Note, Part, Section
-from groundstation.chapters.verdict import NOT_ASSESSABLE
 from groundstation.chapters.wording import (
     any_value,
     clock,

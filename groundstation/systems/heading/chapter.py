@@ -6,9 +6,8 @@ Gates, estimates and the figures of the published method (Markelov 2015).
 from collections.abc import Mapping, Sequence
 
 from groundstation.chapters.agreement import agreement_note
-from groundstation.chapters.gates import gate_grid, setting_facts
+from groundstation.chapters.gates import NOT_ASSESSABLE, gate_grid, setting_facts
 from groundstation.chapters.parts import Facts, Figure, Grid, Head, Note, Part, Section, kept
-from groundstation.chapters.verdict import NOT_ASSESSABLE
 from groundstation.chapters.wording import ABSENT, clock, interval, is_number, number, step_places
 from groundstation.results.chosen import ChosenInterval
 from groundstation.results.flight import FlightResults

@@ -4,9 +4,8 @@ import re
 from collections.abc import Mapping
 
 from groundstation.base.units import ARCMIN_PER_DEG
-from groundstation.chapters.gates import failed_to_inform
+from groundstation.chapters.gates import VERDICTS, failed_to_inform
 from groundstation.chapters.parts import Claim, Rank
-from groundstation.chapters.verdict import VERDICTS
 from groundstation.chapters.wording import ABSENT, interval, is_number, number, step_places, typeset, with_full_stop
 from groundstation.systems.heading.answer import HeadingResult
 

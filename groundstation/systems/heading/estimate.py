@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from groundstation.methods.taxi.pair import HEADING_AND_VELOCITY
-from groundstation.methods.taxi.samples import HeadingOf, OnGround, logged_heading
+from groundstation.methods.taxi.samples import HEADING_AND_VELOCITY, HeadingOf, OnGround, logged_heading
 from groundstation.results.roles import Delays
 from groundstation.systems.heading.answer import HeadingResult, HeadingStep
 from groundstation.systems.heading.outcome import build_answer

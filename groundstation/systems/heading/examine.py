@@ -4,8 +4,7 @@ from itertools import groupby
 
 import numpy as np
 
-from groundstation.methods.taxi.pair import HEADING_AND_VELOCITY
-from groundstation.methods.taxi.samples import Samples
+from groundstation.methods.taxi.samples import HEADING_AND_VELOCITY, Samples
 from groundstation.results.roles import Delays
 from groundstation.systems.analysis import Shortfall
 from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings

@@ -1,15 +1,20 @@
-"""Claims of the INS errors and of the forecast.
+"""Claims of the INS errors and of the forecast, and what to record and check for them.
 
 How fast the INS drifts, and how far a forecast can go.
 """
 
+from collections.abc import Iterator
+
+from groundstation.chapters.chapter import Advice
 from groundstation.chapters.parts import Claim, Mark, Rank, Tone
 from groundstation.chapters.wording import is_number, number
+from groundstation.results.flight import FlightResults
 from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.inertial.forecast_answer import ForecastResult, SkillRow
 
 WORDS: dict[Tone, str] = {"good": "Measured", "warn": "With care", "unknown": "Open"}
 HOUR_MIN = 60.0  # the horizon a forecast is judged by at a glance, or the longest below it
+PURPOSE = "INS errors"
 
 
 def inertial_claim(answer: InertialResult, quality: str, *, is_doubtful: bool) -> Claim:
@@ -95,3 +100,16 @@ def forecast_claim(answer: ForecastResult, sentences: tuple[str, ...], tone: Ton
 
 def _of(method: str, horizon_min: float, rows: list[SkillRow]) -> SkillRow | None:
     return next((row for row in rows if row.method == method and row.horizon_min == horizon_min), None)
+
+
+def advise(results: FlightResults) -> Iterator[Advice]:
+    """Yield what the answer did not learn of the INS."""
+    answer = results.answer(InertialResult)
+    if answer is None:
+        return
+    if answer.kind == "gnss_aided":
+        yield Advice("Record", "the free-inertial output of the INS", PURPOSE)
+    if answer.kind == "unknown":
+        yield Advice("Check", "whether GNSS corrects this INS (ins_kind of the aircraft file)", PURPOSE)
+    if is_start_unknown(answer):
+        yield Advice("Check", "when the INS began to navigate (nav_start_utc of the aircraft file)", PURPOSE)

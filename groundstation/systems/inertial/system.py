@@ -59,9 +59,9 @@ def _in_fleet() -> InFleet:
 
 def _advice() -> "Adviser":
     from groundstation.chapters.chapter import Adviser
-    from groundstation.systems.inertial import advice_chapter
+    from groundstation.systems.inertial.claim_chapter import advise
 
-    return Adviser(advise=advice_chapter.advise)
+    return Adviser(advise=advise)
 
 
 def _plots() -> "Mapping[str, Describe]":

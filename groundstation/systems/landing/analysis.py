@@ -27,7 +27,6 @@ from groundstation.systems.landing.answer import (
 )
 from groundstation.systems.landing.arrays import LandingPath, LandingProtection
 from groundstation.systems.landing.columns import COLUMNS
-from groundstation.systems.landing.figures import path_columns
 from groundstation.systems.landing.finals import Final, ends_of, final_of
 from groundstation.systems.landing.findings import findings_of
 from groundstation.systems.landing.geometry import (
@@ -37,6 +36,7 @@ from groundstation.systems.landing.geometry import (
     against,
     along_and_across,
     line_through,
+    path_columns,
     runway_of,
 )
 from groundstation.systems.landing.height import height_error

@@ -3,6 +3,7 @@
 How each was flown, where it touched down, and what shows accuracy.
 """
 
+from groundstation.chapters.chapter import Remedies
 from groundstation.chapters.gates import limit_text, setting_facts, state_of
 from groundstation.chapters.parts import (
     Cell,
@@ -47,6 +48,7 @@ HOW = (
     "without GNSS: generalised least squares, with tolerances of course line, bends, width, steps and runway bearing "
     "in the covariance."
 )
+REMEDIES: Remedies = (("no position of the aircraft", ("Record", "positions")),)
 
 
 def landing(results: FlightResults) -> Section | None:

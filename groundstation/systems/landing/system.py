@@ -28,9 +28,9 @@ def _chapters() -> "tuple[Chapter, ...]":
 
 def _advice() -> "Adviser":
     from groundstation.chapters.chapter import Adviser
-    from groundstation.systems.landing import advice_chapter
+    from groundstation.systems.landing.chapter import REMEDIES
 
-    return Adviser(advice_chapter.REMEDIES)
+    return Adviser(REMEDIES)
 
 
 def _plots() -> "Mapping[str, Describe]":

@@ -13,7 +13,7 @@ import numpy as np
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import EVENT_SEPARATOR, topics_of_kind
 from groundstation.methods.roles import HeadingOnGround
-from groundstation.methods.taxi.pair import HEADING_AND_VELOCITY
+from groundstation.methods.taxi.samples import HEADING_AND_VELOCITY
 from groundstation.results.roles import HeadingByTrack
 from groundstation.systems.magnetic.entered import corrections_entered
 from groundstation.systems.magnetic.gyros import GyroDrift, gyro_drift

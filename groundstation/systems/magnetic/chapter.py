@@ -5,6 +5,7 @@ Verdict, coefficients, steer card, and the error left by each correction.
 
 from groundstation.chapters.agreement import agreement_note
 from groundstation.chapters.assessed import reason_of
+from groundstation.chapters.chapter import Remedies
 from groundstation.chapters.gates import failed_to_inform, gate_grid, setting_facts
 from groundstation.chapters.parts import (
     Cell,
@@ -62,6 +63,11 @@ CONDITIONS: dict[ConditionName, str] = {
     "ground": "On the ground",
     "gain": "Drift of the gains",
 }
+REMEDIES: Remedies = (
+    ("no turn of steady bank", ("Fly", "a full circle to either side at equal bank")),
+    ("no three-axis magnetometer", ("Record", "a three-axis magnetometer")),
+    ("trusts_aided_heading", ("Check", "where the INS heading comes from (setting trusts_aided_heading)")),
+)
 
 
 def magnetic(results: FlightResults) -> Section | None:

@@ -43,9 +43,9 @@ def _fleet_plots() -> "Mapping[str, Describe]":
 
 def _advice() -> "Adviser":
     from groundstation.chapters.chapter import Adviser
-    from groundstation.systems.magnetic import advice_chapter
+    from groundstation.systems.magnetic.chapter import REMEDIES
 
-    return Adviser(advice_chapter.REMEDIES)
+    return Adviser(REMEDIES)
 
 
 def _plots() -> "Mapping[str, Describe]":

@@ -19,10 +19,10 @@ from groundstation.results.arrays.flight import GapRows
 from groundstation.results.flight import FlightResults
 from groundstation.tables.table import Flight, Table
 from groundstation.viewer import colours
-from groundstation.viewer.markdown import markdown_text
 from groundstation.viewer.names import (
     clean_text,
     label,
+    markdown_text,
     natural_order,
     path_parts,
     source_label,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from groundstation.base.errors import UsageError
-from groundstation.pipeline.verbs.kept_runs import KeptRuns
+from groundstation.pipeline.verbs.synthesis import KeptRuns
 from groundstation.simulation.taxi import Family
 from groundstation.systems.heading.study.family import RunOutcome, run_families
 from groundstation.systems.heading.study.heading import StudyResult, study_heading
@@ -181,7 +181,7 @@ def test_one_engine_is_held_where_it_is_stated_alone() -> None:
 @pytest.mark.slow
 def test_the_study_of_verdicts_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
     """Runs of its eleven kinds by turns; the time is over before the second turn, and none is made again."""
-    from groundstation.pipeline.verbs.kept_runs import KeptRuns
+    from groundstation.pipeline.verbs.synthesis import KeptRuns
     from groundstation.systems.heading.study.crew import ALL_KINDS, CrewOutcome, study_crew
 
     told: list[str] = []

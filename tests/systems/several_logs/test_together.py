@@ -11,7 +11,7 @@ from groundstation.base.errors import UsageError
 from groundstation.base.records import Column, RecordBatch
 from groundstation.base.units import NS_PER_S
 from groundstation.methods.overview import overview
-from groundstation.methods.taxi.pair import HEADING_AND_VELOCITY
+from groundstation.methods.taxi.samples import HEADING_AND_VELOCITY
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
 from groundstation.pipeline.one_flight.flight import read_flight

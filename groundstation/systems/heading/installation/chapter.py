@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from groundstation.base.units import ARCMIN_PER_DEG
+from groundstation.chapters.gates import VERDICTS
 from groundstation.chapters.parts import Claim, Facts, Grid, Head, Note, Part, Rank, Section, kept
-from groundstation.chapters.verdict import VERDICTS
 from groundstation.chapters.wording import ABSENT, clean, interval, is_number, number, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.results.installations import Installed, LearnedHeading

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.chapters.fleet.common import aircraft_name, bounded, day, plural
+from groundstation.chapters.gates import VERDICTS
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Note, Part, Section
-from groundstation.chapters.verdict import VERDICTS
 from groundstation.chapters.wording import ABSENT, clean, is_number, number
 from groundstation.results.fleet import FleetResults
 from groundstation.results.installations import InstallationRow
