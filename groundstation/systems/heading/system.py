@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
     from groundstation.systems.heading.answer import HeadingResult
-    from groundstation.systems.heading.chapter import heading
+    from groundstation.systems.heading.chapter import SOURCES, heading
     from groundstation.systems.heading.installation.answer import InstallationResult
     from groundstation.systems.heading.installation.chapter import installation
 
     return (
         Chapter((InstallationResult,), installation),
-        Chapter((HeadingResult,), heading),
+        Chapter((HeadingResult,), heading, sources=SOURCES),
     )
 
 
@@ -150,4 +150,5 @@ SYSTEM = System(
     fleet_plots=_fleet_plots,
     compared=_compared,
     advice=_advice,
+    notebook_names={"heading": "", "standstill": ""},
 )

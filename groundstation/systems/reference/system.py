@@ -54,4 +54,5 @@ SYSTEM = System(
     tabs=_tabs,
     fleet_chapters=_fleet_chapters,
     fleet_plots=_fleet_plots,
+    notebook_names={"reference.errors": "reference"},
 )
