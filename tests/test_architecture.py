@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from groundstation.systems import systems
 from tests.architecture_picture import PACKAGE, PICTURE, import_nodes, picture
 
 SHARED = {"base", "tables", "results"}
@@ -52,6 +53,27 @@ ALLOWED_TO_NAME = {
     "pipeline/notebook.py": "the Python API has a method for each answer",
     "pipeline/verbs/acceptance.py": "the verb holds an INS against a standard, by its errors and its heading",
 }
+# Strings equal to the name of an analysis or of a plan: the word, files or folders (ending in /), what it means there.
+ALLOWED_STRINGS: tuple[tuple[str, tuple[str, ...], str], ...] = (
+    ("cooperative", ("cli/",), "the verb"),
+    ("landing", ("cli/plans.py",), "the verb"),
+    ("together", ("systems/loading.py",), "the option --together, which a step of a system serves"),
+    ("session", ("cli/", "pipeline/", "reports/", "simulation/"), "recorded flights of several aircraft"),
+    (
+        "heading",
+        ("readers/", "simulation/", "tables/", "methods/taxi/", "results/files.py", "chapters/plots/flight.py"),
+        "the angle, beside roll and pitch",
+    ),
+    ("heading", ("viewer/tabs/raw.py",), "the end of a field's name, as track"),
+    ("magnetic", ("readers/", "pipeline/verbs/anonymous.py"), "the north of a direction, as true"),
+    ("landing", ("simulation/",), "the leg behind an approach"),
+    ("together", ("tables/sources.py", "chapters/provenance.py"), "the key in the metadata of a log joined of several"),
+    ("reference", ("methods/fleet/", "pipeline/many_flights/fleet/"), "the check of a parking heading, as runway"),
+    ("reference", ("pipeline/verbs/compare.py",), "the column that tells rows apart"),
+    ("forecast", ("viewer/colours.py",), "the state of a filter without GNSS"),
+    ("installation", ("reports/installation.py",), "the mark in the page"),
+    ("magnetic", ("pipeline/one_flight/resume.py",), "still to be turned: files that a flight with a deviation has"),
+)
 STILL_NAMED = Path(__file__).parent / "references" / "systems_named.txt"
 ONLY_ROOM_OF = {"mcap": "store", "google": "store", "foxglove_schemas_protobuf": "store", "rerun": "viewer"}
 NOT_PUBLIC = re.compile(r"/?(rerun_|rerun-[a-z]+-|re_viewer|RERUN_|rerun\.(.*\.)?_)")
@@ -198,6 +220,27 @@ def test_a_system_is_named_by_no_file_outside_its_folder() -> None:
     new = [line for path, lines in named.items() if path not in {*listed, *ALLOWED_TO_NAME} for line in lines]
     assert not new
     assert not listed - named.keys(), "no longer names a system: take it off tests/references/systems_named.txt"
+
+
+def test_an_analysis_is_named_by_no_string_outside_its_folder() -> None:
+    """Rooms loop over the systems. A word that means another thing, and a verb, is listed with what it means."""
+    names = {*systems().answer_types, *(plan.name for plan in systems().plans)}
+    new, met = [], set()
+    for path in (path for path in modules() if not system_of(_name(path))):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        docstrings = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        place = path.relative_to(PACKAGE).as_posix()
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and node.value in names and id(node) not in docstrings:
+                rows = [row for row in ALLOWED_STRINGS if row[0] == node.value and _is_at(place, row[1])]
+                met.update(rows)
+                new += [] if rows else [f"{path}:{node.lineno}: {node.value!r}"]
+    assert not new
+    assert not set(ALLOWED_STRINGS) - met, "no longer there: take it off ALLOWED_STRINGS"
+
+
+def _is_at(place: str, files: tuple[str, ...]) -> bool:
+    return any(place == one or (one.endswith("/") and place.startswith(one)) for one in files)
 
 
 def test_no_file_imports_itself_through_others() -> None:

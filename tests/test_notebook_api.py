@@ -204,8 +204,8 @@ def test_every_figure_of_the_report_can_be_had(flight: OpenLog) -> None:
 
 
 def test_names_of_figures_are_those_that_scripts_rely_on() -> None:
-    assert sorted(name_of(Figure(name)) for name in PLOTS) == sorted(NAMES.split())
-    assert name_of(Figure("reference.errors", "gnss position")) == "reference-gnss-position"
+    assert sorted(name_of(Figure(name), systems()) for name in PLOTS) == sorted(NAMES.split())
+    assert name_of(Figure("reference.errors", "gnss position"), systems()) == "reference-gnss-position"
 
 
 def test_matplotlib_comes_with_the_first_figure_and_never_pyplot(folder: Path) -> None:

@@ -9,7 +9,6 @@ import pytest
 from typer.testing import CliRunner
 
 from groundstation.cli.main import app
-from groundstation.cli.single_logs import PURPOSES
 from groundstation.integrity.limits import shipped
 from groundstation.pipeline.one_flight.analyse import known_of, run_analyses, seen_by_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -60,8 +59,13 @@ def agreeing(purpose: str, flight: Flight) -> tuple[Usability, object]:
     return usability, found.answers.get(purpose)
 
 
-def test_the_help_names_every_purpose() -> None:
-    assert PURPOSES.split("|") == [*FLIGHT_PURPOSES, *SESSION_PURPOSES]
+def test_the_page_and_a_wrong_name_tell_every_purpose() -> None:
+    purposes = [*FLIGHT_PURPOSES, *SESSION_PURPOSES]
+    page = Path(__file__).parents[1] / "docs" / "integrity.md"
+    assert f"`--for {'|'.join(purposes)}`" in page.read_text(encoding="utf-8")
+    refused = CliRunner().invoke(app, ["check", str(SAMPLES / "taxi-short.csv"), "--for", "taxi"])
+    assert refused.exit_code != 0
+    assert f"one of {', '.join(purposes)}" in refused.output
 
 
 def test_heading_is_told_by_the_gates_of_the_answer() -> None:

@@ -4,7 +4,7 @@ Times are text for people. Fields stand in alphabetical order, as the JSON of th
 """
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
 
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
@@ -74,6 +74,8 @@ class RelationEntry:
 
     ``reason`` says why nothing is known.
     """
+
+    schema_name: ClassVar[str] = "clock_relation"
 
     breaks: tuple[BreakEntry, ...] = ()
     clock: str

@@ -7,6 +7,7 @@ is written equal.
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from groundstation.base.serial import LEFT_OUT_WHEN_DEFAULT
 
@@ -55,6 +56,8 @@ class StuckStretch:
 class FieldEntry:
     """Counts of one field: samples, NaN of the device, values out of range, stuck stretches."""
 
+    schema_name: ClassVar[str] = "ledger_field"
+
     first_out_of_range: OutOfRange | None = field(default=None, metadata=LEFT_OUT_WHEN_DEFAULT)
     nan: int = 0
     out_of_range: int = 0
@@ -97,6 +100,8 @@ class TopicEntry:
     ``losses`` counts by kind what was unreadable.
     """
 
+    schema_name: ClassVar[str] = "ledger_topic"
+
     actual_rate_hz: float | None
     backward_steps: int
     coverage: float | None
@@ -135,6 +140,8 @@ class DamagedSpan:
     ``start_s`` counts from the first record of the log, as flight time does. An empty topic is the whole log, an empty
     field the whole topic. ``is_exact``: everything within is damaged; else the damage lies somewhere within.
     """
+
+    schema_name: ClassVar[str] = "ledger_span"
 
     cause: str
     count: int

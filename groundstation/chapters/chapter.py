@@ -9,6 +9,7 @@ from groundstation.results.answer import Answer
 from groundstation.results.flight import FlightResults
 
 Pairs = tuple[tuple[str, Cell], ...]
+Citation = tuple[str, str]  # name in the chapters, and the publication
 
 
 class Chapter(NamedTuple):
@@ -16,12 +17,14 @@ class Chapter(NamedTuple):
 
     ``build(results)`` returns None where there is nothing to say.
 
-    ``front(results, pairs)`` is the top of the report of a session, made of its first chapter.
+    ``front(results, pairs)`` is the top of the report of a session, made of its first chapter. ``sources`` are the
+    publications that the method of the first answer rests on.
     """
 
     answers: tuple[type[Answer], ...]
     build: Callable[[FlightResults], Section | None]
     front: Callable[[FlightResults, Pairs], Front] | None = None
+    sources: tuple[Citation, ...] = ()
 
     @property
     def name(self) -> str:

@@ -53,8 +53,7 @@ def study(
     name: Annotated[
         str,
         typer.Argument(
-            help="heading, crew, installation, forecast, magnetic, cooperative, control, landing, approach, "
-            "or one of a plug-in.",
+            help="A study; `groundstation list` names them.",
             metavar="NAME",
         ),
     ],
@@ -69,7 +68,7 @@ def study(
         float | None,
         typer.Option(
             "--minutes",
-            help="Stop after so many minutes (heading, crew, installation); the same command continues.",
+            help="Stop after so many minutes, where a study keeps its runs; the same command continues.",
             min=0.1,
         ),
     ] = None,

@@ -38,8 +38,6 @@ from groundstation.cli.application import (
     time_bound,
 )
 
-PURPOSES = "heading|inertial|magnetic|landing|cooperative"  # analyses that have an ``examine``; a test compares them
-
 
 @app.command(epilog=examples("info"))
 @answers_with_exit_code
@@ -89,9 +87,10 @@ def check(
         str,
         typer.Option(
             "--for",
-            help="The first line says whether the log can be used for this analysis: yes, no, in part, and what is "
-            "missing where. Exit 4 at no; with --fail-on warn also at in part. Logs of a session are judged together.",
-            metavar=PURPOSES,
+            help="The first line says whether the log can be used for this analysis (a wrong name prints those there "
+            "are): yes, no, in part, and what is missing where. Exit 4 at no; with --fail-on warn also at in part. "
+            "Logs of a session are judged together.",
+            metavar="ANALYSIS",
         ),
     ] = "",
     aircraft: AircraftFile = None,

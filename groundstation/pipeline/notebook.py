@@ -151,7 +151,10 @@ class OpenFlight(ABC):
         found = self.results.answer(kind)
         if found is not None:
             return found
-        reasons = self.results.reasons(kind.analysis) or self.results.reasons("inertial")
+        from groundstation.systems import systems
+
+        required = {one.answer: one.requires for one in systems().analyses}.get(kind, ())
+        reasons = self.results.reasons(kind.analysis) or self.results.reasons(*required)
         raise NotAssessableError(kind.analysis, reasons[0] if reasons else "the log does not hold what it needs")
 
     @property

@@ -23,13 +23,17 @@ from groundstation.results.flight import FlightResults
 from groundstation.systems.system import Systems
 
 Build = Callable[[FlightResults], Section | None]
-BEFORE_THE_ANSWERS: dict[str, Callable[[FlightResults, Chapters], Section | None]] = {
+BuildWithChapters = Callable[[FlightResults, Chapters], Section | None]
+BEFORE_THE_ANSWERS: dict[str, BuildWithChapters] = {
     "overview": lambda results, _: overview(results),
     "next_steps": next_steps,
 }
 ON_THE_DATA: dict[str, Build] = {"findings": findings, "quality": quality}  # behind the chapters on the answers
 ON_THE_SESSION: dict[str, Build] = {"findings": findings, "provenance": provenance}  # and of a plan
-APPENDICES: dict[str, Build] = {"provenance": provenance, "sources": sources}
+APPENDICES: dict[str, BuildWithChapters] = {
+    "provenance": lambda results, _: provenance(results),
+    "sources": sources,
+}
 
 
 def flight_sections(saved: SavedFlight, systems: Systems) -> tuple[Section, ...]:
@@ -51,7 +55,7 @@ def told_sections(saved: SavedFlight, systems: Systems) -> tuple[list[Section], 
     is_flight = not (results.is_session or results.is_plan)
     told = (
         (
-            *(attempt("chapter", name, build, results, systems.chapters) for name, build in BEFORE_THE_ANSWERS.items()),
+            *_built_with_chapters(BEFORE_THE_ANSWERS, results, systems.chapters),
             *answer_chapters(results, systems.chapters),
             *_built(ON_THE_DATA, results),
         )
@@ -60,13 +64,19 @@ def told_sections(saved: SavedFlight, systems: Systems) -> tuple[list[Section], 
     )
     chapters = [section for section in told if section is not None]
     workings = (_workings(section, saved.manifest.configuration) for section in chapters)
-    appendices = [*workings, *(_built(APPENDICES, results) if is_flight else ())]
+    appendices = [*workings, *(_built_with_chapters(APPENDICES, results, systems.chapters) if is_flight else ())]
     shown = [replace(section, appendix=()) for section in chapters if not section.is_open]
     return shown, [section for section in appendices if section is not None]
 
 
 def _built(builds: Mapping[str, Build], results: FlightResults) -> tuple[Section | None, ...]:
     return tuple(attempt("chapter", name, build, results) for name, build in builds.items())
+
+
+def _built_with_chapters(
+    builds: Mapping[str, BuildWithChapters], results: FlightResults, chapters: Chapters
+) -> tuple[Section | None, ...]:
+    return tuple(attempt("chapter", name, build, results, chapters) for name, build in builds.items())
 
 
 def _numbered(

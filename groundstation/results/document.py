@@ -5,7 +5,7 @@ The schema is generated from them and from the answers' types.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from groundstation.base.clock import Clock
 from groundstation.base.findings import Finding
@@ -19,6 +19,8 @@ UTC = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z$"
 @dataclass(frozen=True)
 class FlightDocument:
     """Identity of the flight; ``start_utc`` is null without absolute time."""
+
+    schema_name: ClassVar[str] = "flight"
 
     id: str = field(metadata={"pattern": "^[A-Za-z0-9_-]+$"})
     aircraft: str

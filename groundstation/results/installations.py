@@ -3,6 +3,7 @@
 import json
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
 from groundstation.base.errors import SettingsError
 from groundstation.base.serial import MismatchError, from_json, to_json
@@ -162,6 +163,8 @@ class LearnedHeading:
         The platform's error less the azimuth that the same flight showed later, and the sigma of that difference:
         nothing of that azimuth is in the number.
     """
+
+    schema_name: ClassVar[str] = "installation_result"
 
     ins_serial: str
     aircraft: str

@@ -91,6 +91,8 @@ class AzimuthEstimate:
     is for the time of the taxi, None where the first hour shows too little.
     """
 
+    schema_name: ClassVar[str] = "azimuth"
+
     observable: bool
     error_deg: float | None
     sigma_deg: float | None

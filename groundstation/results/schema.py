@@ -25,34 +25,6 @@ ABOUT = (
 )
 SHARES = re.compile(r"(share|coverage|observability|inside)\d*(_.*)?|.*_share")
 NOT_NEGATIVE = re.compile(r".*sigma.*|(length|longest|total|span|nominal_period|residual|resolution)_s|completeness")
-NAMES = {  # names of definitions that differ from the class name
-    "HeadingResult": "heading",
-    "TaxiSegment": "segment",
-    "RunwayCheck": "runway",
-    "OnboardComparison": "onboard",
-    "InertialResult": "inertial",
-    "ChannelResult": "channel",
-    "StateEstimate": "state",
-    "RealOutage": "outage",
-    "AzimuthEstimate": "azimuth",
-    "ForecastResult": "forecast",
-    "SkillRow": "skill",
-    "GapRow": "gap",
-    "PhaseRow": "phase_outage",
-    "CalibrationRow": "calibration",
-    "CoupledRow": "coupled",
-    "MagneticResult": "magnetic",
-    "Method": "magnetic_method",
-    "PoissonParameters": "poisson",
-    "DeclinationUsed": "declination",
-    "GroundDeviation": "magnetic_ground",
-    "TopicEntry": "ledger_topic",
-    "FieldEntry": "ledger_field",
-    "DamagedSpan": "ledger_span",
-    "RelationEntry": "clock_relation",
-    "FlightDocument": "flight",
-    "LearnedHeading": "installation_result",
-}
 Schema = dict[str, Any]
 
 
@@ -93,14 +65,17 @@ def summary_schema(answer_types: Mapping[str, type]) -> Schema:
 def definition_name(cls: type) -> str:
     """Name of a dataclass among the definitions.
 
+    It is the one that the class states as ``schema_name``, else that of the class itself.
+
     Examples
     --------
     >>> from groundstation.results.gates import Gate
-    >>> from groundstation.systems.heading.answer import HeadingResult
-    >>> definition_name(Gate), definition_name(HeadingResult)
-    ('gate', 'heading')
+    >>> from groundstation.results.roles import AzimuthEstimate
+    >>> definition_name(Gate), definition_name(AzimuthEstimate)
+    ('gate', 'azimuth')
     """
-    return NAMES.get(cls.__name__, re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower())
+    stated: str | None = vars(cls).get("schema_name")
+    return stated or re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
 
 
 def _has_known_numbers(cls: type) -> bool:

@@ -1,6 +1,7 @@
 """One analysis as one object: needs, settings, answer, run, and its line for the terminal."""
 
 import dataclasses
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -78,6 +79,23 @@ def _no_samples(_data: Any, _answer: Any) -> None:
     """Return no samples: no damage counts against the answer."""
 
 
+def _none_is_main(_path: str, _saved: Any) -> bool:
+    return False
+
+
+def main_numbers(pattern: str) -> Callable[[str, Any], bool]:
+    r"""Return the ``is_main`` of an analysis whose main numbers have paths of a pattern.
+
+    Examples
+    --------
+    >>> is_main = main_numbers(r"verdict|azimuth\.error_deg")
+    >>> is_main("azimuth.error_deg", ()), is_main("azimuth.samples", ())
+    (True, False)
+    """
+    compiled = re.compile(pattern)
+    return lambda path, _saved: compiled.fullmatch(path) is not None
+
+
 RejudgeAlso = Callable[[str, Rejudged, Any], tuple[Rejudged, ...]]
 
 
@@ -144,6 +162,9 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
         What others may ask of it (:mod:`groundstation.methods.roles`): ``offers[role](known)`` makes it.
     assumes : str
         What an analysis of a session takes for granted where its table is not set.
+    is_main : callable
+        ``is_main(path, saved)``: whether the number at that path of its answer, ``azimuth.error_deg``, is one of those
+        that ``compare`` tells first; ``saved`` are the answers of both flights, as in summary.json.
     judges : bool
         Whether it is given the truth, by which it judges the others: it runs where there is one, and last; every other
         analysis is given a flight without it.
@@ -171,6 +192,7 @@ class Analysis(Generic[Data, KnownT, SettingsT, AnswerT]):
     rules: Rules | None = None
     offers: Mapping[type[Any], Callable[[KnownT], Any]] = field(default_factory=dict)
     page_title: str = ""
+    is_main: Callable[[str, "tuple[Mapping[str, Any], ...]"], bool] = _none_is_main
 
     def __post_init__(self) -> None:
         known = {field.name for field in dataclasses.fields(cast(Any, self.answer))}

@@ -132,6 +132,9 @@ class System:
         What the chapter on what to do next says for it.
     apply : callable, optional
         Imports what ``run --apply`` does behind the analyses and returns it; that of the first system that has one.
+    notebook_names : mapping of str to str
+        Names by which notebooks ask for its figures, where these are not those of the chapter with hyphens: by the name
+        that the chapter gives, and by what stands there before the dot; scripts rely on them.
     join : callable, optional
         Imports what relates the clocks of several logs for ``run --together``, and returns it.
     learn : callable, optional
@@ -155,6 +158,7 @@ class System:
     join: "Callable[[], JoinStep] | None" = None
     learn: "Callable[[], LearnStep] | None" = None
     compared: "Callable[[], tuple[Compared, ...]]" = _none
+    notebook_names: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -196,7 +196,7 @@ def _rows_of(saved: SavedFlight) -> tuple[InertialStates | None, InertialTrack |
 def _not_judged(saved: SavedFlight, inertial: InertialResult | None) -> str:
     """Reason why a flight is no free inertial one that can be judged; empty where it is."""
     if inertial is None:
-        return "; ".join(saved.results.reasons("inertial")) or "no INS errors found"
+        return "; ".join(saved.results.reasons(InertialResult.analysis)) or "no INS errors found"
     if inertial.kind != "unaided":
         return "GNSS corrects its INS" if inertial.kind == "gnss_aided" else "GNSS may correct its INS"
     codes = {finding.code for finding in saved.results.findings}

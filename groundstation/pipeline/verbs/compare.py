@@ -1,8 +1,7 @@
 """Verb ``compare``: two flight folders against each other, from their saved results alone."""
 
 import math
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from pathlib import Path
@@ -38,16 +37,7 @@ STATED_SIGMA = {  # where it is not named as the number with "sigma" before the 
 }
 NO_ANSWER = ("settings", "title", "unit", "limit", "reason", "figures")
 LONGEST_TEXT = 60
-MAIN = re.compile(
-    r"status|flight\.duration_s"
-    r"|heading\.(verdict|error_deg|standard_error_deg|confidence95_(low|high)_deg|precision_deg|correction_deg|samples"
-    r"|taxi_seconds|drift_deg_per_h|lever_arm_m|parking_heading_deg|reference_residual_arcmin)"
-    r"|inertial\.(kind|radial_error_rate_(fit|\d\d)_nmiph|velocity_error_rms_mps|azimuth\.error_deg)"
-    r"|inertial\.(north|east)\.states\.[^.]+\.value"
-    r"|(magnetic|landing)\.verdict|forecast\.default_method"
-    r"|cooperative\.default_algorithm"
-    r"|cooperative\.algorithms\.[^.]+\.(two_sigma_r_m|rms_m|nees|is_consistent|diverges)"
-)
+MAIN = ("status", "flight.duration_s")  # of every flight; those of an answer: Analysis.is_main
 
 
 def compare(a: Path, b: Path, event: Event | None = None) -> tuple[Comparison, SavedFlight, SavedFlight]:
@@ -161,11 +151,11 @@ def deltas_of(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Delta, ...]:
     ('heading.error_deg', 0.2, 0.042426, True)
     """
     answers_a, answers_b = _answers(a), _answers(b)
-    methods = {str(mapping(one, "results", "forecast").get("default_method")) for one in (a, b)}
+    is_main_of = _main_numbers(a, b)
     deltas = []
     for name, (value_a, sigma_a) in answers_a.items():
         value_b, sigma_b = answers_b.get(name, (None, None))
-        is_main = _is_main(name, methods)
+        is_main = is_main_of(name)
         if name not in answers_b or value_a is value_b is None:
             continue
         if not (is_number(value_a) or is_number(value_b) or is_main or value_a != value_b):
@@ -182,11 +172,18 @@ def _difference(name: str, a: Value, b: Value) -> float | None:
     return round(float(wrap_180(b - a)) if name.endswith("_deg") else b - a, 9)
 
 
-def _is_main(name: str, methods: set[str]) -> bool:
-    parts = name.split(".")
-    if parts[:2] == ["forecast", "skill"]:
-        return parts[2] in methods and parts[-1] == "rms_m"
-    return MAIN.fullmatch(name) is not None or (parts[0] == "completeness" and is_canonical(name.partition(".")[2]))
+def _main_numbers(a: Mapping[str, Any], b: Mapping[str, Any]) -> Callable[[str], bool]:
+    """Return what tells the main numbers of two summaries by their names."""
+    every = {one.name: one for one in (*systems().analyses, *systems().session_analyses)}
+    saved = {name: tuple(mapping(summary, "results", name) for summary in (a, b)) for name in every}
+
+    def is_main(name: str) -> bool:
+        first, _, path = name.partition(".")
+        if first in every:
+            return every[first].is_main(path, saved[first])
+        return name in MAIN or (first == "completeness" and is_canonical(path))
+
+    return is_main
 
 
 def _answers(summary: Mapping[str, Any]) -> dict[str, tuple[Value, float | None]]:

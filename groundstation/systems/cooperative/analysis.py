@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.findings import Finding
 from groundstation.results.answer import Answers, answer_of
-from groundstation.systems.analysis import Analysis, Found, Shortfall
+from groundstation.systems.analysis import Analysis, Found, Shortfall, main_numbers
 from groundstation.systems.cooperative.answer import CooperativeResult
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.known import SessionKnown
@@ -115,4 +115,5 @@ COOPERATIVE = Analysis(
     sentence=_sentence,
     examine=_examine,
     assumes="sigmas of the INS",
+    is_main=main_numbers(r"default_algorithm|algorithms\.[^.]+\.(two_sigma_r_m|rms_m|nees|is_consistent|diverges)"),
 )

@@ -10,7 +10,7 @@ from groundstation.methods.roles import HeadingOnGround, LimitsOfTaxi
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.roles import Delays
 from groundstation.results.rules import Rejudged
-from groundstation.systems.analysis import Analysis, Found, RejudgeAlso, RestsOn, Rules, Shortfall
+from groundstation.systems.analysis import Analysis, Found, RejudgeAlso, RestsOn, Rules, Shortfall, main_numbers
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.columns import COLUMNS
 from groundstation.systems.heading.settings import LIMITS, HeadingRequest, HeadingSettings
@@ -148,4 +148,8 @@ HEADING = Analysis(
     examine=_examine,
     rules=Rules(LIMITS, _rejudge, _rejudge_learned),
     offers={HeadingOnGround: _on_ground, LimitsOfTaxi: _limits_of_taxi},
+    is_main=main_numbers(
+        "verdict|error_deg|standard_error_deg|confidence95_(low|high)_deg|precision_deg|correction_deg|samples"
+        "|taxi_seconds|drift_deg_per_h|lever_arm_m|parking_heading_deg|reference_residual_arcmin"
+    ),
 )

@@ -51,6 +51,8 @@ class Standstill:
 class TaxiSegment:
     """One straight taxi segment (stage B) and its own estimate. Times are flight seconds."""
 
+    schema_name: ClassVar[str] = "segment"
+
     start_s: float
     end_s: float
     samples: int
@@ -91,6 +93,8 @@ class RunwayCheck:
     It is a second reference, on line-up or take-off run.
     """
 
+    schema_name: ClassVar[str] = "runway"
+
     name: str
     true_bearing_deg: float
     ins_heading_deg: float
@@ -105,6 +109,8 @@ class OnboardComparison:
 
     Differences are onboard minus ours.
     """
+
+    schema_name: ClassVar[str] = "onboard"
 
     heading_error_deg: float | None
     precision_deg: float | None
@@ -175,6 +181,7 @@ class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns):
     """
 
     analysis: ClassVar[str] = "heading"
+    schema_name: ClassVar[str] = analysis
     taxi_serves: ClassVar[str] = "the heading error"
 
     ins_topic: str

@@ -16,6 +16,13 @@ from groundstation.systems.heading.agreement_answer import heading_agreement
 from groundstation.systems.heading.answer import HeadingResult, OnboardComparison, Standstill, TaxiSegment
 from groundstation.systems.heading.claim_chapter import PARTS, claim
 
+SOURCES = (
+    (
+        "Markelov 2015",
+        "Markelov, Kostishin, Shukalov: Heading correction of an INS before take-off by satellite navigation, "
+        "Information and Control Systems 2015 No 6",
+    ),
+)
 TITLE = "Heading correction"
 LEAD = "On straight taxi the nose points where the aircraft moves: INS heading − GNSS track is the heading error."
 WORKINGS = ("density", "convergence", "spectrum")

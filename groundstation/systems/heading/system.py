@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
     from groundstation.systems.heading.answer import HeadingResult
-    from groundstation.systems.heading.chapter import heading
+    from groundstation.systems.heading.chapter import SOURCES, heading
     from groundstation.systems.heading.installation.answer import InstallationResult
     from groundstation.systems.heading.installation.chapter import installation
 
     return (
         Chapter((InstallationResult,), installation),
-        Chapter((HeadingResult,), heading),
+        Chapter((HeadingResult,), heading, sources=SOURCES),
     )
 
 
@@ -165,4 +165,5 @@ SYSTEM = System(
     compared=_compared,
     advice=_advice,
     learn=_learn,
+    notebook_names={"heading": "", "standstill": ""},
 )

@@ -1,6 +1,7 @@
 """System 2 as analyses: errors of the INS, and their forecast replayed on the flight."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.methods.ins_noise import choose_class
 from groundstation.methods.roles import InsKinds
 from groundstation.results.answer import Answers, answer_of
-from groundstation.systems.analysis import Analysis, Found, RestsOn, Shortfall
+from groundstation.systems.analysis import Analysis, Found, RestsOn, Shortfall, main_numbers
 from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.inertial.columns import FORECAST_COLUMNS, INERTIAL_COLUMNS
 from groundstation.systems.inertial.forecast_answer import ForecastResult
@@ -121,6 +122,14 @@ def _sentence(answers: Answers) -> str:
     return f"INS {', '.join(parts)}" if parts else "INS errors estimated"
 
 
+def _is_main_of_forecast(path: str, saved: tuple[Mapping[str, Any], ...]) -> bool:
+    """Tell the main numbers: the default method, and the errors of the method that either flight has by default."""
+    parts = path.split(".")
+    if parts[0] != "skill" or len(parts) == 1:
+        return path == "default_method"
+    return parts[1] in {str(one.get("default_method")) for one in saved} and parts[-1] == "rms_m"
+
+
 INERTIAL = Analysis(
     name="inertial",
     title="INS errors estimated against GNSS, two channels of six states (Neusypin et al. 2003)",
@@ -135,6 +144,10 @@ INERTIAL = Analysis(
     columns=INERTIAL_COLUMNS,
     examine=_examine,
     offers={InsKinds: _ins_kinds},
+    is_main=main_numbers(
+        r"kind|radial_error_rate_(fit|\d\d)_nmiph|velocity_error_rms_mps|azimuth\.error_deg"
+        r"|(north|east)\.states\.[^.]+\.value"
+    ),
 )
 FORECAST = Analysis(
     name="forecast",
@@ -149,4 +162,5 @@ FORECAST = Analysis(
     requires=("inertial",),
     is_expected=_is_forecast_expected,
     columns=FORECAST_COLUMNS,
+    is_main=_is_main_of_forecast,
 )

@@ -38,6 +38,8 @@ class StateEstimate:
     nothing about it. ``observable_from_s`` is the flight time from which it stays above one half, None if never.
     """
 
+    schema_name: ClassVar[str] = "state"
+
     name: str = field(metadata={"one_of": STATES})
     title: str
     unit: str
@@ -56,6 +58,8 @@ class ChannelResult:
     for colour: then NIS is below one by design); ``share_inside95`` of the innovations inside their own 95 % band;
     ``rejected`` of ``innovations`` were gated.
     """
+
+    schema_name: ClassVar[str] = "channel"
 
     name: str = field(metadata={"one_of": CHANNELS})
     states: tuple[StateEstimate, ...]
@@ -77,6 +81,8 @@ class RealOutage:
     end, ``sigma_m`` what the forecast claimed (both radial); None when the flight ended before. ``missing`` is what was
     absent: ``"gnss"``, ``"ins"`` or ``"both"``.
     """
+
+    schema_name: ClassVar[str] = "outage"
 
     start_s: float
     end_s: float
@@ -191,6 +197,7 @@ class InertialResult(Answer, KindOfIns, AzimuthByTurns, BestTrack, ErrorsAlongTh
     """
 
     analysis: ClassVar[str] = "inertial"
+    schema_name: ClassVar[str] = analysis
 
     ins_topic: str
     gnss_topic: str

@@ -35,6 +35,7 @@ from groundstation.systems.inertial.claim_chapter import drift_of, growth, inert
 NOISE = "noise."  # what begins the names of those settings that the class gives
 PLACES = {"m": 1, "mps": 3, "arcsec": 1, "dph": 4, "dphph": 4}
 CONSISTENT = (0.93, 0.97)  # shares of innovations inside their 95 % band that pass for it
+SOURCES = (("Neusypin 2003", "Neusypin, Smolkin, Kharin, Kopelovich, Staroverov: Herald of BMSTU, 2003"),)
 TITLE = "INS errors"
 LEAD = "A Kalman filter estimates the errors of the INS against GNSS, north and east separately. Error = INS − truth."
 

@@ -25,6 +25,8 @@ class SkillRow:
     the flight's past show.
     """
 
+    schema_name: ClassVar[str] = "skill"
+
     method: str = field(metadata={"one_of": tuple(FORECAST_METHODS)})
     horizon_min: float
     starts: int
@@ -42,6 +44,8 @@ class GapRow:
     ``max_error_rms_m`` is the root mean square over the gaps of the largest radial error in each.
     """
 
+    schema_name: ClassVar[str] = "gap"
+
     method: str = field(metadata={"one_of": ("forward", "rts")})
     length_min: float
     starts: int
@@ -55,6 +59,8 @@ class PhaseRow:
 
     Their starts are closer together than those of ``SkillRow`` and come earlier in the flight: the numbers differ.
     """
+
+    schema_name: ClassVar[str] = "phase_outage"
 
     phase: str
     length_s: float
@@ -86,6 +92,8 @@ class CalibrationRow:
     independent starts. ``scale`` is what the model's sigma was multiplied by (mean over the starts).
     """
 
+    schema_name: ClassVar[str] = "calibration"
+
     method: str = field(metadata={"one_of": tuple(FORECAST_METHODS)})
     horizon_min: float
     starts: int
@@ -106,6 +114,8 @@ class CoupledRow:
     It is 1 - RMS ratio, of the last estimates of both. The coupled model has sixteen states: six of each channel, the
     azimuth error, its drift, two accelerometer biases.
     """
+
+    schema_name: ClassVar[str] = "coupled"
 
     horizon_min: float
     rms_m: float
@@ -134,6 +144,7 @@ class ForecastResult(Answer):
     """
 
     analysis: ClassVar[str] = "forecast"
+    schema_name: ClassVar[str] = analysis
 
     default_method: str = field(metadata={"one_of": tuple(FORECAST_METHODS)})
     first_start_s: float

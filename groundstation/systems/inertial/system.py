@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
     from groundstation.systems.inertial.answer import InertialResult
-    from groundstation.systems.inertial.chapter import inertial
+    from groundstation.systems.inertial.chapter import SOURCES, inertial
     from groundstation.systems.inertial.forecast_answer import ForecastResult
     from groundstation.systems.inertial.forecast_chapter import forecast
 
     return (
-        Chapter((InertialResult,), inertial),
-        Chapter((ForecastResult,), forecast),
+        Chapter((InertialResult,), inertial, sources=SOURCES),
+        Chapter((ForecastResult,), forecast, sources=SOURCES),
     )
 
 
@@ -112,4 +112,10 @@ SYSTEM = System(
     in_fleet=_in_fleet,
     compared=_compared,
     advice=_advice,
+    notebook_names={
+        "forecast": "",
+        "forecast.hindcast_map": "map-hindcast",
+        "inertial.state": "inertial",
+        "inertial.tilt_and_drift": "inertial-tilt",
+    },
 )

@@ -13,7 +13,7 @@ from groundstation.results.answer import Answers, answer_of
 from groundstation.results.arrays.typed import joined
 from groundstation.results.figures import FigureData
 from groundstation.results.landing_categories import ACCURACY_ONLY, axis_category_met
-from groundstation.systems.analysis import Analysis, Found, RestsOn, Rules, Shortfall
+from groundstation.systems.analysis import Analysis, Found, RestsOn, Rules, Shortfall, main_numbers
 from groundstation.systems.known import Known
 from groundstation.systems.landing.answer import (
     Approach,
@@ -352,4 +352,5 @@ LANDING = Analysis(
     columns=COLUMNS,
     rules=Rules(LIMITS, rejudge),
     examine=_examine,
+    is_main=main_numbers("verdict"),
 )

@@ -37,6 +37,11 @@ from groundstation.results.flight import FlightResults
 from groundstation.systems.landing.answer import Approach, HeightError, LandingResult, PositionError, StabilisedAt
 
 LEAD = "How each approach was flown against its runway, and where it touched down."
+SOURCES = (
+    ("FSF ALAR", "Flight Safety Foundation, ALAR Briefing Note 7.1: deviations, sink rate, speed"),
+    ("Airbus FOBN", "Airbus Flight Operations Briefing Notes: bank"),
+    ("ICAO Annex 10", "Volume I, table 3.7.2.4-1: alarm limits; Satellite Navigation 1, 2020: accuracy"),
+)
 TITLE = "Approaches"
 NOT_STABILISED, NOT_MEASURED = "not stabilised", "not measured"
 TONES: dict[str, Tone] = {"stabilised": "good", NOT_STABILISED: "warn", NOT_MEASURED: "unknown"}

@@ -18,10 +18,10 @@ def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.systems.landing.answer import LandingResult
     from groundstation.systems.landing.beacons.answer import BeaconLanding
     from groundstation.systems.landing.beacons.chapter import landing_beacons
-    from groundstation.systems.landing.chapter import landing
+    from groundstation.systems.landing.chapter import SOURCES, landing
 
     return (
-        Chapter((LandingResult,), landing),
+        Chapter((LandingResult,), landing, sources=SOURCES),
         Chapter((BeaconLanding,), landing_beacons),
     )
 
@@ -70,4 +70,5 @@ SYSTEM = System(
     plots=_plots,
     tabs=_tabs,
     advice=_advice,
+    notebook_names={"landing_beacons.deviations": "landing-beacons"},
 )

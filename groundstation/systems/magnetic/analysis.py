@@ -8,7 +8,7 @@ from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.answer import Answers, answer_of
 from groundstation.results.roles import AzimuthByTurns, Delays, HeadingByTrack, KindOfIns
 from groundstation.results.rules import Rejudged
-from groundstation.systems.analysis import Analysis, Found, Rules, Shortfall
+from groundstation.systems.analysis import Analysis, Found, Rules, Shortfall, main_numbers
 from groundstation.systems.known import Known
 from groundstation.systems.magnetic.answer import MagneticResult
 from groundstation.systems.magnetic.columns import COLUMNS
@@ -137,6 +137,7 @@ MAGNETIC = Analysis(
     columns=COLUMNS,
     examine=_examine,
     rules=Rules(LIMITS, _rejudge),
+    is_main=main_numbers("verdict"),
 )
 MAGNETIC_GROUND = Analysis(
     name="magnetic_ground",

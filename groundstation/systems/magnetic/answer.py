@@ -85,6 +85,8 @@ class DeclinationUsed:
     The intensities are horizontal and vertical.
     """
 
+    schema_name: ClassVar[str] = "declination"
+
     value_deg: float
     sigma_deg: float
     model: str
@@ -202,6 +204,8 @@ class Method:
         Coefficients of level flight; empty where refused. The modulus does not show A.
     """
 
+    schema_name: ClassVar[str] = "magnetic_method"
+
     name: MethodName
     state: MethodState
     reason: str = ""
@@ -225,6 +229,8 @@ class PoissonParameters:
     along the body axes (forward, right, down). Sigmas have the same shapes; ``current_*`` are None where no current was
     logged, or it did not vary.
     """
+
+    schema_name: ClassVar[str] = "poisson"
 
     hard_iron_nt: Vector
     hard_iron_sigma_nt: Vector
@@ -310,6 +316,7 @@ class MagneticResult(Answer, CompassCoefficients):
     """
 
     analysis: ClassVar[str] = "magnetic"
+    schema_name: ClassVar[str] = analysis
 
     ins_topic: str
     magnetometer_topic: str

@@ -41,6 +41,7 @@ from groundstation.systems.magnetic.ground_chapter import LEAD as GROUND_LEAD
 from groundstation.systems.magnetic.ground_chapter import TITLE as GROUND_TITLE
 from groundstation.systems.magnetic.ground_chapter import ground_claim, ground_runs, ground_workings
 
+SOURCES = (("RU 2550774", "2015, prior art of the Russian patent on the deviation of magnetometric sensors in flight"),)
 TITLE = "Magnetic deviation"
 LEAD = "Opposite turns of equal bank show what to add to the magnetic heading, east positive."
 HOW = (

@@ -130,6 +130,7 @@ class GroundDeviation(Answer):
     """
 
     analysis: ClassVar[str] = "magnetic_ground"
+    schema_name: ClassVar[str] = analysis
 
     ins_topic: str
     gnss_topic: str

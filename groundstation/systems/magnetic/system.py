@@ -17,13 +17,14 @@ if TYPE_CHECKING:
 def _chapters() -> "tuple[Chapter, ...]":
     from groundstation.chapters.chapter import Chapter
     from groundstation.systems.magnetic.answer import MagneticResult
-    from groundstation.systems.magnetic.chapter import magnetic
+    from groundstation.systems.magnetic.chapter import SOURCES, magnetic
     from groundstation.systems.magnetic.ground_answer import GroundDeviation
 
     return (
         Chapter(
             (MagneticResult, GroundDeviation),
             magnetic,
+            sources=SOURCES,
         ),
     )
 
@@ -94,4 +95,5 @@ SYSTEM = System(
     fleet_plots=_fleet_plots,
     advice=_advice,
     apply=_apply,
+    notebook_names={"magnetic.ground_runs": "magnetic-ground"},
 )

@@ -79,4 +79,9 @@ SYSTEM = System(
     chapters=_chapters,
     plots=_plots,
     tabs=_tabs,
+    notebook_names={
+        "landing_ranges.accuracy": "landing-accuracy",
+        "landing_ranges.space": "landing-space",
+        "landing_ranges.trials": "landing-trials",
+    },
 )

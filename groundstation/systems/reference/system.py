@@ -61,4 +61,5 @@ SYSTEM = System(
     fleet_chapters=_fleet_chapters,
     fleet_plots=_fleet_plots,
     in_fleet=_in_fleet,
+    notebook_names={"reference.errors": "reference"},
 )

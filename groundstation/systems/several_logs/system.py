@@ -45,4 +45,5 @@ SYSTEM = System(
     plots=_plots,
     tabs=_tabs,
     join=_join,
+    notebook_names={"together.motion": "together"},
 )
