@@ -16,8 +16,8 @@ from rosbags.highlevel import AnyReader
 from groundstation.base.records import RecordBatch
 from groundstation.readers import registry
 from groundstation.readers.bags.bag import METADATA
-from tests.bag_writer import small_flight, write_ros1, write_ros2
-from tests.telemetry_writer import telemetry
+from tests.readers.bag_writer import small_flight, write_ros1, write_ros2
+from tests.readers.telemetry_writer import telemetry
 
 
 def ours(path: Path) -> int:

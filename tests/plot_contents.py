@@ -66,7 +66,7 @@ def of_comparison() -> Contents:
 
 def of_fleet() -> Contents:
     """Contents of the plots of three aircraft, one of which changes."""
-    from tests.test_fleet_report import fleet_of
+    from tests.reports.test_fleet_report import fleet_of
 
     fleet = fleet_of(60)
     sections = (one.build(fleet) for one in systems().fleet_chapters)

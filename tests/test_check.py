@@ -15,9 +15,9 @@ from groundstation.pipeline.many_flights.runs.batch import run_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.verbs.conversions import convert_many
-from tests.dataflash_writer import DataFlash
+from tests.readers.dataflash_writer import DataFlash
+from tests.readers.ulog_writer import ATTITUDE, BARO, UlogWriter
 from tests.saved import load
-from tests.ulog_writer import ATTITUDE, BARO, UlogWriter
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 GARBAGE = b"\xff" * 64

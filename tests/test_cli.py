@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 from groundstation.base import compile as compiling
 from groundstation.cli.application import EXAMPLES, VERBS, examples
 from groundstation.cli.main import app
-from tests.dataflash_writer import flight_log
-from tests.receiver_writer import nmea
+from tests.readers.dataflash_writer import flight_log
+from tests.readers.receiver_writer import nmea
 
 HEAVY = (
     "cattrs",

@@ -22,7 +22,7 @@ from groundstation.pipeline.verbs.describe import describe
 from groundstation.store.reader import Part, read, read_info
 from tests.recording_contents import Contents
 from tests.saved import load
-from tests.test_store import joined
+from tests.store.test_store import joined
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
 SAME = ("record_index", "time_ns")

@@ -29,12 +29,12 @@ from groundstation.simulation.scenario import load_scenario
 from groundstation.systems.heading.analysis import HEADING
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.tables.table import Flight
-from tests.bag_writer import Messages, enu_quaternion_xyzw, write_ros2
-from tests.dataflash_writer import DataFlash
-from tests.receiver_writer import nmea, novatel, pvt, rmc, ubx
-from tests.telemetry_writer import Telemetry
-from tests.trajectory_writer import pos_rows
-from tests.ulog_writer import ATTITUDE, GPS, GPS_CODE, UlogWriter
+from tests.readers.bag_writer import Messages, enu_quaternion_xyzw, write_ros2
+from tests.readers.dataflash_writer import DataFlash
+from tests.readers.receiver_writer import nmea, novatel, pvt, rmc, ubx
+from tests.readers.telemetry_writer import Telemetry
+from tests.readers.trajectory_writer import pos_rows
+from tests.readers.ulog_writer import ATTITUDE, GPS, GPS_CODE, UlogWriter
 
 BOOT_US = 5_000_000  # both autopilots have run for five seconds when the log begins
 GPS_UTC_LEAP_NS = 18 * NS_PER_S

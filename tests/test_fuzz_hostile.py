@@ -24,9 +24,9 @@ from groundstation.store.info import COPY_NAME, StoreInfo
 from groundstation.store.marks import METADATA_NAME
 from groundstation.store.reader import read_info
 from groundstation.store.writer import StoreWriter
-from tests.dataflash_writer import flight_log
-from tests.test_store import batch_of
-from tests.ulog_writer import ATTITUDE, UlogWriter
+from tests.readers.dataflash_writer import flight_log
+from tests.readers.ulog_writer import ATTITUDE, UlogWriter
+from tests.store.test_store import batch_of
 
 LIMIT_S = 60.0  # of the processor; measured: 2 to 7 s, and minutes for what is followed into a bomb
 CHANNELS = 10_000

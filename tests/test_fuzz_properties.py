@@ -22,10 +22,10 @@ from groundstation.readers.source import Source
 from groundstation.store.info import StoreInfo, from_strings
 from groundstation.store.reader import read, read_info
 from groundstation.store.writer import StoreWriter
-from tests.dataflash_writer import DataFlash
 from tests.fuzz.mutation import Mutant, random_edits
 from tests.fuzz.trial import check_items, try_file
-from tests.ulog_writer import UlogWriter
+from tests.readers.dataflash_writer import DataFlash
+from tests.readers.ulog_writer import UlogWriter
 
 FEW = settings(derandomize=True, deadline=None, max_examples=60, suppress_health_check=list(HealthCheck))
 FEWER = settings(FEW, max_examples=25)

@@ -23,8 +23,8 @@ from groundstation.cli import application, progress
 from groundstation.cli.main import app
 from groundstation.pipeline.one_flight.progress import Event
 from groundstation.viewer.names import clean_text
+from tests.readers.ulog_writer import UlogWriter
 from tests.real_logs import real_log
-from tests.ulog_writer import UlogWriter
 
 HIDDEN = (
     *("\x1b]0;PWN\x07", "\x1b[2J\x1b[31m", "\x9b2J", "\x00", "\x7f", "\x85", "\u2028", "\ufeff", "\u00ad"),

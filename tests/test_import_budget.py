@@ -9,10 +9,10 @@ import pytest
 from typer.testing import CliRunner
 
 from groundstation.cli.main import app
-from tests.dataflash_writer import flight_log
-from tests.receiver_writer import nmea_log
-from tests.telemetry_writer import telemetry
-from tests.ulog_writer import small_flight
+from tests.readers.dataflash_writer import flight_log
+from tests.readers.receiver_writer import nmea_log
+from tests.readers.telemetry_writer import telemetry
+from tests.readers.ulog_writer import small_flight
 
 SAMPLE = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv"
 NOT_NEEDED = (  # to look at a log, check or convert it

@@ -31,7 +31,7 @@ from groundstation.readers.source import Source
 from groundstation.results.files import load_document, load_manifest
 from groundstation.results.manifest import PartOfRun
 from groundstation.tables.table import Flight
-from tests.bag_writer import small_flight, write_ros2
+from tests.readers.bag_writer import small_flight, write_ros2
 from tests.real_logs import real_log
 from tests.test_formats_agree import ICDS, WRITERS
 

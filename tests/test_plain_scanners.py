@@ -12,9 +12,9 @@ import pytest
 from groundstation.base.compile import Loop
 from groundstation.base.errors import GroundstationError
 from groundstation.readers.registry import read
-from tests.chapter10_packets import messages_1553, packet, time_of_day, word_429, words_429
 from tests.fuzz.bases import chapter10_starts, dataflash, starts_with, ulog, ulog_starts
 from tests.fuzz.mutation import Mutant, random_edits
+from tests.readers.chapter10_packets import messages_1553, packet, time_of_day, word_429, words_429
 
 SEEDS = 10
 LOOPS = {"ulog": {"scan"}, "dataflash": {"scan"}, "chapter10": {"scan", "messages_1553", "words_429"}}

@@ -20,7 +20,7 @@ from groundstation.pipeline.one_flight import outcome
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
-from tests.bag_writer import small_flight, write_ros1
+from tests.readers.bag_writer import small_flight, write_ros1
 
 SAMPLE = Path(__file__).parents[1] / "sample_logs" / "taxi-short.csv"
 BROKEN_AT = 3000  # byte from which a disk gives nothing

@@ -19,14 +19,14 @@ from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.results.files import load_document, load_manifest
 from groundstation.store.reader import read_info
-from tests import chapter10_packets as made
-from tests.dataflash_writer import DataFlash
+from tests.readers import chapter10_packets as made
+from tests.readers.dataflash_writer import DataFlash
+from tests.readers.receiver_writer import gga, pvt, rmc
+from tests.readers.test_g1000 import TOP, row
+from tests.readers.ulog_writer import ATTITUDE, GPS, GPS_CODE, UlogWriter
 from tests.real_logs import real_log
-from tests.receiver_writer import gga, pvt, rmc
-from tests.test_g1000 import TOP, row
 from tests.test_parts import COLUMNS, assert_close, figures, flights, head, later, rows, run, text
 from tests.test_remote import fetched, memory  # noqa: F401
-from tests.ulog_writer import ATTITUDE, GPS, GPS_CODE, UlogWriter
 
 LEAP_NS = 18 * NS_PER_S
 Writer = Callable[[str, int], bytes]  # of a power-up: when it begins, for how many seconds

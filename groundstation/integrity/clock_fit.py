@@ -23,7 +23,7 @@ FloatArray = NDArray[np.float64]
 
 BLOCKS, LEAST_IN_BLOCK, FEWEST_BLOCKS = 32, 3, 4  # blocks of a line, samples in a block, least number of blocks
 SPLIT_BLOCKS, LEAST_IN_SPLIT_BLOCK, SIDE_BLOCKS = 96, 5, 6  # where a change of rate is looked for
-SPLIT_GAIN, SPLIT_RATIO = 16.0, 9.0  # least gain of two lines over one; both by Monte Carlo, tests/test_clock_fit.py
+SPLIT_GAIN, SPLIT_RATIO = 16.0, 9.0  # least gain of two lines over one; by tests/integrity/test_clock_fit.py
 SIDE_SAMPLES = 5  # samples on either side of a step
 MOST_BREAKS = 40
 JITTER_TIMES = 8.0
@@ -222,7 +222,7 @@ def _correlation(residual: FloatArray) -> float:
     It is corrected for its bias, -(2 + 4 r) / n.
 
     Source: Stine and Shaman, A fixed point characterization for bias of autoregressive estimators, Annals of Statistics
-    17 (1989) 1275; tests/test_clock_fit.py.
+    17 (1989) 1275; tests/integrity/test_clock_fit.py.
     """
     power = float(residual @ residual)
     if power == 0.0:

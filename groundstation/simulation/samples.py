@@ -81,7 +81,7 @@ _HEAD = """\
 # Sample logs
 
 These logs are simulated: no aircraft was recorded. `make_sample_logs` of groundstation/simulation/samples.py writes the
-logs and this page; tests/test_sample_logs.py makes them again and compares every byte. To write one log:
+logs and this page; tests/simulation/test_sample_logs.py makes them again and compares every byte. To write one log:
 `groundstation simulate NAME -o DIR`. The format is the flat CSV: `#` lines of metadata, one time column,
 `<topic>.<field>` columns; an empty cell means no sample.
 

@@ -12,17 +12,17 @@ import numpy as np
 import zstandard
 from mcap.writer import CompressionType, Writer
 
-from tests.bag_writer import small_flight as small_flight_of_a_robot
-from tests.bag_writer import write_ros1, write_ros2
-from tests.dataflash_writer import MAGIC as DATAFLASH_MAGIC
-from tests.dataflash_writer import flight_log
-from tests.flightdata_writer import write_flightdata
 from tests.fuzz.harmful import bomb, computed_sqlite3, unallocated_hdf5
+from tests.readers.bag_writer import small_flight as small_flight_of_a_robot
+from tests.readers.bag_writer import write_ros1, write_ros2
+from tests.readers.dataflash_writer import MAGIC as DATAFLASH_MAGIC
+from tests.readers.dataflash_writer import flight_log
+from tests.readers.flightdata_writer import write_flightdata
+from tests.readers.receiver_writer import nmea_log, novatel_log, novatel_text_log, ubx_log
+from tests.readers.telemetry_writer import telemetry
+from tests.readers.trajectory_writer import PLACE, VELOCITY, pos_rows, sbet
+from tests.readers.ulog_writer import GPS, GPS_CODE, small_flight
 from tests.real_logs import REAL_LOGS
-from tests.receiver_writer import nmea_log, novatel_log, novatel_text_log, ubx_log
-from tests.telemetry_writer import telemetry
-from tests.trajectory_writer import PLACE, VELOCITY, pos_rows, sbet
-from tests.ulog_writer import GPS, GPS_CODE, small_flight
 
 SAMPLES = Path(__file__).parents[2] / "sample_logs"
 CSV_BYTES, BINARY_BYTES = 40_000, 150_000  # of a recorded log: enough for all that it defines

@@ -12,9 +12,9 @@ from groundstation.readers.source import Source
 from groundstation.systems.cooperative.algorithms import run_algorithm
 from groundstation.systems.cooperative.consistency import judge
 from groundstation.systems.cooperative.events import prepare
+from tests.readers.test_contract import check
+from tests.readers.test_flat_csv import Read
 from tests.real_logs import real_log
-from tests.test_readers_contract import check
-from tests.test_readers_flat_csv import Read
 
 pytest.importorskip("recorded_robots", reason="the plug-in is not installed: make robots")
 from recorded_robots import miluv, sets

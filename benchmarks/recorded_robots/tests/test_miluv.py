@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.test_readers_warnings import ODD, read_in_silence
+from tests.readers.test_warnings import ODD, read_in_silence
 
 pytest.importorskip("recorded_robots", reason="the plug-in is not installed: make robots")
 

@@ -12,12 +12,12 @@ from groundstation.readers import registry
 from groundstation.readers.source import Source
 from groundstation.systems.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.tables.session import Odometry
-from tests.logged_facts import RAD
-from tests.logs_of_every_format import RNG_SEED
+from tests.readers.logged_facts import RAD
+from tests.readers.logs_of_every_format import RNG_SEED
+from tests.readers.test_contract import check
+from tests.readers.test_flat_csv import Read
+from tests.readers.test_values_as_logged import assert_file_agrees
 from tests.real_logs import real_log
-from tests.test_readers_contract import check
-from tests.test_readers_flat_csv import Read
-from tests.test_values_as_logged import assert_file_agrees
 
 pytest.importorskip("recorded_robots", reason="the plug-in is not installed: make robots")
 from recorded_robots import utias

@@ -61,10 +61,10 @@ from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
 from tests.recording_contents import Contents
+from tests.reports.test_reports import HOSTILE
 from tests.saved import load
 from tests.systems.magnetic import example as magnetic_example
 from tests.systems.magnetic.test_run import analysed, figure_eight, simulated, system_3_alone
-from tests.test_reports import HOSTILE
 from tests.told import write_recording
 
 FAMILY = MagneticFamilySettings(

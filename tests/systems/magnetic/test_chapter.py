@@ -19,9 +19,9 @@ from groundstation.systems.magnetic.answer import ADVISORY, MagneticResult
 from groundstation.systems.magnetic.chapter import magnetic
 from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD
 from tests.report_example import example
+from tests.reports.test_reports import Page, report
 from tests.saved import load
 from tests.systems.magnetic.test_run import figure_eight
-from tests.test_reports import Page, report
 from tests.told import PLOTS, flight_sections
 
 FIGURES = ("Deviation by heading", "Error on data that no fit used", "Figures as flown", "Both branches")

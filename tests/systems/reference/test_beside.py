@@ -29,7 +29,7 @@ from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import simulate
 from groundstation.systems.reference.answer import ReferenceResult
 from groundstation.tables.table import Flight
-from tests.bag_writer import small_flight, write_ros2
+from tests.readers.bag_writer import small_flight, write_ros2
 from tests.real_logs import real_log
 from tests.simulated_flights import quiet
 
