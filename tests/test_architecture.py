@@ -61,7 +61,7 @@ ALLOWED_STRINGS: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("session", ("cli/", "pipeline/", "reports/", "simulation/"), "recorded flights of several aircraft"),
     (
         "heading",
-        ("readers/", "simulation/", "tables/", "methods/taxi/", "results/files.py", "chapters/plots/flight.py"),
+        ("readers/", "simulation/", "tables/", "methods/taxi/", "results/", "chapters/plots/flight.py"),
         "the angle, beside roll and pitch",
     ),
     ("heading", ("viewer/tabs/raw.py",), "the end of a field's name, as track"),

@@ -123,7 +123,7 @@ def _sentence(answers: Answers) -> str:
 
 
 def _is_main_of_forecast(path: str, saved: tuple[Mapping[str, Any], ...]) -> bool:
-    """Tell the main numbers: the default method, and the errors of the method that either flight has by default."""
+    """Tell the main numbers: the default method, and its errors; of two methods, those of both."""
     parts = path.split(".")
     if parts[0] != "skill" or len(parts) == 1:
         return path == "default_method"
