@@ -31,7 +31,7 @@ _QUOTED_DELIMITER = "\x1f"  # takes the place of a delimiter inside quotes until
 
 
 @dataclass(frozen=True)
-class Block:
+class RowBlock:
     """Sound rows as UTF-8 text, each ended by a line feed, and their line numbers (from 1)."""
 
     text: bytes
@@ -54,7 +54,7 @@ class RowScanner:
         self.ends_without_newline = False
         self.skipped: dict[int, str] = {}  # header and comment lines inside the file, by their numbers
 
-    def __iter__(self) -> Iterator[Block]:
+    def __iter__(self) -> Iterator[RowBlock]:
         with self._source.open() as stream:
             stream.seek(self._dialect.first_byte)
             for piece, is_cut in self._pieces(stream):
@@ -115,7 +115,7 @@ class RowScanner:
             piece = piece.replace(b"\r\n", b"\n").replace(b"\r", _STRANGE)
         return piece.replace(b"\0", _STRANGE) if b"\0" in piece else piece
 
-    def _scan(self, text: bytes, is_cut: bool) -> Block:
+    def _scan(self, text: bytes, is_cut: bool) -> RowBlock:
         if b'"' in text:
             text = without_quotes(text, self._dialect.delimiter)
         array = np.frombuffer(text, dtype=np.uint8)
@@ -129,12 +129,12 @@ class RowScanner:
         sound = (cells == self._dialect.cells) & ~skipped
         self.ends_without_newline |= is_cut and bool(sound.all())
         if sound.all():
-            return Block(text, numbers)
+            return RowBlock(text, numbers)
         unsound = np.flatnonzero(~sound & ~skipped)
         filled = [bool(text[starts[at] : ends[at]].strip(_NOTHING)) for at in unsound]
         unsound = unsound[np.array(filled, dtype=bool)]
         self._count_unsound(cells[unsound], numbers[unsound], is_cut)
-        return Block(array[np.repeat(sound, ends - starts + 1)].tobytes(), numbers[sound])
+        return RowBlock(array[np.repeat(sound, ends - starts + 1)].tobytes(), numbers[sound])
 
     def _skipped_lines(
         self, text: bytes, array: NDArray[np.uint8], starts: Any, ends: Any, cells: Any, numbers: Int64Array

@@ -33,7 +33,7 @@ from groundstation.readers.inside import new_logs, with_own_zeros
 from groundstation.readers.layout import METHODS, Key, Layout, Rule, apply
 from groundstation.readers.losses import Losses
 from groundstation.readers.places import PLACED, without_place, zeroed
-from groundstation.readers.rows import Block, RowScanner, restore_delimiters
+from groundstation.readers.rows import RowBlock, RowScanner, restore_delimiters
 from groundstation.readers.sections import Section
 from groundstation.readers.source import Source
 
@@ -129,7 +129,7 @@ class TableReader:
                 break
         return texts
 
-    def _parse(self, block: Block, types: Mapping[int, Any], decimal_point: str = ".") -> dict[int, Any]:
+    def _parse(self, block: RowBlock, types: Mapping[int, Any], decimal_point: str = ".") -> dict[int, Any]:
         """Return columns of a block as arrow arrays, empty cells null.
 
         Raises pa.ArrowInvalid where a type does not fit.
@@ -151,11 +151,11 @@ class TableReader:
         )
         return {column: table.column(str(column)).combine_chunks() for column in types}
 
-    def _typed(self, block: Block) -> tuple[Column, dict[Key, Column]]:
+    def _typed(self, block: RowBlock) -> tuple[Column, dict[Key, Column]]:
         arrays = self._arrays(block)
         return self._time(arrays, block.line_numbers), self._fields(arrays, block.line_numbers)
 
-    def _arrays(self, block: Block, with_time: bool = True) -> dict[int, Any]:
+    def _arrays(self, block: RowBlock, with_time: bool = True) -> dict[int, Any]:
         """Return the cells of the columns that have rules, and of the time.
 
         As numbers where they can be, else as text.

@@ -12,7 +12,7 @@ from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Damage
 from groundstation.readers.bags.mcap import MAGIC as MCAP_MAGIC
 from groundstation.readers.bags.mcap import Mcap
-from groundstation.readers.bags.messages import Block, Connection, Missing, Part, counted_by
+from groundstation.readers.bags.messages import Connection, ConnectionBlock, Missing, Part, counted_by
 from groundstation.readers.bags.ros1 import Ros1Bag
 from groundstation.readers.bags.ros1_records import MAGIC as ROS1_MAGIC
 from groundstation.readers.bags.ros1_records import has_chunk
@@ -29,7 +29,7 @@ MARK = b"rosbag2_bagfile_information:"
 KEPT_BYTES, MESSAGE_BYTES = 64 << 20, 64  # messages kept for the second pass; what each adds to its own
 MOST_METADATA_BYTES = 16 << 20
 _ENDINGS = ("", ".zstd")  # rosbag2 names a file it compressed later without the ending
-Item: TypeAlias = Block | Damage
+Item: TypeAlias = ConnectionBlock | Damage
 _CONTAINERS: Mapping[bytes, tuple[str, Callable[[Source], Iterable[Part]]]] = {
     MCAP_MAGIC: ("MCAP", Mcap),
     ROS1_MAGIC: ("ROS 1", Ros1Bag),
@@ -138,7 +138,7 @@ class Bag:
         kept: list[Item] | None = []
         size, last_buffer = 0, None
         for part in self._read():
-            if kept is not None and isinstance(part, Block):
+            if kept is not None and isinstance(part, ConnectionBlock):
                 size += MESSAGE_BYTES * len(part) + (0 if part.buffer is last_buffer else len(part.buffer))
                 last_buffer = part.buffer
             if kept is not None:
@@ -154,7 +154,7 @@ class Bag:
         told: Counter[str] = Counter()
         count, most = 0, most_messages(self.size)
         for part in self._of_files():
-            if isinstance(part, Block):
+            if isinstance(part, ConnectionBlock):
                 told[part.connection.topic] += len(part)
                 count += len(part)
                 yield part

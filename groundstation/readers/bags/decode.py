@@ -10,7 +10,7 @@ import numpy as np
 from groundstation.base.records import MAX_TEXT_CHARACTERS, Column, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags.definitions import Definition, DefinitionError, known, parse
-from groundstation.readers.bags.messages import Block, Connection
+from groundstation.readers.bags.messages import Connection, ConnectionBlock
 from groundstation.readers.bags.shapes import (
     CDR,
     COUNT,
@@ -96,7 +96,7 @@ class Decoder:
         shape = next(iter(self._shapes.values()), None)
         return shape is not None and shape.at_one_place(name) is not None
 
-    def values_at_one_place(self, block: Block, name: str) -> tuple[Int64Array, Column] | None:
+    def values_at_one_place(self, block: ConnectionBlock, name: str) -> tuple[Int64Array, Column] | None:
         """Return the rows of messages that are long enough, and one value of each.
 
         The value must stand at one place in all messages; None otherwise.
@@ -114,7 +114,7 @@ class Decoder:
         rows = np.flatnonzero(fits)
         return rows, Column(values_of(leaf, block.buffer, block.starts[rows]))
 
-    def decode(self, block: Block) -> Iterator[Decoded]:
+    def decode(self, block: ConnectionBlock) -> Iterator[Decoded]:
         """Yield columns of the messages; unreadable ones have their length alone."""
         bad: list[Int64Array] = []
         if self.reason:
@@ -128,7 +128,7 @@ class Decoder:
             self.unreadable += len(rows)
             yield _sizes(block, rows)
 
-    def _shaped(self, block: Block, bad: list[Int64Array]) -> Iterator[Decoded]:
+    def _shaped(self, block: ConnectionBlock, bad: list[Int64Array]) -> Iterator[Decoded]:
         order = np.argsort(block.sizes, kind="stable")
         sizes = block.sizes[order]
         for group in np.split(order, np.flatnonzero(np.diff(sizes)) + 1):
@@ -168,7 +168,9 @@ class Decoder:
             self._shapes[shape.size, shape.guards] = shape
         return shape
 
-    def _objects(self, block: Block, read: Callable[[bytes], Any], bad: list[Int64Array]) -> Iterator[Decoded]:
+    def _objects(
+        self, block: ConnectionBlock, read: Callable[[bytes], Any], bad: list[Int64Array]
+    ) -> Iterator[Decoded]:
         """Messages that a library reads one by one."""
         found: list[dict[str, Any]] = []
         rows: list[int] = []
@@ -190,7 +192,7 @@ class Decoder:
             return
         yield from self._laid_out(block, np.array(rows, dtype=np.int64), found)
 
-    def _laid_out(self, block: Block, rows: Int64Array, found: list[dict[str, Any]]) -> Iterator[Decoded]:
+    def _laid_out(self, block: ConnectionBlock, rows: Int64Array, found: list[dict[str, Any]]) -> Iterator[Decoded]:
         """Yield columns of flat objects; those without any value have their length."""
         columns: dict[str, Column] = {}
         for name in dict.fromkeys(name for one in found for name in one):
@@ -211,12 +213,12 @@ class Decoder:
             yield _sizes(block, rows[~has_any])
 
 
-def _read(block: Block, shape: Shape, rows: Int64Array) -> Decoded:
+def _read(block: ConnectionBlock, shape: Shape, rows: Int64Array) -> Decoded:
     columns = shape.columns(block.buffer, block.starts[rows])
     return Decoded(rows, columns) if columns else _sizes(block, rows)
 
 
-def _sizes(block: Block, rows: Int64Array) -> Decoded:
+def _sizes(block: ConnectionBlock, rows: Int64Array) -> Decoded:
     return Decoded(rows, {BYTES: Column(block.sizes[rows].astype(np.uint32))})
 
 

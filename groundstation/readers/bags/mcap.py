@@ -7,7 +7,7 @@ import numpy as np
 
 from groundstation.base.records import Damage
 from groundstation.readers.bags.definitions import plain_name
-from groundstation.readers.bags.messages import Block, Connection, Missing, Part
+from groundstation.readers.bags.messages import Connection, ConnectionBlock, Missing, Part
 from groundstation.readers.skipped import bytes_place
 from groundstation.readers.source import Source
 
@@ -39,7 +39,7 @@ class Mcap:
                 if isinstance(found, ForeignMessages):
                     messages = found.messages
                     log_ns, publish_ns = messages.head("log_time"), messages.head("publish_time")
-                    yield Block(
+                    yield ConnectionBlock(
                         self._connection(found),
                         messages.buffer,
                         messages.starts + _HEAD_BYTES,

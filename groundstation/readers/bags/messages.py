@@ -46,7 +46,7 @@ class Connection:
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class ConnectionBlock:
     """Messages of one connection, in the order of the log.
 
     Parameters
@@ -71,9 +71,9 @@ class Block:
     def __len__(self) -> int:
         return len(self.starts)
 
-    def take(self, rows: NDArray[np.int64] | slice) -> "Block":
+    def take(self, rows: NDArray[np.int64] | slice) -> "ConnectionBlock":
         """Return the messages that ``rows`` selects; the buffer is shared."""
-        return Block(
+        return ConnectionBlock(
             self.connection,
             self.buffer,
             self.starts[rows],
@@ -116,10 +116,10 @@ def counted_by(account: str) -> str:
     return f"messages that the {account} counts and that are not in it"
 
 
-Part: TypeAlias = Block | Damage | Missing
+Part: TypeAlias = ConnectionBlock | Damage | Missing
 
 
-def joined(gathered: dict[int, list[Block]]) -> list[Block]:
+def joined(gathered: dict[int, list[ConnectionBlock]]) -> list[ConnectionBlock]:
     """Join blocks into one for each connection, in the order of their numbers.
 
     Its messages are in the order of the log. All blocks share one buffer. Several nodes may publish on one topic: then
@@ -127,7 +127,7 @@ def joined(gathered: dict[int, list[Block]]) -> list[Block]:
 
     Parameters
     ----------
-    gathered : dict of connection number to list of Block
+    gathered : dict of connection number to list of ConnectionBlock
         Those of several connections may share a buffer: they came from one chunk.
     """
     blocks = [block for several in gathered.values() for block in several]
@@ -140,7 +140,7 @@ def joined(gathered: dict[int, list[Block]]) -> list[Block]:
         else np.concatenate([np.zeros(0, np.uint8), *buffers.values()])
     )
     united = (
-        Block(
+        ConnectionBlock(
             several[0].connection,
             buffer,
             np.concatenate([block.starts + places[id(block.buffer)] for block in several]),

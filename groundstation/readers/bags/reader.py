@@ -21,7 +21,7 @@ from groundstation.base.signals import RAW_PREFIX
 from groundstation.readers.bags.bag import Bag, kind_of
 from groundstation.readers.bags.clocks import LARGEST_LAG_S
 from groundstation.readers.bags.decode import Decoded, Decoder
-from groundstation.readers.bags.messages import Block, Connection, joined
+from groundstation.readers.bags.messages import Connection, ConnectionBlock, joined
 from groundstation.readers.bags.profile import MessageProfile
 from groundstation.readers.bags.shapes import MOST_COLUMNS
 from groundstation.readers.bags.sources import Key, key_of
@@ -52,7 +52,7 @@ def items(source: Source, reader_name: str, profile: MessageProfile | None = Non
         clock_offsets=found.offsets.stated,
     )
     topics = _Topics(found, names, Work.of(bag.size))
-    gathered: dict[int, list[Block]] = {}
+    gathered: dict[int, list[ConnectionBlock]] = {}
     size, newest = 0, -1
     for part in bag:
         if isinstance(part, Damage):
@@ -133,7 +133,7 @@ class _Topics:
         self._far_stamps: dict[str, int] = {}
         self._nowhere: Counter[str] = Counter()
 
-    def batches(self, gathered: dict[int, list[Block]]) -> Iterator[RecordBatch]:
+    def batches(self, gathered: dict[int, list[ConnectionBlock]]) -> Iterator[RecordBatch]:
         """Yield the batches of blocks that stand together in the log."""
         canonical: dict[str, list[Part]] = {}
         raw: dict[str, list[Part]] = {}
@@ -154,7 +154,7 @@ class _Topics:
         for topic, parts in sorted(canonical.items()):
             yield from bounded(one_row_each(merged(topic, parts)) if len(parts) > 1 else merged(topic, parts))
 
-    def _part(self, block: Block, decoded: Decoded) -> Part:
+    def _part(self, block: ConnectionBlock, decoded: Decoded) -> Part:
         """Return raw columns of decoded messages, with their three times."""
         log_ns, publish_ns = block.log_time_ns[decoded.rows], block.publish_time_ns[decoded.rows]
         is_time = (log_ns >= 0) & (log_ns < LATEST_NS)

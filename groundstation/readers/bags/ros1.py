@@ -17,7 +17,7 @@ import numpy as np
 from groundstation.base.records import Damage
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags.definitions import plain_name
-from groundstation.readers.bags.messages import Block, Connection, Missing, Part, counted_by
+from groundstation.readers.bags.messages import Connection, ConnectionBlock, Missing, Part, counted_by
 from groundstation.readers.bags.ros1_records import (
     CHUNK,
     CONNECTION,
@@ -167,7 +167,7 @@ class Ros1Bag:
         for number, one in found.items():
             self._met[number] = self._met.get(number, 0) + len(one.times)
             times = np.array(one.times, dtype=np.int64)
-            yield Block(
+            yield ConnectionBlock(
                 self._connections[number],
                 buffer,
                 np.array(one.starts, dtype=np.int64),

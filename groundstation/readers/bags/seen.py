@@ -12,7 +12,7 @@ from groundstation.base.records import Column, Int64Array
 from groundstation.readers.bags import px4
 from groundstation.readers.bags.clocks import Stamped
 from groundstation.readers.bags.decode import Decoder
-from groundstation.readers.bags.messages import Block, Connection
+from groundstation.readers.bags.messages import Connection, ConnectionBlock
 from groundstation.readers.bags.profile import MessageRule
 
 SAMPLE = 4_000  # messages of a connection that are looked at
@@ -67,7 +67,7 @@ class Seen:
         """Stamps of the first messages that have one."""
         return np.concatenate([np.zeros(0, dtype=np.int64), *self._first_stamps])
 
-    def take(self, block: Block, decoder: Decoder) -> None:
+    def take(self, block: ConnectionBlock, decoder: Decoder) -> None:
         """Count a block, and decode some of it."""
         rows, stamp_ns = self._stamps(block, decoder)
         if len(rows):
@@ -80,7 +80,7 @@ class Seen:
             stamp_ns = block.publish_time_ns[rows]
         self.stamped[0].take(block.record_index, block.log_time_ns, rows, stamp_ns)
 
-    def _stamps(self, block: Block, decoder: Decoder) -> tuple[Int64Array, Int64Array]:
+    def _stamps(self, block: ConnectionBlock, decoder: Decoder) -> tuple[Int64Array, Int64Array]:
         """Return the messages that have a stamp, and the stamps.
 
         Those of all messages where the stamp stands at one place in all, else of some.
@@ -102,7 +102,7 @@ class Seen:
         order = np.argsort(rows)
         return rows[order], np.concatenate([stamp_ns for _rows, stamp_ns in found])[order]
 
-    def _looked_into(self, block: Block, decoder: Decoder) -> Iterable[tuple[Int64Array, dict[str, Column]]]:
+    def _looked_into(self, block: ConnectionBlock, decoder: Decoder) -> Iterable[tuple[Int64Array, dict[str, Column]]]:
         """Yield some messages of a block, decoded."""
         rows = np.arange(min(len(block), SAMPLE - self._looked_at), dtype=np.int64)
         if decoder.has_places and not self.columns:

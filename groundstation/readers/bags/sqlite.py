@@ -22,7 +22,7 @@ import zstandard
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage
 from groundstation.readers.bags.definitions import plain_name
-from groundstation.readers.bags.messages import Block, Connection, Missing, Part, counted_by
+from groundstation.readers.bags.messages import Connection, ConnectionBlock, Missing, Part, counted_by
 from groundstation.readers.bags.rosbag2_metadata import BagMetadata
 from groundstation.readers.compressed import MAX_RATIO, MIN_LIMIT_BYTES
 from groundstation.readers.source import Source
@@ -109,7 +109,7 @@ class Ros2Sqlite:
             for name, count in gone.items():
                 yield Missing(name, count, counted_by("metadata in the database"))
 
-    def _blocks(self, rows: list[Any], connections: dict[int, Connection]) -> Iterator[Block]:
+    def _blocks(self, rows: list[Any], connections: dict[int, Connection]) -> Iterator[ConnectionBlock]:
         """Yield the rows of one stretch by topic."""
         sound = [row for row in rows if type(row[1]) is type(row[2]) is type(row[3]) is int]
         self._odd += len(rows) - len(sound)
@@ -127,7 +127,7 @@ class Ros2Sqlite:
             starts = np.cumsum(sizes) - sizes
             topic = connections[number].topic
             self._met[topic] = self._met.get(topic, 0) + len(which)
-            yield Block(connections[number], buffer, starts, sizes, times, times, index[which])
+            yield ConnectionBlock(connections[number], buffer, starts, sizes, times, times, index[which])
 
     def _payload(self, data: Any) -> bytes:
         """Return the bytes of a message, decompressed where the bag compresses them."""

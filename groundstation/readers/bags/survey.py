@@ -16,7 +16,7 @@ from groundstation.readers.bags.bag import Bag
 from groundstation.readers.bags.canonical import MESSAGES, is_earth_frame, wheel_odometry
 from groundstation.readers.bags.clocks import LARGEST_LAG_S, Lags, offsets_of, told, was_set
 from groundstation.readers.bags.decode import Decoder
-from groundstation.readers.bags.messages import Block
+from groundstation.readers.bags.messages import ConnectionBlock
 from groundstation.readers.bags.profile import MessageProfile
 from groundstation.readers.bags.seen import Seen
 from groundstation.readers.bags.sources import in_order, sources_of
@@ -101,7 +101,7 @@ def survey(bag: Bag, profile: MessageProfile | None = None) -> Survey:
     decoders: dict[int, Decoder] = {}
     work = Work.of(bag.size).of_a_first_look()
     for part in bag:
-        if isinstance(part, Block) and len(part):
+        if isinstance(part, ConnectionBlock) and len(part):
             number = part.connection.number
             decoder = decoders.setdefault(number, Decoder(part.connection, work=work))
             if number not in found.seen:

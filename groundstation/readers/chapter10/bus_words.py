@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from groundstation.base.records import MAX_BATCH_ROWS, BoolArray, Column, Int64Array, RecordBatch
 from groundstation.base.signals import BUS_PREFIX
 from groundstation.readers.chapter10 import scan
-from groundstation.readers.chapter10.packets import NS_PER_COUNT, Block
+from groundstation.readers.chapter10.packets import NS_PER_COUNT, PacketBlock
 
 TOPIC_1553, TOPIC_429 = f"{BUS_PREFIX}1553.", f"{BUS_PREFIX}429."
 MOST_WORDS = 36  # two commands, 32 data words, two statuses
@@ -37,7 +37,7 @@ def bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
         yield batch if len(batch) <= MAX_BATCH_ROWS else batch.take(slice(start, start + MAX_BATCH_ROWS))
 
 
-def messages_1553(block: Block, channel: int, packets: Int64Array) -> tuple[RecordBatch, int]:
+def messages_1553(block: PacketBlock, channel: int, packets: Int64Array) -> tuple[RecordBatch, int]:
     """Return the messages of a channel in a block, and how many its packets lack.
 
     The number lacking is by the count that the packets state.
@@ -61,7 +61,7 @@ def messages_1553(block: Block, channel: int, packets: Int64Array) -> tuple[Reco
     return _batch(f"{TOPIC_1553}{channel}", block, places[:count], times[:count], columns), int(lost.sum())
 
 
-def words_429(block: Block, channel: int, packets: Int64Array) -> tuple[RecordBatch, int]:
+def words_429(block: PacketBlock, channel: int, packets: Int64Array) -> tuple[RecordBatch, int]:
     """Return the words of a channel in a block, and how many its packets lack.
 
     The number lacking is by the count that the packets state.
@@ -80,7 +80,9 @@ def words_429(block: Block, channel: int, packets: Int64Array) -> tuple[RecordBa
     return _batch(f"{TOPIC_429}{channel}", block, places[:count], times[:count], columns), int(lost.sum())
 
 
-def _batch(topic: str, block: Block, places: Int64Array, times: Int64Array, columns: dict[str, Column]) -> RecordBatch:
+def _batch(
+    topic: str, block: PacketBlock, places: Int64Array, times: Int64Array, columns: dict[str, Column]
+) -> RecordBatch:
     return RecordBatch(topic, places + block.base, Column(times * NS_PER_COUNT), columns)
 
 

@@ -13,7 +13,7 @@ from groundstation.readers.chapter10 import scan
 from groundstation.readers.chapter10.bus_words import TOPIC_429, TOPIC_1553
 from groundstation.readers.chapter10.kinds import ARINC_429, MIL_STD_1553, TIME, TMATS
 from groundstation.readers.chapter10.naming import Seen
-from groundstation.readers.chapter10.packets import NS_PER_COUNT, Block, Walk
+from groundstation.readers.chapter10.packets import NS_PER_COUNT, PacketBlock, Walk
 from groundstation.readers.chapter10.timing import Reading, dates_in, reading
 from groundstation.readers.chapter10.tmats import Tmats, parse
 from groundstation.readers.source import Source
@@ -61,7 +61,7 @@ def overview(source: Source, *, with_buses: bool) -> Overview:
     return found
 
 
-def _dates(block: Block) -> Counter[date]:
+def _dates(block: PacketBlock) -> Counter[date]:
     """Count the dates in ARINC-429 words with label 260."""
     found: Counter[date] = Counter()
     for packet in block.of(ARINC_429):

@@ -26,7 +26,7 @@ _SMALLEST_PACKET = scan.HEADER_BYTES
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class PacketBlock:
     """Packets of one stretch of the file; to be used before the next one is asked for.
 
     Parameters
@@ -79,7 +79,7 @@ class Walk:
         self._spans = np.empty((MAX_SPANS, 3), dtype=np.int64)
         self._base = 0
 
-    def __iter__(self) -> Iterator[Block]:
+    def __iter__(self) -> Iterator[PacketBlock]:
         data, size = np.zeros(_SLACK, dtype=np.uint8), 0
         with self._source.open() as stream:
             while True:
@@ -118,7 +118,7 @@ class Walk:
             ) from error
         return whole[: (size + count + _SLACK) // 4 * 4], size + count, count < BLOCK_BYTES
 
-    def _blocks(self, data: NDArray[np.uint8], size: int, is_last: bool) -> Iterator[Block]:
+    def _blocks(self, data: NDArray[np.uint8], size: int, is_last: bool) -> Iterator[PacketBlock]:
         """Yield the packets of the data at hand: one block, more if damage is frequent."""
         packets = np.empty((size // _SMALLEST_PACKET + 1, scan.COLUMNS), dtype=np.int64)
         halves, words, state = data.view("<u2"), data.view("<u4"), self._state
@@ -136,6 +136,6 @@ class Walk:
                 is_setup = (verdict == scan.WRONG_CHECKSUM) & (found[:, scan.TYPE] == kinds.TMATS)
                 believed = found[(verdict == scan.WHOLE) | (verdict == scan.CUT) | is_setup]
                 if len(believed):
-                    yield Block(data, believed, self._base)
+                    yield PacketBlock(data, believed, self._base)
             if state[scan.SPANS] < len(self._spans):
                 return

@@ -17,7 +17,7 @@ from groundstation.base.records import Column, Int64Array, RecordBatch
 from groundstation.base.signals import BYTES_PREFIX
 from groundstation.readers.chapter10 import scan
 from groundstation.readers.chapter10.kinds import DISCRETE, EVENT, TIME
-from groundstation.readers.chapter10.packets import NS_PER_COUNT, Block
+from groundstation.readers.chapter10.packets import NS_PER_COUNT, PacketBlock
 from groundstation.readers.chapter10.timing import reading
 from groundstation.readers.chapter10.tmats import Tmats
 
@@ -61,7 +61,7 @@ _WHOLE: Mapping[int, str] = MappingProxyType(
 )
 
 
-def batch_of(block: Block, kind: int, channel: int, packets: Int64Array, tmats: Tmats) -> RecordBatch | None:
+def batch_of(block: PacketBlock, kind: int, channel: int, packets: Int64Array, tmats: Tmats) -> RecordBatch | None:
     """Return the records of a channel in a block; None without any, or if only counted."""
     if kind in _STAMPED:
         return _messages(block, _STAMPED[kind], channel, packets)
@@ -83,11 +83,11 @@ def batch_of(block: Block, kind: int, channel: int, packets: Int64Array, tmats: 
     return _times(block, channel, packets) if kind == TIME else None
 
 
-def _specific(block: Block, packets: Int64Array) -> Int64Array:
+def _specific(block: PacketBlock, packets: Int64Array) -> Int64Array:
     return np.array([block.specific_word(packet) for packet in packets], dtype=np.int64)
 
 
-def _messages(block: Block, form: _Stamped, channel: int, packets: Int64Array) -> RecordBatch | None:
+def _messages(block: PacketBlock, form: _Stamped, channel: int, packets: Int64Array) -> RecordBatch | None:
     flagged = np.full(len(packets), form.is_always_timed) | (_specific(block, packets) >> 31 & 1).astype(bool)
     parts = []
     for has_stamp in (True, False):
@@ -104,7 +104,12 @@ def _messages(block: Block, form: _Stamped, channel: int, packets: Int64Array) -
 
 
 def _bytes(
-    topic: str, block: Block, places: Int64Array, sizes: Int64Array, times: Int64Array, specific: Int64Array | None
+    topic: str,
+    block: PacketBlock,
+    places: Int64Array,
+    sizes: Int64Array,
+    times: Int64Array,
+    specific: Int64Array | None,
 ) -> RecordBatch | None:
     """Stretches of bytes as records of up to 64."""
     pieces = -(-sizes // _PIECE_BYTES)
@@ -129,7 +134,7 @@ def _bytes(
     return RecordBatch(topic, start + block.base, Column(times[which] * NS_PER_COUNT + piece), columns)
 
 
-def _discretes(block: Block, channel: int, packets: Int64Array) -> RecordBatch | None:
+def _discretes(block: PacketBlock, channel: int, packets: Int64Array) -> RecordBatch | None:
     """States of discretes, as 32 bits with the time of each change or sample."""
     places, times = [], []
     for packet in packets:
@@ -145,13 +150,13 @@ def _discretes(block: Block, channel: int, packets: Int64Array) -> RecordBatch |
     return RecordBatch(f"raw.discrete.{channel}", at + block.base, Column(time * NS_PER_COUNT), columns)
 
 
-def _numbers(block: Block, at: Int64Array, dtype: str) -> Int64Array:
+def _numbers(block: PacketBlock, at: Int64Array, dtype: str) -> Int64Array:
     """Numbers that begin at any byte."""
     width = np.dtype(dtype).itemsize
     return np.asarray(block.data[at[:, None] + np.arange(width)].view(dtype)[:, 0], dtype=np.int64)
 
 
-def _events(block: Block, packets: Int64Array, tmats: Tmats) -> RecordBatch | None:
+def _events(block: PacketBlock, packets: Int64Array, tmats: Tmats) -> RecordBatch | None:
     """Recording events by the names that TMATS gives them, else their numbers."""
     places, times, names = [], [], []
     for packet in packets:
@@ -169,7 +174,7 @@ def _events(block: Block, packets: Int64Array, tmats: Tmats) -> RecordBatch | No
     return RecordBatch("event", index + block.base, Column(time * NS_PER_COUNT), {"name": Column(np.array(names))})
 
 
-def _times(block: Block, channel: int, packets: Int64Array) -> RecordBatch | None:
+def _times(block: PacketBlock, channel: int, packets: Int64Array) -> RecordBatch | None:
     """Return the time packets that state a time: ``day_of_year``, ``time_of_day_ms``."""
     told = [
         (

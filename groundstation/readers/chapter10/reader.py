@@ -10,7 +10,7 @@ from groundstation.readers.chapter10.bus_words import bounded, messages_1553, wo
 from groundstation.readers.chapter10.kinds import ARINC_429, EVENT, MIL_STD_1553
 from groundstation.readers.chapter10.naming import named
 from groundstation.readers.chapter10.overview import Overview, overview
-from groundstation.readers.chapter10.packets import Block, Walk
+from groundstation.readers.chapter10.packets import PacketBlock, Walk
 from groundstation.readers.chapter10.payloads import batch_of
 from groundstation.readers.chapter10.timing import start_of
 from groundstation.readers.chapter10.tmats import Tmats
@@ -66,7 +66,7 @@ def metadata(tmats: Tmats) -> dict[str, str]:
     return facts
 
 
-def _batches(block: Block, tmats: Tmats, lost: dict[str, int]) -> Iterator[RecordBatch]:
+def _batches(block: PacketBlock, tmats: Tmats, lost: dict[str, int]) -> Iterator[RecordBatch]:
     """Yield the batches of a block, channel by channel.
 
     A topic's records are in the order of the file.

@@ -34,7 +34,7 @@ FILLERS = (b"\0", b"\xff")  # bytes with which a recorder fills the rest of a pa
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class RecordBlock:
     """Records of one stretch of the file.
 
     Parameters
@@ -81,11 +81,11 @@ class _Places(NamedTuple):
     definitions: dict[int, Definition]
 
     @classmethod
-    def of(cls, block: Block) -> "_Places":
+    def of(cls, block: RecordBlock) -> "_Places":
         return cls(block.offsets.astype(np.uint32), block.types, block.first_index, block.definitions)
 
-    def block(self, data: NDArray[np.uint8]) -> Block:
-        return Block(data, self.offsets.astype(np.int64), self.types, self.first_index, self.definitions)
+    def block(self, data: NDArray[np.uint8]) -> RecordBlock:
+        return RecordBlock(data, self.offsets.astype(np.int64), self.types, self.first_index, self.definitions)
 
 
 class _Chunk(NamedTuple):
@@ -151,7 +151,7 @@ class Scanner:
         self._chunks: list[_Chunk] = []
         self._keeps = source.size <= BYTES_KEPT  # a compressed one may turn out longer
 
-    def __iter__(self) -> Iterator[Block]:
+    def __iter__(self) -> Iterator[RecordBlock]:
         data = np.zeros(0, dtype=np.uint8)
         with self._source.open() as stream:
             while True:
@@ -175,7 +175,7 @@ class Scanner:
                     self._state[scan.SKIP_START] -= done
         self._finish(data)
 
-    def again(self) -> Iterator[Block]:
+    def again(self) -> Iterator[RecordBlock]:
         """Yield the same blocks once more.
 
         Records are searched for again only where they were too many to keep their places.
@@ -209,7 +209,7 @@ class Scanner:
                 self._source.name, f"no more data ({error.strerror})", "", "copy it again"
             ) from error
 
-    def _blocks(self, data: NDArray[np.uint8], is_last: bool) -> Iterator[Block]:
+    def _blocks(self, data: NDArray[np.uint8], is_last: bool) -> Iterator[RecordBlock]:
         """Yield the blocks of the data at hand.
 
         There are several where a definition changes or where there are very many records.
@@ -240,10 +240,10 @@ class Scanner:
                     self._define(new)
         yield from self._block(data, offsets, types)
 
-    def _block(self, data: NDArray[np.uint8], offsets: Int64Array, types: NDArray[np.uint8]) -> Iterator[Block]:
+    def _block(self, data: NDArray[np.uint8], offsets: Int64Array, types: NDArray[np.uint8]) -> Iterator[RecordBlock]:
         count = int(self._state[scan.COUNT])
         if count:
-            block = Block(data, offsets[:count].copy(), types[:count].copy(), self._count, dict(self.definitions))
+            block = RecordBlock(data, offsets[:count].copy(), types[:count].copy(), self._count, dict(self.definitions))
             self._seen[block.types] = True
             self._count += count
             self._state[scan.COUNT] = 0

@@ -12,7 +12,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Damage, Int64Array
-from groundstation.readers.dataflash.blocks import Block, Scanner
+from groundstation.readers.dataflash.blocks import RecordBlock, Scanner
 from groundstation.readers.dataflash.definitions import Definition, Units
 from groundstation.readers.dataflash.rules import FIX_3D, SPEED_SIGMA, UnknownUnits
 from groundstation.readers.dataflash.values import Rows, as_double, by_instance, rows_of
@@ -141,7 +141,7 @@ class _Survey:
             **dict.fromkeys(_EKF_STATUS_TYPES, self._core),
         }
 
-    def add(self, block: Block) -> None:
+    def add(self, block: RecordBlock) -> None:
         """Take in one block; units first, as they tell the field of instances."""
         self._definitions = block.definitions
         groups = sorted(block.groups(), key=lambda group: group[0].name not in ("UNIT", "MULT", "FMTU"))

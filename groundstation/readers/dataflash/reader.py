@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from groundstation.base.records import MAX_BATCH_ROWS, Damage, Item, LogHeader, NewLog, RecordBatch
-from groundstation.readers.dataflash.blocks import Block, Scanner
+from groundstation.readers.dataflash.blocks import RecordBlock, Scanner
 from groundstation.readers.dataflash.canonical import Mapper
 from groundstation.readers.dataflash.choices import choose
 from groundstation.readers.dataflash.definitions import Definition
@@ -54,7 +54,7 @@ def items(source: Source) -> Iterator[Item]:
             yield Damage("unreadable_cells", topic, count, "times that no clock writes", topic)
 
 
-def _rows(block: Block, found: Overview) -> Iterator[Rows]:
+def _rows(block: RecordBlock, found: Overview) -> Iterator[Rows]:
     """Rows of each type, and of each instance where the type tells them apart."""
     for definition, which in block.groups():
         if not definition.fields:

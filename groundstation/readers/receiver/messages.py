@@ -193,7 +193,7 @@ def bounded(batch: RecordBatch) -> Iterator[RecordBatch]:
         yield batch.take(slice(start, start + MAX_BATCH_ROWS))
 
 
-class Block(dict[str, Messages]):
+class MessagesByName(dict[str, Messages]):
     """Sound messages of a block by name; of a name that occurs with several lengths the most."""
 
     def add(self, messages: Messages) -> None:

@@ -18,7 +18,7 @@ from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.receiver import novatel_text, scan
 from groundstation.readers.receiver.credible import credible_attitude, credible_dilution, credible_position
 from groundstation.readers.receiver.layouts import layout
-from groundstation.readers.receiver.messages import Block, Columns, Messages, occupied
+from groundstation.readers.receiver.messages import Columns, Messages, MessagesByName, occupied
 from groundstation.readers.receiver.novatel_messages import LAYOUTS, VELOCITY_OF, name_of
 from groundstation.readers.receiver.stream import Frames
 from groundstation.readers.receiver.tally import Tally
@@ -147,7 +147,7 @@ def epoch_start(frames: Frames) -> int:
 
 
 @np.errstate(all="ignore")  # doubles of a device may be anything
-def gnss_batch(block: Block, leader: str, tally: Tally) -> RecordBatch | None:
+def gnss_batch(block: MessagesByName, leader: str, tally: Tally) -> RecordBatch | None:
     """Return one row for each position, with velocity and dilution of the same moment."""
     messages, fields = block.get(leader), block.fields(leader)
     if not isinstance(messages, Timed) or fields is None:
@@ -175,7 +175,7 @@ def gnss_batch(block: Block, leader: str, tally: Tally) -> RecordBatch | None:
 
 
 @np.errstate(all="ignore")
-def ins_batch(block: Block, source: str, tally: Tally) -> RecordBatch | None:
+def ins_batch(block: MessagesByName, source: str, tally: Tally) -> RecordBatch | None:
     """Return position, velocity and attitude of the receiver's inertial filter.
 
     For a HEADING message it is the heading of the receiver's two antennas.
@@ -294,7 +294,7 @@ def _covariance(fields: Mapping[str, NDArray[Any]]) -> Columns:
     }
 
 
-def _joined(block: Block, leader: Timed, name: str, columns_of: Any) -> Columns:
+def _joined(block: MessagesByName, leader: Timed, name: str, columns_of: Any) -> Columns:
     """Return columns of another message, on the rows of the leading one with its time."""
     other, fields = block.get(name), block.fields(name)
     if not isinstance(other, Timed) or fields is None:

@@ -14,7 +14,7 @@ from groundstation.readers.receiver.dating import Told, dated
 from groundstation.readers.receiver.host_text import HostText
 from groundstation.readers.receiver.host_times import HostTimes
 from groundstation.readers.receiver.host_times import remarks as host_remarks
-from groundstation.readers.receiver.messages import Block, Messages
+from groundstation.readers.receiver.messages import Messages, MessagesByName
 from groundstation.readers.receiver.nmea_canonical import HEADING_FORMATTERS, has_heading
 from groundstation.readers.receiver.sentence_layouts import FORMATTERS, MAKERS_POSITIONS, RECEIVERS, STANDARD_POSITIONS
 from groundstation.readers.receiver.sentences import Sentences, by_address, formatter_of
@@ -83,7 +83,7 @@ def overview(source: Source, bare: bool, host: HostText | None = None) -> Overvi
     stream = Stream(source, bare, is_hosts=host.accepts if host else None)
     host_clock = HostTimes(host) if host else None
     for frames in stream:
-        block = Block()
+        block = MessagesByName()
         for messages in ubx.messages_of(frames):
             found.counts[messages.name] += len(messages)
             if messages.is_sound:

@@ -19,7 +19,7 @@ from groundstation.readers.receiver import (
     ubx,
     ubx_canonical,
 )
-from groundstation.readers.receiver.messages import Block, bounded, raw_batches, text_batches
+from groundstation.readers.receiver.messages import MessagesByName, bounded, raw_batches, text_batches
 from groundstation.readers.receiver.novatel_messages import INS_SOURCES
 from groundstation.readers.receiver.overview import NAME, Overview, overview, remarks
 from groundstation.readers.receiver.sentences import Sentences, by_address
@@ -64,7 +64,7 @@ def _epoch_start_of(found: Overview) -> Callable[[Frames], int]:
 def _of_block(
     frames: Frames, sentences: dict[str, Sentences], found: Overview, days: nmea.DayTimes, tally: Tally
 ) -> Iterator[RecordBatch]:
-    block = Block()
+    block = MessagesByName()
     for messages, time in ubx.timed(frames, found.anchors):
         batches = text_batches if messages.name.startswith("INF-") else raw_batches
         yield from batches(messages, time)
@@ -98,7 +98,7 @@ def _of_block(
         yield from bounded(ins)
 
 
-def _ins(block: Block, epochs: nmea.Epochs, time: Column, found: Overview, tally: Tally) -> RecordBatch | None:
+def _ins(block: MessagesByName, epochs: nmea.Epochs, time: Column, found: Overview, tally: Tally) -> RecordBatch | None:
     if not found.attitude:
         return None
     if found.heading_address:

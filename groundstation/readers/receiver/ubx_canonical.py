@@ -13,7 +13,7 @@ from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatch
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.receiver.credible import credible_attitude, credible_dilution, credible_position
-from groundstation.readers.receiver.messages import Block, Columns, occupied
+from groundstation.readers.receiver.messages import Columns, MessagesByName, occupied
 from groundstation.readers.receiver.tally import MOVING_MPS, Tally
 from groundstation.readers.receiver.times import Anchors
 from groundstation.readers.receiver.ubx import time_of
@@ -35,7 +35,7 @@ SAME_DEG = 2e-5
 INS_MODE = "gnss_aided"
 
 
-def gnss_batch(block: Block, leader: str, anchors: Anchors, tally: Tally) -> RecordBatch | None:
+def gnss_batch(block: MessagesByName, leader: str, anchors: Anchors, tally: Tally) -> RecordBatch | None:
     """Return one row for each epoch, from the leading message and others.
 
     The others are of the same solution and time of the week.
@@ -57,7 +57,7 @@ def gnss_batch(block: Block, leader: str, anchors: Anchors, tally: Tally) -> Rec
     return occupied("gnss", messages.places, time_of(messages, anchors), columns)
 
 
-def ins_batch(block: Block, source: str, anchors: Anchors, tally: Tally) -> RecordBatch | None:
+def ins_batch(block: MessagesByName, source: str, anchors: Anchors, tally: Tally) -> RecordBatch | None:
     """Return the attitude of the vehicle from the message that states it.
 
     Position and velocity stay those of ``gnss``.
@@ -74,14 +74,14 @@ def ins_batch(block: Block, source: str, anchors: Anchors, tally: Tally) -> Reco
     return occupied("ins", messages.places, time_of(messages, anchors), columns)
 
 
-def has_attitude(block: Block, source: str) -> bool:
+def has_attitude(block: MessagesByName, source: str) -> bool:
     """Tell whether a message states the vehicle's heading at least once in a block."""
     fields = block.fields(source)
     heading = None if fields is None else _ATTITUDES[source](fields).get("true_heading_deg")
     return heading is not None and bool(heading.mask.any())
 
 
-def heading_as_track(block: Block, source: str) -> tuple[int, int]:
+def heading_as_track(block: MessagesByName, source: str) -> tuple[int, int]:
     """Count the fixes of a moving vehicle whose heading equals its track, and all of them."""
     fields = block.fields(source)
     if fields is None or source != "NAV-PVAT":
@@ -166,7 +166,7 @@ def _position(fields: Mapping[str, NDArray[Any]], present: BoolArray, has_height
     }
 
 
-def _precise(block: Block, fields: Mapping[str, NDArray[Any]], columns: Columns) -> Columns:
+def _precise(block: MessagesByName, fields: Mapping[str, NDArray[Any]], columns: Columns) -> Columns:
     """Return the finer position of NAV-HPPOSLLH where it is valid and of the same epoch.
 
     Elsewhere it is that of the leading message.
@@ -288,7 +288,7 @@ _SOLUTIONS: Mapping[str, Callable[[Mapping[str, NDArray[Any]]], Columns]] = {
 
 
 def _added(
-    block: Block,
+    block: MessagesByName,
     name: str,
     fields: Mapping[str, NDArray[Any]],
     columns_of: Callable[[Mapping[str, NDArray[Any]]], Columns],

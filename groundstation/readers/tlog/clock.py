@@ -17,7 +17,7 @@ from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.clock_offsets import Jump, Offsets, offsets_by
 from groundstation.readers.tlog.dialect import Message, messages
-from groundstation.readers.tlog.frames import Block
+from groundstation.readers.tlog.frames import FrameBlock
 from groundstation.readers.two_clocks import FEWEST_READINGS, Line, Readings, Stretch, Track, lower_line, stretches_of
 
 Key: TypeAlias = tuple[int, int, bool]  # sender, number of message, and whether its times count from 1970
@@ -95,7 +95,7 @@ class TimeReader:
     number: int
     unwrapped: _Unwrapped = field(default_factory=_Unwrapped)
 
-    def read(self, block: Block, which: Int64Array) -> tuple[Int64Array, BoolArray]:
+    def read(self, block: FrameBlock, which: Int64Array) -> tuple[Int64Array, BoolArray]:
         """Return times in nanoseconds, and which of them count from 1970; shape (n,) each.
 
         A time is -1 where there is none.
@@ -249,7 +249,7 @@ class ClockSurvey:
         self._jumps: list[Jump] = []
         self._last: tuple[int, int] | None = None
 
-    def take(self, block: Block) -> None:
+    def take(self, block: FrameBlock) -> None:
         """Take in the readings of a block."""
         received = block.received
         self._note_jumps(block.record_index, received)
@@ -259,7 +259,7 @@ class ClockSurvey:
             for number, which in steady or timed:
                 self._take(block, sender, number, which if received.present is None else which[received.mask[which]])
 
-    def _take(self, block: Block, sender: int, number: int, which: Int64Array) -> None:
+    def _take(self, block: FrameBlock, sender: int, number: int, which: Int64Array) -> None:
         one = time_fields()[number]
         if (one.is_short and one.unit_ns == NS_PER_US) or not len(which):
             return
@@ -274,7 +274,7 @@ class ClockSurvey:
         if messages()[number].name == "SYSTEM_TIME":
             self._take_utc(block, sender, number, which, time_ns)
 
-    def _take_utc(self, block: Block, sender: int, number: int, which: Int64Array, boot_ns: Int64Array) -> None:
+    def _take_utc(self, block: FrameBlock, sender: int, number: int, which: Int64Array, boot_ns: Int64Array) -> None:
         unix_us = block.rows(which, messages()[number])["time_unix_usec"]
         good = (unix_us >= np.uint64(SINCE_1970_US)) & (unix_us < np.uint64(_LAST_US)) & (boot_ns > 0)
         unix_ns = np.where(good, unix_us, 0).astype(np.int64) * NS_PER_US

@@ -18,7 +18,7 @@ _MOST_US = (1 << 62) // _NS_PER_US
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class FrameBlock:
     """Frames of one stretch: columns as in :mod:`scan`, and the bytes they stand in."""
 
     data: NDArray[np.uint8]

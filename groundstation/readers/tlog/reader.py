@@ -21,7 +21,7 @@ from groundstation.readers.source import Source
 from groundstation.readers.tlog.canonical import ARMED, INSTANCES, ROLES
 from groundstation.readers.tlog.clock import Clocks, ClockSurvey
 from groundstation.readers.tlog.dialect import Message, crc_extras, messages
-from groundstation.readers.tlog.frames import Block
+from groundstation.readers.tlog.frames import FrameBlock
 from groundstation.readers.tlog.timer import Timer
 
 BLOCK_BYTES = 4 << 20
@@ -37,14 +37,14 @@ class _Frames:
     skipped: SkippedBytes = field(default_factory=lambda: SkippedBytes("frame"))
     unknown: int = 0
     cut: tuple[int, int] | None = None
-    _kept: list[Block] | None = None
+    _kept: list[FrameBlock] | None = None
 
-    def __iter__(self) -> Iterator[Block]:
+    def __iter__(self) -> Iterator[FrameBlock]:
         if self._kept is not None:
             yield from self._kept
             return
         self.skipped, self.unknown, self.cut = SkippedBytes("frame"), 0, None
-        kept: list[Block] | None = []
+        kept: list[FrameBlock] | None = []
         size = 0
         for block in self._scanned():
             size += len(block.data)
@@ -55,7 +55,7 @@ class _Frames:
             yield block
         self._kept = kept
 
-    def _scanned(self) -> Iterator[Block]:
+    def _scanned(self) -> Iterator[FrameBlock]:
         from groundstation.readers.tlog import scan
 
         data, base, count = np.zeros(0, dtype=np.uint8), 0, 0
@@ -73,7 +73,7 @@ class _Frames:
                     self.unknown += unknown
                     self._note(view, skipped[:spans], begun + at, count, is_last and at + done == len(data))
                     if frames:
-                        yield Block(view, found[:frames].copy(), count)
+                        yield FrameBlock(view, found[:frames].copy(), count)
                         count += frames
                     at += done
                     if not done or (not is_last and at + scan.LONGEST > len(data)):
@@ -138,7 +138,7 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
     yield from frames.damages()
 
 
-def _with_next(blocks: Iterable[Block]) -> Iterator[tuple[Block, Block | None]]:
+def _with_next(blocks: Iterable[FrameBlock]) -> Iterator[tuple[FrameBlock, FrameBlock | None]]:
     """Yield each block with the one that follows."""
     before = None
     for block in blocks:
@@ -149,7 +149,7 @@ def _with_next(blocks: Iterable[Block]) -> Iterator[tuple[Block, Block | None]]:
         yield before, None
 
 
-def _survey(frames: Iterable[Block]) -> tuple[int, dict[str, frozenset[str]], Clocks]:
+def _survey(frames: Iterable[FrameBlock]) -> tuple[int, dict[str, frozenset[str]], Clocks]:
     """Find the vehicle, the columns of its messages, and the clocks of all senders.
 
     The vehicle (system x 256 + component) is the one that tells its attitude most often.
@@ -170,7 +170,7 @@ def _survey(frames: Iterable[Block]) -> tuple[int, dict[str, frozenset[str]], Cl
     return vehicle, columns, clocks.clocks(vehicle)
 
 
-def _part(block: Block, which: Int64Array, message: Message, validity_ns: Int64Array | None) -> Part:
+def _part(block: FrameBlock, which: Int64Array, message: Message, validity_ns: Int64Array | None) -> Part:
     """Columns of one message's frames."""
     rows_of = block.rows(which, message)
     columns: dict[str, Column] = {}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.tlog.clock import NS_PER_US, Clocks, TimeReader, time_fields
-from groundstation.readers.tlog.frames import Block
+from groundstation.readers.tlog.frames import FrameBlock
 
 MOST_LATE_S = 600.0
 ASTRAY_S = 2.0  # largest difference of a message's time from its sender's clock around it
@@ -35,7 +35,7 @@ class Timer:
         self._references: dict[int, NDArray[np.int64]] = {}  # references of the block that follows
         self._device_ns: Int64Array = np.zeros(0, dtype=np.int64)  # when the last frame before the block was received
 
-    def validity_ns(self, block: Block, following: Block | None) -> Int64Array | None:
+    def validity_ns(self, block: FrameBlock, following: FrameBlock | None) -> Int64Array | None:
         """Return the times of validity of a block's frames, shape (n,).
 
         They are by the ground station's clock; None without any clock.
@@ -73,7 +73,7 @@ class Timer:
         validity_ns += (validity_ns == device_ns) & self._is_repeated(device_ns, following)
         return np.where(has_own | is_known, validity_ns, device_ns)
 
-    def _is_repeated(self, device_ns: Int64Array, following: Block | None) -> BoolArray:
+    def _is_repeated(self, device_ns: Int64Array, following: FrameBlock | None) -> BoolArray:
         """Tell which frames were received together with a neighbour, shape (n,)."""
         behind_ns = np.zeros(0, dtype=np.int64) if following is None else following.received.values[:1]
         around_ns = np.concatenate((self._device_ns, device_ns, behind_ns))
@@ -81,15 +81,15 @@ class Timer:
         first, self._device_ns = len(self._device_ns), device_ns[-1:]
         return np.asarray((is_same[:-1] | is_same[1:])[first : first + len(device_ns)])
 
-    def _received_ns(self, block: Block) -> Int64Array:
+    def _received_ns(self, block: FrameBlock) -> Int64Array:
         return np.asarray(block.received.values + self._clocks.offsets.at(block.record_index))
 
-    def _read(self, block: Block, sender: int, number: int, which: Int64Array) -> Int64Array:
+    def _read(self, block: FrameBlock, sender: int, number: int, which: Int64Array) -> Int64Array:
         """Read times of frames by the clock of their sender, -1 where there is none."""
         reader = self._readers.setdefault((sender, number), TimeReader(number))
         return self._clocks.senders[sender].by_its_clock(*reader.read(block, which))
 
-    def _read_references(self, block: Block) -> dict[int, NDArray[np.int64]]:
+    def _read_references(self, block: FrameBlock) -> dict[int, NDArray[np.int64]]:
         """Read the frames of each sender that serve its clock: record, receipt, clock.
 
         Only those that can be true.
@@ -117,7 +117,7 @@ class Timer:
 
     def _place(
         self,
-        block: Block,
+        block: FrameBlock,
         sender: int,
         groups: Sequence[tuple[int, Int64Array]],
         around: NDArray[np.int64],

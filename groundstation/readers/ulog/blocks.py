@@ -41,7 +41,7 @@ class Topic:
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class UlogBlock:
     """Messages of one stretch of the file, in file order.
 
     Use a block before the next one is asked for.
@@ -196,7 +196,7 @@ class Walk:
         """
         return self._source.size <= KEPT_BYTES
 
-    def __iter__(self) -> Iterator[Block]:
+    def __iter__(self) -> Iterator[UlogBlock]:
         with self._source.open() as stream:
             flags = flags_of(self._source)
             if flags and flags.is_damaged:
@@ -221,7 +221,7 @@ class Walk:
             self._ends.append(Damage("truncated", f"byte {size}", 1, text))
         return [*(offset for offset in dict.fromkeys(offsets) if start < offset < size), size]
 
-    def _section(self, stream: BinaryIO, start: int, end: int) -> Iterator[Block]:
+    def _section(self, stream: BinaryIO, start: int, end: int) -> Iterator[UlogBlock]:
         """Yield blocks of the messages in the bytes from ``start`` to ``end``."""
         state = scan.new_state()
         room = min(BLOCK_BYTES + 2 * scan.LOOKAHEAD, end - start)
@@ -242,7 +242,7 @@ class Walk:
             yield from self._messages(buffer[: filled + SLACK], is_end, base, state)
         self._close(stream, state, base, base + filled)
 
-    def _messages(self, data: NDArray[np.uint8], is_end: bool, base: int, state: Int64Array) -> Iterator[Block]:
+    def _messages(self, data: NDArray[np.uint8], is_end: bool, base: int, state: Int64Array) -> Iterator[UlogBlock]:
         """Yield blocks of the messages in ``data``, which begins at byte ``base`` of the file.
 
         ``data`` includes the slack.
@@ -269,7 +269,7 @@ class Walk:
                     definitions.heed(chr(-int(topic[last])), body, base + place)
             count = int(state[scan.COUNT])
             if count:
-                yield Block(data, at[:count], topic[:count], self._index, definitions.topics)
+                yield UlogBlock(data, at[:count], topic[:count], self._index, definitions.topics)
                 self._index += count
 
     def _note_skipped(self, data: NDArray[np.uint8], start: int, behind: int) -> None:

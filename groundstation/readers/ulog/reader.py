@@ -28,7 +28,7 @@ from groundstation.readers.mapping import mapped
 from groundstation.readers.parts import Part, bounded, merged, occupied
 from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
-from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, Block, Topic, Walk
+from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, Topic, UlogBlock, Walk
 from groundstation.readers.ulog.canonical import MODE_NAMES, MODES, Rows
 from groundstation.readers.ulog.formats import TIMESTAMP
 from groundstation.readers.ulog.survey import Overview, overview
@@ -107,7 +107,7 @@ def items(source: Source, reader_name: str, start_us: int) -> Iterator[Item]:
     yield from texts.damages()
 
 
-def _let_go(blocks: deque[Block]) -> Iterator[Block]:
+def _let_go(blocks: deque[UlogBlock]) -> Iterator[UlogBlock]:
     """Yield blocks; each is freed once it is done."""
     while blocks:
         yield blocks.popleft()

@@ -11,7 +11,7 @@ import numpy as np
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Remark
 from groundstation.readers.mapping import Assignment, Offer, assigned
-from groundstation.readers.ulog.blocks import Block, Definitions, Topic
+from groundstation.readers.ulog.blocks import Definitions, Topic, UlogBlock
 from groundstation.readers.ulog.canonical import ARMING, ROLES
 from groundstation.readers.ulog.messages import Keyed, keyed, release_text
 from groundstation.readers.ulog.utc import FIX_3D, Clocks
@@ -48,7 +48,7 @@ class Overview:
     odd_flags: set[tuple[int, str]] = field(default_factory=set)
 
 
-def overview(blocks: Iterable[Block], definitions: Definitions) -> Overview:
+def overview(blocks: Iterable[UlogBlock], definitions: Definitions) -> Overview:
     """Go through the blocks of a log once; ``definitions`` are those of their walk."""
     with_data: set[int] = set()
     found, clocks = Overview(), Clocks()
@@ -69,7 +69,7 @@ def overview(blocks: Iterable[Block], definitions: Definitions) -> Overview:
     return found
 
 
-def _note_odd_flags(block: Block, topic: Topic, odd: set[tuple[int, str]]) -> None:
+def _note_odd_flags(block: UlogBlock, topic: Topic, odd: set[tuple[int, str]]) -> None:
     """Note columns of type bool that hold other values than 0 and 1.
 
     They are kept as the numbers they are.
@@ -80,7 +80,7 @@ def _note_odd_flags(block: Block, topic: Topic, odd: set[tuple[int, str]]) -> No
     odd.update((topic.number, name) for name in topic.layout.flags if (rows[name] > 1).any())
 
 
-def _has_fix(block: Block, topic: Topic) -> bool:
+def _has_fix(block: UlogBlock, topic: Topic) -> bool:
     """Tell whether a block has a receiver with a fix."""
     if topic.name not in _RECEIVERS or topic.layout is None or "fix_type" not in topic.layout.names:
         return False
@@ -105,7 +105,7 @@ def _assign(found: Overview, topics: list[Topic]) -> None:
             break
 
 
-def _note_facts(block: Block, metadata: dict[str, str], clocks: Clocks) -> None:
+def _note_facts(block: UlogBlock, metadata: dict[str, str], clocks: Clocks) -> None:
     for _number, kind, body in block.controls():
         if kind in "LC":
             clocks.heed_line(kind, body)

@@ -8,7 +8,7 @@ import numpy as np
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Column, Damage, Int64Array, RecordBatch
-from groundstation.readers.ulog.blocks import Block
+from groundstation.readers.ulog.blocks import UlogBlock
 from groundstation.readers.ulog.messages import Keyed, keyed, logged_text
 
 # No topic of PX4 has a dot in its name: these can be no topic of the log.
@@ -64,7 +64,7 @@ class TextTopics:
     dropouts: list[tuple[int, int]] = field(default_factory=list)
     _has_data: bool = False
 
-    def batches(self, block: Block, newest_us: Int64Array) -> Iterator[RecordBatch]:
+    def batches(self, block: UlogBlock, newest_us: Int64Array) -> Iterator[RecordBatch]:
         """Yield the rows of a block's text topics.
 
         ``newest_us`` is the time of the newest data before each text message.

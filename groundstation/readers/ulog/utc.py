@@ -11,7 +11,7 @@ from groundstation.base.timescales import GPS_EPOCH_NS, iso_to_utc_ns, utc_ns_to
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.rollover import Earliest, OtherDate, rollovers
 from groundstation.readers.start import ToldZero, told_at_zero
-from groundstation.readers.ulog.blocks import Block, Topic
+from groundstation.readers.ulog.blocks import Topic, UlogBlock
 from groundstation.readers.ulog.messages import Keyed, logged_text
 
 UTC_SOURCES = ("vehicle_gps_position", "sensor_gps", "vehicle_global_position")
@@ -60,7 +60,7 @@ class Clocks:
     _offset_s: int = 0
     _line: tuple[str, int] | None = None  # name of the log, and when the line with it was written
 
-    def take(self, block: Block, topic: Topic) -> None:
+    def take(self, block: UlogBlock, topic: Topic) -> None:
         """Take in the messages of a topic."""
         layout = topic.layout
         if topic.name not in UTC_SOURCES or layout is None or layout.timestamp_offset is None:
