@@ -152,6 +152,10 @@ class HeadingByTrack:
         """Flight second of the first straight part it rests on, None where there is none."""
         raise NotImplementedError
 
+    def epochs_s(self) -> FloatArray:
+        """Flight seconds of the epochs used, none where they are not kept."""
+        raise NotImplementedError
+
     def seconds_used(self) -> float:
         """Seconds that the epochs used stand for."""
         raise NotImplementedError
@@ -204,6 +208,29 @@ class Outage(Protocol):
     def start_s(self) -> float: ...
     @property
     def missing(self) -> str: ...
+
+
+@dataclass(frozen=True)
+class ReplayedForecasts:
+    """Forecasts of the position error of an INS that were replayed on its flight.
+
+    ``lead_s`` (n,) is the time after the start ``start_s`` (n,), flight seconds; ``forecast_m`` and ``sigma_m`` (n, 2)
+    are the change of the error since the start, north and east, and its sigma.
+    """
+
+    method: str
+    start_s: FloatArray
+    lead_s: FloatArray
+    forecast_m: FloatArray
+    sigma_m: FloatArray
+
+
+class ForecastOfErrors:
+    """Role of an answer that forecasts the errors of an INS without GNSS."""
+
+    def replayed(self) -> ReplayedForecasts | None:
+        """Return the replayed forecasts of the method that is used, None where they are not kept."""
+        raise NotImplementedError
 
 
 class ErrorsAlongTheFlight:

@@ -201,6 +201,11 @@ class Systems:
         """Studies."""
         return tuple(study for one in self.every for study in one.studies)
 
+    @cached_property
+    def roles(self) -> Mapping[type[Any], Callable[[Any], Any]]:
+        """Roles that the analyses of a flight offer to each other."""
+        return {role: make for analysis in self.analyses for role, make in analysis.offers.items()}
+
     @property
     def apply(self) -> "ApplyStep | None":
         """Step of ``run --apply``; None where no system has one."""

@@ -20,7 +20,7 @@ class HasTracks(Protocol):
     def tracks(self, start_ns: int) -> Iterator[tuple[str, Table]]:
         """Yield name and table of each track, with the field names of an INS.
 
-        ``start_ns`` is the start of the flight.
+        Positions are those of the GNSS antenna. ``start_ns`` is the start of the flight.
         """
 
 

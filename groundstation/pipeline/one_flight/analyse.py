@@ -159,7 +159,7 @@ def known_of(flight: Flight, configuration: Configuration) -> Known:
         settings=settings.analyses,
         weather=configuration.weather,
         lessons=configuration.lessons,
-        roles={role: make for analysis in systems().analyses for role, make in analysis.offers.items()},
+        roles=systems().roles,
     )
     try:
         return replace(known, intervals=_intervals(flight, configuration))

@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from groundstation.base.angles import FloatArray
 from groundstation.results.answer import Answer
 from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
@@ -265,6 +266,11 @@ class HeadingResult(Answer, OnTaxi, HeadingByTrack, LatencyByTurns):
     def begins_s(self) -> float | None:
         """Flight second of the first straight segment, None where there is none."""
         return self.segments[0].start_s if self.segments else None
+
+    def epochs_s(self) -> FloatArray:
+        """Flight seconds of the epochs used, none where they are not kept."""
+        samples = found_in(self.figures, HeadingSamples)
+        return np.empty(0) if samples is None else samples.time_s[samples.is_used]
 
     def seconds_used(self) -> float:
         """Seconds that the epochs used stand for."""

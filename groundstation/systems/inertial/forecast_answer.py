@@ -6,9 +6,14 @@ The forecast is replayed on the flight itself.
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+import numpy as np
+
 from groundstation.results.answer import Answer
+from groundstation.results.arrays.typed import found_in
 from groundstation.results.figures import FigureData
 from groundstation.results.forecast_methods import FORECAST_METHODS
+from groundstation.results.roles import ForecastOfErrors, ReplayedForecasts
+from groundstation.systems.inertial.forecast_arrays import ForecastFan
 
 WITHIN, TOO_FEW = "within limits", "too few to judge"  # verdicts by NEES
 FEWEST_STARTS = 5  # independent ones: with fewer the limits of NEES are so wide that anything passes
@@ -123,7 +128,7 @@ class CoupledRow:
 
 
 @dataclass(frozen=True)
-class ForecastResult(Answer):
+class ForecastResult(Answer, ForecastOfErrors):
     """Forecast skill on one flight.
 
     Parameters
@@ -159,6 +164,15 @@ class ForecastResult(Answer):
     coupled: tuple[CoupledRow, ...] = ()
     best_method: dict[str, str] = field(default_factory=dict, metadata={"one_of": tuple(FORECAST_METHODS)})
     figures: tuple[FigureData, ...] = ()
+
+    def replayed(self) -> ReplayedForecasts | None:
+        """Return the fan of the default method, None where it is not kept."""
+        fan = found_in(self.figures, ForecastFan)
+        if fan is None:
+            return None
+        forecast_m = np.stack([fan.north.forecast_m, fan.east.forecast_m], axis=1)
+        sigma_m = np.stack([fan.north.sigma_m, fan.east.sigma_m], axis=1)
+        return ReplayedForecasts(self.default_method, fan.start_s, fan.lead_s, forecast_m, sigma_m)
 
 
 def honesty(independent_starts: int, nees: float, nees_low: float, nees_high: float) -> str:

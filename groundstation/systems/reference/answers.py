@@ -5,34 +5,26 @@ import numpy as np
 from groundstation.base.angles import FloatArray, wrap_180
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.signals import kind_of
-from groundstation.results.arrays.typed import found_in
 from groundstation.results.forecast_methods import FORECAST_HORIZONS_MIN
-from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.heading.arrays import HeadingSamples
-from groundstation.systems.inertial.answer import InertialResult
-from groundstation.systems.inertial.forecast_answer import ForecastResult
-from groundstation.systems.inertial.forecast_arrays import ForecastFan
+from groundstation.results.roles import HeadingByTrack, ReplayedForecasts
 from groundstation.systems.reference.answer import ForecastCheck, HeadingCheck
 from groundstation.systems.reference.errors import Errors
 from groundstation.systems.reference.statistics import share_of, spread_of
 
-SAMPLES = "heading_samples"
 LEAST_SAMPLES, LEAST_STARTS = 10, 3
 NEAR_S = 2.0  # between a time of the forecast and the nearest error that is known
 
 
-def heading_check(heading: HeadingResult, errors: Errors) -> HeadingCheck | None:
+def heading_check(heading: HeadingByTrack, errors: Errors) -> HeadingCheck | None:
     """Compare the heading error found with INS minus reference at the same samples.
 
     None where too few are known.
 
     ``errors`` are those of the INS as logged. Interval and reference are independent: their variances add.
     """
-    figure = found_in(heading.figures, HeadingSamples)
-    if figure is None or heading.ins_topic != errors.subject:
+    if heading.ins_topic != errors.subject:
         return None
-    at = figure.time_s[figure.is_used]
-    seen = _at(errors.time_s, errors.angles_deg[:, 2], at)
+    seen = _at(errors.time_s, errors.angles_deg[:, 2], heading.epochs_s())
     seen = seen[np.isfinite(seen)]
     if len(seen) < LEAST_SAMPLES:
         return None
@@ -54,25 +46,20 @@ def heading_check(heading: HeadingResult, errors: Errors) -> HeadingCheck | None
     )
 
 
-def forecast_checks(forecast: ForecastResult, inertial: InertialResult, errors: Errors) -> tuple[ForecastCheck, ...]:
-    """Compare the replayed forecast with the growth of the INS error by the reference.
+def forecast_checks(replayed: ReplayedForecasts, ins_topic: str, errors: Errors) -> tuple[ForecastCheck, ...]:
+    """Compare replayed forecasts with the growth of the INS error by the reference.
 
-    It is the default method of the replay, at the usual horizons.
+    They are those of one INS, at the usual horizons.
     """
-    fan = found_in(forecast.figures, ForecastFan)
-    if fan is None or inertial.ins_topic != errors.subject or kind_of(errors.subject) != "ins":
+    if ins_topic != errors.subject or kind_of(errors.subject) != "ins":
         return ()
-    rows = []
-    for horizon_min in FORECAST_HORIZONS_MIN:
-        row = _forecast_row(fan, forecast.default_method, float(horizon_min), errors)
-        if row is not None:
-            rows.append(row)
-    return tuple(rows)
+    rows = (_forecast_row(replayed, float(horizon_min), errors) for horizon_min in FORECAST_HORIZONS_MIN)
+    return tuple(row for row in rows if row is not None)
 
 
-def _forecast_row(fan: ForecastFan, method: str, horizon_min: float, errors: Errors) -> ForecastCheck | None:
-    rows = np.abs(fan.lead_s - 60.0 * horizon_min) < 1e-6
-    start_s = fan.start_s[rows]
+def _forecast_row(replayed: ReplayedForecasts, horizon_min: float, errors: Errors) -> ForecastCheck | None:
+    rows = np.abs(replayed.lead_s - 60.0 * horizon_min) < 1e-6
+    start_s = replayed.start_s[rows]
     if rows.sum() < LEAST_STARTS:
         return None
     grown = np.stack(
@@ -82,8 +69,7 @@ def _forecast_row(fan: ForecastFan, method: str, horizon_min: float, errors: Err
         ],
         axis=1,
     )
-    forecast = np.stack([fan.north.forecast_m[rows], fan.east.forecast_m[rows]], axis=1)
-    sigma = np.stack([fan.north.sigma_m[rows], fan.east.sigma_m[rows]], axis=1)
+    forecast, sigma = replayed.forecast_m[rows], replayed.sigma_m[rows]
     known = np.isfinite(grown).all(axis=1) & np.isfinite(forecast).all(axis=1)
     if known.sum() < LEAST_STARTS:
         return None
@@ -94,7 +80,7 @@ def _forecast_row(fan: ForecastFan, method: str, horizon_min: float, errors: Err
         z = error / sigma[known]
         share = share_of(np.abs(z).ravel() <= NORMAL_95, z.reshape(-1, 1))
     return ForecastCheck(
-        *(method, horizon_min, int(known.sum())),
+        *(replayed.method, horizon_min, int(known.sum())),
         rmse_m=float(np.sqrt(np.mean(np.square(radial)))),
         raw_rmse_m=float(np.sqrt(np.mean(np.sum(np.square(grown[known]), axis=1)))),
         share_inside95=None if share is None else share.inside,

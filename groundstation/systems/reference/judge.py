@@ -12,12 +12,10 @@ import numpy as np
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.base.units import NS_PER_S
+from groundstation.results.roles import ErrorsAlongTheFlight, ForecastOfErrors, HeadingByTrack
 from groundstation.systems.analysis import Found
-from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.inertial.answer import InertialResult
-from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.known import Known
-from groundstation.systems.reference.answer import ErrorRow, Placed, ReferenceResult
+from groundstation.systems.reference.answer import ErrorRow, ForecastCheck, Placed, ReferenceResult
 from groundstation.systems.reference.answers import forecast_checks, heading_check
 from groundstation.systems.reference.errors import FIELDS, Errors, errors_of
 from groundstation.systems.reference.figures import checks_figure, errors_figure, track_figure
@@ -84,7 +82,7 @@ def _step_s(reference: "Table") -> float:
 def _placed(as_logged: Sequence[Errors], settings: ReferenceSettings) -> tuple[tuple[Placed, ...], list[Errors]]:
     """Estimate lever arm and clock of the recorded sources, and return the errors without arm.
 
-    The filters' solutions of the INS stand where the GNSS antenna does.
+    Tracks made of an INS stand where the GNSS antenna does.
     """
     placed, listed = [], []
     antenna: Placed | None = None
@@ -93,7 +91,7 @@ def _placed(as_logged: Sequence[Errors], settings: ReferenceSettings) -> tuple[t
             found, one = place(one, settings, takes_stated=kind_of(one.subject) == "gnss")
             placed.append(found)
             antenna = found if antenna is None and kind_of(one.subject) == "gnss" else antenna
-        elif one.subject in ("corrected", "smoothed") and antenna is not None and antenna.is_arm_taken_out:
+        elif np.isfinite(one.position_m[:, :2]).any() and antenna is not None and antenna.is_arm_taken_out:
             one = one.without_arm(antenna.arm_forward_m or 0.0, antenna.arm_right_m or 0.0)
         listed.append(one)
     return tuple(placed), listed
@@ -134,13 +132,8 @@ def _answer(
     claims = [
         found for one in listed for axis in axes_of(one, settings) if axis.sigma and (found := checked(one, axis))
     ]
-    heading, forecast, inertial = (known.answer(kind) for kind in (HeadingResult, ForecastResult, InertialResult))
-    headings = [heading_check(heading, one) for one in as_logged] if isinstance(heading, HeadingResult) else []
-    forecasts = [
-        forecast_checks(forecast, inertial, one)
-        for one in as_logged
-        if isinstance(forecast, ForecastResult) and isinstance(inertial, InertialResult)
-    ]
+    heading = known.answer_meeting(HeadingByTrack)
+    headings = [] if heading is None else [heading_check(heading, one) for one in as_logged]
     figures = (errors_figure(listed), track_figure(listed), checks_figure(claims))
     steps_s = np.diff(reference.time_ns) / NS_PER_S
     covered = float(np.sum(steps_s[steps_s <= max(settings.gap_max_s, 3.0 * _step_s(reference))]))
@@ -157,7 +150,7 @@ def _answer(
         paths=tuple(row for one in listed for row in path_rows(one)),
         relative=tuple(row for one in listed for row in relative_rows(one, settings)),
         headings=tuple(one for one in headings if one is not None),
-        forecasts=tuple(row for rows in forecasts for row in rows),
+        forecasts=_forecasts(known, as_logged),
         settings={
             name: ", ".join(f"{part:g}" for part in value) if isinstance(value, tuple) else value
             for name, value in asdict(settings).items()
@@ -166,3 +159,12 @@ def _answer(
         figures=tuple(figure for figure in figures if figure is not None),
     )
     return answer, claims
+
+
+def _forecasts(known: Known, as_logged: Sequence[Errors]) -> tuple[ForecastCheck, ...]:
+    """Return the checks of the forecast that was replayed for one of the INSs."""
+    forecast, ins = known.answer_meeting(ForecastOfErrors), known.answer_meeting(ErrorsAlongTheFlight)
+    replayed = None if forecast is None else forecast.replayed()
+    if replayed is None or ins is None:
+        return ()
+    return tuple(row for one in as_logged for row in forecast_checks(replayed, ins.ins_topic, one))

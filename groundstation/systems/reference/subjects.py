@@ -12,7 +12,7 @@ from groundstation.base.angles import FloatArray, wrap_360
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.base.signals import topics_of_kind
-from groundstation.systems.heading.answer import HeadingResult
+from groundstation.results.roles import HeadingByTrack
 from groundstation.systems.known import Known
 from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.headings import true_heading
@@ -31,7 +31,7 @@ def subjects_of(flight: Flight, known: Known) -> Iterator[tuple[str, Table]]:
     for working in known.workings.values():
         if isinstance(working, HasTracks):
             yield from working.tracks(flight.start_ns)
-    heading = known.answer(HeadingResult)
+    heading = known.answer_meeting(HeadingByTrack)
     if heading is not None and heading.ins_topic in flight:
         corrected = wrap_360(_true_heading(flight, heading.ins_topic) - heading.error_deg)
         sigma = np.full(len(corrected), heading.standard_error_deg)

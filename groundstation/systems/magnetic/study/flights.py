@@ -4,11 +4,13 @@ Whole flights start on the stand.
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
+from groundstation.methods.roles import HeadingOnGround
+from groundstation.results.roles import Delays, HeadingByTrack
 from groundstation.simulation.flight import simulate
 from groundstation.simulation.legs import Fly
 from groundstation.simulation.magnetic_family import FIGURE_ALTITUDE_M, MagneticFamilySettings, draw_magnetic_scenario
@@ -17,9 +19,7 @@ from groundstation.simulation.readings import Readings, generator
 from groundstation.simulation.scenario import InsSettings, Scenario
 from groundstation.simulation.sensors import ins_readings
 from groundstation.simulation.trajectory import Trajectory, fly
-from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.heading.estimate import estimate_heading_error
-from groundstation.systems.latency.estimate import estimate_latencies
+from groundstation.systems.answers_by_role import answered
 from groundstation.systems.magnetic.study.cases import Legs, Setup, WideCell, with_figure
 from groundstation.systems.magnetic.study.judge import Flown, Outcome, judge
 from groundstation.tables.phases import Interval, Phases
@@ -27,6 +27,7 @@ from groundstation.tables.table import Flight, Table
 
 LEGS_TO_LIFT_OFF = 6
 LEVEL_M = 1.0  # within so much of its altitude the figure's part of the flight begins
+UNTOLD = Phases((), "not told")
 INS_FIELDS = ("latitude_deg", "longitude_deg", "altitude_ellipsoid_m", "roll_deg", "pitch_deg", "true_heading_deg")
 
 
@@ -36,7 +37,7 @@ class Hangar:
     def __init__(self, seed: int) -> None:
         self.seed = seed
         self._motions: dict[Scenario, Trajectory] = {}
-        self._taxis: dict[float, HeadingResult | None] = {}
+        self._taxis: dict[float, HeadingByTrack | None] = {}
 
     def outcome(self, setup: Setup, figure: Legs | None = None) -> Outcome:
         """Fly one setup and judge the estimator's answer.
@@ -49,10 +50,10 @@ class Hangar:
         flown = self.flown(scenario, setup)
         heading = self._taxi(setup.family) if setup.is_aligned else None
         if heading is not None and setup.hours_since_taxi:
-            at_s = (heading.reference_time_s or 0.0) - 3600.0 * setup.hours_since_taxi
-            heading = replace(heading, reference_time_s=at_s)
+            heading = _earlier(heading, 3600.0 * setup.hours_since_taxi)
         phases = Phases((Interval(0.0, flown.flight.duration_s + 1.0, "airborne"),), "truth")
-        return judge(flown, heading=heading, phases=phases)
+        on_ground = answered(flown.flight, phases, ()).role(HeadingOnGround)
+        return judge(flown, heading=heading, on_ground=on_ground, phases=phases)
 
     def flown(self, scenario: Scenario, setup: Setup) -> Flown:
         """Return the level part of a flight."""
@@ -76,8 +77,8 @@ class Hangar:
             self._motions[key] = whole.at(np.arange(first, len(whole)))
         return self._motions[key]
 
-    def _taxi(self, family: MagneticFamilySettings) -> HeadingResult | None:
-        """Return system 1's answer of the taxi before the flight.
+    def _taxi(self, family: MagneticFamilySettings) -> HeadingByTrack | None:
+        """Return the heading error by the taxi before the flight.
 
         The taxi has the same azimuth error, and no drift.
         """
@@ -85,7 +86,8 @@ class Hangar:
         if sigma not in self._taxis:
             drawn = draw_magnetic_scenario(replace(family, drift_sigma_dph=0.0), self.seed)
             legs = (*drawn.legs[:LEGS_TO_LIFT_OFF], Fly(10.0, family.airspeed_mps))
-            self._taxis[sigma] = _aligned(simulate(replace(drawn, legs=legs)).flight)
+            known = answered(simulate(replace(drawn, legs=legs)).flight, UNTOLD, (HeadingByTrack,))
+            self._taxis[sigma] = known.answer_meeting(HeadingByTrack)
         return self._taxis[sigma]
 
 
@@ -100,11 +102,14 @@ def wide_outcome(cell: WideCell, seed: int) -> Outcome:
     field = world_field_nt(motion, scenario, scenario.magnetometer)
     if not cell.is_load_logged:
         flight = replace(flight, tables={topic: flight[topic] for topic in flight.topics() if topic != "electric"})
-    try:
-        latencies = estimate_latencies(flight)
-    except NotAssessableError:
-        latencies = None
-    return judge(Flown(scenario, flight, motion, field), heading=_aligned(flight), latencies=latencies)
+    heading = answered(flight, UNTOLD, (HeadingByTrack,)).answer_meeting(HeadingByTrack)
+    known = answered(flight, UNTOLD, (Delays,))
+    return judge(
+        Flown(scenario, flight, motion, field),
+        heading=heading,
+        on_ground=known.role(HeadingOnGround),
+        latencies=known.answer_meeting(Delays),
+    )
 
 
 def judged_outcome(family: MagneticFamilySettings, seed: int) -> Outcome:
@@ -112,11 +117,11 @@ def judged_outcome(family: MagneticFamilySettings, seed: int) -> Outcome:
     return wide_outcome(WideCell(family), seed)
 
 
-def _aligned(flight: Flight) -> HeadingResult | None:
-    try:
-        return estimate_heading_error(flight)
-    except NotAssessableError:
-        return None
+def _earlier(heading: HeadingByTrack, by_s: float) -> HeadingByTrack:
+    """Return a heading error as if the taxi had been so much earlier."""
+    answer: Any = heading  # a frozen dataclass, as every answer is
+    earlier: HeadingByTrack = replace(answer, reference_time_s=(heading.reference_time_s or 0.0) - by_s)
+    return earlier
 
 
 def _flight(scenario: Scenario, readings: list[Readings]) -> Flight:

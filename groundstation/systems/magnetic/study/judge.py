@@ -12,14 +12,11 @@ from groundstation.base.units import NS_PER_S
 from groundstation.methods import harmonics
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.arrays.typed import found_in
-from groundstation.results.roles import LETTERS
+from groundstation.results.roles import LETTERS, Delays, HeadingByTrack
 from groundstation.simulation.deviation import deviation_truth, levelled_heading_deg
 from groundstation.simulation.magnetometer import sensed_nt
 from groundstation.simulation.scenario import MagnetometerSettings, Scenario
 from groundstation.simulation.trajectory import ANGLE_OF_ATTACK_DEG, Trajectory, rotation_n_from_b
-from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.heading.on_ground import Estimator
-from groundstation.systems.latency.answer import Latencies
 from groundstation.systems.magnetic.answer import MagneticResult, MethodName, PoissonParameters
 from groundstation.systems.magnetic.apply import corrected_by_iron, corrected_by_table
 from groundstation.systems.magnetic.arrays import MagneticSamples, MagneticTable
@@ -134,8 +131,9 @@ class Flown:
 def judge(
     flown: Flown,
     *,
-    heading: HeadingResult | None = None,
-    latencies: Latencies | None = None,
+    heading: HeadingByTrack | None = None,
+    on_ground: HeadingOnGround | None = None,
+    latencies: Delays | None = None,
     phases: Phases | None = None,
 ) -> Outcome:
     """Return the answer of the estimator on a flight, and the errors of its methods.
@@ -145,7 +143,6 @@ def judge(
     middle = flown.field_ned_nt[len(flown.field_ned_nt) // 2]
     horizontal = float(np.hypot(middle[0], middle[1]))
     dip = float(np.rad2deg(np.arctan2(middle[2], horizontal)))
-    on_ground = HeadingOnGround(Estimator(latencies=latencies))
     try:
         result = estimate_deviation(
             flown.flight, settings=UNREFUSED, heading=heading, on_ground=on_ground, latencies=latencies, phases=phases

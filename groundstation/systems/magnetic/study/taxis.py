@@ -5,7 +5,6 @@ turns where the taxi may not.
 """
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +14,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import Column
 from groundstation.methods.roles import HeadingOnGround
 from groundstation.results.figures import FigureData
+from groundstation.results.roles import AzimuthByTurns, Delays, HeadingByTrack
 from groundstation.simulation.deviation import deviation_truth
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.legs import GroundTurn, Leg, Parked, Taxi
@@ -24,16 +24,10 @@ from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.readings import generator
 from groundstation.simulation.scenario import GnssSettings, GroundMotion, Scenario
 from groundstation.simulation.trajectory import ANGLE_OF_ATTACK_DEG
-from groundstation.systems.heading.answer import HeadingResult
-from groundstation.systems.heading.estimate import estimate_heading_error
-from groundstation.systems.heading.on_ground import Estimator
-from groundstation.systems.inertial.answer import InertialResult
-from groundstation.systems.inertial.estimate import estimate_ins_errors
-from groundstation.systems.latency.answer import Latencies
-from groundstation.systems.latency.estimate import estimate_latencies
+from groundstation.systems.answers_by_role import answered
 from groundstation.systems.magnetic.estimate import estimate_deviation
 from groundstation.systems.magnetic.study.cases import JUDGED, seed_of
-from groundstation.tables.phases import flight_phases, ground_mask
+from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight
 
 TAXIED = replace(JUDGED, wind_sigma_mps=3.6)
@@ -109,13 +103,19 @@ def taxi_outcome(name: str, seed: int) -> TaxiOutcome:
     """Fly one flight of a cell, answer it as the pipeline does and judge A by the truth."""
     simulated = simulate_taxi_flight(taxi_cells()[name], seed)
     flight, scenario = simulated.flight, simulated.scenario
-    heading, inertial, latencies = _answers(flight)
+    known = answered(flight, flight_phases(flight), (Delays, HeadingByTrack, AzimuthByTurns))
+    heading = known.answer_meeting(HeadingByTrack)
     truth = true_airframe_error(simulated)
     off = np.nan if heading is None else wrap_180(heading.error_deg - truth(heading.reference_time_s or 0.0))
     told = "none" if heading is None else heading.verdict
-    on_ground = HeadingOnGround(Estimator(latencies=latencies))
     try:
-        found = estimate_deviation(flight, heading=heading, on_ground=on_ground, by_turns=inertial, latencies=latencies)
+        found = estimate_deviation(
+            flight,
+            heading=heading,
+            on_ground=known.role(HeadingOnGround),
+            by_turns=known.answer_meeting(AzimuthByTurns),
+            latencies=known.answer_meeting(Delays),
+        )
     except NotAssessableError as error:
         nan = float("nan")
         return TaxiOutcome(name, told, "not assessable", error.found, "", nan, nan, nan, float(off))
@@ -194,23 +194,6 @@ def _row(outcomes: Sequence[TaxiOutcome]) -> tuple[float, ...]:
         float(np.sqrt(np.mean(accepted**2))) if accepted.size else float("nan"),
         float(np.max(accepted, initial=0.0)),
     )
-
-
-def _answers(flight: Flight) -> tuple[HeadingResult | None, InertialResult | None, Latencies | None]:
-    """Return the answers that the pipeline has before the deviation."""
-    latencies, heading, inertial = None, None, None
-    with suppress(NotAssessableError):
-        latencies = estimate_latencies(flight)
-    with suppress(NotAssessableError):
-        heading = estimate_heading_error(
-            flight,
-            on_ground=lambda time_ns: ground_mask(flight, time_ns),
-            latencies=latencies,
-            phases=flight_phases(flight),
-        )
-    with suppress(NotAssessableError):
-        inertial = estimate_ins_errors(flight).result
-    return heading, inertial, latencies
 
 
 def _drawn(cell: TaxiCell, seed: int) -> Scenario:
