@@ -41,12 +41,13 @@ OF_A_ROLE: dict[str, set[str]] = {
     "arrays": {"base", "results"},
     "chapter": PAGES,
     "plots": PAGES,
+    "page": PAGES,
     "tab": {*PAGES, "tables", "viewer"},
     "system": {"chapters", "plots", "systems"},
     "study": {*SHARED, "chapters", "methods", "simulation", "systems"},
     "": {*SHARED, "methods", "systems"},
 }
-OF_PAGES = ("answer", "arrays", "chapter", "plots")  # of a system; they import files of these roles alone
+OF_PAGES = ("answer", "arrays", "chapter", "plots", "page")  # of a system; they import files of these roles alone
 PARTS_OF_THE_PIPELINE = ("one_flight", "many_flights", "verbs", "")  # each imports those before it; "": the Python API
 FLOORS_OF_MANY_FLIGHTS = 5
 ALLOWED_TO_NAME = {

@@ -87,6 +87,7 @@ FILES = {
     "pipeline.one_flight.apply_deviation": "systems.magnetic.apply_deviation",
     "pipeline.one_flight.deviation_to_apply": "systems.magnetic.deviation_to_apply",
     "pipeline.verbs.kept_runs": "pipeline.verbs.synthesis",
+    "reports.steer_card": "systems.magnetic.steer_card_page",
     "reports.svg.dates": "reports.svg.ticks",
     "results.arrays.cooperative": "systems.cooperative.arrays",
     "results.arrays.forecast": "systems.inertial.forecast_arrays",

@@ -7,7 +7,8 @@ escape. Where long tables are no help, on paper and in panels that are laid out 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import ClassVar, Literal, TypeAlias
+from pathlib import Path
+from typing import ClassVar, Literal, NamedTuple, TypeAlias
 
 from groundstation.chapters.wording import number
 
@@ -274,6 +275,13 @@ class Document:
     label: str
     front: Front
     sections: Sequence[Section]
+
+
+class Paper(NamedTuple):
+    """Document that a template of its own sets as PDF; a dataclass."""
+
+    document: object
+    template: Path
 
 
 def shortened(section: Section, most: int, where: str) -> Section:

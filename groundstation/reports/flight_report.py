@@ -12,10 +12,10 @@ from groundstation.base.failures import Failure, attempt, failures, gathered_fai
 from groundstation.chapters.front import front
 from groundstation.chapters.parts import Document, Front
 from groundstation.reports.drawing import Drawing
+from groundstation.reports.exports import write_exports
 from groundstation.reports.page import TEMPLATES, live_figures, render
 from groundstation.reports.pdf import PdfError, write_pdf
 from groundstation.reports.sections import flight_sections
-from groundstation.reports.steer_card import write_exports
 from groundstation.results.file_names import SUMMARY
 from groundstation.results.files import SavedFlight, has_text, load, put_failures, write_text
 from groundstation.systems.system import Systems
@@ -42,9 +42,9 @@ class Written:
 
 
 def write_flight_report(folder: Path, systems: Systems, *, with_pdf: bool = False) -> Written:
-    """Write report.html into a flight folder, and its exports.
+    """Write report.html into a flight folder, and the files that systems write beside it.
 
-    The exports are its table and steer card. A part that fails by a defect is left out; summary.json and the report
+    A part that fails by a defect is left out; summary.json and the report
     name it, and those that failed before.
 
     Parameters
@@ -65,7 +65,7 @@ def write_flight_report(folder: Path, systems: Systems, *, with_pdf: bool = Fals
     with gathered_failures():
         saved = load(folder, systems.answer_types)
         # first: the report links to those that are there
-        exports = attempt("report", "exports", write_exports, saved, unless=(OSError,))
+        exports = attempt("report", "exports", write_exports, saved, systems, unless=(OSError,))
         written, problem = exports or ((), "")
         document = flight_document(saved, systems)
         is_changed = put_failures(folder, failures(), PARTS)

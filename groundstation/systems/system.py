@@ -4,7 +4,7 @@ Every part is optional. What costs an import is given as a function that imports
 page the chapters and plots, a recording the tabs, a study its own simulation.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -16,6 +16,7 @@ from groundstation.systems.plan import Plan
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Adviser, Chapter, Chapters
     from groundstation.chapters.fleet.chapter import FleetChapter
+    from groundstation.chapters.parts import Paper
     from groundstation.chapters.plots.comparison import Compared
     from groundstation.plots.plot import Describe
     from groundstation.results.files import SavedFlight
@@ -48,6 +49,27 @@ class FleetTab(NamedTuple):
 
     name: str
     log: Callable[[Any, "FleetResults"], Any]
+
+
+class Export(NamedTuple):
+    """File that a system writes beside the report of a flight.
+
+    Parameters
+    ----------
+    name : str
+    analysis : str
+        The analysis whose answer it shows: only flights with one have the file.
+    load : callable
+        Imports what builds it and returns it: ``build(results)`` gives its text, or a document and the template that
+        sets it as PDF; None where the flight lacks the arrays.
+    is_page : bool
+        A page to print, which is not written where reports are not.
+    """
+
+    name: str
+    analysis: str
+    load: "Callable[[], Callable[[FlightResults], str | Paper | None]]"
+    is_page: bool = False
 
 
 class InFleet(NamedTuple):
@@ -112,6 +134,8 @@ class System:
     plans : tuple of Plan
     studies : tuple of Study
         Monte Carlo behind its published figures.
+    exports : tuple of Export
+        Files beside the report of a flight.
     chapters : callable
         Chapters of the report, in its order: what tells which answers.
     plots : callable
@@ -146,6 +170,7 @@ class System:
     session_analyses: tuple[Analysis, ...] = ()
     plans: tuple[Plan[Any], ...] = ()
     studies: tuple[Study, ...] = ()
+    exports: tuple[Export, ...] = ()
     chapters: "Callable[[], tuple[Chapter, ...]]" = _none
     plots: "Callable[[], Mapping[str, Describe]]" = _no_plots
     tabs: Callable[[], tuple[Tab, ...]] = _none
@@ -205,6 +230,15 @@ class Systems:
     def roles(self) -> Mapping[type[Any], Callable[[Any], Any]]:
         """Roles that the analyses of a flight offer to each other."""
         return {role: make for analysis in self.analyses for role, make in analysis.offers.items()}
+
+    @cached_property
+    def exports(self) -> tuple[Export, ...]:
+        """Files beside the report of a flight."""
+        return tuple(export for one in self.every for export in one.exports)
+
+    def exports_of(self, analyses: Collection[str], *, with_pages: bool = True) -> tuple[Export, ...]:
+        """Files of a flight with answers of these analyses; pages to print where asked for."""
+        return tuple(one for one in self.exports if one.analysis in analyses and (with_pages or not one.is_page))
 
     @property
     def apply(self) -> "ApplyStep | None":

@@ -27,19 +27,17 @@ from groundstation.pipeline.one_flight.parts import part_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, keys_of
 from groundstation.pipeline.one_flight.sealing import note, seal
+from groundstation.reports.exports import write_exports
 from groundstation.reports.flight_report import PDF, REPORT, add_pdf, write_flight_report
-from groundstation.reports.steer_card import write_exports
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY, TABLES
 from groundstation.results.flight import FlightResults
 from groundstation.results.manifest import PartOfRun, PowerUpOfRun, Resume
 from groundstation.results.recorded import recorded
 from groundstation.systems import systems
-from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD
 from groundstation.tables.table import Flight
 
 PARTIAL_PREFIX = ".partial-"
 OF_THE_WORLD = OSError, GroundstationError  # a full disk, a setting: no defect of the part that meets it
-REPORT_FILES = (REPORT, PDF, DEVIATION_CSV, STEER_CARD)
 MOST_APART = 50  # records that a part read alone may have more than as part of a flight, at each joint
 Version = tuple[tuple[int, int], ...]  # of each file of a log: time and size
 
@@ -260,8 +258,9 @@ def _export(folder: Path) -> str:
     """Write the tables that reports write beside them; returns what went wrong."""
     from groundstation.results.files import load
 
-    saved = load(folder, systems().answer_types)
-    written = attempt("report", "exports", bound(write_exports, saved, with_card=False), unless=OF_THE_WORLD)
+    every = systems()
+    exports = bound(write_exports, load(folder, every.answer_types), every, with_pages=False)
+    written = attempt("report", "exports", exports, unless=OF_THE_WORLD)
     return "" if written is None else written[1]
 
 
@@ -273,7 +272,8 @@ def _run_reports(job: Job, finished: Finished, watch: Stopwatch) -> Outcome:
     if job.step == "reports" and job.only_results:
         problem = _export(finished.folder)
         put_failures(finished.folder, failures())
-        note(finished.folder, [finished.folder / DEVIATION_CSV])
+        exports = systems().exports_of(finished.answered, with_pages=False)
+        note(finished.folder, [finished.folder / one.name for one in exports])
     elif job.step != "nothing":
         with watch.stage("reporting"):
             problem = report_finished(
@@ -303,7 +303,7 @@ def report_finished(folder: Path, *, with_page: bool, with_pdf: bool) -> str:
     """
     every = systems()
     written = write_flight_report(folder, every, with_pdf=with_pdf) if with_page else add_pdf(folder, every)
-    note(folder, written.paths, removed=REPORT_FILES)
+    note(folder, written.paths, removed=report_files())
     return written.problem
 
 
@@ -375,7 +375,12 @@ def optional_files(identity: str) -> tuple[str, ...]:
 
     Left from an earlier run, they would show other results.
     """
-    return f"{identity}.rrd", REPORT, PDF, DEVIATION_CSV, STEER_CARD, corrected_name(identity)
+    return f"{identity}.rrd", *report_files(), corrected_name(identity)
+
+
+def report_files() -> tuple[str, ...]:
+    """Return the files of a flight that are its reports: page, PDF, those of systems."""
+    return REPORT, PDF, *(one.name for one in systems().exports)
 
 
 def remove(folder: Path) -> None:

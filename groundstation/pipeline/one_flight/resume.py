@@ -34,8 +34,8 @@ from groundstation.results.files import load_document, load_manifest
 from groundstation.results.flight import Source
 from groundstation.results.manifest import Keys as Keys
 from groundstation.results.manifest import Manifest, PartOfRun, PowerUpOfRun
+from groundstation.systems import systems
 from groundstation.systems.applied import APPLIED
-from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD
 
 Step = Literal["everything", "analysis", "reports", "pdf", "nothing"]  # what has to be done for a log
 TO_DO: Mapping[Step, str] = {
@@ -68,8 +68,10 @@ class Finished:
         What was found, in one line.
     has_lost_data : bool
     findings : tuple of Finding
-    has_deviation, has_applied : bool
-        Whether a magnetic deviation was found, and whether one was added to the log: there are files of both.
+    answered : frozenset of str
+        Names of the analyses that gave an answer: there are files of some.
+    has_applied : bool
+        Whether records were added to the log by ``--apply``: there is an MCAP with them.
     spoiled : frozenset of str
         Paths in the folder of files that are missing or not as the run left them; ``files`` has none of them.
     mcap_sha256 : str
@@ -90,7 +92,7 @@ class Finished:
     text: str
     has_lost_data: bool
     findings: tuple[Finding, ...]
-    has_deviation: bool = False
+    answered: frozenset[str] = frozenset()
     has_applied: bool = False
     spoiled: frozenset[str] = frozenset()
     mcap_sha256: str = ""
@@ -132,11 +134,10 @@ class Finished:
         is_spoiled = self._has_spoiled_results or is_incomplete(self.findings)
         if keys.analysis != self.keys.analysis or not analysed <= self.files or is_spoiled:
             return "analysis"
-        wanted = {DEVIATION_CSV} if self.has_deviation else set()
+        wanted = {one.name for one in systems().exports_of(self.answered, with_pages=not only_results)}
         if only_results:
             return "nothing" if wanted <= self.files else "reports"
-        wanted |= {REPORT, *([STEER_CARD] if self.has_deviation else [])}
-        if not wanted <= self.files:
+        if not {REPORT, *wanted} <= self.files:
             return "reports"
         return "pdf" if with_pdf and PDF not in self.files else "nothing"
 
@@ -251,7 +252,7 @@ def _finished(
         resume.text,
         resume.has_lost_data,
         summary.findings,
-        bool(summary.results.get("magnetic")),
+        frozenset(name for name, found in summary.results.items() if found),
         any(finding.code.endswith(APPLIED) for finding in summary.findings),
         spoiled,
         "" if mcap is None else mcap.sha256,

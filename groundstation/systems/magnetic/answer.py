@@ -27,6 +27,7 @@ METHOD_TITLES: dict[MethodName, str] = {
     "constant_modulus": "modulus fit",
 }
 ADVISORY = "Advisory, not a release to service."
+DEVIATION_CSV, STEER_CARD = "deviation.csv", "steer_card.pdf"  # in the folder of a flight that has one
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,9 @@ from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.agreement_answer import deviation_agreement
 from groundstation.systems.magnetic.answer import (
     ADVISORY,
+    DEVIATION_CSV,
     METHOD_TITLES,
+    STEER_CARD,
     Alignment,
     ConditionName,
     MagneticResult,
@@ -36,7 +38,6 @@ from groundstation.systems.magnetic.answer import (
     PoissonParameters,
     Vector,
 )
-from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD
 from groundstation.systems.magnetic.ground_chapter import LEAD as GROUND_LEAD
 from groundstation.systems.magnetic.ground_chapter import TITLE as GROUND_TITLE
 from groundstation.systems.magnetic.ground_chapter import ground_claim, ground_runs, ground_workings

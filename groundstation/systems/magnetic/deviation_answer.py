@@ -17,10 +17,15 @@ from groundstation.results.files import csv_text, mapping
 from groundstation.results.flight import FlightResults
 from groundstation.results.restore import restored_answer
 from groundstation.results.roles import LETTERS
-from groundstation.systems.magnetic.answer import METHOD_TITLES, MagneticResult, MagneticVerdict, PoissonParameters
+from groundstation.systems.magnetic.answer import (
+    DEVIATION_CSV,
+    METHOD_TITLES,
+    MagneticResult,
+    MagneticVerdict,
+    PoissonParameters,
+)
 from groundstation.systems.magnetic.arrays import MagneticCurves, MagneticTable
 
-DEVIATION_CSV, STEER_CARD = "deviation.csv", "steer_card.pdf"  # in the folder of a flight that has one
 BINS = 360
 MIDDLE_TOLERANCE_DEG = 0.01  # a spreadsheet may have rounded
 READING, TO_ADD, SIGMA = "uncorrected_magnetic_heading_deg", "deviation_to_add_deg", "deviation_sigma_deg"

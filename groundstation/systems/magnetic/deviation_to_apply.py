@@ -9,8 +9,8 @@ from typing import Any
 from groundstation.base.errors import UsageError
 from groundstation.results.file_names import SUMMARY
 from groundstation.systems.applied import Asked
+from groundstation.systems.magnetic.answer import DEVIATION_CSV
 from groundstation.systems.magnetic.deviation_answer import (
-    DEVIATION_CSV,
     Deviation,
     deviation_from_csv,
     deviation_from_summary,

@@ -4,11 +4,13 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from groundstation.systems.magnetic.analysis import MAGNETIC, MAGNETIC_GROUND
-from groundstation.systems.system import Study, System, Tab
+from groundstation.systems.magnetic.answer import DEVIATION_CSV, STEER_CARD
+from groundstation.systems.system import Export, Study, System, Tab
 
 if TYPE_CHECKING:
     from groundstation.chapters.chapter import Adviser, Chapter
     from groundstation.chapters.fleet.chapter import FleetChapter
+    from groundstation.chapters.parts import Paper
     from groundstation.plots.plot import Describe
     from groundstation.systems.applied import ApplyStep
     from groundstation.systems.study import StudyResult
@@ -66,6 +68,18 @@ def _tabs() -> tuple[Tab, ...]:
     )
 
 
+def _deviation_csv() -> Callable[..., str | None]:
+    from groundstation.systems.magnetic.deviation_answer import deviation_csv
+
+    return deviation_csv
+
+
+def _steer_card() -> "Callable[..., Paper | None]":
+    from groundstation.systems.magnetic.steer_card_page import steer_card_page
+
+    return steer_card_page
+
+
 def _study_magnetic() -> "Callable[..., StudyResult]":
     from groundstation.systems.magnetic.study.magnetic import study_magnetic
 
@@ -87,6 +101,10 @@ SYSTEM = System(
             "magnetic deviation: error of every method, the published claim and its limit, how honest sigmas are",
             _study_magnetic,
         ),
+    ),
+    exports=(
+        Export(DEVIATION_CSV, MAGNETIC.name, _deviation_csv),
+        Export(STEER_CARD, MAGNETIC.name, _steer_card, is_page=True),
     ),
     chapters=_chapters,
     plots=_plots,

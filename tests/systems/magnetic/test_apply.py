@@ -33,8 +33,8 @@ from groundstation.pipeline.many_flights.runs.dry_run import plan_many
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.verbs.check import check_many
+from groundstation.reports.exports import write_exports
 from groundstation.reports.pdf import write_pdf
-from groundstation.reports.steer_card import MOST_ROWS, TEMPLATE, steer_card, write_exports
 from groundstation.results.file_names import SUMMARY
 from groundstation.results.files import save
 from groundstation.results.flight import FlightResults
@@ -43,20 +43,20 @@ from groundstation.simulation.flat_csv_writer import write_flat_csv
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, draw_magnetic_scenario
 from groundstation.store.reader import read, read_info
+from groundstation.systems import systems
 from groundstation.systems.known import Known
 from groundstation.systems.latency.answer import Latencies
-from groundstation.systems.magnetic.answer import ADVISORY, CardRow, MagneticResult
+from groundstation.systems.magnetic.answer import ADVISORY, DEVIATION_CSV, STEER_CARD, CardRow, MagneticResult
 from groundstation.systems.magnetic.apply_deviation import APPLIED, NOT_APPLIED, AppliedDeviation, apply_deviation
 from groundstation.systems.magnetic.corrected import CorrectedHeading, correct_heading
 from groundstation.systems.magnetic.deviation_answer import (
-    DEVIATION_CSV,
-    STEER_CARD,
     Deviation,
     deviation_csv,
     deviation_from_csv,
     deviation_of,
 )
 from groundstation.systems.magnetic.deviation_to_apply import Apply, asked_for
+from groundstation.systems.magnetic.steer_card_page import MOST_ROWS, TEMPLATE, steer_card
 from groundstation.tables.assemble import flight_from_batches
 from groundstation.tables.phases import flight_phases
 from groundstation.tables.table import Flight, Table
@@ -201,7 +201,7 @@ def test_a_magnetometer_turned_by_2_5_deg_is_put_right(tmp_path: Path) -> None:
     made = magnetic_example.make(hard_nt=(0.0, 0.0, 0.0), soft=mounted)
     results = analysed(made.flight, Configuration({"magnetic": {"alignment_sigma_deg": 0.3}}))
     save(tmp_path, results, Manifest())
-    paths, problem = write_exports(load(tmp_path), with_card=False)
+    paths, problem = write_exports(load(tmp_path), systems(), with_pages=False)
     assert ([path.name for path in paths], problem) == ([DEVIATION_CSV], "")
     rows = list(csv.DictReader(io.StringIO((tmp_path / DEVIATION_CSV).read_text(encoding="utf-8"), newline="")))
     shown = rows[92]
@@ -491,16 +491,16 @@ def test_a_name_is_no_formula_and_comes_back(tmp_path: Path) -> None:
 
 def test_without_a_deviation_there_are_no_files_and_old_ones_go(tmp_path: Path) -> None:
     save(tmp_path, figure_eight(), Manifest())
-    write_exports(load(tmp_path))
+    write_exports(load(tmp_path), systems())
     assert (tmp_path / DEVIATION_CSV).exists() and (tmp_path / STEER_CARD).exists()
     save(tmp_path, replace(figure_eight(), answers={}, figures=()), Manifest())
-    assert write_exports(load(tmp_path)) == ((), "")
+    assert write_exports(load(tmp_path), systems()) == ((), "")
     assert not (tmp_path / DEVIATION_CSV).exists() and not (tmp_path / STEER_CARD).exists()
 
 
 def test_arrays_that_are_missing_are_told(tmp_path: Path) -> None:
     save(tmp_path, replace(figure_eight(), figures=()), Manifest())
-    paths, problem = write_exports(load(tmp_path), with_card=False)
+    paths, problem = write_exports(load(tmp_path), systems(), with_pages=False)
     assert (paths, problem[:26]) == ((), "deviation.csv: not written")
 
 
@@ -574,7 +574,7 @@ def test_a_damaged_answer_is_one_line_and_leaves_no_new_report(tmp_path: Path) -
     summary["results"]["magnetic"]["card"] = "?"
     (folder / SUMMARY).write_text(json.dumps(summary), encoding="utf-8")
     with pytest.raises(UnreadableLogError, match=r"results\.magnetic\.card"):
-        write_exports(load(folder), with_card=False)
+        write_exports(load(folder), systems(), with_pages=False)
     answer = CliRunner().invoke(app, ["report", str(folder.parent)])
     assert answer.exit_code == 1
     (line,) = (line for line in answer.stderr.splitlines() if "results.magnetic.card" in line)

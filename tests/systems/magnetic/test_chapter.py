@@ -15,9 +15,8 @@ from groundstation.results.files import save
 from groundstation.results.flight import FlightResults, NotAssessable
 from groundstation.results.gates import Gate
 from groundstation.results.manifest import Manifest
-from groundstation.systems.magnetic.answer import ADVISORY, MagneticResult
+from groundstation.systems.magnetic.answer import ADVISORY, DEVIATION_CSV, STEER_CARD, MagneticResult
 from groundstation.systems.magnetic.chapter import magnetic
-from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD
 from tests.report_example import example
 from tests.reports.test_reports import Page, report
 from tests.saved import load

@@ -10,9 +10,8 @@ from groundstation.chapters.markdown import escaped, markdown
 from groundstation.chapters.wording import number
 from groundstation.results.answer import by_analysis
 from groundstation.results.flight import NotAssessable
-from groundstation.systems.magnetic.answer import ADVISORY, MagneticResult
+from groundstation.systems.magnetic.answer import ADVISORY, STEER_CARD, MagneticResult
 from groundstation.systems.magnetic.chapter import magnetic
-from groundstation.systems.magnetic.deviation_answer import STEER_CARD
 from tests.recording_contents import Contents
 from tests.systems.magnetic.test_run import figure_eight, simulated
 from tests.told import write_recording

@@ -20,7 +20,7 @@ from groundstation.pipeline.many_flights.inputs import (
     plan_folders,
     session_folders,
 )
-from groundstation.pipeline.one_flight.flight import REPORT_FILES
+from groundstation.pipeline.one_flight.flight import report_files
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.sealing import note
 from groundstation.reports.fleet_report import PAGE as FLEET_PAGE
@@ -154,7 +154,7 @@ def report_again(out: Path, *, with_pdf: bool = False) -> ReportedAgain:
         try:
             with told_in_a_line(str(folder)):
                 written = write_flight_report(folder, systems(), with_pdf=with_pdf)
-                note(folder, written.paths, removed=REPORT_FILES)
+                note(folder, written.paths, removed=report_files())
         except GroundstationError as error:
             if is_flight:
                 raise

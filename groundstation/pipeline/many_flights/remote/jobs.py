@@ -19,7 +19,7 @@ from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.resume import Finished, finished
 from groundstation.reports.flight_report import PDF
 from groundstation.results.file_names import ARRAYS, MANIFEST, OLD_ARRAYS, SUMMARY
-from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD
+from groundstation.systems import systems
 
 STAGING, BY_LOG = ".staging", ".logs"  # in an OUT elsewhere: what is on its way; flight ids by digest of the log
 
@@ -108,7 +108,7 @@ def _sent(job: Job, outcome: Outcome, out: RemoteFolder) -> Outcome:
         return replace(outcome, folder=outcome.flight_id)
     if job.step == "reports" and job.finished is not None:
         out.send(job.finished.folder, outcome.flight_id)
-        for name in (PDF, DEVIATION_CSV, STEER_CARD):
+        for name in (PDF, *(one.name for one in systems().exports)):
             if not (job.finished.folder / name).exists():
                 out.remove(f"{outcome.flight_id}/{name}")
         return replace(outcome, folder=outcome.flight_id)

@@ -13,7 +13,7 @@ from groundstation.base.findings import Finding
 from groundstation.base.toml_settings import settings_from
 from groundstation.pipeline.many_flights.inputs import session_folders
 from groundstation.pipeline.one_flight.configuration import Configuration, read_toml, session_tables
-from groundstation.pipeline.one_flight.flight import REPORT_FILES
+from groundstation.pipeline.one_flight.flight import report_files
 from groundstation.pipeline.one_flight.log import Log
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.resume import TO_DO, Step, digest_of_parts, versions
@@ -130,7 +130,7 @@ def kept_session(job: SessionJob) -> KeptSession | None:
         is_of_the_verb = job.is_found and not manifest.is_found
         spoiled = frozenset() if job.is_copy else spoiled_files(folder, manifest)
         is_whole = resume.keys.analysis == keys.analysis and not _is_incomplete(folder)
-        is_whole &= spoiled <= {f"{folder.name}.rrd", *REPORT_FILES}
+        is_whole &= spoiled <= {f"{folder.name}.rrd", *report_files()}
         if not job.only_results:
             is_whole &= _is_whole(folder / f"{folder.name}.rrd", spoiled)
         if not is_of_the_verb and (job.redo or not is_whole):

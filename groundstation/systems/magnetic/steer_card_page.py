@@ -1,20 +1,16 @@
-"""Exports for the cockpit, beside a flight's report: deviation table and steer card (A6)."""
+"""Steer card for the cockpit, a page of A6 beside a flight's report."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from groundstation.base.timescales import utc_ns_to_iso
-from groundstation.chapters.parts import Mark
+from groundstation.chapters.parts import Mark, Paper
 from groundstation.chapters.wording import ABSENT, is_number, number, typeset
-from groundstation.reports.page import TEMPLATES
-from groundstation.reports.pdf import PdfError, write_pdf
-from groundstation.results.files import SavedFlight, write_text
 from groundstation.results.flight import FlightResults
-from groundstation.systems.magnetic.answer import ADVISORY, METHOD_TITLES, CardRow, MagneticResult
-from groundstation.systems.magnetic.deviation_answer import DEVIATION_CSV, STEER_CARD, deviation_csv
+from groundstation.systems.magnetic.answer import ADVISORY, DEVIATION_CSV, METHOD_TITLES, CardRow, MagneticResult
 
-TEMPLATE = TEMPLATES / "steer_card.typ"
+TEMPLATE = Path(__file__).parent / "steer_card.typ"
 MOST_ROWS = 36  # of a page of A6: every 10 deg
 MOST_LETTERS, MOST_OF_A_REASON = 40, 150
 
@@ -57,36 +53,10 @@ class SteerCard:
     advisory: str = ADVISORY
 
 
-def write_exports(saved: SavedFlight, *, with_card: bool = True) -> tuple[tuple[Path, ...], str]:
-    """Write deviation.csv and steer_card.pdf of a flight that has a magnetic deviation.
-
-    Other flights lose old ones. Without ``with_card`` a card that is there stays.
-
-    Returns
-    -------
-    tuple of Path, str
-        What was written, and why one of them was not.
-    """
-    answer = saved.results.answer(MagneticResult)
-    table, card = saved.folder / DEVIATION_CSV, saved.folder / STEER_CARD
-    for path in (table, card) if with_card or answer is None else (table,):
-        path.unlink(missing_ok=True)
-    if answer is None:
-        return (), ""
-    paths, problems = [], []
-    text = deviation_csv(saved.results)
-    if text is None:
-        problems.append(f"{DEVIATION_CSV}: not written, its arrays are missing in arrays/: run the log again")
-    else:
-        write_text(table, text)
-        paths.append(table)
-    if with_card:
-        try:
-            write_pdf(steer_card(saved.results, answer), card, TEMPLATE)
-            paths.append(card)
-        except PdfError as error:
-            problems.append(str(error))
-    return tuple(paths), "; ".join(problems)
+def steer_card_page(results: FlightResults) -> Paper | None:
+    """Return the card of a flight that has a deviation; None of any other."""
+    answer = results.answer(MagneticResult)
+    return None if answer is None else Paper(steer_card(results, answer), TEMPLATE)
 
 
 def steer_card(results: FlightResults, answer: MagneticResult) -> SteerCard:
