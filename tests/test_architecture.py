@@ -73,9 +73,7 @@ ALLOWED_STRINGS: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("reference", ("pipeline/verbs/compare.py",), "the column that tells rows apart"),
     ("forecast", ("viewer/colours.py",), "the state of a filter without GNSS"),
     ("installation", ("reports/installation.py",), "the mark in the page"),
-    ("magnetic", ("pipeline/one_flight/resume.py",), "still to be turned: files that a flight with a deviation has"),
 )
-STILL_NAMED = Path(__file__).parent / "references" / "systems_named.txt"
 ONLY_ROOM_OF = {"mcap": "store", "google": "store", "foxglove_schemas_protobuf": "store", "rerun": "viewer"}
 NOT_PUBLIC = re.compile(r"/?(rerun_|rerun-[a-z]+-|re_viewer|RERUN_|rerun\.(.*\.)?_)")
 OF_TUPLES = ("_replace", "_fields", "_asdict", "_make")  # public methods of named tuples, which cannot have others
@@ -210,17 +208,14 @@ def test_file_of_a_system_imports_only_what_its_role_may() -> None:
 
 
 def test_a_system_is_named_by_no_file_outside_its_folder() -> None:
-    """What one needs of another is a role; rooms loop over the systems. Files listed are still to be turned."""
+    """What one needs of another is a role; rooms loop over the systems."""
     named: dict[str, list[str]] = {}
     for path in modules():
         for name, line in imports_of(path):
             if system_of(name) not in ("", system_of(_name(path))):
                 named.setdefault(str(path.relative_to(PACKAGE)), []).append(f"{path}:{line}: {name}")
-    listed = set(STILL_NAMED.read_text(encoding="utf-8").split())
-    assert not listed & ALLOWED_TO_NAME.keys() and ALLOWED_TO_NAME.keys() <= named.keys()
-    new = [line for path, lines in named.items() if path not in {*listed, *ALLOWED_TO_NAME} for line in lines]
-    assert not new
-    assert not listed - named.keys(), "no longer names a system: take it off tests/references/systems_named.txt"
+    assert not [line for path, lines in named.items() if path not in ALLOWED_TO_NAME for line in lines]
+    assert ALLOWED_TO_NAME.keys() <= named.keys(), "no longer names a system: take it off ALLOWED_TO_NAME"
 
 
 def test_an_analysis_is_named_by_no_string_outside_its_folder() -> None:

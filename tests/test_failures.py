@@ -156,7 +156,7 @@ def test_damage_checks_lines_and_columns_that_fail_leave_the_rest(name: str, mon
     with_it = changed(systems().analyses, name, sentence=fails)
     monkeypatch.setattr(running, "systems", lambda: shipped_but(analyses=with_it))
     with gathered_failures():
-        assert running.sentence(results).startswith("not assessable")
+        assert running.sentence(results).startswith("no signals; nothing lost; not assessable")
         assert codes() == [f"internal.line.{name}"]
     monkeypatch.setattr(analysing, "_on_damage", fails)
     flight = bare()
