@@ -1,4 +1,6 @@
-"""Ticks of axes: round places and their texts; of dates hours, days, months or years, as in ISO 8601."""
+"""Ticks of axes: round places and their texts.
+
+Of dates hours, days, months or years, as in ISO 8601.
 
 import math
 from collections.abc import Callable, Iterable, Sequence
