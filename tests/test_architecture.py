@@ -69,7 +69,7 @@ ALLOWED_STRINGS: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("magnetic", ("readers/", "pipeline/verbs/anonymous.py"), "the north of a direction, as true"),
     ("landing", ("simulation/",), "the leg behind an approach"),
     ("together", ("tables/sources.py", "chapters/provenance.py"), "the key in the metadata of a log joined of several"),
-    ("reference", ("methods/fleet/", "pipeline/many_flights/fleet/"), "the check of a parking heading, as runway"),
+    ("reference", ("methods/fleet/",), "the check of a parking heading, as runway"),
     ("reference", ("pipeline/verbs/compare.py",), "the column that tells rows apart"),
     ("forecast", ("viewer/colours.py",), "the state of a filter without GNSS"),
     ("installation", ("reports/installation.py",), "the mark in the page"),

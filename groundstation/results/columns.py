@@ -1,13 +1,32 @@
 """Columns of the tables of flights: index.json, index.csv and fleet.parquet."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
 from groundstation.results.answer import Answer
+from groundstation.results.roles import LETTERS
 
 Kind = Literal["text", "category", "number", "count", "time", "flag"]
 AnswerT = TypeVar("AnswerT", bound=Answer)
+
+
+# What statistics and pages of all flights read of the columns that systems give, empty where no system gives them.
+READ_BY_FLEETS: Mapping[str, Kind] = {
+    **dict.fromkeys(("verdict", "ins_kind", "magnetic_verdict", "magnetic_method"), "category"),
+    "verdict_reason": "text",
+    "samples": "count",
+    **dict.fromkeys(
+        (
+            *("error_deg", "standard_error_deg", "confidence95_low_deg", "confidence95_high_deg", "correction_deg"),
+            *("estimate_sd_deg", "sample_mean_deg", "sample_m2_deg2", "onboard_difference_deg"),
+            *("reference_residual_arcmin", "radial_error_rate_fit_nmiph", "forecast_60min_rms_m"),
+            *("magnetic_before_rms_deg", "magnetic_after_rms_deg"),
+            *(f"magnetic_{letter.lower()}{end}_deg" for letter in LETTERS for end in ("", "_sigma")),
+        ),
+        "number",
+    ),
+}
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from groundstation.base.serial import from_json, to_json_exactly
 from groundstation.methods.fleet.density import SampleHistogram
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS, TEXTS, FlightShare, dataset_schema
 from groundstation.reports.index import IndexRow
-from groundstation.results.columns import FlightColumn
+from groundstation.results.columns import READ_BY_FLEETS, FlightColumn
 from groundstation.results.figures import FigureData
 from groundstation.results.files import parquet_bytes, utf8_text
 from groundstation.results.installations import Lesson
@@ -42,8 +42,14 @@ def to_arrow(shares: Sequence[FlightShare]) -> Any:
 
 
 def flights_of(table: Any) -> FigureData:
-    """The table of flights in a table of shares."""
+    """The table of flights in a table of shares.
+
+    Columns that statistics and pages read are there, empty, even where no system gives them.
+    """
     columns = {column.name: _numpy(column, table.column(column.name)) for column in FLIGHT_COLUMNS}
+    for name, kind in READ_BY_FLEETS.items():
+        if name not in columns:
+            columns[name] = np.full(len(table), "") if kind in TEXTS else np.full(len(table), math.nan)
     return FigureData("flights", columns, {})
 
 
