@@ -1,21 +1,33 @@
-"""A system can be taken out: without its folder and its line everything else runs."""
+"""A system can be taken out: without its folder and its line all else runs, type-checks and passes its tests."""
 
+import os
 import re
 import shutil
+import subprocess
+import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
 from groundstation.systems import OURS, systems
-from tests.test_extending import ROOT, groundstation
+from tests.test_architecture import ALLOWED_TO_NAME
+from tests.test_extending import LONGEST_S, ROOT, groundstation
 
 SAMPLE = ROOT / "sample_logs" / "taxi-short.csv"
 NAMES = tuple(path.split(".")[2] for path in OURS)
-# Systems that files of tests/references/systems_named.txt still import: the rows of a fleet, the steer card, exports.
-NOT_YET: tuple[str, ...] = ()
-FREE = tuple(one for one in NAMES if one not in NOT_YET)
-TODAY = FREE[datetime.now(UTC).toordinal() % len(FREE)]  # one by turns; all by the slow mark
+TODAY = NAMES[datetime.now(UTC).toordinal() % len(NAMES)]  # one by turns; all by the slow mark
+SOME_TESTS = (  # of each system, quick ones that need no other system
+    "heading/test_parts.py",
+    "inertial/test_filter.py",
+    "latency/test_coverage.py",
+    "magnetic/test_ground.py",
+    "landing/test_approaches.py",
+    "reference/test_beside.py",
+    "cooperative/test_filters.py",
+    "planning/test_plan.py",
+)
+OVERRIDE = '\n[[tool.mypy.overrides]]\nmodule = [{}]\nfollow_imports = "error"\n'
 
 
 def taken_out(folder: Path, name: str) -> list[str]:
@@ -41,12 +53,27 @@ def _requiring(name: str) -> list[str]:
     return [one.name for one in others if any(own & set(analysis.requires) for analysis in one.analyses)]
 
 
-def _marks(name: str) -> list[pytest.MarkDecorator]:
-    named = [pytest.mark.xfail(strict=True, reason="files outside still import it")] if name in NOT_YET else []
-    return named if name == TODAY else [*named, pytest.mark.slow]
+def _python(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Python in a folder whose package comes before the one installed."""
+    return subprocess.run(
+        [sys.executable, *arguments],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(folder)},
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=2 * LONGEST_S,
+        check=False,
+    )
 
 
-@pytest.mark.parametrize("name", [pytest.param(one, marks=_marks(one)) for one in NAMES])
+EVERY = pytest.mark.parametrize("name", NAMES)
+BY_TURNS = pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=[] if one == TODAY else [pytest.mark.slow]) for one in NAMES]
+)
+
+
+@BY_TURNS
 def test_everything_else_runs_without_a_system(name: str, tmp_path: Path) -> None:
     gone = taken_out(tmp_path, name)
     listed = groundstation(tmp_path, "list")
@@ -61,3 +88,32 @@ def test_everything_else_runs_without_a_system(name: str, tmp_path: Path) -> Non
     for one in systems().every:
         if one.name in gone:
             assert not any(f'"{analysis.name}": {{' in results for analysis in one.analyses)
+
+
+@pytest.mark.slow
+@EVERY
+def test_types_hold_without_a_system(name: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Files that may name a system are not asked; the cache serves one system after another."""
+    gone = taken_out(tmp_path, name)
+    modules = ", ".join(f'"groundstation.systems.{one}", "groundstation.systems.{one}.*"' for one in gone)
+    settings = (ROOT / "pyproject.toml").read_text(encoding="utf-8") + OVERRIDE.format(modules)
+    (tmp_path / "pyproject.toml").write_text(settings, encoding="utf-8")
+    cache = tmp_path_factory.getbasetemp() / "types"
+    checked = _python(tmp_path, "-m", "mypy", "--cache-dir", str(cache), "groundstation")
+    assert "source files" in checked.stdout, checked.stdout + checked.stderr
+    errors = [line for line in checked.stdout.splitlines() if ": error: " in line]
+    allowed = tuple(f"groundstation/{path}:" for path in ALLOWED_TO_NAME)
+    left = [line for line in errors if not line.replace("\\", "/").startswith(allowed)]
+    assert not left, "\n".join(left)
+
+
+@pytest.mark.slow
+@EVERY
+def test_others_pass_their_tests_without_a_system(name: str, tmp_path: Path) -> None:
+    gone = taken_out(tmp_path, name)
+    for folder in ("tests", "sample_logs"):
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__", *gone))
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    some = [f"tests/systems/{path}" for path in SOME_TESTS if path.partition("/")[0] not in gone]
+    tested = _python(tmp_path, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *some)
+    assert tested.returncode == 0, tested.stdout[-4000:]

@@ -1,6 +1,7 @@
 """Ticks of axes: round places and their texts.
 
 Of dates hours, days, months or years, as in ISO 8601.
+"""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
