@@ -166,7 +166,7 @@ FILES = {
     "viewer.tabs.forecast": "systems.inertial.forecast_tab",
     "viewer.tabs.heading": "systems.heading.tab",
     "viewer.tabs.inertial": "systems.inertial.tab",
-    "viewer.tabs.installation": "systems.heading.installation.tab",
+    "viewer.tabs.installation": "viewer.tabs.generic",
     "viewer.tabs.landing": "systems.landing.tab",
     "viewer.tabs.landing_beacons": "systems.landing.beacons.tab",
     "viewer.tabs.landing_ranges": "systems.planning.landing.tab",
@@ -175,7 +175,7 @@ FILES = {
     "viewer.tabs.placement": "systems.planning.session.placement_tab",
     "viewer.tabs.reference": "systems.reference.tab",
     "viewer.tabs.session_space": "systems.cooperative.space_tab",
-    "viewer.tabs.together": "systems.several_logs.tab",
+    "viewer.tabs.together": "viewer.tabs.generic",
 }
 FOLDERS = {
     "estimators.approaches": "systems.landing",
