@@ -65,6 +65,7 @@ FILES = {
     "chapters.plots.together": "systems.several_logs.plots",
     "chapters.reference": "systems.reference.chapter",
     "chapters.shortened": "chapters.parts",
+    "chapters.sources": "chapters.provenance",
     "chapters.together": "systems.several_logs.chapter",
     "chapters.verdict": "chapters.gates",
     "estimators.analysis": "systems.analysis",
@@ -82,9 +83,12 @@ FILES = {
     "estimators.overview": "methods.overview",
     "estimators.plan": "systems.plan",
     "estimators.two_clocks.places": "systems.several_logs.relate",
+    "exports.text": "exports.tracks",
+    "methods.lag.motion": "base.attitude",
     "methods.taxi.intervals": "results.chosen",
     "methods.taxi.pair": "methods.taxi.samples",
     "pipeline.one_flight.apply_deviation": "systems.magnetic.apply_deviation",
+    "pipeline.one_flight.cores": "pipeline.many_flights.processes.crews",
     "pipeline.one_flight.deviation_to_apply": "systems.magnetic.deviation_to_apply",
     "pipeline.verbs.kept_runs": "pipeline.verbs.synthesis",
     "reports.steer_card": "systems.magnetic.steer_card_page",
@@ -197,6 +201,7 @@ FOLDERS = {
 # Further modules that have names of the old one.
 ALSO = {
     "estimators.two_clocks.relation": ("systems.joining",),
+    "methods.lag.motion": ("methods.lag.settings",),
     "results.arrays.cooperative": (
         "results.arrays.session",
         "systems.planning.session.arrays",

@@ -1,4 +1,7 @@
-"""Ticks of axes: round places and their texts; of dates hours, days, months or years, as in ISO 8601."""
+"""Ticks of axes: round places and their texts.
+
+Those of dates are hours, days, months or years of UTC, as in ISO 8601.
+"""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
