@@ -74,6 +74,19 @@ ALLOWED_STRINGS: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("forecast", ("viewer/colours.py",), "the state of a filter without GNSS"),
     ("installation", ("reports/installation.py",), "the mark in the page"),
 )
+FEWEST_LINES = 25
+MAY_BE_SHORT = {  # beside __init__.py
+    "__main__.py": "python -m groundstation",
+    "base/version.py": "read by the build",
+    "chapters/overview.py": "a chapter of its own, as those beside it",
+    "pipeline/verbs/schema.py": "a command: python -m",
+    "results/file_names.py": "tells results from logs without loading either",
+    "results/forecast_methods.py": "words of the forecast for rooms that name no system",
+    "store/marks.py": "every other log is opened without the store",
+    "systems/heading/installation/answer.py": "an answer: who looks for one looks there",
+    "systems/latency/arrays.py": "arrays of a system: who looks for them looks there",
+    "systems/several_logs/arrays.py": "the same",
+}
 ONLY_ROOM_OF = {"mcap": "store", "google": "store", "foxglove_schemas_protobuf": "store", "rerun": "viewer"}
 NOT_PUBLIC = re.compile(r"/?(rerun_|rerun-[a-z]+-|re_viewer|RERUN_|rerun\.(.*\.)?_)")
 OF_TUPLES = ("_replace", "_fields", "_asdict", "_make")  # public methods of named tuples, which cannot have others
@@ -286,6 +299,18 @@ def _imported(path: Path, files: Mapping[str, Path]) -> set[str]:
                 name if (name := f"{node.module}.{alias.name}") in files else node.module or "" for alias in node.names
             )
     return found & files.keys()
+
+
+def test_a_short_file_is_one_of_those_listed() -> None:
+    """One of a few lines belongs to a neighbour, unless it has a reason to stand alone."""
+    short = {
+        path.relative_to(PACKAGE).as_posix()
+        for path in modules()
+        if path.name != "__init__.py" and len(path.read_text(encoding="utf-8").splitlines()) < FEWEST_LINES
+    }
+    new = ", ".join(sorted(short - MAY_BE_SHORT.keys()))
+    assert not new, f"fewer than {FEWEST_LINES} lines: {new}: merge it with the file that needs it"
+    assert not MAY_BE_SHORT.keys() - short, "no longer short: take it off MAY_BE_SHORT"
 
 
 def test_picture_of_the_rooms_is_fresh() -> None:

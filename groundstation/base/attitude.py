@@ -1,6 +1,6 @@
-"""Attitude as a quaternion for programs that draw.
+"""Attitude as a rotation from body axes to north-east-down, and as a quaternion.
 
-Axes are east-north-up and forward-left-up; the scalar is last.
+The quaternion is for programs that draw. Its axes are east-north-up and forward-left-up; the scalar is last.
 """
 
 import numpy as np
@@ -41,3 +41,19 @@ def quaternion_enu_from_flu_xyzw(roll_deg: FloatArray, pitch_deg: FloatArray, he
             cos_r * cos_p * cos_y + sin_r * sin_p * sin_y,
         ]
     )
+
+
+def rotation_n_from_b(attitude_deg: FloatArray) -> FloatArray:
+    """Return rotations, shape (m, 3, 3), by roll, pitch and heading, shape (m, 3).
+
+    Angles that are not known are zero.
+    """
+    roll, pitch, yaw = np.deg2rad(np.nan_to_num(attitude_deg)).T
+    (sr, cr), (sp, cp), (sy, cy) = ((np.sin(part), np.cos(part)) for part in (roll, pitch, yaw))
+    return np.array(
+        [
+            [cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy],
+            [cp * sy, sr * sp * sy + cr * cy, cr * sp * sy - sr * cy],
+            [-sp, sr * cp, cr * cp],
+        ]
+    ).transpose(2, 0, 1)

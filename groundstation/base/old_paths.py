@@ -65,6 +65,7 @@ FILES = {
     "chapters.plots.together": "systems.several_logs.plots",
     "chapters.reference": "systems.reference.chapter",
     "chapters.shortened": "chapters.parts",
+    "chapters.sources": "chapters.provenance",
     "chapters.together": "systems.several_logs.chapter",
     "chapters.verdict": "chapters.gates",
     "estimators.analysis": "systems.analysis",
@@ -82,9 +83,12 @@ FILES = {
     "estimators.overview": "methods.overview",
     "estimators.plan": "systems.plan",
     "estimators.two_clocks.places": "systems.several_logs.relate",
+    "exports.text": "exports.tracks",
+    "methods.lag.motion": "base.attitude",
     "methods.taxi.intervals": "results.chosen",
     "methods.taxi.pair": "methods.taxi.samples",
     "pipeline.one_flight.apply_deviation": "systems.magnetic.apply_deviation",
+    "pipeline.one_flight.cores": "pipeline.many_flights.processes.crews",
     "pipeline.one_flight.deviation_to_apply": "systems.magnetic.deviation_to_apply",
     "pipeline.verbs.kept_runs": "pipeline.verbs.synthesis",
     "reports.steer_card": "systems.magnetic.steer_card_page",
@@ -166,7 +170,7 @@ FILES = {
     "viewer.tabs.forecast": "systems.inertial.forecast_tab",
     "viewer.tabs.heading": "systems.heading.tab",
     "viewer.tabs.inertial": "systems.inertial.tab",
-    "viewer.tabs.installation": "systems.heading.installation.tab",
+    "viewer.tabs.installation": "viewer.tabs.generic",
     "viewer.tabs.landing": "systems.landing.tab",
     "viewer.tabs.landing_beacons": "systems.landing.beacons.tab",
     "viewer.tabs.landing_ranges": "systems.planning.landing.tab",
@@ -175,7 +179,7 @@ FILES = {
     "viewer.tabs.placement": "systems.planning.session.placement_tab",
     "viewer.tabs.reference": "systems.reference.tab",
     "viewer.tabs.session_space": "systems.cooperative.space_tab",
-    "viewer.tabs.together": "systems.several_logs.tab",
+    "viewer.tabs.together": "viewer.tabs.generic",
 }
 FOLDERS = {
     "estimators.approaches": "systems.landing",
@@ -197,6 +201,7 @@ FOLDERS = {
 # Further modules that have names of the old one.
 ALSO = {
     "estimators.two_clocks.relation": ("systems.joining",),
+    "methods.lag.motion": ("methods.lag.settings",),
     "results.arrays.cooperative": (
         "results.arrays.session",
         "systems.planning.session.arrays",

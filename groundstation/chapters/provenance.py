@@ -1,8 +1,9 @@
-"""Chapter on where the numbers come from.
+"""Chapter on where the numbers come from, and that on the sources of the methods.
 
 Time of run, host and versions stand in manifest.json alone.
 """
 
+from groundstation.chapters.chapter import Chapters
 from groundstation.chapters.parts import Facts, Note, Part, Section
 from groundstation.chapters.wording import ABSENT, clean, number
 from groundstation.results.flight import FlightResults, Source
@@ -52,3 +53,15 @@ def source_pairs(source: Source, what: str = "log") -> tuple[tuple[str, str, str
         (f"SHA-256 of the {what}", source.sha256 or ABSENT, ""),
         ("Read by", source.reader or ABSENT, ""),
     )
+
+
+def sources(results: FlightResults, chapters: Chapters) -> Section | None:
+    """Return the chapter on the sources of the methods.
+
+    Each is told once, by the name used in the other chapters. None where no answer rests on a source.
+    """
+    cited = {chapter.name: chapter.sources for chapter in chapters.of(results)}
+    named = dict.fromkeys(source for name in results.answers for source in cited.get(name, ()))
+    if not named:
+        return None
+    return Section("sources", "Sources", "", (Facts("", [(name, text, "") for name, text in named]),))

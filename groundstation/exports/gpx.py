@@ -6,8 +6,7 @@ from xml.etree import ElementTree as ET
 
 from groundstation.base.printable import printable
 from groundstation.base.timescales import utc_ns_to_iso
-from groundstation.exports.text import coordinates, number
-from groundstation.exports.tracks import MSL, Track
+from groundstation.exports.tracks import MSL, Track, coordinates, number
 
 GPX, OWN = "http://www.topografix.com/GPX/1/1", "https://groundstation.invalid/gpx/1"
 OF_GPX = (MSL, "satellites_used", "hdop")

@@ -13,8 +13,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import continuous_longitude_deg
 from groundstation.base.printable import printable
 from groundstation.base.timescales import utc_ns_to_iso
-from groundstation.exports.text import coordinates, number
-from groundstation.exports.tracks import ELLIPSOID, MSL, PRESSURE, Track
+from groundstation.exports.tracks import ELLIPSOID, MSL, PRESSURE, Track, coordinates, number
 
 KML, GX = "http://www.opengis.net/kml/2.2", "http://www.google.com/kml/ext/2.2"
 COLOURS = ("ffd18802", "ff3c8f00", "ff1f6fd8", "ff8f3f97", "ff5a5a5a")  # alpha, blue, green, red

@@ -10,8 +10,7 @@ import numpy as np
 
 from groundstation.base.angles import direction_of, wrap_360
 from groundstation.base.errors import NotAssessableError
-from groundstation.exports.text import number
-from groundstation.exports.tracks import MSL, SPEED, Track
+from groundstation.exports.tracks import MSL, SPEED, Track, number
 
 KNOT_MPS = 1852.0 / 3600.0
 AUTONOMOUS = 1  # quality of GGA: a fix, its kind is not said

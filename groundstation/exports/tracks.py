@@ -1,5 +1,6 @@
 """Tracks to export: those logged, and those that an analysis made of an INS."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -157,3 +158,22 @@ def _altitudes(flight: Flight, ins_topic: str, at_s: FloatArray) -> dict[str, Fl
         for name in ALTITUDES
         if table.has(name)
     }
+
+
+def number(value: float, digits: int) -> str:
+    """Write a number with so many decimals at most; empty where it is not known.
+
+    Examples
+    --------
+    >>> number(1.5, 3), number(-0.0001, 3), number(float("nan"), 3)
+    ('1.5', '0', '')
+    """
+    if not math.isfinite(value):
+        return ""
+    text = f"{value:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{value:.0f}"
+    return "0" if text == "-0" else text
+
+
+def coordinates(values_deg: FloatArray) -> list[str]:
+    """Write degrees with nine decimals, 0.1 mm."""
+    return [number(value, 9) for value in values_deg.tolist()]

@@ -14,9 +14,8 @@ from groundstation.chapters.findings import findings
 from groundstation.chapters.next_steps import next_steps
 from groundstation.chapters.overview import overview
 from groundstation.chapters.parts import Facts, Note, Part, Section, kept
-from groundstation.chapters.provenance import provenance
+from groundstation.chapters.provenance import provenance, sources
 from groundstation.chapters.quality import quality
-from groundstation.chapters.sources import sources
 from groundstation.reports.drawing import drawn_by
 from groundstation.results.files import SavedFlight
 from groundstation.results.flight import FlightResults

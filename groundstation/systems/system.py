@@ -32,12 +32,13 @@ if TYPE_CHECKING:
 class Tab(NamedTuple):
     """A tab of the recording, and the analyses whose answers it shows.
 
-    ``log(recorder, results)`` logs it and returns its layout, None where there is nothing to show. Without it the
-    answers have no tab: another one shows them. ``part_of`` names the one that shows their chapters: "quality".
+    ``log(recorder, results)`` logs it and returns its layout, None where there is nothing to show. Without it each
+    answer has the generic tab, its chapter and its figures over time. ``part_of`` names the tab that shows the chapters
+    in place of one of their own: "quality".
     """
 
     shows: tuple[str, ...]
-    log: Callable[[Any, "FlightResults"], Any] | None
+    log: Callable[[Any, "FlightResults"], Any] | None = None
     part_of: Literal["", "quality"] = ""
 
 

@@ -157,9 +157,15 @@ def answer_tabs(kind: type[Answer] | None, recorder: Recorder, results: FlightRe
     for tab in tabs:
         if tab.log is not None:
             yield tab.shows[0], partial(tab.log, recorder, results)
+        elif not tab.part_of:
+            yield from _generic(tab.shows, recorder, results)
     shown = {name for tab in tabs for name in tab.shows}
-    for name, answer in results.answers.items():
-        if name not in shown:
+    yield from _generic([name for name in results.answers if name not in shown], recorder, results)
+
+
+def _generic(names: Iterable[str], recorder: Recorder, results: FlightResults) -> Iterator[NamedTab]:
+    for name in names:
+        if (answer := results.answers.get(name)) is not None:
             yield name, partial(generic_tab, recorder, results, answer)
 
 

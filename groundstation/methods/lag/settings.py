@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 from groundstation.base.toml_settings import check_ranges, number
 
+SLOW_MPS = 3.0  # the track of a slower aircraft does not show where the nose points
+
 
 @dataclass(frozen=True)
 class LatencySettings:

@@ -1,6 +1,6 @@
 """Ticks of axes: round places and their texts.
 
-Of dates hours, days, months or years, as in ISO 8601.
+Those of dates are hours, days, months or years of UTC, as in ISO 8601.
 """
 
 import math

@@ -88,12 +88,11 @@ def _compared() -> "tuple[Compared, ...]":
 
 
 def _tabs() -> tuple[Tab, ...]:
-    from groundstation.systems.heading.installation.tab import installation
     from groundstation.systems.heading.tab import heading
 
     return (
         Tab(("heading",), heading),
-        Tab(("installation",), installation),
+        Tab(("installation",)),
     )
 
 

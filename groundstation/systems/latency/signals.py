@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import direction_of, unwrap
-from groundstation.methods.lag.motion import SLOW_MPS, rotation_n_from_b
-from groundstation.methods.lag.settings import LatencySettings
+from groundstation.base.attitude import rotation_n_from_b
+from groundstation.methods.lag.settings import SLOW_MPS, LatencySettings
 from groundstation.methods.lag.windows import Series
 from groundstation.systems.latency.answer import Quantity
 from groundstation.tables.epochs import distinct_epochs

@@ -26,7 +26,7 @@ def _plots() -> "Mapping[str, Describe]":
 
 
 def _tabs() -> tuple[Tab, ...]:
-    return (Tab(("latency",), None, part_of="quality"),)
+    return (Tab(("latency",), part_of="quality"),)
 
 
 SYSTEM = System(

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.base.angles import FloatArray, direction_of, unwrap
+from groundstation.base.attitude import rotation_n_from_b
 from groundstation.base.quantiles import NORMAL_95, student_quantile
 from groundstation.methods.lag.fit import DelayFit, fit_delay
-from groundstation.methods.lag.motion import SLOW_MPS, rotation_n_from_b
-from groundstation.methods.lag.settings import LatencySettings
+from groundstation.methods.lag.settings import SLOW_MPS, LatencySettings
 from groundstation.methods.lag.windows import Series, Windows, cut_windows, too_few_windows
 from groundstation.systems.several_logs.channels import Pair, Side, averaged, running_mean
 from groundstation.systems.several_logs.settings import TwoClocksSettings

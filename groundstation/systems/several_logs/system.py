@@ -27,9 +27,7 @@ def _plots() -> "Mapping[str, Describe]":
 
 
 def _tabs() -> tuple[Tab, ...]:
-    from groundstation.systems.several_logs.tab import together
-
-    return (Tab(("together",), together),)
+    return (Tab(("together",)),)
 
 
 def _join() -> "JoinStep":

@@ -1,6 +1,7 @@
 """Crew of a run: a cluster, processes side by side or each apart, or this process alone."""
 
 import math
+import os
 from functools import partial
 
 from groundstation.pipeline.many_flights.processes.apart import outcomes_apart
@@ -30,3 +31,11 @@ def crew_for(
     if min(workers, logs) <= 1 and logs <= TASKS_PER_PROCESS and math.isinf(timeout_s):
         return partial(in_turn, listen=listen)
     return partial(side_by_side, workers=min(workers, logs), listen=listen, timeout_s=timeout_s)
+
+
+def cores() -> int:
+    """Return the number of processes that run at once by default.
+
+    It is the number of cores that this process may use.
+    """
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -23,7 +23,7 @@ from groundstation.pipeline.many_flights.fleet.refresh import refresh
 from groundstation.pipeline.many_flights.fleet.scan import Scan
 from groundstation.pipeline.many_flights.inputs import is_remote, session_folders
 from groundstation.pipeline.many_flights.processes.apart import bounds_of
-from groundstation.pipeline.many_flights.processes.crews import crew_for
+from groundstation.pipeline.many_flights.processes.crews import cores, crew_for
 from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS, AnyJob, Crew, in_turn
 from groundstation.pipeline.many_flights.remote.jobs import RemoteJob, digest_remote, run_remote
 from groundstation.pipeline.many_flights.remote.output import RemoteOutput
@@ -43,7 +43,6 @@ from groundstation.pipeline.many_flights.sessions.found import Asked, find_sessi
 from groundstation.pipeline.many_flights.sessions.job import load_stations
 from groundstation.pipeline.many_flights.sessions.session import run_one
 from groundstation.pipeline.one_flight.configuration import Configuration
-from groundstation.pipeline.one_flight.cores import cores
 from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.identity import plain_id
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
