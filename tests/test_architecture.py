@@ -73,7 +73,6 @@ ALLOWED_STRINGS: tuple[tuple[str, tuple[str, ...], str], ...] = (
     ("reference", ("pipeline/verbs/compare.py",), "the column that tells rows apart"),
     ("forecast", ("viewer/colours.py",), "the state of a filter without GNSS"),
     ("installation", ("reports/installation.py",), "the mark in the page"),
-    ("magnetic", ("pipeline/one_flight/resume.py",), "still to be turned: files that a flight with a deviation has"),
 )
 STILL_NAMED = Path(__file__).parent / "references" / "systems_named.txt"
 ONLY_ROOM_OF = {"mcap": "store", "google": "store", "foxglove_schemas_protobuf": "store", "rerun": "viewer"}
