@@ -21,7 +21,7 @@ from numpy.typing import NDArray  # noqa: E402
 
 from groundstation.methods.kalman.filter import (  # noqa: E402
     FilterRun,
-    Kept,
+    KeptArrays,
     Measurements,
     Start,
     run_filter,
@@ -72,7 +72,7 @@ def by_us(given: System) -> FilterRun:
     transition = Transition.blocks(given.F[None], given.Q[None], given.count)
     seen = Measurements.of(given.epoch, given.value, given.columns, given.coefficients, 1.0)
     step = np.zeros(given.epoch[-1] + 1, dtype=np.int64)
-    kept = Kept(covariances=False, gains=False, variances=True)
+    kept = KeptArrays(covariances=False, gains=False, variances=True)
     return run_filter(transition, step, seen, Start(np.zeros(given.size), np.eye(given.size)), kept=kept)
 
 

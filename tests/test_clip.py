@@ -19,7 +19,7 @@ from groundstation.pipeline.one_flight.convert import convert_log
 from groundstation.pipeline.one_flight.log import open_log
 from groundstation.pipeline.verbs.clip import Wanted, clip
 from groundstation.pipeline.verbs.describe import describe
-from groundstation.store.reader import Part, read, read_info
+from groundstation.store.reader import StorePart, read, read_info
 from tests.recording_contents import Contents
 from tests.saved import load
 from tests.store.test_store import joined
@@ -185,7 +185,7 @@ def test_only_chunks_that_overlap_are_read(whole: Path, tmp_path: Path) -> None:
     assert read_info(tmp_path / "b.mcap").findings[-1].code.startswith("store.")
     elsewhere = clip(broken, tmp_path / "c.mcap", Wanted(str(low_s), str(high_s), ("ins",)), with_recording=False)
     assert elsewhere.state == "done"
-    part = Part(0, (read_info(whole).start_ns or 0) + 60 * NS_PER_S)
+    part = StorePart(0, (read_info(whole).start_ns or 0) + 60 * NS_PER_S)
     assert sum(isinstance(item, RecordBatch) for item in read(whole, part)) < sum(
         isinstance(item, RecordBatch) for item in read(whole)
     )

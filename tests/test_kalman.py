@@ -12,8 +12,8 @@ from groundstation.base.compile import Loop
 from groundstation.methods.kalman.arrays import ABSENT, REJECTED, USED
 from groundstation.methods.kalman.filter import (
     FilterRun,
-    Gate,
-    Kept,
+    InnovationGate,
+    KeptArrays,
     Measurements,
     Start,
     run_filter,
@@ -271,7 +271,9 @@ def test_gate_counts_what_it_rejects_and_the_rest_is_as_if_it_were_absent() -> N
     z = draw(model, np.random.default_rng(7))[1]
     z[[5, 20, 21]] += 1e4
     kinds = np.arange(len(z)) % 3
-    run = run_filter(model.transition, model.step, model.measurements(z, kind=kinds), start_of(model), gate=Gate(20.0))
+    run = run_filter(
+        model.transition, model.step, model.measurements(z, kind=kinds), start_of(model), gate=InnovationGate(20.0)
+    )
     assert np.flatnonzero(run.mark == REJECTED).tolist() == [5, 20, 21]
     assert run.rejected == 3
     assert run.rejected_by_kind.tolist() == [1, 0, 2]
@@ -285,7 +287,9 @@ def test_neighbours_of_one_kind_are_judged_together() -> None:
     still = Transition.sparse(2, [0], [0], [[1.0]])
     z = np.array([0.1, 50.0, 0.2, 0.3, np.nan, 0.1])
     seen = Measurements.of([0, 0, 1, 1, 2, 2], z, np.array([[0], [1]] * 3), np.ones((6, 1)), 1.0, kind=0)
-    run = run_filter(still, [-1, 0, 0], seen, Start(np.zeros(2), np.eye(2)), gate=Gate(5.0), kept=Kept(judged=True))
+    run = run_filter(
+        still, [-1, 0, 0], seen, Start(np.zeros(2), np.eye(2)), gate=InnovationGate(5.0), kept=KeptArrays(judged=True)
+    )
     assert run.mark.tolist() == [REJECTED, REJECTED, USED, USED, ABSENT, USED]
     assert run.record.judged_variance[2:4].tolist() == [2.0, 2.0]
     assert np.isnan(run.record.judged_variance[4])
@@ -296,7 +300,9 @@ def test_filter_that_rejects_for_too_long_is_opened_again(is_by_innovation: bool
     still = Transition.sparse(2, [0], [0], [[1.0]])
     z = np.where(np.arange(20) < 10, 0.0, 100.0)
     seen = Measurements.of(np.arange(20), z, np.zeros((20, 1), dtype=int), np.full((20, 1), 2.0), 1.0)
-    gate = Gate(5.0, patience=3, opened=0.0 if is_by_innovation else [1e4, 0.0], is_by_innovation=is_by_innovation)
+    gate = InnovationGate(
+        5.0, patience=3, opened=0.0 if is_by_innovation else [1e4, 0.0], is_by_innovation=is_by_innovation
+    )
     run = run_filter(still, [-1] + [0] * 19, seen, Start(np.zeros(2), np.eye(2)), gate=gate)
     assert run.reopened == 1
     assert (run.mark == REJECTED).nonzero()[0].tolist() == [10, 11, 12]

@@ -19,7 +19,7 @@ from groundstation.base.errors import GroundstationError
 from groundstation.pipeline.verbs.view import look_at
 from groundstation.viewer import inner, launch, verification
 from groundstation.viewer.fleet_catalog import catalog_server
-from groundstation.viewer.gate import Gate, request_of
+from groundstation.viewer.gate import GateServer, request_of
 from groundstation.viewer.own_page import page_files, page_server
 from groundstation.viewer.recorder import FLIGHT_TIME
 from groundstation.viewer.recording import save_stream
@@ -237,18 +237,18 @@ class _Echo(socketserver.BaseRequestHandler):
 
 
 @pytest.fixture
-def gate() -> Iterator[Gate]:
+def gate() -> Iterator[GateServer]:
     with socketserver.ThreadingTCPServer(("127.0.0.1", 0), _Echo) as server:
         server.daemon_threads = True
         threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True).start()
-        entry = Gate("127.0.0.1", 0)
+        entry = GateServer("127.0.0.1", 0)
         with entry.listening():
             entry.open("127.0.0.1", server.server_address[1])
             yield entry
         server.shutdown()
 
 
-def passed(gate: Gate, *blocks: bytes) -> bytes:
+def passed(gate: GateServer, *blocks: bytes) -> bytes:
     """What of some blocks the server behind the gate gets."""
     with socket.create_connection(("127.0.0.1", gate.port), timeout=PATIENCE_S) as visitor:
         for block in blocks:
@@ -262,7 +262,7 @@ OWN = b"POST /a HTTP/1.1\r\nHost: localhost\r\nContent-Length: 4\r\nConnection: 
 OTHER = b"GET /b HTTP/1.1\r\nHost: pages.example\r\n\r\n"
 
 
-def test_every_request_is_looked_at_not_the_first_alone(gate: Gate) -> None:
+def test_every_request_is_looked_at_not_the_first_alone(gate: GateServer) -> None:
     sent = OWN.replace(b"keep-alive, Upgrade", b"close")
     assert passed(gate, OWN + b"body" + OTHER) == sent + b"body"
     assert passed(gate, OWN + b"bo", b"dy" + OTHER, OTHER) == sent + b"body"
@@ -270,6 +270,6 @@ def test_every_request_is_looked_at_not_the_first_alone(gate: Gate) -> None:
     assert passed(gate, OTHER).startswith(b"HTTP/1.1 421 ")
 
 
-def test_a_program_keeps_its_connection(gate: Gate) -> None:
+def test_a_program_keeps_its_connection(gate: GateServer) -> None:
     everything = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", b"frames", OTHER
     assert passed(gate, *everything) == b"".join(everything)

@@ -15,8 +15,8 @@ from groundstation.integrity.ledger import FieldCounts
 from groundstation.integrity.limits import Thresholds
 from groundstation.integrity.sequence import Counter, Sequence, counters_of
 from groundstation.integrity.spans import Dropout, Timeline
-from groundstation.integrity.stretches import Constancy, Place, Sampler
-from groundstation.integrity.stuck import Judge, Motion, Stuck, is_watched
+from groundstation.integrity.stretches import Constancy, RecordPlace, Sampler
+from groundstation.integrity.stuck import Judge, MotionSampler, Stuck, is_watched
 
 FloatArray = NDArray[np.float64]
 
@@ -35,8 +35,8 @@ class _FieldTally:
     present: int = 0
     nan: int = 0
     out_of_range: int = 0
-    first: Place | None = None
-    last: Place | None = None
+    first: RecordPlace | None = None
+    last: RecordPlace | None = None
 
     def add(self, column: Column, rows: Int64Array | None, record_index: Int64Array, device_ns: Int64Array) -> None:
         """Count a batch; ``rows`` are those where the column is present, None for all."""
@@ -78,7 +78,7 @@ class _FieldTally:
 
     def _add_outside(self, at: Int64Array, record_index: Int64Array, device_ns: Int64Array) -> None:
         self.out_of_range += len(at)
-        first, last = (Place(int(record_index[one]), int(device_ns[one])) for one in (at[0], at[-1]))
+        first, last = (RecordPlace(int(record_index[one]), int(device_ns[one])) for one in (at[0], at[-1]))
         self.first, self.last = self.first or first, last
 
     def ledger(self, name: str, clock: ClockModel, stuck: tuple[Stuck, ...]) -> FieldCounts:
@@ -108,9 +108,9 @@ class Contents:
     def __init__(self, thresholds: Thresholds) -> None:
         self._thresholds = thresholds
         self._topics: dict[str, _TopicTally] = {}
-        self._motion = Motion()
+        self._motion = MotionSampler()
         self._timeline = Sampler()
-        self._dropouts: list[tuple[Place, float]] = []
+        self._dropouts: list[tuple[RecordPlace, float]] = []
         self._judge: Judge | None = None
 
     def add(self, batch: RecordBatch, device_ns: Int64Array | None = None) -> None:
@@ -156,7 +156,7 @@ class Contents:
         for at in np.flatnonzero(column.mask)[: MOST_DROPOUTS - len(self._dropouts)].tolist():
             length_s = float(column.values[at]) / 1e3
             if length_s > 0.0:
-                self._dropouts.append((Place(int(record_index[at]), int(device_ns[at])), length_s))
+                self._dropouts.append((RecordPlace(int(record_index[at]), int(device_ns[at])), length_s))
 
     def fields(self, topic: str, clock: ClockModel) -> tuple[FieldCounts, ...]:
         """Ledgers of a topic's fields."""

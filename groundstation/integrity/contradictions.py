@@ -16,7 +16,7 @@ from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.signals import kind_of
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import ClockModel
-from groundstation.integrity.stuck import METRES_PER_DEG, Motion
+from groundstation.integrity.stuck import METRES_PER_DEG, MotionSampler
 
 FloatArray = NDArray[np.float64]
 CONTRADICTION = "data.contradiction"  # code of the finding
@@ -91,13 +91,13 @@ class _Windows:
 
 
 def contradictions(
-    motion: Motion, clock: ClockModel, topics: Iterable[str], metadata: Mapping[str, str]
+    motion: MotionSampler, clock: ClockModel, topics: Iterable[str], metadata: Mapping[str, str]
 ) -> tuple[Contradiction, ...]:
     """Find the places where a log contradicts itself.
 
     Parameters
     ----------
-    motion : Motion
+    motion : MotionSampler
         Samples of all sources of motion.
     clock : ClockModel
     topics : iterable of str
@@ -122,7 +122,7 @@ def contradictions(
     return tuple(one for one in found if one is not None)
 
 
-def _series_of(motion: Motion, clock: ClockModel) -> tuple[int, list[_Series]]:
+def _series_of(motion: MotionSampler, clock: ClockModel) -> tuple[int, list[_Series]]:
     placed = []
     for topic, index, device_ns, columns in motion.samples():
         time_ns = clock.time_ns(index, Column(device_ns))

@@ -23,7 +23,7 @@ WINDOW_RECORDS = 500_000  # at least so many records of all topics are laid in o
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class BatchPlaces:
     """Places and times of one batch, or of a whole topic; topics sampled together share it.
 
     ``validity_ns`` are times of validity by the device's clock, where they are others.
@@ -58,7 +58,7 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Kept:
+class PieceOnDisk:
     """Location of a kept piece in the file, with a summary that saves reading it.
 
     Parameters
@@ -106,12 +106,12 @@ class Places:
     """
 
     def __init__(self) -> None:
-        self._held: dict[int, tuple[Kept, Piece]] = {}
+        self._held: dict[int, tuple[PieceOnDisk, BatchPlaces]] = {}
         self._held_bytes = 0
         self._file: Any = None
         self._end = 0
         self._count = self.records = 0
-        self._recent: deque[tuple[Piece, Kept]] = deque(maxlen=8)
+        self._recent: deque[tuple[BatchPlaces, PieceOnDisk]] = deque(maxlen=8)
 
     def close(self) -> None:
         """Release pieces and file."""
@@ -124,7 +124,7 @@ class Places:
         """Tell whether there may be several windows."""
         return self.records > WINDOW_RECORDS
 
-    def of(self, batch: RecordBatch) -> Kept:
+    def of(self, batch: RecordBatch) -> PieceOnDisk:
         """Keep the piece of a batch."""
         for piece, kept in self._recent:
             if piece.holds(batch):
@@ -132,7 +132,7 @@ class Places:
         device = batch.device_time_ns
         present = None if device.present is None else _lasting(device.present)
         validity = batch.validity_time_ns
-        piece = Piece(
+        piece = BatchPlaces(
             _lasting(np.asarray(batch.record_index, np.int64)),
             Column(_lasting(np.asarray(device.values, np.int64)), present),
             None if validity is None else _lasting(np.asarray(validity, np.int64)),
@@ -140,13 +140,13 @@ class Places:
         self._recent.append((piece, self._keep(piece)))
         return self._recent[-1][1]
 
-    def _keep(self, piece: Piece) -> Kept:
+    def _keep(self, piece: BatchPlaces) -> PieceOnDisk:
         index, timed = piece.index, piece.timed
         first, last = int(index[0]), int(index[-1])
         is_near, is_timed = last - first < 1 << 32, len(timed) == len(index)
         times = (int(timed[0]), int(timed[-1]), len(timed), _repeats(timed)) if len(timed) else ()
         has_validity = piece.validity_ns is not None
-        kept = Kept(self._count, self._end, len(index), first, last, is_near, is_timed, times, has_validity)
+        kept = PieceOnDisk(self._count, self._end, len(index), first, last, is_near, is_timed, times, has_validity)
         self._end += kept.size
         self._count += 1
         self.records += len(index)
@@ -176,7 +176,7 @@ class Places:
         self._held.clear()
         self._held_bytes = 0
 
-    def piece(self, kept: Kept) -> Piece:
+    def piece(self, kept: PieceOnDisk) -> BatchPlaces:
         """Read a piece back."""
         if kept.number in self._held:
             return self._held[kept.number][1]
@@ -184,12 +184,12 @@ class Places:
         index = self._array(np.uint32 if kept.is_near else np.int64, kept.count).astype(np.int64) + kept.first
         time = self._array(np.int64, kept.count)
         timed = None if kept.is_timed else self._array(np.bool_, kept.count)
-        return Piece(index, Column(time, timed), self._array(np.int64, kept.count) if kept.has_validity else None)
+        return BatchPlaces(index, Column(time, timed), self._array(np.int64, kept.count) if kept.has_validity else None)
 
     def _array(self, dtype: Any, count: int) -> Any:
         return np.frombuffer(self._file.read(count * np.dtype(dtype).itemsize), dtype)
 
-    def in_order(self, topics: Iterable[Sequence[Kept]]) -> Iterator[tuple[Int64Array, Column, BoolArray]]:
+    def in_order(self, topics: Iterable[Sequence[PieceOnDisk]]) -> Iterator[tuple[Int64Array, Column, BoolArray]]:
         """Yield places, device times and frozenness of all records in log order, in windows.
 
         Each place comes once. Where topics tell different times of a place, the topic that is named first is believed.
@@ -205,7 +205,7 @@ class Places:
                     is_frozen_here[np.searchsorted(index, piece.index)] = True
             yield index, time, is_frozen_here
 
-    def in_one(self, topics: Iterable[Sequence[Kept]]) -> tuple[Int64Array, Column]:
+    def in_one(self, topics: Iterable[Sequence[PieceOnDisk]]) -> tuple[Int64Array, Column]:
         """Places and device times of all records in the order of the log, each place once."""
         index, time = np.empty(self.records, dtype=np.int64), np.empty(self.records, dtype=np.int64)
         timed = np.empty(self.records, dtype=bool)
@@ -234,7 +234,7 @@ def _repeats(times: Int64Array) -> int:
     return int(np.count_nonzero(times[1:] == times[:-1]))
 
 
-def _is_frozen(several: Sequence[Kept]) -> bool:
+def _is_frozen(several: Sequence[PieceOnDisk]) -> bool:
     """Tell whether the times of a topic are frozen."""
     timed = [kept.times for kept in several if kept.times]
     count = sum(times[2] for times in timed)
@@ -243,13 +243,13 @@ def _is_frozen(several: Sequence[Kept]) -> bool:
     return is_frozen(count, repeats)
 
 
-def _windows(pieces: Collection[Kept]) -> Iterator[list[Kept]]:
+def _windows(pieces: Collection[PieceOnDisk]) -> Iterator[list[PieceOnDisk]]:
     """Yield the pieces of one stretch of the log after another, none reaching into the next.
 
     The pieces of a stretch stand in the order given.
     """
     rank = {kept.number: at for at, kept in enumerate(pieces)}
-    window: list[Kept] = []
+    window: list[PieceOnDisk] = []
     count, reached = 0, -1
     for kept in sorted(pieces, key=lambda kept: kept.first):
         if count >= WINDOW_RECORDS and kept.first > reached:
@@ -261,7 +261,7 @@ def _windows(pieces: Collection[Kept]) -> Iterator[list[Kept]]:
         yield sorted(window, key=lambda kept: rank[kept.number])
 
 
-def _united(pieces: list[Piece]) -> tuple[Int64Array, Column]:
+def _united(pieces: list[BatchPlaces]) -> tuple[Int64Array, Column]:
     """Records of all pieces in order of their places, each place once."""
     if len(pieces) == 1:
         return pieces[0].index, pieces[0].time

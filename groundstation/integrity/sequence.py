@@ -10,7 +10,7 @@ from groundstation.base.ledger import CounterEntry
 from groundstation.base.records import Column, Int64Array, RecordBatch
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.limits import SequenceLimits
-from groundstation.integrity.stretches import Place
+from groundstation.integrity.stretches import RecordPlace
 
 LISTED = 100
 _LARGEST = 2.0**53
@@ -68,7 +68,7 @@ class Counter:
     resets: int = 0
     first: int | None = None
     last: int = 0
-    places: list[tuple[Place, int]] = field(default_factory=list)
+    places: list[tuple[RecordPlace, int]] = field(default_factory=list)
 
     def add(self, column: Column, record_index: Int64Array, device_ns: Int64Array) -> None:
         """Continue with a batch."""
@@ -96,7 +96,7 @@ class Counter:
         lost = np.flatnonzero((step > usual) & (step <= self.limits.longest_jump))
         self.lost += int((step[lost] - usual).sum())
         for at in lost[: LISTED - len(self.places)].tolist():
-            self.places.append((Place(int(index[at]), int(device[at])), int(step[at]) - usual))
+            self.places.append((RecordPlace(int(index[at]), int(device[at])), int(step[at]) - usual))
 
     def sequence(self, clock: ClockModel) -> Sequence | None:
         """Return the losses that the counter shows; None when it is no counter after all."""

@@ -12,7 +12,7 @@ from groundstation.integrity.clock_references import ClockReferences
 from groundstation.integrity.counting import CountingSettings, estimate_counting_clock
 from groundstation.integrity.limits import Thresholds
 from groundstation.integrity.ordering import joined_columns
-from groundstation.integrity.places import Kept, Places
+from groundstation.integrity.places import PieceOnDisk, Places
 from groundstation.integrity.power_ups import SILENT_NS, TOLERANCE_NS, Evidence, PowerUp, power_ups
 from groundstation.integrity.thinning import Thinner
 
@@ -49,7 +49,7 @@ class PowerUpClock:
 
 
 @dataclass(frozen=True)
-class Found:
+class ClockPass:
     """Results of a pass over a source.
 
     They are its header, further logs that begin in it, places and times, other clocks.
@@ -58,11 +58,11 @@ class Found:
     header: LogHeader
     new_logs: tuple[NewLog, ...]
     places: Places
-    pieces: Mapping[str, Sequence[Kept]]
+    pieces: Mapping[str, Sequence[PieceOnDisk]]
     references: ClockReferences
 
     @property
-    def topics(self) -> list[Sequence[Kept]]:
+    def topics(self) -> list[Sequence[PieceOnDisk]]:
         """The pieces of each topic, in alphabetical order."""
         return [self.pieces[topic] for topic in sorted(self.pieces)]
 
@@ -76,7 +76,7 @@ class Found:
                 yield index[rows], Column(part.unwrapped_ns(index[rows], here.values), here.present), frozen[rows]
 
 
-def clock_of(found: Found, limits: Thresholds) -> tuple[ClockModel, tuple[PowerUpClock, ...]]:
+def clock_of(found: ClockPass, limits: Thresholds) -> tuple[ClockModel, tuple[PowerUpClock, ...]]:
     """Model the clock of a source; also return its power-ups where there are several.
 
     A source is looked at for them where its clock steps back, is out of order, is silent for an hour, or another log
@@ -100,7 +100,7 @@ def clock_of(found: Found, limits: Thresholds) -> tuple[ClockModel, tuple[PowerU
     return _beside([_of(part, found, limits, zero_ns) for part, zero_ns in zip(parts, zeros, strict=True)])
 
 
-def _whole(found: Found, limits: Thresholds, offsets: ClockOffsets | None = None) -> ClockModel:
+def _whole(found: ClockPass, limits: Thresholds, offsets: ClockOffsets | None = None) -> ClockModel:
     """The model of a source as one power-up; ``offsets`` are added to its times."""
     zero_ns = found.header.utc_of_zero_ns
     if found.header.has_counting_clock:
@@ -113,7 +113,7 @@ def _whole(found: Found, limits: Thresholds, offsets: ClockOffsets | None = None
     return estimate_clock(index, time, zero_ns, settings=limits.clock)
 
 
-def _set_by_another(found: Found, limits: Thresholds, offsets: ClockOffsets) -> ClockModel:
+def _set_by_another(found: ClockPass, limits: Thresholds, offsets: ClockOffsets) -> ClockModel:
     """Return the model for times as the device wrote them, set by another clock of the log.
 
     It is made from the model for times that the other clock has set.
@@ -150,14 +150,14 @@ def _joined(windows: Sequence[Window]) -> Window:
     )
 
 
-def _believed(found: Found) -> Iterator[tuple[Int64Array, Int64Array]]:
+def _believed(found: ClockPass) -> Iterator[tuple[Int64Array, Int64Array]]:
     """Places and times of the records that have a time which advances."""
     for index, time, frozen in found.places.in_order(found.topics):
         usable = time.mask & ~frozen
         yield (index, time.values) if usable.all() else (index[usable], time.values[usable])
 
 
-def _evidence(found: Found, clock: ClockModel) -> Evidence:
+def _evidence(found: ClockPass, clock: ClockModel) -> Evidence:
     return Evidence(
         is_utc=found.header.utc_of_zero_ns == 0,
         period_ns=clock.period_ns,
@@ -167,7 +167,7 @@ def _evidence(found: Found, clock: ClockModel) -> Evidence:
     )
 
 
-def _most_step_back(found: Found, place: int, middle_ns: int) -> bool:
+def _most_step_back(found: ClockPass, place: int, middle_ns: int) -> bool:
     """Tell whether most topics go back, each by itself, at the end of a power-up.
 
     Only topics in the second half of the power-up count.
@@ -184,7 +184,7 @@ def _most_step_back(found: Found, place: int, middle_ns: int) -> bool:
     return back > on and 2 * back > late
 
 
-def _around(places: Places, several: Sequence[Kept], place: int) -> tuple[int | None, int | None]:
+def _around(places: Places, several: Sequence[PieceOnDisk], place: int) -> tuple[int | None, int | None]:
     """Return the last time of a topic before a place, and the first one from there on."""
     before_ns = behind_ns = None
     for kept in several:
@@ -205,7 +205,7 @@ def _around(places: Places, several: Sequence[Kept], place: int) -> tuple[int | 
     return before_ns, behind_ns
 
 
-def _read_zero(found: Found, first: int, end: int) -> int | None:
+def _read_zero(found: ClockPass, first: int, end: int) -> int | None:
     """Return UTC of device time zero by the readings between two records.
 
     They are the reader's, or else those of another clock of the log.
@@ -215,7 +215,7 @@ def _read_zero(found: Found, first: int, end: int) -> int | None:
     return int(zeros[len(zeros) // 2]) if len(zeros) else None
 
 
-def _zero_of(part: PowerUp, found: Found, before_ns: int | None, *, is_alone: bool) -> int | None:
+def _zero_of(part: PowerUp, found: ClockPass, before_ns: int | None, *, is_alone: bool) -> int | None:
     """Return UTC of device time zero of one power-up.
 
     It is 0 for all power-ups where the device's own time is UTC. A header speaks for the first log in the source;
@@ -235,7 +235,7 @@ def _zero_of(part: PowerUp, found: Found, before_ns: int | None, *, is_alone: bo
     return before_ns if read_ns is None and (is_alone or part.is_ahead) else read_ns
 
 
-def _of(part: PowerUp, found: Found, limits: Thresholds, zero_ns: int | None) -> tuple[ClockModel, PowerUpClock]:
+def _of(part: PowerUp, found: ClockPass, limits: Thresholds, zero_ns: int | None) -> tuple[ClockModel, PowerUpClock]:
     """Model one power-up by the device's own times; also return what is known of it."""
     header = found.header
     if header.has_counting_clock:

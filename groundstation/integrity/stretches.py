@@ -16,7 +16,7 @@ CHANGES_MEASURED = 512  # number of changes of a batch that are measured
 FloatArray = NDArray[np.float64]
 
 
-class Place(NamedTuple):
+class RecordPlace(NamedTuple):
     """Place of a record: its number in the source, and its device time (0 if it has none)."""
 
     record_index: int
@@ -28,11 +28,11 @@ class Place(NamedTuple):
         return int(time[0])
 
 
-class Stretch(NamedTuple):
+class ConstantStretch(NamedTuple):
     """Consecutive samples with one value: the first, the last, their number."""
 
-    first: Place
-    last: Place
+    first: RecordPlace
+    last: RecordPlace
     samples: int
     value: float
 
@@ -101,15 +101,15 @@ class Constancy:
                 smallest = float(np.abs(values[at + 1] - values[at]).min())
             self.resolution = min(self.resolution or smallest, smallest)
 
-    def stretches(self) -> list[Stretch]:
+    def stretches(self) -> list[ConstantStretch]:
         """Return the long stretches, in the order of the log."""
         self._keep(self._open)
         self._open = self._open[:0]
         kept = np.concatenate((self._open, *self._kept))
         kept = kept[np.argsort(kept["first_index"], kind="stable")]
-        return [Stretch(Place(*row[:2]), Place(*row[2:4]), *row[4:]) for row in kept.tolist()]
+        return [ConstantStretch(RecordPlace(*row[:2]), RecordPlace(*row[2:4]), *row[4:]) for row in kept.tolist()]
 
-    def usual_samples(self, without: Stretch) -> float:
+    def usual_samples(self, without: ConstantStretch) -> float:
         """Mean length of all other stretches; infinite when there is none."""
         others = self.changes
         return (self.samples - without.samples) / others if others else float("inf")

@@ -15,7 +15,7 @@ from groundstation.base.signals import kind_of
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock import ClockModel
 from groundstation.integrity.limits import StuckLimits
-from groundstation.integrity.stretches import Constancy, FloatArray, Sampler, Stretch
+from groundstation.integrity.stretches import Constancy, ConstantStretch, FloatArray, Sampler
 
 METRES_PER_DEG = 111_195.0  # metres per degree of latitude on a sphere: enough for a comparison with a hundred metres
 FINE = 1.05  # samples that a value lasts, on average, where a channel is finer than its noise
@@ -63,7 +63,7 @@ class _Seen(NamedTuple):
     places: Int64Array
     values: FloatArray
 
-    def within(self, stretch: Stretch) -> FloatArray:
+    def within(self, stretch: ConstantStretch) -> FloatArray:
         """Return the finite values of the records inside a stretch."""
         low = np.searchsorted(self.places, stretch.first.record_index)
         high = np.searchsorted(self.places, stretch.last.record_index, side="right")
@@ -71,7 +71,7 @@ class _Seen(NamedTuple):
         return values[np.isfinite(values)]
 
 
-class Motion:
+class MotionSampler:
     """Motion of the aircraft by all sources, thinned."""
 
     def __init__(self) -> None:
@@ -123,7 +123,7 @@ class Motion:
 class Judge:
     """Judge that tells stuck stretches from innocent ones."""
 
-    def __init__(self, motion: Motion, clock: ClockModel, limits: StuckLimits) -> None:
+    def __init__(self, motion: MotionSampler, clock: ClockModel, limits: StuckLimits) -> None:
         self._sources = motion.sources()
         self._clock, self._limits = clock, limits
 
@@ -138,7 +138,7 @@ class Judge:
                 found[name] = stuck
         return found
 
-    def _long(self, name: str, constancy: Constancy) -> Iterator[Stretch]:
+    def _long(self, name: str, constancy: Constancy) -> Iterator[ConstantStretch]:
         """Return the stretches that last, of a field that is not constant through the whole log."""
         times = self._limits.noise_times_usual if name in _NOISY else self._limits.times_usual
         for stretch in constancy.stretches() if constancy.changes else ():
@@ -148,16 +148,21 @@ class Judge:
             if is_long and not is_short and self._seconds(stretch) >= self._limits.min_s:
                 yield stretch
 
-    def _seconds(self, stretch: Stretch) -> float:
+    def _seconds(self, stretch: ConstantStretch) -> float:
         return (stretch.last.time_ns(self._clock) - stretch.first.time_ns(self._clock)) / NS_PER_S
 
-    def _told(self, stretch: Stretch, why: str) -> Stuck:
+    def _told(self, stretch: ConstantStretch, why: str) -> Stuck:
         start_ns = stretch.first.time_ns(self._clock)
         index = stretch.first.record_index
         return Stuck(index, start_ns, self._seconds(stretch), stretch.samples, stretch.value, why)
 
     def _why(
-        self, topic: str, name: str, stretch: Stretch, constancy: Constancy, long: dict[str, list[Stretch]]
+        self,
+        topic: str,
+        name: str,
+        stretch: ConstantStretch,
+        constancy: Constancy,
+        long: dict[str, list[ConstantStretch]],
     ) -> str:
         """Return the evidence that the value should have changed; empty when there is none."""
         if name in _NOISY:
@@ -174,7 +179,7 @@ class Judge:
         why = self._why_elsewhere(topic, (name,), stretch, enough_m, "m", scale)
         return why or self._why_position(topic, name, stretch, enough_m, long)
 
-    def _shrinks(self, name: str, stretch: Stretch) -> float:
+    def _shrinks(self, name: str, stretch: ConstantStretch) -> float:
         """Return the length of a degree of longitude over that of one of latitude.
 
         It is 1 for the latitude itself.
@@ -186,7 +191,7 @@ class Judge:
         return float(np.cos(np.deg2rad(latitudes[0][0]))) if latitudes else 1.0
 
     def _why_elsewhere(
-        self, topic: str, names: tuple[str, ...], stretch: Stretch, enough: float, unit: str, scale: float = 1.0
+        self, topic: str, names: tuple[str, ...], stretch: ConstantStretch, enough: float, unit: str, scale: float = 1.0
     ) -> str:
         """Return the evidence that the same quantity of another topic moves."""
         for seen in self._sources:
@@ -198,7 +203,7 @@ class Judge:
                 return f"{seen.topic}.{seen.name} moves by {moved:.0f} {unit} meanwhile"
         return ""
 
-    def _slowest(self, topic: str, stretch: Stretch) -> tuple[str, float, float] | None:
+    def _slowest(self, topic: str, stretch: ConstantStretch) -> tuple[str, float, float] | None:
         """Return source, least and mean speed during a stretch; of one topic where it is named."""
         for seen in self._sources:
             if seen.name == "ground_speed_mps" and topic in ("", seen.topic):
@@ -210,7 +215,7 @@ class Judge:
         return None
 
     def _why_position(
-        self, topic: str, name: str, stretch: Stretch, enough_m: float, long: dict[str, list[Stretch]]
+        self, topic: str, name: str, stretch: ConstantStretch, enough_m: float, long: dict[str, list[ConstantStretch]]
     ) -> str:
         """Return the evidence that the aircraft moves while both coordinates stand still."""
         other = "longitude_deg" if name == "latitude_deg" else "latitude_deg"
@@ -222,7 +227,7 @@ class Judge:
         moved_m = speed[2] * self._seconds(stretch)
         return f"the speed of {speed[0]} covers {moved_m:.0f} m meanwhile" if moved_m > enough_m else ""
 
-    def _why_heading(self, topic: str, name: str, stretch: Stretch, least: float) -> str:
+    def _why_heading(self, topic: str, name: str, stretch: ConstantStretch, least: float) -> str:
         """Return the evidence that another heading or track turns.
 
         A track counts only where the aircraft moves.
@@ -246,7 +251,7 @@ class Judge:
                 return f"{seen.topic}.{seen.name} turns by {moved:.0f} deg meanwhile"
         return ""
 
-    def _why_noisy(self, stretch: Stretch, usual: float) -> str:
+    def _why_noisy(self, stretch: ConstantStretch, usual: float) -> str:
         """Return the evidence against a noisy value that stands still.
 
         The aircraft moves, or nobody knows whether it does.

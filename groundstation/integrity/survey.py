@@ -21,8 +21,8 @@ from groundstation.integrity.clock_references import ClockReferences
 from groundstation.integrity.contents import Contents
 from groundstation.integrity.ledger import LedgerCounts, TopicCounts, topic_ledger
 from groundstation.integrity.limits import Thresholds, shipped
-from groundstation.integrity.places import Kept, Places
-from groundstation.integrity.source_clock import Found, PowerUpClock, clock_of
+from groundstation.integrity.places import PieceOnDisk, Places
+from groundstation.integrity.source_clock import ClockPass, PowerUpClock, clock_of
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class _Order(NamedTuple):
     stray_rows: int
 
 
-def _order_of(places: Places, pieces: Sequence[Kept], clock: ClockModel) -> _Order:
+def _order_of(places: Places, pieces: Sequence[PieceOnDisk], clock: ClockModel) -> _Order:
     """The order of the records of some pieces, taken piece by piece."""
     time_ns = np.empty(sum(kept.count for kept in pieces), dtype=np.int64)
     valid_ns = np.empty_like(time_ns) if any(kept.has_validity for kept in pieces) else time_ns
@@ -123,7 +123,7 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
     new_logs: list[NewLog] = []
     damages: list[Damage] = []
     remarks: list[Remark] = []
-    pieces: dict[str, list[Kept]] = {}
+    pieces: dict[str, list[PieceOnDisk]] = {}
     contents, references = Contents(limits), ClockReferences(limits.clock_relation)
     for item in items:
         if isinstance(item, RecordBatch):
@@ -139,7 +139,7 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
             new_logs.append(item)
         else:
             header = item
-    clock, parts = clock_of(Found(header, tuple(new_logs), places, pieces, references), limits)
+    clock, parts = clock_of(ClockPass(header, tuple(new_logs), places, pieces, references), limits)
     clock = replace(clock, relations=references.relations(clock))
     results = _ledgers(places, pieces, contents, clock, limits) if clock.has_times else []
     topics = tuple(ledger for ledger, _lateness in results)
@@ -152,7 +152,11 @@ def _surveyed(items: Iterable[Item], places: Places, limits: Thresholds) -> Surv
 
 
 def _ledgers(
-    places: Places, pieces: Mapping[str, Sequence[Kept]], contents: Contents, clock: ClockModel, limits: Thresholds
+    places: Places,
+    pieces: Mapping[str, Sequence[PieceOnDisk]],
+    contents: Contents,
+    clock: ClockModel,
+    limits: Thresholds,
 ) -> list[tuple[TopicCounts, int]]:
     """Return ledgers and latenesses of all topics in alphabetical order.
 

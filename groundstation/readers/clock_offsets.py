@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.base.records import Int64Array
-from groundstation.readers.two_clocks import Stretch, Track
+from groundstation.readers.two_clocks import ClockStretch, ReadingSequence
 
 
 class Jump(NamedTuple):
@@ -49,9 +49,11 @@ class Offsets:
         """Return the offsets with ``added_ns`` added everywhere."""
         return Offsets(self.starts, self.added_ns + added_ns, self.by)
 
-    def moved(self, track: Track) -> Track:
+    def moved(self, track: ReadingSequence) -> ReadingSequence:
         """Return readings with the corrected time of receipt."""
-        return Track(track.record_index, track.receipt_ns + self.at(track.record_index), track.clock_ns, track.number)
+        return ReadingSequence(
+            track.record_index, track.receipt_ns + self.at(track.record_index), track.clock_ns, track.number
+        )
 
     @property
     def stated(self) -> tuple[tuple[int, int], ...]:
@@ -80,14 +82,14 @@ class _Step(NamedTuple):
     by: int
 
 
-def offsets_by(clocks: Mapping[int, Sequence[Stretch]], jumps: Sequence[Jump] = ()) -> Offsets:
+def offsets_by(clocks: Mapping[int, Sequence[ClockStretch]], jumps: Sequence[Jump] = ()) -> Offsets:
     """Return offsets that make times of receipt follow the readings of some clocks smoothly.
 
     The offset is zero before the first step.
 
     Parameters
     ----------
-    clocks : mapping of number to sequence of Stretch
+    clocks : mapping of number to sequence of ClockStretch
         Readings of each clock, parted where one of the two was set.
     jumps : sequence of Jump
         Of records without a reading as well: where between two readings the clock was set.
@@ -100,7 +102,7 @@ def offsets_by(clocks: Mapping[int, Sequence[Stretch]], jumps: Sequence[Jump] = 
     return Offsets(np.array(starts, dtype=np.int64), np.array(added, dtype=np.int64), tuple(dict.fromkeys(by)))
 
 
-def _steps(clocks: Mapping[int, Sequence[Stretch]]) -> list[_Step]:
+def _steps(clocks: Mapping[int, Sequence[ClockStretch]]) -> list[_Step]:
     found = []
     for number, stretches in clocks.items():
         readings = sum(one.track.readings for one in stretches)

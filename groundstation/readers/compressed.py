@@ -110,7 +110,7 @@ def _unnamed_file() -> BinaryIO:
     return file
 
 
-class Window(io.RawIOBase):
+class FileWindow(io.RawIOBase):
     """A read-only view of a shared file with a position of its own."""
 
     def __init__(self, file: BinaryIO, size: int) -> None:

@@ -13,7 +13,7 @@ from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Item, LogHeader, Remark
 from groundstation.base.slips import slips
 from groundstation.base.source_units import PREFIX, units_entry
-from groundstation.readers.dialect import Dialect, Line, detect_encoding, head_lines
+from groundstation.readers.dialect import Dialect, HeadLine, detect_encoding, head_lines
 from groundstation.readers.misnamed import misnamed
 from groundstation.readers.profile import Profile, load, shipped
 from groundstation.readers.profile_fit import Fit, delimiter_of, fit_at, fit_below
@@ -145,7 +145,7 @@ def _rows_of_another(fit: Fit) -> Dialect | None:
     return replace(fit.dialect_to(None), first_byte=0, first_line=1, end_byte=fit.rows_above[-1].next_byte)
 
 
-def _fit(profile: Profile, encoding: str, lines: Sequence[Line]) -> Fit | None:
+def _fit(profile: Profile, encoding: str, lines: Sequence[HeadLine]) -> Fit | None:
     """Find the header row: the first one that has every column the profile asks for."""
     for at, line in enumerate(lines):
         delimiter = delimiter_of(line.text, profile)

@@ -15,7 +15,7 @@ _DECIMAL_POINT = re.compile(r"[+-]?\d+\.\d+")
 
 
 @dataclass(frozen=True)
-class Line:
+class HeadLine:
     """Line of the head: its number, where the next one starts, its text without line end.
 
     Numbers count from 1; ``next_byte`` is the byte where the next line starts.
@@ -78,7 +78,7 @@ def detect_encoding(head: bytes, name: str) -> str:
     return "utf-8"
 
 
-def head_lines(source: Source, encoding: str, limit: int = 1000) -> list[Line]:
+def head_lines(source: Source, encoding: str, limit: int = 1000) -> list[HeadLine]:
     """Return the first lines of a file, at most ``limit``.
 
     A last line that the head cuts off is left out.
@@ -86,7 +86,7 @@ def head_lines(source: Source, encoding: str, limit: int = 1000) -> list[Line]:
     head = source.head
     position = len(_UTF8_BOM) if head.startswith(_UTF8_BOM) else 0
     separator = b"\n" if b"\n" in head or b"\r" not in head else b"\r"
-    lines: list[Line] = []
+    lines: list[HeadLine] = []
     while position < len(head) and len(lines) < limit:
         end = head.find(separator, position)
         ended = end >= 0
@@ -94,7 +94,7 @@ def head_lines(source: Source, encoding: str, limit: int = 1000) -> list[Line]:
             break
         stop, following = (end, end + 1) if ended else (len(head), len(head))
         text = head[position:stop].decode(encoding, errors="replace").rstrip("\r")
-        lines.append(Line(len(lines) + 1, following, text, ended))
+        lines.append(HeadLine(len(lines) + 1, following, text, ended))
         position = following
     return lines
 

@@ -20,7 +20,7 @@ from groundstation.base.signals import RAW_PREFIX, TOPICS, field_of, kind_of
 from groundstation.base.slips import slips
 from groundstation.readers.dialect import (
     Dialect,
-    Line,
+    HeadLine,
     detect_delimiter,
     detect_encoding,
     head_lines,
@@ -29,11 +29,11 @@ from groundstation.readers.dialect import (
     trailing_cells,
     uses_decimal_comma,
 )
-from groundstation.readers.layout import Derivation, Layout, Rule, TimeRule, rule_for
+from groundstation.readers.layout import Derivation, LayoutRule, TableLayout, TimeRule, rule_for
 from groundstation.readers.misnamed import misnamed
 from groundstation.readers.sections import (
     MOST,
-    Place,
+    HeaderPlace,
     Section,
     ended,
     header_places,
@@ -62,7 +62,7 @@ class _Top:
 
     encoding: str
     metadata: Mapping[str, str]
-    header: Line
+    header: HeadLine
     names: tuple[str, ...]
     delimiter: str
     first_rows: tuple[str, ...]
@@ -129,7 +129,7 @@ def _read_top(source: Source) -> _Top | None:
     return first
 
 
-def _top(encoding: str, metadata: Mapping[str, str], lines: Sequence[Line], at: int, strange_lines: int) -> _Top:
+def _top(encoding: str, metadata: Mapping[str, str], lines: Sequence[HeadLine], at: int, strange_lines: int) -> _Top:
     """Return the part above the rows when line ``at`` is the header row."""
     header = lines[at]
     delimiter = detect_delimiter(header.text)
@@ -188,7 +188,7 @@ def read(source: Source) -> Iterator[Item]:
 
 
 def _sections(
-    source: Source, top: _Top, layout: Layout, utc_of_zero_ns: int | None
+    source: Source, top: _Top, layout: TableLayout, utc_of_zero_ns: int | None
 ) -> tuple[list[Section], list[Remark | Damage]]:
     """Rows below each header that names other columns or another zero of time."""
     sections, remarks = [Section(top.dialect, layout)], list[Remark | Damage]()
@@ -240,7 +240,7 @@ def _are_flat(names: Sequence[str]) -> bool:
     return any(name in TIME_COLUMNS for name in names) and any("." in name.strip(".") for name in names)
 
 
-def _belonging(place: Place) -> tuple[tuple[Line, ...], int]:
+def _belonging(place: HeaderPlace) -> tuple[tuple[HeadLine, ...], int]:
     """Lines of metadata right above a header, and the byte where they begin."""
     count = 0
     for line in reversed(place.above):
@@ -250,7 +250,7 @@ def _belonging(place: Place) -> tuple[tuple[Line, ...], int]:
     return place.above[len(place.above) - count :], place.above_from[-count] if count else place.first_byte
 
 
-def _entries(lines: Sequence[Line]) -> Iterator[tuple[str, str]]:
+def _entries(lines: Sequence[HeadLine]) -> Iterator[tuple[str, str]]:
     for line in lines:
         key, colon, value = line.text.lstrip("#").partition(":")
         if colon and key.strip():
@@ -258,7 +258,7 @@ def _entries(lines: Sequence[Line]) -> Iterator[tuple[str, str]]:
 
 
 def _utc_of_zero(
-    source: Source, dialect: Dialect, layout: Layout, metadata: Mapping[str, str], names: tuple[str, ...]
+    source: Source, dialect: Dialect, layout: TableLayout, metadata: Mapping[str, str], names: tuple[str, ...]
 ) -> tuple[int | None, list[Remark]]:
     """Return the UTC of device time zero, and remarks.
 
@@ -272,7 +272,9 @@ def _utc_of_zero(
     return _utc_from_rows(source, dialect, layout, names.index("time_utc"))
 
 
-def _utc_from_rows(source: Source, dialect: Dialect, layout: Layout, column: int) -> tuple[int | None, list[Remark]]:
+def _utc_from_rows(
+    source: Source, dialect: Dialect, layout: TableLayout, column: int
+) -> tuple[int | None, list[Remark]]:
     """Return the UTC of device time zero, and remarks, by the column ``time_utc``.
 
     The first rows that have both a recorder time and a ``time_utc`` tell it.
@@ -292,11 +294,11 @@ def _utc_from_rows(source: Source, dialect: Dialect, layout: Layout, column: int
     return zero.ns, remarks
 
 
-def _layout(top: _Top) -> tuple[Layout, list[Remark]]:
+def _layout(top: _Top) -> tuple[TableLayout, list[Remark]]:
     time_name = next(name for name in TIME_COLUMNS if name in top.names)
     time_column = top.names.index(time_name)
     time = TimeRule(TIME_COLUMNS[time_name], (time_column,), (time_name,))  # type: ignore[arg-type]
-    rules: dict[tuple[str, str], Rule] = {}
+    rules: dict[tuple[str, str], LayoutRule] = {}
     remarks: list[Remark] = []
     for column, name in enumerate(top.names):
         if column == time_column or not name:
@@ -309,20 +311,20 @@ def _layout(top: _Top) -> tuple[Layout, list[Remark]]:
             remarks.append(Remark("duplicate_column", f"column {name!r} occurs twice: the second is {renamed.target}"))
             rule = renamed
         rules[rule.key] = rule
-    layout = Layout(time, tuple(rules.values()), decimal_comma=uses_decimal_comma(top.first_rows, top.delimiter))
+    layout = TableLayout(time, tuple(rules.values()), decimal_comma=uses_decimal_comma(top.first_rows, top.delimiter))
     return replace(layout, derivations=_derivations(layout.rules)), remarks
 
 
-def _rule(column: int, name: str) -> Rule:
+def _rule(column: int, name: str) -> LayoutRule:
     topic, _, field = name.rpartition(".")
     known = field_of(topic, field)
     if known is not None:
         return rule_for(column, topic, known, raw=(f"{RAW_PREFIX}{topic}", field))
     raw_topic = topic if topic.startswith(RAW_PREFIX) else f"{RAW_PREFIX}{topic or 'csv'}"
-    return Rule(column, raw_topic, field, "raw")
+    return LayoutRule(column, raw_topic, field, "raw")
 
 
-def _derivations(rules: tuple[Rule, ...]) -> tuple[Derivation, ...]:
+def _derivations(rules: tuple[LayoutRule, ...]) -> tuple[Derivation, ...]:
     """Velocities from track and ground speed, for topics that have no velocities of their own."""
     keys = {rule.key for rule in rules}
     found = []

@@ -20,7 +20,7 @@ FloatArray: TypeAlias = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Rule:
+class LayoutRule:
     """Rule for one column of a file: its topic, its field, and how its cells are converted.
 
     Canonical value = number in the cell x ``factor`` + ``offset``.
@@ -87,7 +87,7 @@ class TimeRule:
 
 
 @dataclass(frozen=True)
-class Method:
+class DerivationMethod:
     """Method that derives fields from others.
 
     It states the names and units of its inputs, what it gives, and the text for the user.
@@ -118,11 +118,11 @@ class Derivation:
 
 
 @dataclass(frozen=True)
-class Layout:
+class TableLayout:
     """Layout of a table: time, columns, derived fields."""
 
     time: TimeRule
-    rules: tuple[Rule, ...]
+    rules: tuple[LayoutRule, ...]
     derivations: tuple[Derivation, ...] = ()
     decimal_comma: bool = False
     metadata: Mapping[str, str] = field(default_factory=dict)
@@ -183,26 +183,26 @@ def pressure_altitude(indicated_m: FloatArray, setting_inhg: FloatArray) -> tupl
     return (indicated_m + setting_altitude_m,)
 
 
-METHODS: Mapping[str, Method] = MappingProxyType(
+METHODS: Mapping[str, DerivationMethod] = MappingProxyType(
     {
-        "true_from_magnetic": Method(
+        "true_from_magnetic": DerivationMethod(
             ("magnetic", "variation"), ("deg", "deg"), true_from_magnetic, (), "magnetic direction plus variation"
         ),
-        "velocity_from_track": Method(
+        "velocity_from_track": DerivationMethod(
             ("track", "speed"),
             ("deg", "mps"),
             velocity_from_track,
             ("velocity_north_mps", "velocity_east_mps"),
             "true track and ground speed",
         ),
-        "wind_from_direction": Method(
+        "wind_from_direction": DerivationMethod(
             ("direction", "speed"),
             ("deg", "mps"),
             wind_from_direction,
             ("wind_north_mps", "wind_east_mps"),
             "the direction the wind blows from and its speed",
         ),
-        "pressure_altitude": Method(
+        "pressure_altitude": DerivationMethod(
             ("indicated", "setting"),
             ("m", "inhg"),
             pressure_altitude,
@@ -215,9 +215,9 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 
 def rule_for(
     column: int, topic: str, known: Field, factor: float = 1.0, offset: float = 0.0, raw: Key | None = None
-) -> Rule:
+) -> LayoutRule:
     """Return the rule that feeds a canonical field from a column."""
-    return Rule(column, topic, known.name, known.kind, factor, offset, known.is_heading, raw)
+    return LayoutRule(column, topic, known.name, known.kind, factor, offset, known.is_heading, raw)
 
 
 def apply(derivation: Derivation, known: Mapping[Key, Column]) -> dict[Key, Column]:

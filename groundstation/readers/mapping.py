@@ -26,7 +26,7 @@ class Numbers(Protocol):
 
 
 @dataclass(frozen=True)
-class Rule:
+class SourceRule:
     """Rule that turns the messages of one source into fields of a canonical topic.
 
     Parameters
@@ -61,7 +61,7 @@ class Role:
     """
 
     topic: str
-    rules: tuple[Rule, ...]
+    rules: tuple[SourceRule, ...]
     has_instances: bool = False
 
 
@@ -76,7 +76,7 @@ class Offer:
     instance: int
     columns: frozenset[str]
 
-    def serves(self, rule: Rule) -> bool:
+    def serves(self, rule: SourceRule) -> bool:
         """Tell whether a rule applies to these messages."""
         return self.source == rule.source and self.columns.issuperset(rule.needs)
 
@@ -87,7 +87,7 @@ class Assignment:
 
     offer: Offer
     topic: str
-    rule: Rule
+    rule: SourceRule
 
 
 def assigned(roles: Iterable[Role], offers: Sequence[Offer]) -> Iterator[Assignment]:

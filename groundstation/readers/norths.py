@@ -15,7 +15,7 @@ from groundstation.base.declination import declination_along
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.geodesy import SEMI_MAJOR_M, has_position
 from groundstation.readers.dialect import Dialect
-from groundstation.readers.layout import Layout
+from groundstation.readers.layout import TableLayout
 from groundstation.readers.sections import Section
 from groundstation.readers.source import Source
 
@@ -35,7 +35,7 @@ _FIELD_MISFIT_DEG, _FIELD_MARGIN_DEG = 2.5, 1.0  # tables of recorders are years
 
 
 @dataclass(frozen=True)
-class Samples:
+class NorthSamples:
     """Some rows of a log, shape (n,) each; NaN where a row has no value."""
 
     track_deg: FloatArray
@@ -74,7 +74,7 @@ class Norths:
     has_variation: bool = False
 
 
-def samples_of(source: Source, dialect: Dialect, layout: Layout) -> Samples:
+def samples_of(source: Source, dialect: Dialect, layout: TableLayout) -> NorthSamples:
     """Read rows from the middle of a file, or from elsewhere where nothing moves there.
 
     All rows of a small file are read.
@@ -92,7 +92,7 @@ def samples_of(source: Source, dialect: Dialect, layout: Layout) -> Samples:
     none = np.full(sum(len(part["variation_deg"]) for part in parts), np.nan)
     names = {name for part in parts for name in part}
     joined = {name: np.concatenate([part[name] for part in parts]) for name in names}
-    return Samples(
+    return NorthSamples(
         joined.get("track_deg", none),
         joined.get("variation_deg", none),
         joined.get("velocity_east_mps", none),
@@ -102,7 +102,7 @@ def samples_of(source: Source, dialect: Dialect, layout: Layout) -> Samples:
     )
 
 
-def day_of(source: Source, dialect: Dialect, layout: Layout) -> int | None:
+def day_of(source: Source, dialect: Dialect, layout: TableLayout) -> int | None:
     """Return the time of one row, device nanoseconds; None where no row has one."""
     from groundstation.readers.table_reader import first_times
 
@@ -136,13 +136,13 @@ def _is_enough(parts: Sequence[Mapping[str, FloatArray]]) -> bool:
         return int((speed > _MOVING_MPS).sum()) >= _ENOUGH or bool(len(known) and known.max() < LEAST_VARIATION_DEG)
 
 
-def by_motion(samples: Samples) -> Norths:
+def by_motion(samples: NorthSamples) -> Norths:
     """Find the north of the track by the motion, and the sign of its variation if magnetic.
 
     Examples
     --------
     >>> one, none = np.ones(30), np.full(30, np.nan)
-    >>> found = by_motion(Samples(77.0 * one, 13.0 * one, 12.0 * one, 0.0 * one, none, none))  # it flies east
+    >>> found = by_motion(NorthSamples(77.0 * one, 13.0 * one, 12.0 * one, 0.0 * one, none, none))  # it flies east
     >>> found.track, found.sign, found.track_by
     ('magnetic', 1, 'velocities')
     """
@@ -166,7 +166,7 @@ def by_motion(samples: Samples) -> Norths:
     return Norths()
 
 
-def _moved_m(samples: Samples) -> FloatArray:
+def _moved_m(samples: NorthSamples) -> FloatArray:
     """Return the way north and east around each row, metres, shape (2, n)."""
     moved = np.full((2, len(samples.track_deg)), np.nan)
     known = np.flatnonzero(has_position(samples.latitude_deg, samples.longitude_deg))
@@ -179,7 +179,7 @@ def _moved_m(samples: Samples) -> FloatArray:
     return np.asarray(np.deg2rad(moved) * SEMI_MAJOR_M)
 
 
-def by_the_field(samples: Samples, utc_ns: int) -> Norths:
+def by_the_field(samples: NorthSamples, utc_ns: int) -> Norths:
     """Find the sign of the variation by the Earth's field at some of the positions."""
     with np.errstate(invalid="ignore"):
         usable = has_position(samples.latitude_deg, samples.longitude_deg)

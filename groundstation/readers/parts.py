@@ -18,7 +18,7 @@ from groundstation.base.records import (
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class TopicPart:
     """Columns of one topic from one source, with their places in the log and device time.
 
     ``validity_ns`` is the time of validity, where it differs from the device time.
@@ -30,7 +30,7 @@ class Part:
     validity_ns: Int64Array | None = None
 
 
-def occupied(part: Part) -> Part | None:
+def occupied(part: TopicPart) -> TopicPart | None:
     """Return the rows that have any value; None when there are none."""
     columns = part.columns.values()
     if not part.columns or any(column.present is None for column in columns):
@@ -44,10 +44,10 @@ def occupied(part: Part) -> Part | None:
     taken = {identity: frozen(mask[rows]) for identity, mask in masks.items()}
     kept = {name: Column(column.values[rows], taken[id(column.present)]) for name, column in part.columns.items()}
     validity_ns = None if part.validity_ns is None else part.validity_ns[rows]
-    return Part(part.index[rows], part.time.take(rows), kept, validity_ns)
+    return TopicPart(part.index[rows], part.time.take(rows), kept, validity_ns)
 
 
-def merged(topic: str, parts: Sequence[Part]) -> RecordBatch:
+def merged(topic: str, parts: Sequence[TopicPart]) -> RecordBatch:
     """Merge parts from different messages into one batch, in the order of the log.
 
     Each row has the fields of its source.

@@ -5,11 +5,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from groundstation.readers.dialect import DELIMITERS, Dialect, Line, normal_form, split_cells, trailing_cells
+from groundstation.readers.dialect import DELIMITERS, Dialect, HeadLine, normal_form, split_cells, trailing_cells
 from groundstation.readers.profile import Profile
-from groundstation.readers.sections import Place, lines_below
+from groundstation.readers.sections import HeaderPlace, lines_below
 from groundstation.readers.source import Source
-from groundstation.readers.told import Told, bare, told
+from groundstation.readers.told import ColumnFacts, bare, told
 
 _MOST_ABOVE = 20  # lines above a header in the middle of a file that belong to it
 _TIMES: Mapping[str, re.Pattern[str]] = {
@@ -31,12 +31,12 @@ class Fit:
     encoding, delimiter : str
     names : tuple of str
         Cells of the header row.
-    header : Line
-    behind : tuple of Line
+    header : HeadLine
+    behind : tuple of HeadLine
         Rows of units or of other names below the header.
-    above : tuple of Line
+    above : tuple of HeadLine
         Lines above the header that are no rows.
-    rows_above : tuple of Line
+    rows_above : tuple of HeadLine
         Rows above the header.
     first_rows : tuple of str
     """
@@ -45,14 +45,14 @@ class Fit:
     encoding: str
     delimiter: str
     names: tuple[str, ...]
-    header: Line
-    behind: tuple[Line, ...] = ()
-    above: tuple[Line, ...] = ()
-    rows_above: tuple[Line, ...] = ()
+    header: HeadLine
+    behind: tuple[HeadLine, ...] = ()
+    above: tuple[HeadLine, ...] = ()
+    rows_above: tuple[HeadLine, ...] = ()
     first_rows: tuple[str, ...] = ()
 
     @property
-    def last(self) -> Line:
+    def last(self) -> HeadLine:
         """Last line above the rows."""
         return self.behind[-1] if self.behind else self.header
 
@@ -98,7 +98,7 @@ class Fit:
         """Number of columns whose name has more in parentheses."""
         return sum(bare(name) != name for name in self.names)
 
-    def told(self, at: int) -> Told:
+    def told(self, at: int) -> ColumnFacts:
         """Read the names of a column, and its cells in the rows around the header."""
         names, units = self._around
         return told([cells[at] for cells in names], [cells[at] for cells in units])
@@ -126,7 +126,7 @@ class Fit:
         """Tell whether another header has the same names and the same units."""
         return (self.names, self.delimiter, self._around) == (other.names, other.delimiter, other._around)
 
-    def is_repeated(self, place: Place) -> bool:
+    def is_repeated(self, place: HeaderPlace) -> bool:
         """Tell whether another header has exactly the same lines."""
         above = place.above[len(place.above) - len(self.above) :] if self.above else ()
         return place.line.text == self.header.text and [one.text for one in above] == [one.text for one in self.above]
@@ -170,7 +170,7 @@ def delimiter_of(line: str, profile: Profile) -> str:
     return ""
 
 
-def fit_at(profile: Profile, encoding: str, delimiter: str, lines: Sequence[Line], at: int) -> Fit:
+def fit_at(profile: Profile, encoding: str, delimiter: str, lines: Sequence[HeadLine], at: int) -> Fit:
     """Match a profile to the header row ``at`` of the lines at the top of a file."""
     fit = _with_names(profile, encoding, delimiter, lines, at)
     return replace(
@@ -180,7 +180,7 @@ def fit_at(profile: Profile, encoding: str, delimiter: str, lines: Sequence[Line
     )
 
 
-def fit_below(source: Source, before: Fit, place: Place) -> tuple[Fit, int]:
+def fit_below(source: Source, before: Fit, place: HeaderPlace) -> tuple[Fit, int]:
     """Match a profile to a header inside a file.
 
     Returns also the byte that ends the rows above.
@@ -194,7 +194,7 @@ def fit_below(source: Source, before: Fit, place: Place) -> tuple[Fit, int]:
     return replace(fit, above=place.above[len(place.above) - count :]), end_byte
 
 
-def _with_names(profile: Profile, encoding: str, delimiter: str, lines: Sequence[Line], at: int) -> Fit:
+def _with_names(profile: Profile, encoding: str, delimiter: str, lines: Sequence[HeadLine], at: int) -> Fit:
     """Return a match with names and the lines below them, without the lines above."""
     names = _names(lines[at].text, delimiter, profile)
     first = at + 1 + profile.rows_after_header

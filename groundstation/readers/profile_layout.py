@@ -8,12 +8,12 @@ import numpy as np
 from groundstation.base.records import Remark
 from groundstation.base.signals import field_of
 from groundstation.readers.dialect import uses_decimal_comma
-from groundstation.readers.layout import METHODS, Derivation, Key, Layout, Rule, TimeRule, rule_for
+from groundstation.readers.layout import METHODS, Derivation, Key, LayoutRule, TableLayout, TimeRule, rule_for
 from groundstation.readers.norths import LOOKED_AT, OF_MOTION, Norths, by_motion, by_the_field, day_of, samples_of
 from groundstation.readers.profile import ColumnRule, DerivedRule
 from groundstation.readers.profile_fit import Fit
 from groundstation.readers.source import Source
-from groundstation.readers.told import Told
+from groundstation.readers.told import ColumnFacts
 
 _HEIGHTS = {"altitude_ellipsoid_m": "ellipsoid", "altitude_msl_m": "msl"}
 
@@ -22,18 +22,18 @@ _HEIGHTS = {"altitude_ellipsoid_m": "ellipsoid", "altitude_msl_m": "msl"}
 class _Fed:
     """Rules and derivations that are settled, and the remarks on them."""
 
-    rules: dict[Key, Rule]
+    rules: dict[Key, LayoutRule]
     derivations: list[Derivation]
     remarks: list[Remark]
 
-    def add(self, rule: Rule) -> None:
+    def add(self, rule: LayoutRule) -> None:
         """Add a rule where its field is free."""
         self.rules.setdefault(rule.key, rule)
 
 
 def layout_of(
     fit: Fit, source: Source, utc_of_zero_ns: int | None, end_byte: int | None
-) -> tuple[Layout, list[Remark]]:
+) -> tuple[TableLayout, list[Remark]]:
     """Return the layout of the rows below a header, up to ``end_byte``, and remarks."""
     profile = fit.profile
     time = _time(fit)
@@ -52,7 +52,7 @@ def layout_of(
     derivations = [*fed.derivations, *_derivations(fit, fed)]
     rules = [*fed.rules.values(), *_raw(fit, fed.rules.values(), derivations, time)]
     decimal_comma = uses_decimal_comma(fit.first_rows, fit.delimiter)
-    return Layout(time, tuple(rules), tuple(derivations), decimal_comma), fed.remarks
+    return TableLayout(time, tuple(rules), tuple(derivations), decimal_comma), fed.remarks
 
 
 def _time(fit: Fit) -> TimeRule:
@@ -67,7 +67,7 @@ def _time(fit: Fit) -> TimeRule:
     )
 
 
-def _adapted(rule: ColumnRule, said: Told, remarks: list[Remark]) -> ColumnRule | None:
+def _adapted(rule: ColumnRule, said: ColumnFacts, remarks: list[Remark]) -> ColumnRule | None:
     """Adapt a rule to the unit and height that the file states; None if of another kind."""
     known = rule.field
     if said.unit is not None and known.unit and said.unit[0] != known.unit:
@@ -105,7 +105,7 @@ def _feed(fit: Fit, rule: ColumnRule, at: int, norths: Norths, fed: _Fed) -> Non
     if magnetic is not None:
         fed.add(rule_for(at, rule.topic, magnetic, rule.factor, rule.offset, raw))
     else:
-        fed.add(Rule(at, *raw, "double", rule.factor, rule.offset))
+        fed.add(LayoutRule(at, *raw, "double", rule.factor, rule.offset))
     variation = fit.profile.variation
     if variation is None or variation.column not in fit.position:
         if magnetic is None:
@@ -151,14 +151,16 @@ def _factors(fit: Fit, rule: DerivedRule) -> tuple[float, ...]:
     return tuple(factors)
 
 
-def _raw(fit: Fit, rules: Iterable[Rule], derivations: Sequence[Derivation], time: TimeRule) -> Iterator[Rule]:
+def _raw(
+    fit: Fit, rules: Iterable[LayoutRule], derivations: Sequence[Derivation], time: TimeRule
+) -> Iterator[LayoutRule]:
     """Rules of columns that no other rule takes; derivations get numbers."""
     taken = {rule.column for rule in rules} | set(time.columns)
     inputs = {key for derivation in derivations for key in derivation.inputs}
     for at, name in enumerate(fit.names):
         key = (fit.profile.raw_topic, fit.label(at))
         if name and at not in taken:
-            yield Rule(at, *key, "double" if key in inputs else "raw")
+            yield LayoutRule(at, *key, "double" if key in inputs else "raw")
 
 
 def _norths(fit: Fit, source: Source, time: TimeRule, utc_of_zero_ns: int | None, end_byte: int | None) -> Norths:
@@ -167,13 +169,13 @@ def _norths(fit: Fit, source: Source, time: TimeRule, utc_of_zero_ns: int | None
     directions = {rule.field.name for rule in profile.columns if rule.north and rule.name in fit.position}
     if variation is None or variation.column not in fit.position or not directions:
         return Norths()
-    rules = [Rule(fit.position[variation.column], LOOKED_AT, "variation_deg", "double", abs(variation.factor))]
+    rules = [LayoutRule(fit.position[variation.column], LOOKED_AT, "variation_deg", "double", abs(variation.factor))]
     rules += [
-        Rule(fit.position[one.name], LOOKED_AT, one.field.name, "double", one.factor)
+        LayoutRule(fit.position[one.name], LOOKED_AT, one.field.name, "double", one.factor)
         for one in profile.columns
         if one.topic == "gnss" and one.field.name in OF_MOTION and one.name in fit.position
     ]
-    layout = Layout(time, tuple(rules), decimal_comma=uses_decimal_comma(fit.first_rows, fit.delimiter))
+    layout = TableLayout(time, tuple(rules), decimal_comma=uses_decimal_comma(fit.first_rows, fit.delimiter))
     dialect = fit.dialect_to(end_byte)
     samples = samples_of(source, dialect, layout)
     found = by_motion(samples) if "track_deg" in directions else Norths()

@@ -13,7 +13,7 @@ import numpy as np
 
 from groundstation.base.ecef import geodetic_deg_m
 from groundstation.base.records import Damage
-from groundstation.readers.dialect import Line, head_lines
+from groundstation.readers.dialect import HeadLine, head_lines
 from groundstation.readers.sections import MOST, left_out, lines_with
 from groundstation.readers.source import Source
 
@@ -71,7 +71,7 @@ def form_of(source: Source) -> Governed | None:
     """Return the header at the top of a file; None where it is not RTKLIB's."""
     if not source.head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"%"):
         return None
-    top: list[Line] = []
+    top: list[HeadLine] = []
     for line in head_lines(source, "utf-8", _HEAD_LINES):
         if not line.text.lstrip().startswith("%"):
             break
@@ -83,7 +83,7 @@ def form_of(source: Source) -> Governed | None:
 def forms_of(source: Source, first: Governed) -> tuple[list[Governed], Damage | None]:
     """Find the headers that change how rows are read; damage where there are too many."""
     governed = [first]
-    last = Line(first.first_line - 1, first.first_byte, "", True)
+    last = HeadLine(first.first_line - 1, first.first_byte, "", True)
     for block, start in _blocks(source, last):
         form = _form(source, block, governed[-1].form)
         if form is None or form.reads_as(governed[-1].form):
@@ -95,9 +95,9 @@ def forms_of(source: Source, first: Governed) -> tuple[list[Governed], Damage | 
     return governed, None
 
 
-def _blocks(source: Source, last: Line) -> Iterator[tuple[list[Line], int]]:
+def _blocks(source: Source, last: HeadLine) -> Iterator[tuple[list[HeadLine], int]]:
     """Yield runs of lines after the first header that begin with a percent sign."""
-    block: list[Line] = []
+    block: list[HeadLine] = []
     begin = 0
     for line, start in lines_with(source, last, "utf-8", _PERCENT):
         if not line.text.lstrip().startswith("%"):
@@ -111,7 +111,7 @@ def _blocks(source: Source, last: Line) -> Iterator[tuple[list[Line], int]]:
         yield block, begin
 
 
-def _form(source: Source, block: Sequence[Line], before: Form | None) -> Form | None:
+def _form(source: Source, block: Sequence[HeadLine], before: Form | None) -> Form | None:
     """Return the form that a block of lines states; None where it changes nothing.
 
     A line of names begins anew: what the lines around it do not say is not known. Without one, or where the same line

@@ -26,7 +26,7 @@ from groundstation.base.records import Column, Item, LogHeader, RecordBatch, Rem
 from groundstation.base.timescales import gps_to_utc_ns, gps_week_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.dialect import Dialect
-from groundstation.readers.layout import Layout, Rule, TimeRule
+from groundstation.readers.layout import LayoutRule, TableLayout, TimeRule
 from groundstation.readers.losses import Losses
 from groundstation.readers.places import placed
 from groundstation.readers.rtklib_header import Form, Governed, form_of, forms_of
@@ -75,12 +75,12 @@ def _rows(source: Source, governed: Sequence[Governed], losses: Losses) -> Itera
 
     form, first = governed[0].form, governed[0]
     time = TimeRule("seconds", (1,), ("tow",)) if form.has_week else _CALENDAR
-    rules = [Rule(at, RAW, name, "double") for at, name in enumerate(form.names) if at >= 2]
-    rules += [Rule(0, RAW, "week", "double")] if form.has_week else []
+    rules = [LayoutRule(at, RAW, name, "double") for at, name in enumerate(form.names) if at >= 2]
+    rules += [LayoutRule(0, RAW, "week", "double")] if form.has_week else []
     dialect = Dialect("utf-8", "\t", len(form.names), 0, first.first_line)
     table = TableReader(
         _Tabbed(source.path, source, first.first_byte, governed[-1].end_byte),
-        [Section(dialect, Layout(time, tuple(rules)))],
+        [Section(dialect, TableLayout(time, tuple(rules)))],
     )
     items = table.items(LogHeader(NAME))
     next(items)

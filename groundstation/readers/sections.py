@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 from typing import BinaryIO
 
 from groundstation.base.records import Damage, Remark
-from groundstation.readers.dialect import Dialect, Line
-from groundstation.readers.layout import Layout
+from groundstation.readers.dialect import Dialect, HeadLine
+from groundstation.readers.layout import TableLayout
 from groundstation.readers.source import Source
 
 MOST = 500  # more headers that change something are no log: what follows is left out
@@ -30,7 +30,7 @@ class Section:
     ----------
     dialect : Dialect
         With the bytes where the rows begin and end.
-    layout : Layout
+    layout : TableLayout
     shift_ns : int, optional
         From the time of these rows to that of the log's header; None where nothing tells it: the rows have no time.
     facts : mapping of str to str
@@ -38,30 +38,30 @@ class Section:
     """
 
     dialect: Dialect
-    layout: Layout
+    layout: TableLayout
     shift_ns: int | None = 0
     facts: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class Place:
+class HeaderPlace:
     """Header line, and the lines between it and the header before, with their first bytes."""
 
-    line: Line
+    line: HeadLine
     first_byte: int
-    above: tuple[Line, ...]
+    above: tuple[HeadLine, ...]
     above_from: tuple[int, ...]
 
 
 def header_places(
-    source: Source, first: Line, encoding: str, mark: re.Pattern[bytes], is_header: Callable[[str], bool]
-) -> Iterator[Place]:
+    source: Source, first: HeadLine, encoding: str, mark: re.Pattern[bytes], is_header: Callable[[str], bool]
+) -> Iterator[HeaderPlace]:
     """Lines below the first header that are headers too.
 
     Parameters
     ----------
     source : Source
-    first : Line
+    first : HeadLine
         The last line of the first header; looked for is behind it.
     encoding : str
     mark : pattern
@@ -73,7 +73,7 @@ def header_places(
     with source.open() as again:
         for line, start in lines_with(source, first, encoding, mark):
             if is_header(line.text):
-                yield Place(line, start, *_above(again, after, line.number, start, encoding, _separator(source)))
+                yield HeaderPlace(line, start, *_above(again, after, line.number, start, encoding, _separator(source)))
                 after = line
 
 
@@ -82,7 +82,9 @@ def mark_of(name: str) -> re.Pattern[bytes]:
     return _WORD if len(name) <= _SHORT else re.compile(re.escape(name.encode()))
 
 
-def lines_with(source: Source, first: Line, encoding: str, mark: re.Pattern[bytes]) -> Iterator[tuple[Line, int]]:
+def lines_with(
+    source: Source, first: HeadLine, encoding: str, mark: re.Pattern[bytes]
+) -> Iterator[tuple[HeadLine, int]]:
     """Whole lines behind a line that have a mark, and their first bytes."""
     separator = _separator(source)
     base, rest = first.next_byte - len(separator), b""  # every piece begins with the end of the line before
@@ -102,7 +104,7 @@ def lines_with(source: Source, first: Line, encoding: str, mark: re.Pattern[byte
                     number, counted = number + _count(again, counted, base, separator), base
                 number, counted = number + piece.count(separator, counted - base, start), base + start
                 text = piece[start:at].decode(encoding, errors="replace").rstrip("\r").removeprefix(_MARK_OF_UTF8)
-                yield Line(number, base + at + 1, text, True), counted
+                yield HeadLine(number, base + at + 1, text, True), counted
             base, rest = base + max(end, 0), piece[max(end, 0) :]
 
 
@@ -115,7 +117,7 @@ def _count(stream: BinaryIO, start: int, end: int, separator: bytes) -> int:
     return count
 
 
-def lines_below(source: Source, line: Line, encoding: str) -> tuple[Line, ...]:
+def lines_below(source: Source, line: HeadLine, encoding: str) -> tuple[HeadLine, ...]:
     """The first lines below a header."""
     separator = _separator(source)
     with source.open() as stream:
@@ -124,7 +126,9 @@ def lines_below(source: Source, line: Line, encoding: str) -> tuple[Line, ...]:
     found, next_byte = [], line.next_byte
     for offset, text in enumerate(content, start=1):
         next_byte += len(text) + len(separator)
-        found.append(Line(line.number + offset, next_byte, text.decode(encoding, errors="replace").rstrip("\r"), True))
+        found.append(
+            HeadLine(line.number + offset, next_byte, text.decode(encoding, errors="replace").rstrip("\r"), True)
+        )
     return tuple(found)
 
 
@@ -150,7 +154,7 @@ def without_headers(section: Section) -> Section:
     return replace(section, dialect=replace(section.dialect, header_lines=frozenset()))
 
 
-def told(place: Place, is_same: bool, shift_ns: int | None = 0) -> Remark:
+def told(place: HeaderPlace, is_same: bool, shift_ns: int | None = 0) -> Remark:
     """Return a remark on a header inside the file: it has other columns, or another time.
 
     The header governs the rows below it.
@@ -163,8 +167,8 @@ def told(place: Place, is_same: bool, shift_ns: int | None = 0) -> Remark:
 
 
 def _above(
-    stream: BinaryIO, after: Line, number: int, start: int, encoding: str, separator: bytes
-) -> tuple[tuple[Line, ...], tuple[int, ...]]:
+    stream: BinaryIO, after: HeadLine, number: int, start: int, encoding: str, separator: bytes
+) -> tuple[tuple[HeadLine, ...], tuple[int, ...]]:
     """Lines between the header before and a line, and their first bytes."""
     begin = max(after.next_byte, start - _ABOVE_BYTES)
     stream.seek(begin)
@@ -174,7 +178,7 @@ def _above(
     found, starts, next_byte = [], [], start
     for offset, content in enumerate(reversed(lines), start=1):
         text = content.decode(encoding, errors="replace").rstrip("\r")
-        found.append(Line(number - offset, next_byte, text, True))
+        found.append(HeadLine(number - offset, next_byte, text, True))
         next_byte -= len(content) + len(separator)
         starts.append(next_byte)
     return tuple(reversed(found)), tuple(reversed(starts))

@@ -13,7 +13,7 @@ from typing import BinaryIO, Protocol, runtime_checkable
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.reading import open_to_read
 from groundstation.base.records import Damage, Item
-from groundstation.readers.compressed import Expanded, Window, compression_of, expand, head_of
+from groundstation.readers.compressed import Expanded, FileWindow, compression_of, expand, head_of
 
 HEAD_BYTES = 1 << 20  # a header row of 10 000 columns takes about 300 kB
 
@@ -69,7 +69,7 @@ class Source:
             When the file is absent, a folder, may not be read, or expands beyond all measure.
         """
         if self.compression:
-            return io.BufferedReader(Window(self._expanded.file, self._expanded.size))
+            return io.BufferedReader(FileWindow(self._expanded.file, self._expanded.size))
         return self._open_file()
 
     def damages(self) -> tuple[Damage, ...]:

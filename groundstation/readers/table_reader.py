@@ -30,7 +30,7 @@ from groundstation.readers.cells import Cells
 from groundstation.readers.dates import local_ns
 from groundstation.readers.dialect import Dialect
 from groundstation.readers.inside import new_logs, with_own_zeros
-from groundstation.readers.layout import METHODS, Key, Layout, Rule, apply
+from groundstation.readers.layout import METHODS, Key, LayoutRule, TableLayout, apply
 from groundstation.readers.losses import Losses
 from groundstation.readers.places import PLACED, without_place, zeroed
 from groundstation.readers.rows import RowBlock, RowScanner, restore_delimiters
@@ -178,9 +178,9 @@ class TableReader:
             columns |= apply(derivation, columns)
         return columns
 
-    def _places(self) -> Iterator[tuple[str, dict[str, Rule]]]:
+    def _places(self) -> Iterator[tuple[str, dict[str, LayoutRule]]]:
         """Yield topics whose rows state a position, with rules by field; truth is left out."""
-        topics: dict[str, dict[str, Rule]] = {}
+        topics: dict[str, dict[str, LayoutRule]] = {}
         for rule in self._layout.rules:
             topics.setdefault(rule.topic, {})[rule.field] = rule
         for topic, by_field in topics.items():
@@ -188,7 +188,7 @@ class TableReader:
                 yield topic, by_field
 
     def _placed(
-        self, topic: str, by_field: Mapping[str, Rule], columns: Mapping[Key, Column], lines: Int64Array
+        self, topic: str, by_field: Mapping[str, LayoutRule], columns: Mapping[Key, Column], lines: Int64Array
     ) -> dict[Key, Column]:
         """Drop values without a position; keep their raw numbers in raw columns."""
         latitude, longitude = (columns[topic, f"{name}_deg"] for name in ("latitude", "longitude"))
@@ -225,7 +225,7 @@ class TableReader:
         self._losses.add("unreadable_cells", "times that cannot be read", lines[read.unreadable], where=rule.names[0])
         return read.column
 
-    def _column(self, rule: Rule, array: Any, lines: Int64Array) -> Column:
+    def _column(self, rule: LayoutRule, array: Any, lines: Int64Array) -> Column:
         read, what = self._read_cells(rule, array)
         self._losses.add("unreadable_cells", what, lines[read.unreadable], where=rule.target, topic=rule.topic)
         if read.cut is not None:
@@ -237,7 +237,7 @@ class TableReader:
                 column = Column(column.values * rule.factor + rule.offset, column.present)
         return self._on_the_circle(rule, column) if rule.is_heading else column
 
-    def _read_cells(self, rule: Rule, array: Any) -> tuple[Cells, str]:
+    def _read_cells(self, rule: LayoutRule, array: Any) -> tuple[Cells, str]:
         if rule.kind == "bool":
             return cells.flags(array), "cells that are not 0, 1, true or false"
         if rule.kind == "text":
@@ -248,7 +248,7 @@ class TableReader:
             return cells.ready_numbers(array), what
         return cells.numbers(_with_point(array) if self._layout.decimal_comma else array), what
 
-    def _on_the_circle(self, rule: Rule, column: Column) -> Column:
+    def _on_the_circle(self, rule: LayoutRule, column: Column) -> Column:
         """Bring headings into [0, 360).
 
         A value more than a turn outside is no heading: it is left for the ledger to flag.
@@ -319,7 +319,7 @@ def _occupied(fields: Mapping[str, Column]) -> BoolArray | None:
     return None if rows.all() else rows
 
 
-def first_times(source: Source, dialect: Dialect, layout: Layout) -> tuple[Column, int]:
+def first_times(source: Source, dialect: Dialect, layout: TableLayout) -> tuple[Column, int]:
     """Return the times of the first block of rows, and how many name no time zone.
 
     There are no times when there are no rows.

@@ -46,7 +46,7 @@ _SEA = re.compile(r"\ba?msl\b|\bgeoid\b|\begm(?:96|08|2008)?\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
-class Told:
+class ColumnFacts:
     """Facts that a header states of one column; empty where it states none.
 
     Parameters
@@ -73,7 +73,7 @@ def bare(name: str) -> str:
     return " ".join(_IN_PARENTHESES.sub(" ", name).split())
 
 
-def told(names: Iterable[str], units: Iterable[str] = ()) -> Told:
+def told(names: Iterable[str], units: Iterable[str] = ()) -> ColumnFacts:
     """Read the names of a column and its cells in rows of units; the first one counts.
 
     Examples
@@ -86,7 +86,7 @@ def told(names: Iterable[str], units: Iterable[str] = ()) -> Told:
     names = list(names)
     inside = [*(text for name in names for text in _IN_PARENTHESES.findall(name)), *units]
     said = [*inside, *map(bare, names)]
-    return Told(
+    return ColumnFacts(
         next((found for text in inside if (found := _unit(text)) is not None), None),
         _word(said, {"true": _TRUE, "magnetic": _MAGNETIC}),
         _word(said, {"ellipsoid": _ELLIPSOID, "msl": _SEA}),

@@ -34,7 +34,7 @@ Stepped: TypeAlias = Literal["", "receipt", "clock"]
 
 
 @dataclass
-class Readings:
+class ClockReadings:
     """Readings of a clock, thinned.
 
     Those around each jump are kept, and of each run the one that arrived least late.
@@ -78,14 +78,14 @@ class Readings:
         self._parts.append(rows[:, is_kept])
         self._last = rows[:, -1:]
 
-    def all(self) -> "Track":
+    def all(self) -> "ReadingSequence":
         """Return the readings that were kept."""
         rows = np.concatenate(self._parts, axis=1) if self._parts else np.zeros((4, 0), dtype=np.int64)
-        return Track(*rows)
+        return ReadingSequence(*rows)
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class ReadingSequence:
     """Readings in the order of the log: record, receipt, clock, place among all readings.
 
     Each has shape (n,).
@@ -99,9 +99,9 @@ class Track:
     def __len__(self) -> int:
         return len(self.record_index)
 
-    def take(self, rows: BoolArray | slice) -> "Track":
+    def take(self, rows: BoolArray | slice) -> "ReadingSequence":
         """The readings that ``rows`` selects."""
-        return Track(self.record_index[rows], self.receipt_ns[rows], self.clock_ns[rows], self.number[rows])
+        return ReadingSequence(self.record_index[rows], self.receipt_ns[rows], self.clock_ns[rows], self.number[rows])
 
     @property
     def late_ns(self) -> Int64Array:
@@ -115,19 +115,19 @@ class Track:
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class ClockStretch:
     """Readings over which neither clock was set.
 
     Parameters
     ----------
-    track : Track
+    track : ReadingSequence
     stepped : {'', 'receipt', 'clock'}
         Which clock was set, or started again, where it begins.
     after : int
         Record of the reading before; -1 for the first stretch.
     """
 
-    track: Track
+    track: ReadingSequence
     stepped: Stepped = ""
     after: int = -1
 
@@ -137,14 +137,14 @@ class Stretch:
         return int(self.track.late_ns.min())
 
 
-def stretches_of(track: Track, *, receipt_step_s: float = STEP_S) -> list[Stretch]:
+def stretches_of(track: ReadingSequence, *, receipt_step_s: float = STEP_S) -> list[ClockStretch]:
     """Part readings into stretches between steps; readings astray are left out.
 
     All are one stretch where the steps are no steps of a clock.
 
     Parameters
     ----------
-    track : Track
+    track : ReadingSequence
     receipt_step_s : float
         Least step ahead of the receiver's clock that is taken for one: readings may go on being late.
 
@@ -152,11 +152,11 @@ def stretches_of(track: Track, *, receipt_step_s: float = STEP_S) -> list[Stretc
     --------
     >>> seconds = np.arange(100)
     >>> late = np.where(seconds < 40, 0, 3_600)  # the receiver's clock is set
-    >>> track = Track(seconds, (seconds + late) * NS_PER_S, seconds * NS_PER_S, seconds)
+    >>> track = ReadingSequence(seconds, (seconds + late) * NS_PER_S, seconds * NS_PER_S, seconds)
     >>> [(len(one.track), one.stepped, one.level_ns // NS_PER_S) for one in stretches_of(track)]
     [(40, '', 0), (60, 'receipt', 3600)]
     """
-    left, found = track.take(~_slips(track)), list[Stretch]()
+    left, found = track.take(~_slips(track)), list[ClockStretch]()
     for _ in range(MOST_ROUNDS):
         found = _stretches(left, receipt_step_s)
         sound = [one for one in found if one.track.readings >= min(FEWEST_READINGS, track.readings)]
@@ -167,7 +167,7 @@ def stretches_of(track: Track, *, receipt_step_s: float = STEP_S) -> list[Stretc
     return found
 
 
-def _slips(track: Track) -> BoolArray:
+def _slips(track: ReadingSequence) -> BoolArray:
     """Tell which single readings are far from two neighbours that are near each other."""
     late_ns, step_ns = track.late_ns, STEP_S * NS_PER_S
     found = np.zeros(len(track), dtype=bool)
@@ -177,7 +177,7 @@ def _slips(track: Track) -> BoolArray:
     return found
 
 
-def _stretches(track: Track, receipt_step_s: float) -> list[Stretch]:
+def _stretches(track: ReadingSequence, receipt_step_s: float) -> list[ClockStretch]:
     if not len(track):
         return []
     late_ns = track.late_ns
@@ -194,10 +194,10 @@ def _stretches(track: Track, receipt_step_s: float) -> list[Stretch]:
             kinds[place] = kind
             open_ends += [(start, place), (place, end)]
     if len(places) > MOST_STEPS:
-        return [Stretch(track)]
+        return [ClockStretch(track)]
     edges = [0, *sorted(places), len(track)]
     return [
-        Stretch(
+        ClockStretch(
             track.take(slice(start, end)), kinds.get(start, ""), int(track.record_index[start - 1]) if start else -1
         )
         for start, end in pairwise(edges)
@@ -205,7 +205,7 @@ def _stretches(track: Track, receipt_step_s: float) -> list[Stretch]:
 
 
 def _step_in(
-    track: Track, late_ns: Int64Array, start: int, end: int, tolerance_ns: float, ahead_ns: float
+    track: ReadingSequence, late_ns: Int64Array, start: int, end: int, tolerance_ns: float, ahead_ns: float
 ) -> tuple[int, Stepped]:
     """Return the largest step of the lower envelope in some readings: its place and clock.
 
@@ -246,7 +246,7 @@ def _oddness(change_ns: int) -> float:
 
 
 @dataclass(frozen=True)
-class Line:
+class ReceiptLine:
     """Receipt less clock of readings that were not late, as a straight line.
 
     ``offset_ns`` at ``zero_ns`` of the clock, and its drift.
@@ -263,7 +263,7 @@ class Line:
         return np.asarray(self.offset_ns + np.rint((clock_ns - self.zero_ns) * self.drift).astype(np.int64))
 
 
-def lower_line(track: Track) -> Line:
+def lower_line(track: ReadingSequence) -> ReceiptLine:
     """Fit the line below all differences of receipt and clock that is nearest to them.
 
     It goes through the edge of their lower hull above which the middle of the clock's times lies. A clock that runs off
@@ -273,13 +273,13 @@ def lower_line(track: Track) -> Line:
     --------
     >>> clock = np.arange(0, 3_600, 10) * NS_PER_S
     >>> late = np.where(np.arange(360) % 7, 400_000_000, 0) + (clock * 50e-6).astype(np.int64)
-    >>> line = lower_line(Track(np.arange(360), clock + 5 * NS_PER_S + late, clock, np.arange(360)))
+    >>> line = lower_line(ReadingSequence(np.arange(360), clock + 5 * NS_PER_S + late, clock, np.arange(360)))
     >>> round(line.drift * 1e6), [round(at / NS_PER_S, 3) for at in line.at(clock[[0, -1]]).tolist()]
     (50, [5.0, 5.179])
     """
     order = np.argsort(track.clock_ns, kind="stable")
     clock_ns, late_ns = track.clock_ns[order], track.late_ns[order]
-    least = Line(int(clock_ns[0]), int(late_ns.min()))
+    least = ReceiptLine(int(clock_ns[0]), int(late_ns.min()))
     corners = _lower_hull(clock_ns, late_ns)
     middle = float(np.mean((clock_ns - clock_ns[0]).astype(np.float64)))
     after = next((at for at in range(1, len(corners)) if clock_ns[corners[at]] - clock_ns[0] >= middle), 0)
@@ -289,7 +289,7 @@ def lower_line(track: Track) -> Line:
     drift = int(late_ns[other] - late_ns[one]) / int(clock_ns[other] - clock_ns[one])
     if abs(drift) > MOST_SKEW_PPM * 1e-6:
         return least
-    return Line(int(clock_ns[one]), int(late_ns[one]), drift)
+    return ReceiptLine(int(clock_ns[one]), int(late_ns[one]), drift)
 
 
 def _lower_hull(x: Int64Array, y: Int64Array) -> list[int]:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from groundstation.base.failures import attempt
 from groundstation.chapters.comparison import answers, findings, opening, settings
 from groundstation.chapters.parts import Section, kept
-from groundstation.chapters.plots.comparison import COMPARED, Side, Tell, sides_of
+from groundstation.chapters.plots.comparison import COMPARED, PlottedSide, Tell, sides_of
 from groundstation.reports.drawing import Drawing, drawing_of
 from groundstation.reports.page import TEMPLATES, render
 from groundstation.results.comparison import Comparison
@@ -42,5 +42,5 @@ def _figures(comparison: Comparison, a: SavedFlight, b: SavedFlight, systems: Sy
     )
 
 
-def _drawn(tell: Tell, sides: Sequence[Side]) -> Drawing | None:
+def _drawn(tell: Tell, sides: Sequence[PlottedSide]) -> Drawing | None:
     return drawing_of(tell(sides))

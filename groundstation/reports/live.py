@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Samples:
+class CursorValues:
     """Places in a picture, each with a value that is shown when the cursor is near it.
 
     ``title`` names the quantity.
@@ -52,7 +52,7 @@ class Frame:
     x_range: tuple[float, float]
     y_range: tuple[float, float]
     names: tuple[tuple[float, str], ...]
-    samples: Samples | None = field(default=None, kw_only=True)
+    samples: CursorValues | None = field(default=None, kw_only=True)
 
 
 @dataclass(frozen=True)

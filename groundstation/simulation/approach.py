@@ -51,7 +51,7 @@ class TrueRunway:
 
 
 @dataclass(frozen=True)
-class Flown:
+class FinalMotion:
     """Motion on the final.
 
     Across is right of the course; ``crab_deg`` turns the nose right of the track.
@@ -99,7 +99,7 @@ class ApproachScenario:
     title: str = ""
     seed: int = 1
     start_utc: str = "2026-05-04T06:00:00Z"
-    flown: Flown = field(default_factory=Flown)
+    flown: FinalMotion = field(default_factory=FinalMotion)
     recorded: Recorded = field(default_factory=Recorded)
 
     def __post_init__(self) -> None:
@@ -207,7 +207,7 @@ def _course_line(scenario: ApproachScenario, distance_m: FloatArray) -> FloatArr
 
 
 def _across(
-    flown: Flown, time_s: FloatArray, distance_m: FloatArray, height_m: FloatArray, rng: np.random.Generator
+    flown: FinalMotion, time_s: FloatArray, distance_m: FloatArray, height_m: FloatArray, rng: np.random.Generator
 ) -> FloatArray:
     """Return the true displacement right of the course: capture, wander, roll-out.
 

@@ -5,7 +5,7 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
-from groundstation.simulation.readings import Readings, every, quantised
+from groundstation.simulation.readings import TopicReadings, every, quantised
 from groundstation.simulation.scenario import ElectricSettings
 from groundstation.simulation.trajectory import Trajectory
 
@@ -30,9 +30,9 @@ def current_a(time_s: FloatArray, settings: ElectricSettings | None) -> FloatArr
     return current
 
 
-def electric_readings(trajectory: Trajectory, settings: ElectricSettings, rng: np.random.Generator) -> Readings:
+def electric_readings(trajectory: Trajectory, settings: ElectricSettings, rng: np.random.Generator) -> TopicReadings:
     """Return the current as the recorder has it: with noise, rounded."""
     time_ns = trajectory.time_ns[every(trajectory, settings.rate_hz)]
     noise = settings.noise_a * rng.standard_normal(len(time_ns))
     values = quantised(current_a(time_ns / NS_PER_S, settings) + noise, settings.resolution_a)
-    return Readings("electric", time_ns, {"current_a": Column(values)}, {"current_a": settings.resolution_a})
+    return TopicReadings("electric", time_ns, {"current_a": Column(values)}, {"current_a": settings.resolution_a})

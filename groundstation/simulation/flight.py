@@ -15,7 +15,7 @@ from groundstation.simulation.flight_errors import flight_errors
 from groundstation.simulation.landing_aids import adf_readings, radio_altimeter_readings
 from groundstation.simulation.magnetometer import magnetometer_readings
 from groundstation.simulation.onboard import onboard_readings
-from groundstation.simulation.readings import Readings, every, generator
+from groundstation.simulation.readings import TopicReadings, every, generator
 from groundstation.simulation.scenario import Scenario
 from groundstation.simulation.sensors import (
     air_readings,
@@ -133,7 +133,7 @@ def _magnetic_truth(simulated: Simulated) -> dict[str, float]:
     return letters | {"declination_deg": deviation.declination_deg, "horizontal_nt": deviation.horizontal_nt}
 
 
-def _all_readings(scenario: Scenario, trajectory: Trajectory) -> list[Readings]:
+def _all_readings(scenario: Scenario, trajectory: Trajectory) -> list[TopicReadings]:
     seed = scenario.seed
     ins = ins_readings(trajectory, scenario.ins, generator(seed, "ins"), seed)
     gnss = gnss_readings(trajectory, scenario.gnss, generator(seed, "gnss"))
@@ -164,7 +164,7 @@ def _all_readings(scenario: Scenario, trajectory: Trajectory) -> list[Readings]:
     return readings
 
 
-def _assemble(scenario: Scenario, readings: list[Readings]) -> Flight:
+def _assemble(scenario: Scenario, readings: list[TopicReadings]) -> Flight:
     """Put readings into tables whose rows know their row of the log.
 
     Samples recorded at one time share a row, unless repeated.

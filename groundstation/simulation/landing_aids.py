@@ -14,7 +14,7 @@ from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import Column
 from groundstation.simulation.landing_settings import AdfSettings, RadioAltimeterSettings, RunwayOfLanding
 from groundstation.simulation.processes import gauss_markov
-from groundstation.simulation.readings import Readings, every, quantised
+from groundstation.simulation.readings import TopicReadings, every, quantised
 from groundstation.simulation.scenario import Scenario
 from groundstation.simulation.trajectory import Trajectory
 
@@ -75,7 +75,7 @@ def site_of(trajectory: Trajectory, scenario: Scenario) -> str:
 
 def adf_readings(
     trajectory: Trajectory, settings: AdfSettings, runway: RunwayOfLanding, rng: np.random.Generator
-) -> list[Readings]:
+) -> list[TopicReadings]:
     """Relative bearings of every beacon, one topic each; none beyond the range."""
     index = every(trajectory, settings.rate_hz)
     places, motion = runway_places(trajectory, runway), trajectory.at(index)
@@ -95,13 +95,13 @@ def adf_readings(
             )
         }
         step = {"relative_bearing_deg": settings.resolution_deg}
-        readings.append(Readings(f"adf.{beacon.name}", motion.time_ns, columns, step))
+        readings.append(TopicReadings(f"adf.{beacon.name}", motion.time_ns, columns, step))
     return readings
 
 
 def radio_altimeter_readings(
     trajectory: Trajectory, settings: RadioAltimeterSettings, runway: RunwayOfLanding, rng: np.random.Generator
-) -> Readings:
+) -> TopicReadings:
     """Return the height above the ground, which rises before the threshold.
 
     From the threshold on, the ground is the runway.
@@ -111,4 +111,4 @@ def radio_altimeter_readings(
     ground = settings.rise_m_per_km * np.maximum(-places.along_m[index], 0.0) / 1000.0
     height = places.up_m[index] - ground + settings.sigma_m * rng.standard_normal(len(index))
     columns = {"height_m": Column(quantised(height, settings.resolution_m), height <= settings.highest_m)}
-    return Readings("radio_altimeter", motion.time_ns, columns, {"height_m": settings.resolution_m})
+    return TopicReadings("radio_altimeter", motion.time_ns, columns, {"height_m": settings.resolution_m})

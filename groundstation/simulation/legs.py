@@ -125,7 +125,7 @@ Leg: TypeAlias = Parked | Taxi | GroundTurn | TakeOff | Fly | ClimbTo | AirTurn 
 
 
 @dataclass(frozen=True)
-class Piece:
+class MotionSegment:
     """Stretch of motion with smooth changes of speed, turn rate and climb rate.
 
     They go from their last values to these. ``airborne`` is the state during the piece. Durations are rounded up to
@@ -156,7 +156,7 @@ class MotionState:
     latitude_deg: float = 0.0
     wind_mps: tuple[float, float] = (0.0, 0.0)
 
-    def after(self, piece: Piece, turn_rate_dps: float) -> "MotionState":
+    def after(self, piece: MotionSegment, turn_rate_dps: float) -> "MotionState":
         """The state at the end of a piece that starts with a turn rate."""
         time, rate = piece.duration_s, turn_rate_dps
         mean_mps = 0.5 * (self.speed_mps + piece.speed_mps)
@@ -183,7 +183,7 @@ class MotionState:
         return float(np.ceil(duration_s / self.step_s - 1e-6)) * self.step_s
 
 
-def pieces_of(leg: Leg, state: MotionState, place: str) -> tuple[Piece, ...]:
+def pieces_of(leg: Leg, state: MotionState, place: str) -> tuple[MotionSegment, ...]:
     """The pieces of one leg flown from a state (which is not changed).
 
     Raises
@@ -211,7 +211,8 @@ def pieces_of(leg: Leg, state: MotionState, place: str) -> tuple[Piece, ...]:
             if leg.great_circle:
                 return _great_circle(leg, ramp_s, hold_s, state)
             return tuple(
-                Piece(duration, leg.airspeed_mps, 0.0, leg.climb_rate_mps, True) for duration in (ramp_s, hold_s)
+                MotionSegment(duration, leg.airspeed_mps, 0.0, leg.climb_rate_mps, True)
+                for duration in (ramp_s, hold_s)
             )
         case ClimbTo():
             return _climb_to(leg.altitude_m, leg.airspeed_mps, leg.climb_rate_mps, state, place)
@@ -227,29 +228,29 @@ def pieces_of(leg: Leg, state: MotionState, place: str) -> tuple[Piece, ...]:
             return _climb_to(leg.runway_altitude_m, leg.airspeed_mps, leg.descent_rate_mps, state, place)
 
 
-def _speed_change(state: MotionState, speed_mps: float, acceleration_mps2: float) -> tuple[Piece, ...]:
+def _speed_change(state: MotionState, speed_mps: float, acceleration_mps2: float) -> tuple[MotionSegment, ...]:
     difference = abs(speed_mps - state.speed_mps)
     if difference == 0.0:
         return ()
     # The smoothstep's steepest slope is 1.5 times its mean one.
-    return (Piece(state.whole_steps(1.5 * difference / acceleration_mps2), speed_mps, airborne=state.airborne),)
+    return (MotionSegment(state.whole_steps(1.5 * difference / acceleration_mps2), speed_mps, airborne=state.airborne),)
 
 
-def _parked(leg: Parked, state: MotionState) -> tuple[Piece, ...]:
-    return (*_speed_change(state, 0.0, GROUND_ACCELERATION_MPS2), Piece(state.whole_steps(leg.duration_s), 0.0))
+def _parked(leg: Parked, state: MotionState) -> tuple[MotionSegment, ...]:
+    return (*_speed_change(state, 0.0, GROUND_ACCELERATION_MPS2), MotionSegment(state.whole_steps(leg.duration_s), 0.0))
 
 
-def _taxi(leg: Taxi, state: MotionState, place: str) -> tuple[Piece, ...]:
+def _taxi(leg: Taxi, state: MotionState, place: str) -> tuple[MotionSegment, ...]:
     ramp = _speed_change(state, leg.speed_mps, GROUND_ACCELERATION_MPS2)
     used_m = sum(piece.duration_s * 0.5 * (state.speed_mps + leg.speed_mps) for piece in ramp)
     if used_m > leg.length_m:
         raise SettingsError(f"{place}.length_m", f"{leg.length_m:g} m", f"{used_m:.0f} m or more for the speed change")
-    return (*ramp, Piece(state.whole_steps((leg.length_m - used_m) / leg.speed_mps), leg.speed_mps))
+    return (*ramp, MotionSegment(state.whole_steps((leg.length_m - used_m) / leg.speed_mps), leg.speed_mps))
 
 
 def _turn(
     angle_deg: float, rate_dps: float, ramp_s: float, speed_mps: float, state: MotionState, growth: float = 0.0
-) -> tuple[Piece, ...]:
+) -> tuple[MotionSegment, ...]:
     """Return the pieces of a turn: rate up, hold, rate down.
 
     The rate is adjusted so that whole steps give exactly the angle. ``growth`` is the share by which the rate at the
@@ -259,36 +260,36 @@ def _turn(
     ramp_s = state.whole_steps(ramp_s)
     rate = angle_deg / (hold_s + ramp_s)  # each ramp contributes half its length at full rate
     rates_and_times = ((rate * (1.0 - growth), ramp_s), (rate * (1.0 + growth), hold_s), (0.0, ramp_s))
-    return tuple(Piece(time, speed_mps, rate, 0.0, state.airborne) for rate, time in rates_and_times)
+    return tuple(MotionSegment(time, speed_mps, rate, 0.0, state.airborne) for rate, time in rates_and_times)
 
 
-def _great_circle(leg: Fly, ramp_s: float, hold_s: float, state: MotionState) -> tuple[Piece, ...]:
+def _great_circle(leg: Fly, ramp_s: float, hold_s: float, state: MotionState) -> tuple[MotionSegment, ...]:
     """Return a change of speed and short pieces that follow a great circle.
 
     The pieces take up the turn rate of the great circle; at the end there is none again.
     """
-    pieces, rate = [Piece(ramp_s, leg.airspeed_mps, 0.0, leg.climb_rate_mps, True)], 0.0
+    pieces, rate = [MotionSegment(ramp_s, leg.airspeed_mps, 0.0, leg.climb_rate_mps, True)], 0.0
     state = state.after(pieces[0], rate)
     length_s = state.whole_steps(GREAT_CIRCLE_PIECE_S)
     while hold_s > 2.0 * length_s:
-        piece = Piece(length_s, leg.airspeed_mps, state.great_circle_rate_dps(), leg.climb_rate_mps, True)
+        piece = MotionSegment(length_s, leg.airspeed_mps, state.great_circle_rate_dps(), leg.climb_rate_mps, True)
         state, rate, hold_s = state.after(piece, rate), piece.turn_rate_dps, hold_s - length_s
         pieces.append(piece)
-    return (*pieces, Piece(state.whole_steps(hold_s), leg.airspeed_mps, 0.0, leg.climb_rate_mps, True))
+    return (*pieces, MotionSegment(state.whole_steps(hold_s), leg.airspeed_mps, 0.0, leg.climb_rate_mps, True))
 
 
-def _take_off(leg: TakeOff, state: MotionState) -> tuple[Piece, ...]:
+def _take_off(leg: TakeOff, state: MotionState) -> tuple[MotionSegment, ...]:
     roll_s = state.whole_steps(1.5 * (leg.lift_off_speed_mps - state.speed_mps) / leg.acceleration_mps2)
-    return (Piece(roll_s, leg.lift_off_speed_mps),)
+    return (MotionSegment(roll_s, leg.lift_off_speed_mps),)
 
 
-def pieces_after_transition(leg: Leg, state: MotionState) -> tuple[Piece, ...]:
+def pieces_after_transition(leg: Leg, state: MotionState) -> tuple[MotionSegment, ...]:
     """Return the pieces of a take-off in the air, or of a landing on the ground.
 
     They are flown after lift-off and touchdown.
     """
     if isinstance(leg, TakeOff):
-        return (Piece(state.whole_steps(CLIMB_RAMP_S), state.speed_mps, 0.0, leg.climb_rate_mps, True),)
+        return (MotionSegment(state.whole_steps(CLIMB_RAMP_S), state.speed_mps, 0.0, leg.climb_rate_mps, True),)
     if isinstance(leg, Landing):
         return _speed_change(state, leg.taxi_speed_mps, BRAKING_MPS2)
     return ()
@@ -298,13 +299,13 @@ def _air_ramp_s(state: MotionState, airspeed_mps: float) -> float:
     return max(1.5 * abs(airspeed_mps - state.speed_mps) / AIR_ACCELERATION_MPS2, CLIMB_RAMP_S)
 
 
-def _level(state: MotionState) -> Piece:
-    return Piece(state.whole_steps(CLIMB_RAMP_S), state.speed_mps, 0.0, 0.0, True)
+def _level(state: MotionState) -> MotionSegment:
+    return MotionSegment(state.whole_steps(CLIMB_RAMP_S), state.speed_mps, 0.0, 0.0, True)
 
 
 def _climb_to(
     altitude_m: float, airspeed_mps: float, climb_rate_mps: float, state: MotionState, place: str
-) -> tuple[Piece, ...]:
+) -> tuple[MotionSegment, ...]:
     """Return the pieces of a climb: change speed and begin to climb, climb, level off.
 
     The middle rate is solved so that the altitude is exact.
@@ -316,4 +317,4 @@ def _climb_to(
     if abs(rate) > 45.0:
         raise SettingsError(place, f"climb rate {rate:.0f} m/s", "an altitude that can be reached")
     times_and_rates = ((ramp_s, rate), (hold_s, rate), (level_s, 0.0))
-    return tuple(Piece(time, airspeed_mps, 0.0, rate, True) for time, rate in times_and_rates)
+    return tuple(MotionSegment(time, airspeed_mps, 0.0, rate, True) for time, rate in times_and_rates)

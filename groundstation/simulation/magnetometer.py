@@ -12,7 +12,7 @@ from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.simulation.electric import current_a
 from groundstation.simulation.processes import gauss_markov
-from groundstation.simulation.readings import Readings, every, quantised
+from groundstation.simulation.readings import TopicReadings, every, quantised
 from groundstation.simulation.scenario import Airport, Anomaly, MagnetometerSettings, Scenario
 from groundstation.simulation.trajectory import Trajectory, rotation_n_from_b
 
@@ -23,7 +23,7 @@ MODEL_YEARS = range(2010, 2030)  # that the sets of pygeomag serve
 
 def magnetometer_readings(
     trajectory: Trajectory, scenario: Scenario, settings: MagnetometerSettings, rng: np.random.Generator
-) -> Readings:
+) -> TopicReadings:
     """Return the field at the sensor's axes with noise, rounded, recorded ``latency_s`` late.
 
     The noise is white and correlated.
@@ -42,7 +42,7 @@ def magnetometer_readings(
     columns = {
         f"field_{axis}_nt": Column(quantised(reading[in_log, i], settings.resolution_nt)) for i, axis in enumerate(AXES)
     }
-    return Readings("magnetometer", time_ns[in_log], columns, dict.fromkeys(columns, settings.resolution_nt))
+    return TopicReadings("magnetometer", time_ns[in_log], columns, dict.fromkeys(columns, settings.resolution_nt))
 
 
 def sensed_nt(

@@ -6,7 +6,7 @@ from groundstation.base.angles import FloatArray, direction_of, wrap_180
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.simulation.readings import Readings, quantised
+from groundstation.simulation.readings import TopicReadings, quantised
 from groundstation.simulation.scenario import OnboardSettings
 from groundstation.simulation.trajectory import Trajectory
 
@@ -15,7 +15,9 @@ READY_QUALITY_DEG = 0.3
 STANDING_MPS = 0.1
 
 
-def onboard_readings(trajectory: Trajectory, ins: Readings, gnss: Readings, settings: OnboardSettings) -> Readings:
+def onboard_readings(
+    trajectory: Trajectory, ins: TopicReadings, gnss: TopicReadings, settings: OnboardSettings
+) -> TopicReadings:
     """Run the paper's recursion over computer cycles.
 
     The last GNSS output is used again until the next one arrives. m_i = m_(i-1) - (m_(i-1) - d_i) / i, e_i = 1.96
@@ -52,11 +54,11 @@ def onboard_readings(trajectory: Trajectory, ins: Readings, gnss: Readings, sett
     names = ("heading_error_deg", "precision_deg", "quality_deg")
     resolution = dict.fromkeys(names, settings.resolution_deg)
     resolution |= {"correction_entered_deg": settings.entry_step_deg, "cycles": 1.0}
-    return Readings("onboard", cycle_ns[rows], columns, resolution)
+    return TopicReadings("onboard", cycle_ns[rows], columns, resolution)
 
 
 def _cycles(
-    cycle_ns: Int64Array, ins: Readings, gnss: Readings, settings: OnboardSettings
+    cycle_ns: Int64Array, ins: TopicReadings, gnss: TopicReadings, settings: OnboardSettings
 ) -> tuple[FloatArray, BoolArray]:
     """Return heading minus track of each cycle, and whether the cycle counts.
 

@@ -11,7 +11,7 @@ from groundstation.base.angles import FloatArray, direction_of, wrap_180
 from groundstation.base.errors import SettingsError
 from groundstation.base.records import BoolArray
 from groundstation.base.units import NS_PER_S
-from groundstation.simulation.legs import MotionState, Piece, pieces_after_transition, pieces_of
+from groundstation.simulation.legs import MotionSegment, MotionState, pieces_after_transition, pieces_of
 from groundstation.simulation.scenario import Scenario
 
 
@@ -91,7 +91,7 @@ def plan(scenario: Scenario) -> Profile:
         latitude_deg=scenario.airport.latitude_deg,
         wind_mps=(scenario.wind.north_mps, scenario.wind.east_mps),
     )
-    planned: list[tuple[MotionState, Piece, float]] = []
+    planned: list[tuple[MotionState, MotionSegment, float]] = []
     for number, leg in enumerate(scenario.legs):
         place = f"{scenario.name}, key legs[{number}]"
         state = _fly(pieces_of(leg, state, place), state, 0.0, planned)
@@ -102,7 +102,10 @@ def plan(scenario: Scenario) -> Profile:
 
 
 def _fly(
-    pieces: tuple[Piece, ...], state: MotionState, turn_rate_dps: float, planned: list[tuple[MotionState, Piece, float]]
+    pieces: tuple[MotionSegment, ...],
+    state: MotionState,
+    turn_rate_dps: float,
+    planned: list[tuple[MotionState, MotionSegment, float]],
 ) -> MotionState:
     """Append pieces with the state and turn rate at their start.
 
@@ -133,7 +136,7 @@ def _change_frame(state: MotionState, scenario: Scenario) -> MotionState:
     )
 
 
-def _sample(planned: list[tuple[MotionState, Piece, float]], end: MotionState, step_ns: int) -> Profile:
+def _sample(planned: list[tuple[MotionState, MotionSegment, float]], end: MotionState, step_ns: int) -> Profile:
     step_s = step_ns / NS_PER_S
     blocks = [_sample_piece(state, piece, rate, round(piece.duration_s / step_s)) for state, piece, rate in planned]
     last = [end.speed_mps, 0.0, end.direction_deg, 0.0, 0.0, end.altitude_m, end.climb_rate_mps, 0.0]
@@ -157,7 +160,7 @@ def _sample(planned: list[tuple[MotionState, Piece, float]], end: MotionState, s
     )
 
 
-def _sample_piece(state: MotionState, piece: Piece, turn_rate_dps: float, count: int) -> FloatArray:
+def _sample_piece(state: MotionState, piece: MotionSegment, turn_rate_dps: float, count: int) -> FloatArray:
     """Sample one piece, shape (8, count), in closed form.
 
     Rows are speed, direction and altitude with their derivatives.

@@ -19,7 +19,7 @@ ROUNDING_NUDGE = 1e-6  # in steps of the resolution
 
 
 @dataclass(frozen=True)
-class Readings:
+class TopicReadings:
     """One topic's samples in order of recording.
 
     Parameters
@@ -42,12 +42,12 @@ class Readings:
         object.__setattr__(self, "columns", MappingProxyType(dict(self.columns)))
         object.__setattr__(self, "resolution", MappingProxyType(dict(self.resolution)))
 
-    def only(self, names: tuple[str, ...]) -> "Readings":
+    def only(self, names: tuple[str, ...]) -> "TopicReadings":
         """Keep the named fields, in canonical order; all where none is named."""
         if not names:
             return self
         columns = {name: column for name, column in self.columns.items() if name in names}
-        return Readings(self.topic, self.time_ns, columns, self.resolution)
+        return TopicReadings(self.topic, self.time_ns, columns, self.resolution)
 
 
 def generator(seed: int, stream: str) -> np.random.Generator:

@@ -42,7 +42,7 @@ class Route:
 
 
 @dataclass(frozen=True)
-class Plan:
+class RoutePlan:
     """Plan that a route is flown from; arrays of shape (n,).
 
     Where ``steers`` the aircraft turns to its destination by itself, at most at ``steering_radps``.
@@ -73,7 +73,7 @@ def draw_route(kind: RouteKind, time_s: FloatArray, rng: np.random.Generator) ->
     return fly_plan(planners[kind](time_s, rng), time_s)
 
 
-def fly_plan(plan: Plan, time_s: FloatArray) -> Route:
+def fly_plan(plan: RoutePlan, time_s: FloatArray) -> Route:
     """Integrate a plan: heading along the geodesic plus turns, position on the ellipsoid."""
     n = len(time_s)
     latitude, longitude, heading, turn = (np.zeros(n) for _ in range(4))
@@ -135,7 +135,7 @@ def _climb_out(
     return speed, field_m + (cruise_m - field_m) * _ramp(time_s, 30.0 + ROLL_S, climb_s)
 
 
-def _straight(time_s: FloatArray, rng: np.random.Generator) -> Plan:
+def _straight(time_s: FloatArray, rng: np.random.Generator) -> RoutePlan:
     """Plan a ferry flight: one departure turn, then a great circle.
 
     It lies anywhere below 75 deg of latitude.
@@ -151,7 +151,7 @@ def _straight(time_s: FloatArray, rng: np.random.Generator) -> Plan:
             break
     else:  # so long a flight fits along the equator only
         latitude, runway = 0.0, 90.0 - turn_deg
-    return Plan(latitude, rng.uniform(-180.0, 180.0), runway, speed, altitude, turn, np.zeros(len(time_s)))
+    return RoutePlan(latitude, rng.uniform(-180.0, 180.0), runway, speed, altitude, turn, np.zeros(len(time_s)))
 
 
 def _highest_deg(latitude_deg: float, course_deg: float, arc_rad: float) -> float:
@@ -162,7 +162,7 @@ def _highest_deg(latitude_deg: float, course_deg: float, arc_rad: float) -> floa
     return float(np.rad2deg(np.arcsin(np.max(np.abs(sine)))))
 
 
-def _norilsk_moscow(time_s: FloatArray, rng: np.random.Generator) -> Plan:
+def _norilsk_moscow(time_s: FloatArray, rng: np.random.Generator) -> RoutePlan:
     """Plan the paper's flight: 400 s of departure, the great circle, 1400 s of approach.
 
     The cruise speed fits the time.
@@ -192,10 +192,10 @@ def _norilsk_moscow(time_s: FloatArray, rng: np.random.Generator) -> Plan:
         part, at = turn_of(time_s, at, angle, _rate_dps(20.0, float(np.interp(at, time_s, speed))))
         turn, at = turn + part, at + rng.uniform(60.0, 150.0)
     steers = ((time_s > DEPARTURE_S - 60.0) & (time_s < end - APPROACH_S)).astype(np.float64)
-    return Plan(*NORILSK_DEG, runway, speed, altitude, turn * (1.0 - steers), steers, MOSCOW_DEG)
+    return RoutePlan(*NORILSK_DEG, runway, speed, altitude, turn * (1.0 - steers), steers, MOSCOW_DEG)
 
 
-def _manoeuvring(time_s: FloatArray, rng: np.random.Generator) -> Plan:
+def _manoeuvring(time_s: FloatArray, rng: np.random.Generator) -> RoutePlan:
     """Plan survey lines or racetracks: a turn every 5 to 20 min, back and forth or onwards."""
     cruise = rng.uniform(100.0, 180.0)
     speed, altitude = _climb_out(time_s, rng.uniform(0.0, 600.0), rng.uniform(3e3, 9e3), 70.0, cruise, 8.0)
@@ -206,15 +206,15 @@ def _manoeuvring(time_s: FloatArray, rng: np.random.Generator) -> Plan:
         turn, side = turn + part, side * float(rng.choice([-1.0, -1.0, 1.0]))
         at += rng.uniform(300.0, 1200.0)
     start = (rng.uniform(-65.0, 65.0), rng.uniform(-180.0, 180.0), rng.uniform(0.0, 360.0))
-    return Plan(*start, speed, altitude, turn, np.zeros(len(time_s)))
+    return RoutePlan(*start, speed, altitude, turn, np.zeros(len(time_s)))
 
 
-def _out_and_back(time_s: FloatArray, rng: np.random.Generator) -> Plan:
+def _out_and_back(time_s: FloatArray, rng: np.random.Generator) -> RoutePlan:
     """Plan one long leg, a turn of 180 deg near mid-flight, and the same leg back."""
     return _legs(time_s, rng, [(rng.uniform(0.35, 0.6) * float(time_s[-1]), 180.0 * rng.choice([-1.0, 1.0]))])
 
 
-def _dogleg(time_s: FloatArray, rng: np.random.Generator) -> Plan:
+def _dogleg(time_s: FloatArray, rng: np.random.Generator) -> RoutePlan:
     """Plan an airway: legs of 15 to 45 min with changes of course of 20 to 80 deg.
 
     The changes go either way.
@@ -223,13 +223,13 @@ def _dogleg(time_s: FloatArray, rng: np.random.Generator) -> Plan:
     return _legs(time_s, rng, [(start, rng.choice([-1.0, 1.0]) * rng.uniform(20.0, 80.0)) for start in at])
 
 
-def _racetrack(time_s: FloatArray, rng: np.random.Generator) -> Plan:
+def _racetrack(time_s: FloatArray, rng: np.random.Generator) -> RoutePlan:
     """Plan a patrol: legs of one length, 3 to 25 min, every turn 180 deg to the same side."""
     angle, leg_s = 180.0 * rng.choice([-1.0, 1.0]), rng.uniform(180.0, 1500.0)
     return _legs(time_s, rng, [(start, angle) for start in np.arange(600.0 + leg_s, time_s[-1], leg_s + 120.0)])
 
 
-def _late_survey(time_s: FloatArray, rng: np.random.Generator) -> Plan:
+def _late_survey(time_s: FloatArray, rng: np.random.Generator) -> RoutePlan:
     """Plan a straight transit over 0.4 to 0.6 of the time, then a turn every 5 to 15 min.
 
     The past does not tell what comes.
@@ -239,7 +239,7 @@ def _late_survey(time_s: FloatArray, rng: np.random.Generator) -> Plan:
     return _legs(time_s, rng, [(start, float(rng.choice([-180.0, -90.0, 60.0, 90.0, 180.0]))) for start in at])
 
 
-def _legs(time_s: FloatArray, rng: np.random.Generator, turns: list[tuple[float, float]]) -> Plan:
+def _legs(time_s: FloatArray, rng: np.random.Generator, turns: list[tuple[float, float]]) -> RoutePlan:
     """Plan a climb out, cruise, and turns (start, angle) at 20 deg of bank."""
     cruise = rng.uniform(120.0, 230.0)
     speed, altitude = _climb_out(time_s, rng.uniform(0.0, 600.0), rng.uniform(5e3, 11e3), 70.0, cruise, 8.0)
@@ -247,7 +247,7 @@ def _legs(time_s: FloatArray, rng: np.random.Generator, turns: list[tuple[float,
     for start_s, angle_deg in turns:
         turn += turn_of(time_s, start_s, angle_deg, _rate_dps(20.0, cruise))[0]
     latitude = rng.uniform(-50.0, 50.0)  # 16 000 s at 230 m/s end below 84 deg at worst
-    return Plan(latitude, rng.uniform(-180.0, 180.0), rng.uniform(0.0, 360.0), speed, altitude, turn, 0.0 * turn)
+    return RoutePlan(latitude, rng.uniform(-180.0, 180.0), rng.uniform(0.0, 360.0), speed, altitude, turn, 0.0 * turn)
 
 
 @compiled

@@ -114,7 +114,7 @@ class InsSettings:
 
 
 @dataclass(frozen=True)
-class Interval:
+class LogInterval:
     """An interval of log seconds, end not included."""
 
     from_s: float = required_number(0.0)
@@ -146,8 +146,8 @@ class GnssSettings:
     gdop: float = number(1.5, 0.5, 50.0)
     satellites: int = number(16, 0, 100)
     constellation: str = "GPS+GLONASS"
-    outages: tuple[Interval, ...] = ()
-    low_integrity: tuple[Interval, ...] = ()
+    outages: tuple[LogInterval, ...] = ()
+    low_integrity: tuple[LogInterval, ...] = ()
     jump_mps: float = number(0.0, -100.0, 100.0)
     velocity_resolution_mps: float = number(0.001, 1e-6, 1.0)
     position_resolution_deg: float = number(1e-7, 1e-10, 0.01)
@@ -201,7 +201,7 @@ class MagnetometerSettings:
 
 
 @dataclass(frozen=True)
-class Load(Interval):
+class Load(LogInterval):
     """Consumer of current that is on for an interval."""
 
     current_a: float = required_number(-10_000.0, 10_000.0)

@@ -12,7 +12,7 @@ from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.simulation.flight_errors import flight_errors
 from groundstation.simulation.processes import gauss_markov
-from groundstation.simulation.readings import Readings, every, quantised, quantised_heading
+from groundstation.simulation.readings import TopicReadings, every, quantised, quantised_heading
 from groundstation.simulation.scenario import (
     AirSettings,
     BaroSettings,
@@ -20,7 +20,7 @@ from groundstation.simulation.scenario import (
     EventMarker,
     GnssSettings,
     InsSettings,
-    Interval,
+    LogInterval,
     TruthSettings,
     Wind,
 )
@@ -29,7 +29,7 @@ from groundstation.simulation.trajectory import Trajectory
 TRUTH_RESOLUTION = {"deg": 1e-9, "heading": 1e-6, "mps": 1e-6, "m": 1e-4, "dps": 1e-6}
 
 
-def truth_readings(trajectory: Trajectory, settings: TruthSettings) -> Readings:
+def truth_readings(trajectory: Trajectory, settings: TruthSettings) -> TopicReadings:
     """The true motion of the reference point and the nose, as topic ``truth``."""
     motion = trajectory.at(every(trajectory, settings.rate_hz))
     step = TRUTH_RESOLUTION
@@ -38,7 +38,9 @@ def truth_readings(trajectory: Trajectory, settings: TruthSettings) -> Readings:
     )
 
 
-def ins_readings(trajectory: Trajectory, settings: InsSettings, rng: np.random.Generator, seed: int = 0) -> Readings:
+def ins_readings(
+    trajectory: Trajectory, settings: InsSettings, rng: np.random.Generator, seed: int = 0
+) -> TopicReadings:
     """Return the readings of the INS at the reference point.
 
     They have the errors of its error model (``seed`` draws those of a class) and the noise of its output.
@@ -81,10 +83,10 @@ def ins_readings(trajectory: Trajectory, settings: InsSettings, rng: np.random.G
         "mode": Column(np.where(aligned, "nav", "align")),
         "valid": Column(aligned),
     }
-    return Readings("ins", readings.time_ns, columns, readings.resolution)
+    return TopicReadings("ins", readings.time_ns, columns, readings.resolution)
 
 
-def gnss_readings(trajectory: Trajectory, settings: GnssSettings, rng: np.random.Generator) -> Readings:
+def gnss_readings(trajectory: Trajectory, settings: GnssSettings, rng: np.random.Generator) -> TopicReadings:
     """Return the readings of GNSS at its antenna.
 
     They are position and velocity with white and correlated errors, quality, outages, latency.
@@ -118,12 +120,12 @@ def gnss_readings(trajectory: Trajectory, settings: GnssSettings, rng: np.random
     time_ns = antenna.time_ns[rows] + shift_ns + round(settings.latency_s * NS_PER_S)
     in_log = time_ns <= trajectory.time_ns[-1]
     columns = {name: column.take(rows[in_log]) for name, column in readings.columns.items()}
-    return Readings("gnss", time_ns[in_log], columns, readings.resolution)
+    return TopicReadings("gnss", time_ns[in_log], columns, readings.resolution)
 
 
 def _gnss_fields(
     position: dict[str, FloatArray], velocity_mps: FloatArray, good: BoolArray, settings: GnssSettings
-) -> Readings:
+) -> TopicReadings:
     n = velocity_mps.shape[1]
     speed_sigma = float(np.hypot(settings.velocity_white_mps, settings.velocity_correlated_mps))
     resolution = {
@@ -157,20 +159,20 @@ def _gnss_fields(
     columns["constellation"] = Column(np.full(n, settings.constellation))
     columns["integrity_ok"] = Column(good)
     resolution["track_deg"] = settings.track_resolution_deg
-    return Readings("gnss", np.zeros(n, dtype=np.int64), columns, resolution)
+    return TopicReadings("gnss", np.zeros(n, dtype=np.int64), columns, resolution)
 
 
-def baro_readings(trajectory: Trajectory, settings: BaroSettings, rng: np.random.Generator) -> Readings:
+def baro_readings(trajectory: Trajectory, settings: BaroSettings, rng: np.random.Generator) -> TopicReadings:
     """Pressure altitude: ellipsoid altitude + offset + noise."""
     motion = trajectory.at(every(trajectory, settings.rate_hz))
     altitude = motion.altitude_m + settings.offset_m + settings.noise_m * rng.standard_normal(len(motion))
     column = Column(quantised(altitude, settings.resolution_m))
-    return Readings(
+    return TopicReadings(
         "baro", motion.time_ns, {"pressure_altitude_m": column}, {"pressure_altitude_m": settings.resolution_m}
     )
 
 
-def air_readings(trajectory: Trajectory, settings: AirSettings, wind: Wind, rng: np.random.Generator) -> Readings:
+def air_readings(trajectory: Trajectory, settings: AirSettings, wind: Wind, rng: np.random.Generator) -> TopicReadings:
     """True airspeed along the airspeed vector, and the wind when asked for."""
     motion = trajectory.at(every(trajectory, settings.rate_hz))
     noise = rng.standard_normal((3, len(motion)))
@@ -180,16 +182,16 @@ def air_readings(trajectory: Trajectory, settings: AirSettings, wind: Wind, rng:
         for name, value, row in (("north", wind.north_mps, 1), ("east", wind.east_mps, 2)):
             values = value + settings.wind_noise_mps * noise[row]
             columns[f"wind_{name}_mps"] = Column(quantised(values, settings.resolution_mps))
-    return Readings("air", motion.time_ns, columns, dict.fromkeys(columns, settings.resolution_mps))
+    return TopicReadings("air", motion.time_ns, columns, dict.fromkeys(columns, settings.resolution_mps))
 
 
-def discrete_readings(trajectory: Trajectory, settings: DiscreteSettings) -> Readings:
+def discrete_readings(trajectory: Trajectory, settings: DiscreteSettings) -> TopicReadings:
     """Weight-on-wheels switch: true on the ground, open from lift-off to touchdown."""
     motion = trajectory.at(every(trajectory, settings.rate_hz))
-    return Readings("discrete", motion.time_ns, {"weight_on_wheels": Column(~motion.airborne)})
+    return TopicReadings("discrete", motion.time_ns, {"weight_on_wheels": Column(~motion.airborne)})
 
 
-def event_readings(trajectory: Trajectory, events: tuple[EventMarker, ...]) -> Readings:
+def event_readings(trajectory: Trajectory, events: tuple[EventMarker, ...]) -> TopicReadings:
     """Place markers at the first row of the internal grid not before their time.
 
     Markers after the end are left out.
@@ -198,10 +200,10 @@ def event_readings(trajectory: Trajectory, events: tuple[EventMarker, ...]) -> R
     times = [-(-round(event.time_s * NS_PER_S) // trajectory.step_ns) * trajectory.step_ns for event in named]
     kept = [(time, event.name) for time, event in zip(times, named, strict=True) if time <= trajectory.time_ns[-1]]
     names = np.array([name for _, name in kept], dtype=np.str_)
-    return Readings("event", np.array([time for time, _ in kept], dtype=np.int64), {"name": Column(names)})
+    return TopicReadings("event", np.array([time for time, _ in kept], dtype=np.int64), {"name": Column(names)})
 
 
-def _inside(time_ns: Int64Array, intervals: tuple[Interval, ...]) -> BoolArray:
+def _inside(time_ns: Int64Array, intervals: tuple[LogInterval, ...]) -> BoolArray:
     inside = np.zeros(len(time_ns), dtype=bool)
     for interval in intervals:
         inside |= (time_ns >= round(interval.from_s * NS_PER_S)) & (time_ns < round(interval.to_s * NS_PER_S))
@@ -218,7 +220,7 @@ def _motion_readings(
     attitude_step_deg: float,
     heading_step_deg: float,
     rate_step_dps: float = TRUTH_RESOLUTION["dps"],
-) -> Readings:
+) -> TopicReadings:
     """The fields of ``ins`` and ``truth``, rounded."""
     resolution = {
         "latitude_deg": position_step_deg,
@@ -238,4 +240,4 @@ def _motion_readings(
         name: Column(quantised(getattr(motion, source.get(name, name)), step)) for name, step in resolution.items()
     }
     columns["true_heading_deg"] = Column(quantised_heading(heading_deg, heading_step_deg))
-    return Readings(topic, motion.time_ns, columns, resolution | {"true_heading_deg": heading_step_deg})
+    return TopicReadings(topic, motion.time_ns, columns, resolution | {"true_heading_deg": heading_step_deg})

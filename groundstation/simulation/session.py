@@ -8,8 +8,8 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.ecef import ecef_from_n, geodetic_deg_m
 from groundstation.base.records import frozen
 from groundstation.simulation.session_errors import VehicleErrors, draw_errors
-from groundstation.simulation.session_links import Flown, draw_ranges, draw_satellite_ranges
-from groundstation.simulation.session_motion import Motion, fly, grid_s, place_m
+from groundstation.simulation.session_links import SimulatedAircraft, draw_ranges, draw_satellite_ranges
+from groundstation.simulation.session_motion import AircraftMotion, fly, grid_s, place_m
 from groundstation.simulation.session_scenario import SessionAircraft, SessionPoint, SessionScenario
 from groundstation.tables.session import DeadReckoning, GroundPoint, Session
 
@@ -75,7 +75,7 @@ def simulate_session(scenario: SessionScenario, seed: int, run: int = 0, *, scal
     for aircraft, rng in zip(scenario.aircraft, generators, strict=False):
         motion = fly(scenario, aircraft)
         errors = _scaled(draw_errors(scenario, motion, aircraft.height_m, rng), scale)
-        flown.append(Flown(aircraft, motion, errors))
+        flown.append(SimulatedAircraft(aircraft, motion, errors))
         epochs = _epochs(scenario, aircraft, time_s)
         vehicles.append(_dead_reckoning(scenario, aircraft, motion, errors, epochs))
         truths.append(_truth(scenario, aircraft, motion, errors, epochs))
@@ -108,7 +108,7 @@ def _epochs(scenario: SessionScenario, aircraft: SessionAircraft, time_s: FloatA
 
 
 def _dead_reckoning(
-    scenario: SessionScenario, aircraft: SessionAircraft, motion: Motion, errors: VehicleErrors, epochs: slice
+    scenario: SessionScenario, aircraft: SessionAircraft, motion: AircraftMotion, errors: VehicleErrors, epochs: slice
 ) -> DeadReckoning:
     position, axes, latitude = motion.position_m[epochs], motion.axes[epochs], motion.latitude_deg[epochs]
     error = np.concatenate([errors.position_m, -errors.height_m[:, None]], axis=1)[epochs]
@@ -125,7 +125,7 @@ def _dead_reckoning(
 
 
 def _truth(
-    scenario: SessionScenario, aircraft: SessionAircraft, motion: Motion, errors: VehicleErrors, epochs: slice
+    scenario: SessionScenario, aircraft: SessionAircraft, motion: AircraftMotion, errors: VehicleErrors, epochs: slice
 ) -> VehicleTruth:
     one = [errors.height_m[:, None], errors.clock_m[:, None], errors.clock_mps[:, None]]
     parts = [errors.position_m, errors.velocity_mps]

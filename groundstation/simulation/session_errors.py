@@ -17,7 +17,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.records import frozen
 from groundstation.simulation.ins_errors import InsErrors, SensorErrors, TrueMotion, propagate
 from groundstation.simulation.processes import gauss_markov
-from groundstation.simulation.session_motion import Motion
+from groundstation.simulation.session_motion import AircraftMotion
 from groundstation.simulation.session_scenario import SessionErrors, SessionScenario
 
 RAD_PER_ARCSEC = float(np.deg2rad(1.0 / 3600.0))
@@ -104,7 +104,7 @@ def integrated_gauss_markov(
 
 
 def draw_errors(
-    scenario: SessionScenario, motion: Motion, height_above_m: float, rng: np.random.Generator
+    scenario: SessionScenario, motion: AircraftMotion, height_above_m: float, rng: np.random.Generator
 ) -> VehicleErrors:
     """Draw the errors of one aircraft that flies at a constant height."""
     errors, n = scenario.errors, len(motion.time_s)
@@ -126,7 +126,7 @@ def draw_errors(
 
 
 def _inertial_errors(
-    errors: SessionErrors, motion: Motion, height_above_m: float, rng: np.random.Generator
+    errors: SessionErrors, motion: AircraftMotion, height_above_m: float, rng: np.random.Generator
 ) -> tuple[InsErrors, FloatArray]:
     n = len(motion.time_s)
     step_s = float(motion.time_s[1] - motion.time_s[0])

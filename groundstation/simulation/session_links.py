@@ -15,21 +15,23 @@ from groundstation.base.records import BoolArray
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.simulation.satellites import elevation_deg, emission_ecef_m, orbit_of
 from groundstation.simulation.session_errors import VehicleErrors
-from groundstation.simulation.session_motion import Motion, fly, place_m
+from groundstation.simulation.session_motion import AircraftMotion, fly, place_m
 from groundstation.simulation.session_scenario import SessionAircraft, SessionPoint, SessionScenario
 from groundstation.tables.session import Ranges, SatelliteRanges
 
 
 @dataclass(frozen=True)
-class Flown:
+class SimulatedAircraft:
     """One aircraft with its motion and errors."""
 
     aircraft: SessionAircraft
-    motion: Motion
+    motion: AircraftMotion
     errors: VehicleErrors
 
 
-def draw_ranges(scenario: SessionScenario, flown: Sequence[Flown], rng: np.random.Generator, scale: float) -> Ranges:
+def draw_ranges(
+    scenario: SessionScenario, flown: Sequence[SimulatedAircraft], rng: np.random.Generator, scale: float
+) -> Ranges:
     """Draw pseudo-ranges over the link.
 
     Each aircraft transmits in its slot, and all that hear it measure. Points transmit in the first slots of a frame,
@@ -42,10 +44,10 @@ def draw_ranges(scenario: SessionScenario, flown: Sequence[Flown], rng: np.rando
     bias = dict(zip((one.aircraft.name for one in flown), link.bias_m * rng.standard_normal(len(flown)), strict=True))
     rows: list[tuple[FloatArray, ...]] = []
     names: list[tuple[str, str]] = []
-    transmitters: list[SessionPoint | Flown] = [*scenario.points, *flown]
+    transmitters: list[SessionPoint | SimulatedAircraft] = [*scenario.points, *flown]
     for slot, transmitter in enumerate(transmitters):
         at = slot + per_frame * np.arange(frames)
-        source = transmitter.aircraft if isinstance(transmitter, Flown) else transmitter
+        source = transmitter.aircraft if isinstance(transmitter, SimulatedAircraft) else transmitter
         for receiver in flown:
             if receiver is transmitter or (receiver.aircraft.hears and source.name not in receiver.aircraft.hears):
                 continue
@@ -64,11 +66,14 @@ def draw_ranges(scenario: SessionScenario, flown: Sequence[Flown], rng: np.rando
 
 
 def _pseudorange(
-    scenario: SessionScenario, transmitter: "SessionPoint | Flown", receiver: Flown, at: "np.ndarray"
+    scenario: SessionScenario,
+    transmitter: "SessionPoint | SimulatedAircraft",
+    receiver: SimulatedAircraft,
+    at: "np.ndarray",
 ) -> FloatArray:
     """Return the true distance with both clocks in it, at places of the grid."""
     place, clock = receiver.motion.position_m[at], receiver.errors.clock_m[at]
-    if isinstance(transmitter, Flown):
+    if isinstance(transmitter, SimulatedAircraft):
         distance = np.linalg.norm(place - transmitter.motion.position_m[at], axis=1)
         return np.asarray(distance + clock - transmitter.errors.clock_m[at])
     return np.asarray(np.linalg.norm(place - place_m(scenario, transmitter), axis=1) + clock)
@@ -98,7 +103,7 @@ def _in_order(rows: list[tuple[FloatArray, ...]], names: list[tuple[str, str]], 
 
 
 def draw_satellite_ranges(
-    scenario: SessionScenario, flown: Sequence[Flown], rng: np.random.Generator, scale: float
+    scenario: SessionScenario, flown: Sequence[SimulatedAircraft], rng: np.random.Generator, scale: float
 ) -> SatelliteRanges:
     """Pseudo-ranges to the satellites above the mask, at the start of every frame."""
     parts: list[tuple[FloatArray, ...]] = []

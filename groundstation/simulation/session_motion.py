@@ -16,7 +16,7 @@ from groundstation.simulation.session_scenario import SessionAircraft, SessionPo
 
 
 @dataclass(frozen=True)
-class Motion:
+class AircraftMotion:
     """One aircraft at the times of a fine grid.
 
     Parameters
@@ -52,7 +52,7 @@ def grid_s(scenario: SessionScenario) -> FloatArray:
 
 
 @lru_cache(maxsize=64)  # motion has no randomness: the runs of a study share it
-def fly(scenario: SessionScenario, aircraft: SessionAircraft) -> Motion:
+def fly(scenario: SessionScenario, aircraft: SessionAircraft) -> AircraftMotion:
     """Fly one aircraft over the grid of times.
 
     Displacements of a step are those of an arc of a circle, exact in the plane; in the global frame they are laid on
@@ -73,10 +73,10 @@ def fly(scenario: SessionScenario, aircraft: SessionAircraft) -> Motion:
             [aircraft.north_m + moved[0], aircraft.east_m + moved[1], np.full(len(time_s), -aircraft.height_m)], axis=-1
         )
         axes = np.broadcast_to(np.eye(3), (len(time_s), 3, 3)).copy()
-        return Motion(time_s, position, velocity, track_deg, axes, np.full(len(time_s), np.nan))
+        return AircraftMotion(time_s, position, velocity, track_deg, axes, np.full(len(time_s), np.nan))
     latitude, longitude = _over_the_ellipsoid(scenario, aircraft, step)
     position = ecef_m(latitude, longitude, aircraft.height_m)
-    return Motion(time_s, position, velocity, track_deg, ecef_from_n(latitude, longitude), latitude)
+    return AircraftMotion(time_s, position, velocity, track_deg, ecef_from_n(latitude, longitude), latitude)
 
 
 def _track_deg(aircraft: SessionAircraft, time_s: FloatArray) -> FloatArray:

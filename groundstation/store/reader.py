@@ -53,7 +53,7 @@ def read_info(path: str | os.PathLike[str]) -> StoreInfo:
 
 
 @dataclass(frozen=True)
-class Part:
+class StorePart:
     """Part of a store file: the records from ``start_ns`` on and before ``end_ns``.
 
     Only topics for which ``wants`` is true belong to it.
@@ -72,7 +72,7 @@ class Part:
         return batch if last - first == len(batch) else batch.take(slice(first, last))
 
 
-def read(path: str | os.PathLike[str], part: Part | None = None) -> Iterator[Item]:
+def read(path: str | os.PathLike[str], part: StorePart | None = None) -> Iterator[Item]:
     """Yield the items of a store file: one LogHeader, then batches and damage in file order.
 
     Batches have ``time_ns`` and, where it differs, ``validity_time_ns``; their columns are those that the topic had, in
@@ -200,7 +200,7 @@ def _definition(channel: Channel, schema: Schema | None) -> _Definition:
     return _Definition(channel.topic, (*message.fields[:2], *own))
 
 
-def _narrowed(summary: Summary, part: Part, definitions: dict[int, _Definition]) -> Summary:
+def _narrowed(summary: Summary, part: StorePart, definitions: dict[int, _Definition]) -> Summary:
     """Return the summary with only the chunks that may hold records of a part."""
     unwanted = {number for number, one in definitions.items() if one.is_derived or not part.wants(one.topic)}
     chunks = [
@@ -213,7 +213,7 @@ def _narrowed(summary: Summary, part: Part, definitions: dict[int, _Definition])
     return replace(summary, chunks=chunks)
 
 
-def _cut(items: Iterator[RecordBatch | Damage], part: Part) -> Iterator[RecordBatch | Damage]:
+def _cut(items: Iterator[RecordBatch | Damage], part: StorePart) -> Iterator[RecordBatch | Damage]:
     for item in items:
         kept = part.cut(item) if isinstance(item, RecordBatch) else item
         if not isinstance(kept, RecordBatch) or len(kept):

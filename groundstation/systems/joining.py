@@ -68,7 +68,7 @@ class PlacedLog:
 
 
 @dataclass(frozen=True)
-class Told:
+class JoinRecord:
     """Record of a joining: the text that the MCAP keeps for the analysis, and findings."""
 
     text: str
@@ -95,7 +95,7 @@ class JoinStep:
     settings: type[Any]
     timed: "Callable[[Flight, Clock, str, Any], Timed]"
     relate: Callable[[Any, Any, Any], ClockRelation]
-    told: Callable[[Sequence[PlacedLog], int], Told]
+    told: Callable[[Sequence[PlacedLog], int], JoinRecord]
 
 
 def name_in_flight(topic: str, label: str) -> str:

@@ -3,12 +3,25 @@
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from groundstation.chapters.markdown import markdown
 from groundstation.chapters.parts import Grid, Head, Note, Part, Section
 from groundstation.results.figures import FigureData
+
+OutcomeT = TypeVar("OutcomeT")
+
+
+class RunStore(Protocol[OutcomeT]):
+    """Outcomes of runs of earlier calls, by a name for what was run and its seed, and by number."""
+
+    def get(self, name: str, number: int) -> OutcomeT | None:
+        """Return the outcome of a run, None where it has not ended."""
+
+    def put(self, name: str, number: int, outcome: OutcomeT) -> None:
+        """Keep the outcome of a run."""
 
 
 @dataclass(frozen=True)

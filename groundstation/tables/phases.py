@@ -63,7 +63,7 @@ class GroundProof:
 
 
 @dataclass(frozen=True)
-class Interval:
+class PhaseInterval:
     """One phase from ``start_s`` to ``end_s``, flight seconds."""
 
     start_s: float
@@ -78,7 +78,7 @@ class Phases:
     The intervals do not overlap and reach from its first to its last sample.
     """
 
-    intervals: tuple[Interval, ...]
+    intervals: tuple[PhaseInterval, ...]
     method: str
 
     @property
@@ -148,7 +148,7 @@ def flight_phases(flight: Flight, *, settings: GroundSettings | None = None) -> 
         edges = np.flatnonzero(np.diff(label)) + 1
         bounds = [0.0, *(float(edge) / RATE_HZ for edge in edges), flight.duration_s]
         return Phases(
-            tuple(Interval(start, end, PHASES[label[round(start * RATE_HZ)]]) for start, end in pairwise(bounds)),
+            tuple(PhaseInterval(start, end, PHASES[label[round(start * RATE_HZ)]]) for start, end in pairwise(bounds)),
             evidence.method,
         )
 

@@ -36,7 +36,7 @@ FILLING, BEHIND, MIDDLE, FRONT, NOW = -1.0, 0.0, 1.0, 2.0, 90.0
 
 
 @dataclass(frozen=True)
-class Axis:
+class ChartAxis:
     """Axis of a chart: title with unit, ends, scale, and the places that have own texts.
 
     One that runs backwards has the greater end first; a symlog scale is linear up to ``linear_to``.
@@ -64,13 +64,13 @@ class Axis:
 
         Examples
         --------
-        >>> [text for _, text in Axis("lead, min", 0.0, 120.0).ticks()]
+        >>> [text for _, text in ChartAxis("lead, min", 0.0, 120.0).ticks()]
         ['0', '20', '40', '60', '80', '100', '120']
-        >>> [text for _, text in Axis("RMS, m", 5.0, 300.0, "log").ticks()]
+        >>> [text for _, text in ChartAxis("RMS, m", 5.0, 300.0, "log").ticks()]
         ['5', '10', '20', '50', '100', '200']
-        >>> [text for _, text in Axis("a, m", 3.2, 4.5, "log").ticks()]
+        >>> [text for _, text in ChartAxis("a, m", 3.2, 4.5, "log").ticks()]
         ['3.2', '3.4', '3.6', '3.8', '4', '4.2', '4.4']
-        >>> [text for _, text in Axis("flight time", 50.0, 200.0, "time").ticks()]
+        >>> [text for _, text in ChartAxis("flight time", 50.0, 200.0, "time").ticks()]
         ['1:00', '1:30', '2:00', '2:30', '3:00']
         """
         if self.texts:
@@ -123,12 +123,12 @@ class Chart:
     recorder : Recorder
     path : str
         Entity the chart lives under.
-    x, y : Axis
+    x, y : ChartAxis
     height : float
         Of the box, which is 160 wide.
     """
 
-    def __init__(self, recorder: Recorder, path: str, x: Axis, y: Axis, height: float = 100.0) -> None:
+    def __init__(self, recorder: Recorder, path: str, x: ChartAxis, y: ChartAxis, height: float = 100.0) -> None:
         self.recorder, self.path, self.x, self.y, self.height = recorder, path, x, y, height
         self.right = RIGHT
         self._frame()

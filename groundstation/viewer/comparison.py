@@ -12,7 +12,7 @@ from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.chapters.comparison import answers, findings, opening, settings
 from groundstation.chapters.markdown import markdown, part_markdown
 from groundstation.chapters.parts import shortened
-from groundstation.chapters.plots.comparison import COMPARED, Side, Tell, sides_of
+from groundstation.chapters.plots.comparison import COMPARED, PlottedSide, Tell, sides_of
 from groundstation.results.comparison import Comparison
 from groundstation.results.files import SavedFlight
 from groundstation.systems.system import Systems
@@ -64,14 +64,14 @@ def send_comparison(
     return send_layout(stream, [tab for tab in tabs if tab is not None])
 
 
-def _tabs(recorder: Recorder, sides: Sequence[Side]) -> Iterator[NamedTab]:
+def _tabs(recorder: Recorder, sides: Sequence[PlottedSide]) -> Iterator[NamedTab]:
     """Tabs in their order: the name of each and what logs it."""
     yield "overview", partial(_overview, recorder, sides)
     for one in recorder.systems.compared:
         yield one.name, partial(_grid, one.rows, one.title, recorder, sides, one.figures)
 
 
-def _overview(recorder: Recorder, sides: Sequence[Side]) -> rrb.Container:
+def _overview(recorder: Recorder, sides: Sequence[PlottedSide]) -> rrb.Container:
     text = document("A and B", "comparison")
     ground = panels_of(recorder, COMPARED["tracks"](sides), of="Tracks")
     left = rrb.Vertical(contents=[*ground, text]) if ground else text
@@ -80,7 +80,7 @@ def _overview(recorder: Recorder, sides: Sequence[Side]) -> rrb.Container:
 
 
 def _grid(
-    rows: Rows, name: str, recorder: Recorder, sides: Sequence[Side], figures: Mapping[str, Tell]
+    rows: Rows, name: str, recorder: Recorder, sides: Sequence[PlottedSide], figures: Mapping[str, Tell]
 ) -> rrb.Container | None:
     """Log plots, and show each row of them side by side; None where there is none."""
     drawn = [[view for plot in row for view in panels_of(recorder, figures[plot](sides))] for row in rows]

@@ -19,7 +19,7 @@ from rerun.server import Server
 from groundstation.base.errors import GroundstationError
 from groundstation.viewer.catalog_table import save_flight_table
 from groundstation.viewer.fleet import FLEET, FLIGHTS_TEXT
-from groundstation.viewer.gate import Gate, hidden_address
+from groundstation.viewer.gate import GateServer, hidden_address
 from groundstation.viewer.inner import catalog_client
 from groundstation.viewer.recording import open_stream
 from groundstation.viewer.verification import damaged
@@ -103,7 +103,7 @@ def _behind_a_gate(host: str, port: int) -> Iterator[tuple[Server, str]]:
     Others know only the address of the gate.
     """
     try:
-        entry = Gate(host, port)
+        entry = GateServer(host, port)
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise GroundstationError(f"{host}:{port}", reason, next_step="choose another --port or --host") from error

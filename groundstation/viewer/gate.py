@@ -44,7 +44,7 @@ def hidden_address() -> str:
     return address
 
 
-class Gate(socketserver.ThreadingTCPServer):
+class GateServer(socketserver.ThreadingTCPServer):
     """Server that forwards permitted connections, byte by byte.
 
     Parameters
@@ -104,7 +104,7 @@ class Gate(socketserver.ThreadingTCPServer):
 
 class _Visitor(socketserver.BaseRequestHandler):
     request: socket.socket
-    server: Gate
+    server: GateServer
 
     def handle(self) -> None:
         with suppress(OSError):  # a visitor who leaves

@@ -10,12 +10,11 @@ import rerun.blueprint as rrb
 
 from groundstation.plots import extents, marks
 from groundstation.plots.marks import AnyMark
-from groundstation.plots.plot import Axis as DescribedAxis
-from groundstation.plots.plot import Panel
+from groundstation.plots.plot import Axis, Panel
 from groundstation.plots.scales import Span
 from groundstation.plots.viridis import viridis
 from groundstation.viewer import colours
-from groundstation.viewer.chart import FILLING, WIDTH, Axis, Chart
+from groundstation.viewer.chart import FILLING, WIDTH, Chart, ChartAxis
 from groundstation.viewer.colours import Colour
 from groundstation.viewer.names import clean_text
 from groundstation.viewer.recorder import Line, Recorder
@@ -56,10 +55,10 @@ def chart_view(
     return chart.view(name)
 
 
-def _axis(told: DescribedAxis, span: Span, names: tuple[tuple[float, str], ...]) -> Axis:
+def _axis(told: Axis, span: Span, names: tuple[tuple[float, str], ...]) -> ChartAxis:
     texts = tuple((place, clean_text(text)) for place, text in names)
     texts = texts or tuple((place, f"{place:g}") for place in told.ticks)
-    return Axis(told.title, span.low, span.high, span.scale, span.linear_to, texts)
+    return ChartAxis(told.title, span.low, span.high, span.scale, span.linear_to, texts)
 
 
 def _of_window(panel: Panel, window: int) -> Panel:

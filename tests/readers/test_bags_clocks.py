@@ -13,7 +13,7 @@ from rosbags.rosbag2 import Writer as Ros2Writer
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
 from groundstation.pipeline.one_flight.flight import read_flight
 from groundstation.pipeline.one_flight.log import open_log
-from groundstation.readers.two_clocks import Readings, stretches_of
+from groundstation.readers.two_clocks import ClockReadings, stretches_of
 from groundstation.tables.table import Flight
 from tests.readers.bag_writer import LAG_NS, START_NS, Messages
 
@@ -204,7 +204,7 @@ def test_steps_of_a_clock_are_found_among_late_readings(seed: int) -> None:
         clock_ns[at:] -= clock_ns[at]
     for slip in rng.integers(0, count, 2).tolist():
         (receipt_ns if is_receipt else clock_ns)[slip] = int(rng.integers(0, 2 * 10**18))
-    readings = Readings()
+    readings = ClockReadings()
     for rows in np.array_split(np.arange(count), int(rng.integers(1, 9))):
         readings.take(rows, receipt_ns[rows], clock_ns[rows])
     found = stretches_of(readings.all(), receipt_step_s=10.0)

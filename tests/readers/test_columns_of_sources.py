@@ -3,12 +3,12 @@
 import numpy as np
 
 from groundstation.base.records import Column, frozen
-from groundstation.readers.parts import Part, bounded, merged, occupied
+from groundstation.readers.parts import TopicPart, bounded, merged, occupied
 
 
-def part(index: list[int], validity: list[int] | None = None, **columns: Column) -> Part:
+def part(index: list[int], validity: list[int] | None = None, **columns: Column) -> TopicPart:
     places = np.array(index)
-    return Part(places, Column(places * 10), columns, None if validity is None else np.array(validity))
+    return TopicPart(places, Column(places * 10), columns, None if validity is None else np.array(validity))
 
 
 def test_rows_of_several_parts_stand_in_order_with_the_fields_of_their_own() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.readers import registry
-from groundstation.readers.norths import Samples, by_motion
+from groundstation.readers.norths import NorthSamples, by_motion
 from groundstation.readers.told import told
 from tests.readers.garmin_writer import G3X, G5, G5_TOP, G1000, G1000_TOP, KT, MPS, Flight, log
 from tests.readers.test_flat_csv import Read
@@ -239,8 +239,8 @@ def test_words_of_a_name(text: str, north: str) -> None:
 
 def test_nothing_is_decided_by_what_does_not_move() -> None:
     n = np.full(100, np.nan)
-    still = Samples(n * 0 + 77.0, n * 0 + 13.0, n * 0 + 0.1, n * 0, n, n)
-    assert by_motion(still).track == "" and by_motion(Samples(*[n] * 6)).track == ""
+    still = NorthSamples(n * 0 + 77.0, n * 0 + 13.0, n * 0 + 0.1, n * 0, n, n)
+    assert by_motion(still).track == "" and by_motion(NorthSamples(*[n] * 6)).track == ""
 
 
 @pytest.mark.real_log

@@ -414,12 +414,12 @@ def test_interleaved_topics_are_no_clock_steps(tmp_path: Path) -> None:
 
 def test_every_rule_names_fields_that_exist() -> None:
     from groundstation.base.signals import field_of
-    from groundstation.readers.ulog.canonical import Rows
+    from groundstation.readers.ulog.canonical import TopicRows
 
     for role in ROLES:
         for rule in role.rules:
             rows = np.zeros(1, dtype=[(name, "f8") for name in rule.needs])
-            columns = rule.columns(Rows(rows))
+            columns = rule.columns(TopicRows(rows))
             assert columns and all(field_of(role.topic, name) for name in (*columns, *rule.derived))
 
 

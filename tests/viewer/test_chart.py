@@ -7,7 +7,7 @@ import pytest
 import rerun as rr
 
 from groundstation.viewer import colours
-from groundstation.viewer.chart import BAND_COLUMNS, WIDTH, Axis, Chart
+from groundstation.viewer.chart import BAND_COLUMNS, WIDTH, Chart, ChartAxis
 from groundstation.viewer.recorder import Recorder
 from tests.recording_contents import Contents
 
@@ -17,7 +17,9 @@ def test_a_band_fills_between_its_edges_and_not_across_a_gap(tmp_path: Path) -> 
     low, high = np.where(x == 6.0, np.nan, 0.1 * x), np.full(11, 5.0)  # the upper edge leaves the box
     with rr.RecordingStream("chart") as stream:
         stream.save(tmp_path / "a.rrd")
-        chart = Chart(Recorder(stream, 0, has_utc=False), "chart", Axis("x", 0.0, 10.0), Axis("y", 0.0, 2.0), 100.0)
+        chart = Chart(
+            Recorder(stream, 0, has_utc=False), "chart", ChartAxis("x", 0.0, 10.0), ChartAxis("y", 0.0, 2.0), 100.0
+        )
         chart.band("band", x, low, high, colours.GREEN)
         stream.disconnect()
     (batch,) = Contents(tmp_path / "a.rrd").fixed["/chart/band"]

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from groundstation.base.angles import wrap_360
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import BoolArray, Column, Item, LogHeader, RecordBatch, Remark
-from groundstation.readers.dialect import Dialect, Line, head_lines, split_cells
-from groundstation.readers.layout import Layout, Rule, TimeRule
+from groundstation.readers.dialect import Dialect, HeadLine, head_lines, split_cells
+from groundstation.readers.layout import LayoutRule, TableLayout, TimeRule
 from groundstation.readers.losses import Losses
 from groundstation.readers.sections import Section
 from groundstation.readers.source import Claim, Source
@@ -37,7 +37,7 @@ _ENTRY = re.compile(r"""^\s+["']?(\w+)["']?\s*:\s*["']?\[([^\]]*)\]""")
 _GROUP = re.compile(r"""^["']?(\w+)["']?\s*:\s*$""")
 
 
-def _header(source: Source) -> tuple[Line, list[str]] | None:
+def _header(source: Source) -> tuple[HeadLine, list[str]] | None:
     """Return the header row, if it is that of this format."""
     lines = head_lines(source, "utf-8", 1)
     names = split_cells(lines[0].text, ",") if lines else []
@@ -66,13 +66,13 @@ def read(source: Source) -> Iterator[Item]:
         return
     poses = {f"{start}{vehicle}" for vehicle in vehicles for start in (PLACE, TURN)}
     rules = tuple(
-        Rule(at, RAW, name, "text" if name in poses else "double" if name in (RANGE, *ENDS) else "raw")
+        LayoutRule(at, RAW, name, "text" if name in poses else "double" if name in (RANGE, *ENDS) else "raw")
         for at, name in enumerate(names)
         if name and name != TIME
     )
     time = TimeRule("seconds", (names.index(TIME),), (TIME,))
     dialect = Dialect("utf-8", ",", len(names), line.next_byte, 2)
-    items = TableReader(source, [Section(dialect, Layout(time, rules))]).items(header)
+    items = TableReader(source, [Section(dialect, TableLayout(time, rules))]).items(header)
     yield next(items)
     yield Remark("no_truth_range", "gt_range and bias are kept raw: the true range is that of the poses")
     losses = Losses()

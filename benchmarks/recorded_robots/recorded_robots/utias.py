@@ -18,7 +18,7 @@ import numpy as np
 from groundstation.base.errors import UnclaimedLogError, UnreadableLogError
 from groundstation.base.records import Damage, Int64Array, Item, LogHeader, RecordBatch, Remark
 from groundstation.readers.dialect import Dialect, head_lines
-from groundstation.readers.layout import Layout, Rule, TimeRule
+from groundstation.readers.layout import LayoutRule, TableLayout, TimeRule
 from groundstation.readers.losses import Losses
 from groundstation.readers.sections import Section
 from groundstation.readers.source import Claim, Source
@@ -28,20 +28,20 @@ MARK = b"# UTIAS Multi-Robot"
 _CAMERA = "raw.camera"  # topic of the rows before they are split by the barcode seen
 _ROBOT = re.compile(r"robot(\d+)_", re.IGNORECASE)
 _DEG = float(np.rad2deg(1.0))
-_RULES: dict[str, tuple[Rule, ...]] = {
+_RULES: dict[str, tuple[LayoutRule, ...]] = {
     "Odometry": (
-        Rule(1, "odometry", "speed_mps", "double"),
-        Rule(2, "odometry", "turn_rate_dps", "double", -_DEG),
+        LayoutRule(1, "odometry", "speed_mps", "double"),
+        LayoutRule(2, "odometry", "turn_rate_dps", "double", -_DEG),
     ),
     "Robot Groundtruth": (
-        Rule(1, "truth", "position_north_m", "double"),
-        Rule(2, "truth", "position_east_m", "double", -1.0),
-        Rule(3, "truth", "true_heading_deg", "double", -_DEG, is_heading=True),
+        LayoutRule(1, "truth", "position_north_m", "double"),
+        LayoutRule(2, "truth", "position_east_m", "double", -1.0),
+        LayoutRule(3, "truth", "true_heading_deg", "double", -_DEG, is_heading=True),
     ),
     "Measurement": (
-        Rule(1, _CAMERA, "barcode", "double"),
-        Rule(2, _CAMERA, "pseudorange_m", "double"),
-        Rule(3, _CAMERA, "relative_bearing_deg", "double", -_DEG),
+        LayoutRule(1, _CAMERA, "barcode", "double"),
+        LayoutRule(2, _CAMERA, "pseudorange_m", "double"),
+        LayoutRule(3, _CAMERA, "relative_bearing_deg", "double", -_DEG),
     ),
 }
 _TABLES = {"Barcode Data": 2, "Landmark Groundtruth": 5}  # tables of a data set and their columns; they are no logs
@@ -88,7 +88,7 @@ def read(source: Source) -> Iterator[Item]:
     robot = _ROBOT.search(source.name)
     metadata = {"dataset": "UTIAS MRCLAM"} | ({"aircraft": f"R{robot.group(1)}"} if robot else {})
     header = LogHeader(f"{NAME} {kind.lower()}", metadata, 0)
-    layout = Layout(TimeRule("seconds", (0,), ("Time [s]",)), _RULES[kind])
+    layout = TableLayout(TimeRule("seconds", (0,), ("Time [s]",)), _RULES[kind])
     items = TableReader(source, [Section(dialect, layout)]).items(header)
     yield next(items)
     if robot is None:

@@ -23,7 +23,7 @@ LANE_MM = 4.0
 
 
 @dataclass(frozen=True)
-class Side:
+class PlottedSide:
     """One of two flights: its letter, A or B, and its start in seconds after that of A."""
 
     letter: str
@@ -41,12 +41,12 @@ class Side:
         return "bold" if self.letter == "A" else "usual"
 
 
-def sides_of(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> tuple[Side, Side]:
+def sides_of(comparison: Comparison, a: SavedFlight, b: SavedFlight) -> tuple[PlottedSide, PlottedSide]:
     """Both flights as plots take them."""
-    return Side("A", a), Side("B", b, comparison.alignment.offset_s)
+    return PlottedSide("A", a), PlottedSide("B", b, comparison.alignment.offset_s)
 
 
-Tell = Callable[[Sequence[Side]], Plot | None]  # describes a figure of both flights, None where neither has it
+Tell = Callable[[Sequence[PlottedSide]], Plot | None]  # describes a figure of both flights, None where neither has it
 
 
 class Compared(NamedTuple):
@@ -114,7 +114,7 @@ def _heading(data: Overview) -> TimeLine:
     return TimeLine(*broken_at_wrap(data.time_s, data.heading_deg))
 
 
-def tracks(sides: Sequence[Side]) -> Plot | None:
+def tracks(sides: Sequence[PlottedSide]) -> Plot | None:
     """Return the tracks of both flights on one map.
 
     Each from its own origin where they are far from each other.
@@ -150,7 +150,7 @@ def tracks(sides: Sequence[Side]) -> Plot | None:
     )
 
 
-def overlay(sides: Sequence[Side], told: Overlay[Any]) -> Plot | None:
+def overlay(sides: Sequence[PlottedSide], told: Overlay[Any]) -> Plot | None:
     """Return a line of both flights over the flight time of A, with its band."""
     drawn = [(side, line) for side in sides if (line := told.of(side.flight)) is not None]
     if not drawn:
@@ -184,7 +184,7 @@ def overlay(sides: Sequence[Side], told: Overlay[Any]) -> Plot | None:
     )
 
 
-def phases(sides: Sequence[Side]) -> Plot | None:
+def phases(sides: Sequence[PlottedSide]) -> Plot | None:
     """Phases of both flights in lanes under each other, over the flight time of A."""
     drawn = [(side, rows) for side in sides if (rows := side.flight.rows_of(PhaseSpans)) is not None and len(rows)]
     if not drawn:

@@ -71,7 +71,7 @@ class Schedule(NamedTuple):
     row: Int64Array  # (m,) what each measures: row of ``Lines``
 
 
-class Rules(NamedTuple):
+class GateRules(NamedTuple):
     """Rules by which a measurement is rejected and the filter is opened again.
 
     The filter is opened when it is the filter that is wrong, and not the measurements. ``gate``: largest y^2 over (h p
@@ -109,7 +109,7 @@ class Now(NamedTuple):
     in_a_row: Int64Array  # (kinds,) rejections
 
 
-class Room(NamedTuple):
+class FilterWorkspace(NamedTuple):
     """Working arrays of the filter; contents mean nothing before and after."""
 
     w: FloatArray  # (n, n)

@@ -17,13 +17,13 @@ from groundstation.methods.kalman.arrays import (
     REJECTED,
     USED,
     Drive,
+    FilterWorkspace,
     FloatArray,
+    GateRules,
     Lines,
     Marks,
     Now,
     Record,
-    Room,
-    Rules,
     Schedule,
 )
 from groundstation.methods.kalman.transition import NONE, Transition
@@ -110,7 +110,7 @@ def _place_within(epoch: Int64Array) -> Int64Array:
 
 
 @dataclass(frozen=True)
-class Gate:
+class InnovationGate:
     """Rules by which measurements are rejected and the filter is opened again.
 
     Parameters
@@ -131,11 +131,11 @@ class Gate:
     opened: ArrayLike = 0.0
     is_by_innovation: bool = False
 
-    def rules(self, kinds: int, size: int) -> Rules:
+    def rules(self, kinds: int, size: int) -> GateRules:
         """Return the rules as the compiled loops want them."""
         patience = np.array(np.broadcast_to(np.asarray(self.patience, dtype=np.int64), kinds))
         opened = np.array(np.broadcast_to(np.asarray(self.opened, dtype=np.float64), (kinds, size)), order="C")
-        return Rules(float(self.sigmas) ** 2, frozen(patience), frozen(opened), self.is_by_innovation)
+        return GateRules(float(self.sigmas) ** 2, frozen(patience), frozen(opened), self.is_by_innovation)
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ class Start:
 
 
 @dataclass(frozen=True)
-class Kept:
+class KeptArrays:
     """Choice of the arrays that a run keeps; smoothing needs all of the first three."""
 
     states: bool = True
@@ -244,12 +244,12 @@ def run_filter(
     measurements: Measurements,
     start: Start,
     *,
-    gate: Gate | None = None,
+    gate: InnovationGate | None = None,
     held: ArrayLike = NONE,
     jump: ArrayLike | None = None,
     jumps: ArrayLike | None = None,
     drive: Drive | None = None,
-    kept: Kept | None = None,
+    kept: KeptArrays | None = None,
 ) -> FilterRun:
     """Filter measurements over epochs; without any the states are forecast.
 
@@ -263,14 +263,14 @@ def run_filter(
         Used one after the other (sequential scalar updates, Joseph's form). Without right-hand sides (value of shape
         (m, 0), start x of shape (n, 0)) the run is one of the covariance alone.
     start : Start
-    gate : Gate, optional
+    gate : InnovationGate, optional
     held : ndarray of int
         States that are considered, not estimated (Schmidt): they keep value and variance, their correlation counts.
     jump, jumps : ndarrays, shapes (n,), (j, states)
         Variances added before the measurements of epoch k: row ``jump[k]``, -1 none.
     drive : Drive, optional
         Known motion of a state besides F.
-    kept : Kept, optional
+    kept : KeptArrays, optional
         Arrays to keep.
 
     Raises
@@ -282,14 +282,14 @@ def run_filter(
     --------
     >>> walk = Transition.sparse(1, [0], [0], [[1.0]], [0], [0], [[0.5]])
     >>> seen = Measurements.of([0, 1, 2], [1.0, 2.0, 30.0], [[0]], np.ones((3, 1)), 1.0)
-    >>> run = run_filter(walk, [-1, 0, 0], seen, Start(np.zeros(1), np.eye(1)), gate=Gate(5.0))
+    >>> run = run_filter(walk, [-1, 0, 0], seen, Start(np.zeros(1), np.eye(1)), gate=InnovationGate(5.0))
     >>> run.x[:, 0, 0].round(3).tolist(), run.mark.tolist(), run.rejected
     ([0.5, 1.25, 1.25], [1, 1, -1], 1)
     """
     from groundstation.methods.kalman import runs
 
     size, n = transition.size, len(np.asarray(step))
-    lines, kept = measurements.lines, kept or Kept()
+    lines, kept = measurements.lines, kept or KeptArrays()
     steps = np.ascontiguousarray(step, dtype=np.int64)
     now = start.now(_kinds(lines))
     channels = measurements.value.shape[1]
@@ -307,12 +307,12 @@ def run_filter(
         transition.dynamics,
         schedule,
         lines,
-        (gate or Gate()).rules(_kinds(lines), size),
+        (gate or InnovationGate()).rules(_kinds(lines), size),
         Drive(driven.state, frozen(driven.mix), frozen(driven.push)),
         measurements.value,
         considered,
         now,
-        Room(np.zeros((size, size)), np.zeros(size), np.zeros(size), np.zeros(channels)),
+        FilterWorkspace(np.zeros((size, size)), np.zeros(size), np.zeros(size), np.zeros(channels)),
         record,
     )
     end = Start(frozen(now.x.T), frozen(now.p), frozen(now.in_a_row))
@@ -333,7 +333,7 @@ def _check_run(transition: Transition, step: Int64Array, measurements: Measureme
         raise ValueError(f"measurements of states outside 0 to {size - 1}")
 
 
-def _room(n: int, m: int, size: int, channels: int, kept: Kept) -> Record:
+def _room(n: int, m: int, size: int, channels: int, kept: KeptArrays) -> Record:
     """Arrays of a record, those that are not kept without length."""
     return Record(
         x=np.empty((n if kept.states else 0, size, channels)),

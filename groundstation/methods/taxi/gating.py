@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
 from groundstation.base.records import BoolArray
-from groundstation.methods.taxi.samples import GATE_TEXT, USED, Samples
+from groundstation.methods.taxi.samples import GATE_TEXT, USED, TaxiSamples
 from groundstation.methods.taxi.settings import TaxiLimits
 from groundstation.results.chosen import Interval
 from groundstation.tables.phases import Phases
@@ -18,8 +18,8 @@ CHANGING_MPS2 = 0.5  # a change of speed that is a run's, and not taxi's
 
 
 def gate_samples(
-    samples: Samples, settings: TaxiLimits, intervals: Sequence[Interval] = (), phases: Phases | None = None
-) -> Samples:
+    samples: TaxiSamples, settings: TaxiLimits, intervals: Sequence[Interval] = (), phases: Phases | None = None
+) -> TaxiSamples:
     """Tell for every epoch why it is used or not, and number the straight segments.
 
     Later reasons give way to earlier ones: excluded, no heading, ground, geometry, integrity, too fast, too slow,
@@ -54,7 +54,7 @@ def gate_samples(
     return replace(samples, gate=gate, segment=segment)
 
 
-def _not_taxi(samples: Samples, phases: Phases) -> Iterator[tuple[str, BoolArray]]:
+def _not_taxi(samples: TaxiSamples, phases: Phases) -> Iterator[tuple[str, BoolArray]]:
     """Yield the epochs of take-off runs and landing rolls.
 
     The slow epochs beside them in which the speed still changes belong to them.
@@ -89,14 +89,14 @@ def intervals_without_epoch(time_s: NDArray[np.float64], intervals: Sequence[Int
     return tuple(part for part in intervals if not ((time_s >= part.start_s) & (time_s <= part.end_s)).any())
 
 
-def is_straight_and_fast(samples: Samples, settings: TaxiLimits) -> BoolArray:
+def is_straight_and_fast(samples: TaxiSamples, settings: TaxiLimits) -> BoolArray:
     """Tell which epochs are straight taxi by speed and rate of heading alone, shape (n,)."""
     speed = samples.speed_mps
     is_straight = np.abs(np.nan_to_num(samples.rate_dps, nan=np.inf)) <= settings.turn_rate_max_dps
     return is_straight & (speed > settings.taxi_speed_min_mps) & (speed <= settings.taxi_speed_max_mps)
 
 
-def _outliers(samples: Samples, settings: TaxiLimits) -> BoolArray:
+def _outliers(samples: TaxiSamples, settings: TaxiLimits) -> BoolArray:
     """Find differences far from the running median of 5 s.
 
     The distance is counted in robust sigmas of the straight and fast samples. Six robust sigmas and at least a floor:
@@ -118,7 +118,7 @@ def _outliers(samples: Samples, settings: TaxiLimits) -> BoolArray:
     return out
 
 
-def _segments(samples: Samples, used: BoolArray, settings: TaxiLimits) -> NDArray[np.int64]:
+def _segments(samples: TaxiSamples, used: BoolArray, settings: TaxiLimits) -> NDArray[np.int64]:
     """Number the straight segments: a GNSS gap, a turn or a long unused stretch ends one."""
     segment = np.zeros(len(samples), dtype=np.int64)
     index = np.flatnonzero(used)

@@ -86,7 +86,7 @@ class HeadingValues:
 
 
 @dataclass(frozen=True)
-class Samples:
+class TaxiSamples:
     """Distinct GNSS epochs of the ground part of a flight, shapes (n,).
 
     Parameters
@@ -195,7 +195,7 @@ def pair_samples(
     heading: HeadingOf | None = None,
     with_later_runs: bool = False,
     gnss_latency_s: float = 0.0,
-) -> Samples:
+) -> TaxiSamples:
     """Pair each distinct GNSS epoch before lift-off with the INS heading at its time.
 
     The heading is interpolated. GNSS times are put back by ``gnss_latency_s``, by which GNSS is later than the INS.
@@ -220,7 +220,7 @@ def pair_samples(
     ins_time, ins_heading = _ins_heading(flight, ins_topic, given.values_deg, time_s)
     geometry, geometry_name = _geometry(gnss, settings)
     raw = settings.turn_rate_kind == "raw"
-    return Samples(
+    return TaxiSamples(
         time_s=time_s,
         time_ns=gnss.time_ns,
         heading_deg=_interpolated(time_s, ins_time, ins_heading, settings.heading_gap_max_s),
@@ -321,7 +321,7 @@ def _interpolated(at: FloatArray, time_s: FloatArray, heading_deg: FloatArray, g
     return np.where(is_near, interpolate_heading(at, time_s, heading_deg), np.nan)
 
 
-def without_arm(samples: Samples, arm_m: float, error_deg: float = 0.0) -> Samples:
+def without_arm(samples: TaxiSamples, arm_m: float, error_deg: float = 0.0) -> TaxiSamples:
     """Return the velocities of the main-gear axle from those of the antenna ahead of it.
 
     The antenna is ``arm_m`` ahead. v_axle = v_antenna - omega x arm: a turn to the right moves the antenna to the right
@@ -338,7 +338,7 @@ def without_arm(samples: Samples, arm_m: float, error_deg: float = 0.0) -> Sampl
     )
 
 
-def take_samples(samples: Samples, mask: BoolArray | NDArray[np.intp]) -> Samples:
+def take_samples(samples: TaxiSamples, mask: BoolArray | NDArray[np.intp]) -> TaxiSamples:
     """The rows of every array that a mask or positions select."""
     arrays: dict[str, Any] = {
         name: value[mask] for name, value in vars(samples).items() if isinstance(value, np.ndarray)

@@ -157,7 +157,7 @@ class _Target:
         scaled = ((thetas - PRIOR_MEAN) / PRIOR_SIGMA)[:, self.free]
         return found._replace(density=found.density - 0.5 * np.sum(scaled**2, axis=1))
 
-    def likelihood(self, thetas: FloatArray, checkpoints: NDArray[np.int64], room: noise.Room) -> _Found:
+    def likelihood(self, thetas: FloatArray, checkpoints: NDArray[np.int64], room: noise.NoiseWorkspace) -> _Found:
         """Return the same with the log likelihood alone as density.
 
         ``room`` then holds the results of the loops.

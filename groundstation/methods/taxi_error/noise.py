@@ -52,7 +52,7 @@ DAMPING_MAX = 0.99
 _LOG_2PI = math.log(2.0 * math.pi)
 
 
-class Room(NamedTuple):
+class NoiseWorkspace(NamedTuple):
     """Working arrays of the loops, made once for many calls.
 
     Of the filters, a lane for each draw: q, P, x, K, H, S and its inverse, the three noise parameters as they enter,
@@ -83,13 +83,13 @@ class Room(NamedTuple):
     inverse: FloatArray  # (c - 1, c - 1)
 
 
-def room_for(width: int, checkpoints: int = 1, *, lanes: int = LANES, history: int = 0) -> Room:
+def room_for(width: int, checkpoints: int = 1, *, lanes: int = LANES, history: int = 0) -> NoiseWorkspace:
     """Return working arrays for ``width`` columns, data and regressors.
 
     With ``history``, they hold the states of so many samples too.
     """
     rest = width - 1
-    return Room(
+    return NoiseWorkspace(
         q=np.zeros((STATES, lanes)),
         P=np.zeros((STATES, STATES, lanes)),
         x=np.zeros((width, STATES, lanes)),
@@ -116,7 +116,7 @@ def room_for(width: int, checkpoints: int = 1, *, lanes: int = LANES, history: i
 
 @in_place
 def standstill_filter(
-    time_s: FloatArray, north: FloatArray, east: FloatArray, restart: int, thetas: FloatArray, room: Room
+    time_s: FloatArray, north: FloatArray, east: FloatArray, restart: int, thetas: FloatArray, room: NoiseWorkspace
 ) -> None:
     """Compute the log likelihood of standstill velocities and the last state.
 
@@ -198,7 +198,7 @@ def taxi_filter(
     start_gap_s: float,
     thetas: FloatArray,
     checkpoints: NDArray[np.int64],
-    room: Room,
+    room: NoiseWorkspace,
 ) -> None:
     """Filter the differences and the regressors.
 
@@ -221,7 +221,7 @@ def taxi_filter(
         As many draws as the room has lanes, or fewer.
     checkpoints : ndarray of int64, shape (m,)
         Numbers of samples, increasing.
-    room : Room
+    room : NoiseWorkspace
         Where it has room for the history, S and K of every sample, of the first draw, are written.
 
     Letters: P covariance and x states in the order of ``STATES``; q stationary variances; S innovation variance
@@ -342,7 +342,7 @@ def generalised_weights(
     from_east: FloatArray,
     is_start: NDArray[np.bool_],
     theta: FloatArray,
-    room: Room,
+    room: NoiseWorkspace,
     innovation: FloatArray,
     weights: FloatArray,
 ) -> None:
@@ -396,7 +396,7 @@ def solve_normal_equations(
     prior_precision: FloatArray,
     mean: FloatArray,
     inverse: FloatArray,
-    room: Room,
+    room: NoiseWorkspace,
 ) -> float:
     """Solve the normal equations with normal priors.
 
@@ -450,7 +450,7 @@ def evaluate(
     variance: FloatArray,
     prior_of_alone: tuple[FloatArray, FloatArray],
     alone: FloatArray,
-    room: Room,
+    room: NoiseWorkspace,
 ) -> None:
     """Fill log likelihood, estimate and its variance for every row of ``thetas``.
 

@@ -31,11 +31,11 @@ from groundstation.store.info import StoreInfo
 from groundstation.systems import systems
 from groundstation.systems.joining import (
     ClockRelation,
+    JoinRecord,
     JoinStep,
     NotOneFlightError,
     PlacedLog,
     Timed,
-    Told,
     name_in_flight,
 )
 from groundstation.tables.sources import TOGETHER
@@ -342,7 +342,7 @@ def _renamed(part: _Part, of_clock: StoreInfo, start_ns: int) -> StoreInfo:
 def _merged(
     parts: Sequence[_Part],
     infos: Sequence[StoreInfo],
-    told: Told,
+    told: JoinRecord,
     of_clock: StoreInfo,
     left_out: Sequence[Damage],
 ) -> StoreInfo:

@@ -301,11 +301,11 @@ def disguise_of(mcap: Path, info: "StoreInfo", seed: int | None) -> Disguise:
 
 
 def _positions_of(mcap: Path, info: "StoreInfo") -> Flight:
-    from groundstation.store.reader import Part, read
+    from groundstation.store.reader import StorePart, read
     from groundstation.tables.assemble import flight_from_batches
 
     everything = np.iinfo(np.int64)
-    part = Part(everything.min, everything.max, lambda topic: kind_of(topic) in ("ins", "gnss"))
+    part = StorePart(everything.min, everything.max, lambda topic: kind_of(topic) in ("ins", "gnss"))
     batches = (item for item in read(mcap, part) if isinstance(item, RecordBatch))
     return flight_from_batches(batches, metadata={}, has_utc=info.has_utc, source_name="")
 

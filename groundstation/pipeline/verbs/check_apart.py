@@ -25,7 +25,7 @@ DRAFT = "draft of an ICD"
 
 
 @dataclass(frozen=True)
-class Job:
+class CheckJob:
     """Logs to look at in one process: several of a session, else one."""
 
     paths: tuple[Path, ...]
@@ -77,7 +77,7 @@ class _Several:
     checks: tuple[_Told, ...]
 
 
-def _check(job: Job, listen: Listener) -> _Several:
+def _check(job: CheckJob, listen: Listener) -> _Several:
     found = check_here(job.paths, job.configuration, job.purpose, job.is_session, job.fail_on, listen)
     return _Several(tuple(map(_Told.of, found)))
 
@@ -104,10 +104,10 @@ def check_apart(
     listen(Event("begin", total=len(logs)))
     groups = [tuple(logs)] if is_session else [(log,) for log in logs]
 
-    def failed(job: Job, reason: str) -> _Several:
+    def failed(job: CheckJob, reason: str) -> _Several:
         return _Several(tuple(_Told.of(unread(path, f"{path.name}: {reason}")) for path in job.paths))
 
-    jobs = enumerate(Job(group, configuration, purpose, is_session, fail_on) for group in groups)
+    jobs = enumerate(CheckJob(group, configuration, purpose, is_session, fail_on) for group in groups)
     found = each_apart(jobs, _check, _Several, failed, workers=1, listen=listen, bounds=bounds)
     return tuple(told.checked() for _, several in sorted(found, key=lambda item: item[0]) for told in several.checks)
 
@@ -122,7 +122,7 @@ class _Described:
     is_usage: bool = False
 
 
-def _describe(job: Job, _listen: Listener) -> _Described:
+def _describe(job: CheckJob, _listen: Listener) -> _Described:
     configuration = job.configuration
     try:
         if job.purpose == DRAFT:
@@ -143,7 +143,7 @@ def describe_apart(path: Path, profile: Path | None, icds: tuple[str, ...], boun
         As :func:`groundstation.pipeline.verbs.describe.describe`; where the process went beyond its limits.
     """
     configuration = Configuration(profile=str(profile) if profile else None, icds=icds)
-    found = _described_apart(Job((path,), configuration), bounds)
+    found = _described_apart(CheckJob((path,), configuration), bounds)
     assert found.description is not None
     return found.description
 
@@ -156,12 +156,12 @@ def suggest_icd_apart(path: Path, bounds: Bounds) -> str:
     UsageError, GroundstationError
         As :func:`groundstation.pipeline.verbs.describe.suggest_icd`; where the process went beyond its limits.
     """
-    found = _described_apart(Job((path,), Configuration(), DRAFT), bounds)
+    found = _described_apart(CheckJob((path,), Configuration(), DRAFT), bounds)
     assert found.draft is not None
     return found.draft
 
 
-def _described_apart(job: Job, bounds: Bounds) -> _Described:
+def _described_apart(job: CheckJob, bounds: Bounds) -> _Described:
     ((_, found),) = each_apart(
         [(0, job)],
         _describe,

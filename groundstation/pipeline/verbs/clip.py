@@ -32,7 +32,7 @@ from groundstation.results.flight import Source
 
 if TYPE_CHECKING:
     from groundstation.store.info import StoreInfo
-    from groundstation.store.reader import Part
+    from groundstation.store.reader import StorePart
 
 FARTHEST_S = 1e9  # a time further from the flight than this, 32 years, selects the same as one this far
 CUT_FROM, CUT_SHA256, ZERO = "clip.source", "clip.source_sha256", "clip.zero_s"
@@ -180,13 +180,13 @@ def _may_hold(segment: Segment, wanted: Wanted) -> bool:
 
 
 def _cut(log: Log, mcap: Path, target: Path, wanted: Wanted, limits: Thresholds) -> Converted:
-    from groundstation.store.reader import Part, read, read_info
+    from groundstation.store.reader import StorePart, read, read_info
     from groundstation.store.writer import StoreWriter
 
     info = read_info(mcap)
     zero_ns = _zero_ns(mcap, info)
     start_ns, end_ns = _span_ns(wanted, zero_ns, info.has_utc)
-    part = Part(start_ns, end_ns, wanted.wants)
+    part = StorePart(start_ns, end_ns, wanted.wants)
     disguise = disguise_of(mcap, info, wanted.seed) if wanted.anonymous else None
     census, damages = census_of(info, limits), list[Damage]()
     first_ns: int | None = None
@@ -279,7 +279,7 @@ def _nothing_in(log: Log, info: "StoreInfo", wanted: Wanted) -> UsageError:
     return UsageError(log.path.name, f"no record from {wanted.span}", expected)
 
 
-def _inside(info: "StoreInfo", zero_ns: int, first_ns: int, part: "Part") -> "StoreInfo":
+def _inside(info: "StoreInfo", zero_ns: int, first_ns: int, part: "StorePart") -> "StoreInfo":
     """Return the facts of the flight without those of places outside the part.
 
     Damaged spans, losses there, and findings on them. Losses without a known place in time stay: they may lie within.
@@ -314,7 +314,7 @@ def _mark_of_span(span: DamagedSpan) -> tuple[Any, ...]:
 
 
 def _origin(
-    source: Source, info: "StoreInfo", zero_ns: int, first_ns: int, part: "Part", wanted: Wanted
+    source: Source, info: "StoreInfo", zero_ns: int, first_ns: int, part: "StorePart", wanted: Wanted
 ) -> dict[str, str]:
     """Return the source that the part was cut from.
 

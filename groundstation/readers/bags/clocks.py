@@ -15,9 +15,9 @@ from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags.messages import Connection
-from groundstation.readers.bags.sources import Line
+from groundstation.readers.bags.sources import WriteTimes
 from groundstation.readers.clock_offsets import Jump, Offsets, offsets_by
-from groundstation.readers.two_clocks import FEWEST_READINGS, Readings, Stretch, Track, stretches_of
+from groundstation.readers.two_clocks import FEWEST_READINGS, ClockReadings, ClockStretch, ReadingSequence, stretches_of
 
 LARGEST_LAG_S = 2.0  # between header stamp and log time: a larger lag means another clock
 MOST_QUEUED_S = 60.0  # longest time that a message waits for the recorder
@@ -96,14 +96,14 @@ class Stamped:
         Log times.
     stamps : Sample
         Record, log time and stamp of messages that have one.
-    readings : Readings
+    readings : ClockReadings
         Of the stamps, against log time.
     jumps : list of Jump
     """
 
     log: Sample = field(default_factory=lambda: Sample(1))
     stamps: Sample = field(default_factory=lambda: Sample(3))
-    readings: Readings = field(default_factory=Readings)
+    readings: ClockReadings = field(default_factory=ClockReadings)
     jumps: list[Jump] = field(default_factory=list)
     _last: Int64Array = field(default_factory=lambda: np.zeros((2, 0), dtype=np.int64))
 
@@ -122,18 +122,18 @@ class Stamped:
         self._last = new[:, -1:]
 
     @cached_property
-    def track(self) -> Track:
+    def track(self) -> ReadingSequence:
         """Readings of the stamps, once all were taken."""
         return self.readings.all()
 
     @cached_property
-    def stretches(self) -> list[Stretch]:
+    def stretches(self) -> list[ClockStretch]:
         """Readings of the stamps, parted where one of the clocks was set."""
         return stretches_of(self.track)
 
-    def line(self, connection: Connection) -> Line:
+    def line(self, connection: Connection) -> WriteTimes:
         """Return the log times at which the connection was written."""
-        return Line(connection, np.sort(self.log.all()[0]), self.log.stride)
+        return WriteTimes(connection, np.sort(self.log.all()[0]), self.log.stride)
 
 
 def told(offsets: Offsets, names: Mapping[int, str]) -> str:
@@ -167,7 +167,7 @@ def offsets_of(stamped: Mapping[int, Stamped]) -> Offsets:
     return offsets.plus(-int(offsets.added_ns[-1]) if unset_ns is None else -unset_ns)
 
 
-def _added_where_right(track: Track, offsets: Offsets) -> tuple[int, int] | None:
+def _added_where_right(track: ReadingSequence, offsets: Offsets) -> tuple[int, int] | None:
     """Return first record and offset of the last stretch of log time that can be right.
 
     It is plausible and near the stamps.
@@ -182,7 +182,7 @@ def _added_where_right(track: Track, offsets: Offsets) -> tuple[int, int] | None
     return None
 
 
-def _least_unset(tracks: Iterable[Track], offsets: Offsets) -> int | None:
+def _least_unset(tracks: Iterable[ReadingSequence], offsets: Offsets) -> int | None:
     """Return the least difference between a log time that was never set and dated stamps.
 
     None where there are none.
@@ -300,12 +300,12 @@ def _is_stopped(one: Stamped) -> bool:
     return bool((np.diff(stamp_ns) >= 0).all() and np.ptp(stamp_ns) > _LARGEST_LAG_NS)
 
 
-def _is_near(track: Track) -> bool:
+def _is_near(track: ReadingSequence) -> bool:
     low = np.quantile(track.late_ns, 0.1, method="lower")
     return bool(abs(int(low)) <= _LARGEST_LAG_NS)
 
 
-def _astray(track: Track, stretches: Sequence[Stretch]) -> Int64Array:
+def _astray(track: ReadingSequence, stretches: Sequence[ClockStretch]) -> Int64Array:
     """Return the records of readings that are not of the stretches.
 
     A few readings in a row that did not merely wait are included.

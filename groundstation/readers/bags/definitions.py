@@ -82,7 +82,7 @@ class DefinitionError(Exception):
 
 
 @dataclass(frozen=True)
-class Field:
+class MessageField:
     """A field of a message.
 
     Parameters
@@ -106,11 +106,11 @@ class Definition:
     Parameters
     ----------
     root : str
-    types : mapping of name to tuple of Field
+    types : mapping of name to tuple of MessageField
     """
 
     root: str
-    types: Mapping[str, tuple[Field, ...]]
+    types: Mapping[str, tuple[MessageField, ...]]
 
 
 def plain_name(name: str) -> str:
@@ -146,7 +146,7 @@ def parse(root: str, text: str) -> Definition:
         if named is None:
             raise DefinitionError("a part without a name")
         texts.setdefault(plain_name(named.group(1)), other.lstrip()[named.end() :])
-    types: dict[str, tuple[Field, ...]] = {}
+    types: dict[str, tuple[MessageField, ...]] = {}
     wanted = [plain_name(root)]
     while wanted:
         name = wanted.pop()
@@ -170,7 +170,7 @@ def known(type_name: str) -> Definition | None:
     return None if text is None else parse(type_name, text)
 
 
-def _fields(text: str, owner: str, texts: Mapping[str, str]) -> tuple[Field, ...]:
+def _fields(text: str, owner: str, texts: Mapping[str, str]) -> tuple[MessageField, ...]:
     fields = []
     for line in text.splitlines():
         content = line.partition("#")[0].strip()
@@ -182,7 +182,7 @@ def _fields(text: str, owner: str, texts: Mapping[str, str]) -> tuple[Field, ...
         count = None
         if match["array"]:
             count = int(match["count"]) if match["count"] and not match["bound"] else -1
-        fields.append(Field(match["name"], _full_name(match["type"], owner, texts), count))
+        fields.append(MessageField(match["name"], _full_name(match["type"], owner, texts), count))
     return tuple(fields)
 
 
@@ -198,7 +198,7 @@ def _full_name(name: str, owner: str, texts: Mapping[str, str]) -> str:
     return next((known for known in texts if known.rpartition("/")[2] == name), sibling)
 
 
-def _refuse_circles(types: Mapping[str, tuple[Field, ...]]) -> None:
+def _refuse_circles(types: Mapping[str, tuple[MessageField, ...]]) -> None:
     """Refuse a type that contains itself."""
     left = {name: {field.type for field in fields} & types.keys() for name, fields in types.items()}
     while ready := [name for name, parts in left.items() if not parts & left.keys()]:

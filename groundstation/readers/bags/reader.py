@@ -27,7 +27,7 @@ from groundstation.readers.bags.shapes import MOST_COLUMNS
 from groundstation.readers.bags.sources import Key, key_of
 from groundstation.readers.bags.survey import Survey, survey
 from groundstation.readers.bags.work import Work
-from groundstation.readers.parts import Part, bounded, merged, occupied, one_row_each
+from groundstation.readers.parts import TopicPart, bounded, merged, occupied, one_row_each
 from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
 
@@ -135,8 +135,8 @@ class _Topics:
 
     def batches(self, gathered: dict[int, list[ConnectionBlock]]) -> Iterator[RecordBatch]:
         """Yield the batches of blocks that stand together in the log."""
-        canonical: dict[str, list[Part]] = {}
-        raw: dict[str, list[Part]] = {}
+        canonical: dict[str, list[TopicPart]] = {}
+        raw: dict[str, list[TopicPart]] = {}
         for block in joined(gathered):
             number = block.connection.number
             decoder = self._decoder(block.connection)
@@ -146,7 +146,7 @@ class _Topics:
                 for feed in self._found.feeds.get(number, ()):
                     columns, zeros = placed(feed.topic, feed.of(decoded.columns))
                     self._nowhere[feed.topic] += len(zeros)
-                    of_topic = occupied(Part(part.index, part.time, columns, part.validity_ns))
+                    of_topic = occupied(TopicPart(part.index, part.time, columns, part.validity_ns))
                     if of_topic is not None:
                         canonical.setdefault(feed.topic, []).append(of_topic)
         for topic, parts in raw.items():
@@ -154,7 +154,7 @@ class _Topics:
         for topic, parts in sorted(canonical.items()):
             yield from bounded(one_row_each(merged(topic, parts)) if len(parts) > 1 else merged(topic, parts))
 
-    def _part(self, block: ConnectionBlock, decoded: Decoded) -> Part:
+    def _part(self, block: ConnectionBlock, decoded: Decoded) -> TopicPart:
         """Return raw columns of decoded messages, with their three times."""
         log_ns, publish_ns = block.log_time_ns[decoded.rows], block.publish_time_ns[decoded.rows]
         is_time = (log_ns >= 0) & (log_ns < LATEST_NS)
@@ -166,7 +166,7 @@ class _Topics:
             columns[PUBLISHER] = Column(np.full(len(log_ns), publisher[:MAX_TEXT_CHARACTERS] or "_"))
         time = Column(log_ns, None if is_time.all() else is_time)
         index = block.record_index[decoded.rows]
-        return Part(index, time, columns, self._validity(block.connection.number, decoded, index, log_ns))
+        return TopicPart(index, time, columns, self._validity(block.connection.number, decoded, index, log_ns))
 
     def _decoder(self, connection: Connection) -> Decoder:
         kinds = self._kinds.setdefault(self._names[connection.number], {})

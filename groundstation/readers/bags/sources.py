@@ -20,7 +20,7 @@ Key: TypeAlias = tuple[str, str, str, bytes]
 
 
 @dataclass(frozen=True)
-class Line:
+class WriteTimes:
     """Log times at which a connection was written, in their order.
 
     Each stands for ``stride`` messages.
@@ -30,7 +30,7 @@ class Line:
     time_ns: Int64Array
     stride: int
 
-    def overlaps(self, other: "Line") -> bool:
+    def overlaps(self, other: "WriteTimes") -> bool:
         """Tell whether messages of both interlace."""
         pairs = ((self, other), (other, self))
         counts = [one._within(two) for one, two in pairs]
@@ -38,7 +38,7 @@ class Line:
         messages = [count * one.stride for count, (one, _two) in zip(counts, pairs, strict=True)]
         return min(messages) >= OVERLAP_MESSAGES and max(shares) >= OVERLAP_SHARE
 
-    def _within(self, other: "Line") -> int:
+    def _within(self, other: "WriteTimes") -> int:
         first, end = np.searchsorted(self.time_ns, (other.time_ns[0], other.time_ns[-1] + 1))
         return int(end - first)
 
@@ -58,9 +58,9 @@ def in_order(connection: Connection) -> tuple[str, list[tuple[int, str]], int]:
     )
 
 
-def sources_of(lines: Iterable[Line]) -> list[list[int]]:
+def sources_of(lines: Iterable[WriteTimes]) -> list[list[int]]:
     """Return the numbers of each source's connections, in order of first appearance."""
-    topics: dict[Key, list[Line]] = {}
+    topics: dict[Key, list[WriteTimes]] = {}
     for line in lines:
         topics.setdefault(key_of(line.connection), []).append(line)
     found = [source for several in topics.values() for source in _of_topic(several)]
@@ -68,9 +68,9 @@ def sources_of(lines: Iterable[Line]) -> list[list[int]]:
     return [[line.connection.number for line in source] for source in found]
 
 
-def _of_topic(lines: Sequence[Line]) -> list[list[Line]]:
+def _of_topic(lines: Sequence[WriteTimes]) -> list[list[WriteTimes]]:
     """Group the connections of a topic that one source wrote one after the other."""
-    sources: list[list[Line]] = []
+    sources: list[list[WriteTimes]] = []
     for line in sorted(lines, key=lambda line: (int(line.time_ns[0]), line.connection.number)):
         free = [source for source in sources if not any(line.overlaps(one) for one in source)]
         if free:

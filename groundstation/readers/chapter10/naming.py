@@ -15,7 +15,7 @@ from groundstation.base.records import BoolArray, Item, LogHeader, RecordBatch, 
 from groundstation.base.signals import kind_of, topics_of_kind
 from groundstation.readers.chapter10.bus_words import ANY_ERROR, TOPIC_429, TOPIC_1553, bounded, words_of
 from groundstation.readers.chapter10.contents import KEYS, BusNames, channel_of, keys_429, keys_1553
-from groundstation.readers.chapter10.pieces import SAMPLE_NS, Piece, completed, merged
+from groundstation.readers.chapter10.pieces import SAMPLE_NS, WordSamples, completed, merged
 from groundstation.readers.icd import (
     Element,
     Icd,
@@ -77,7 +77,7 @@ class Seen:
 
 
 @dataclass(frozen=True)
-class Found:
+class NamedWords:
     """Words and messages of the ICDs that are on the buses, each with its place."""
 
     words: tuple[Word429, ...]
@@ -85,7 +85,7 @@ class Found:
     remarks: tuple[Remark, ...]
 
 
-def found_on(seen: Seen, icds: Sequence[Icd], names: BusNames) -> Found:
+def found_on(seen: Seen, icds: Sequence[Icd], names: BusNames) -> NamedWords:
     """Find the words and messages of the ICDs that are on the buses.
 
     A word that may be on any bus is one of another unit on each.
@@ -105,7 +105,7 @@ def found_on(seen: Seen, icds: Sequence[Icd], names: BusNames) -> Found:
         text = f"ICD {icd.name}: {count} of its {len(icd)} words and messages are on the buses"
         remarks += [Remark("icd" if count else "icd_of_another", text), *(Remark("icd", note) for note in icd.notes)]
     of_words, of_messages = numbered(tuple(words), tuple(messages))
-    return Found(of_words, of_messages, tuple(remarks))
+    return NamedWords(of_words, of_messages, tuple(remarks))
 
 
 def _placed(holder: Any, channel: int, bus: int | None, names: BusNames) -> Any:
@@ -166,10 +166,10 @@ class Namer:
 
     Parameters
     ----------
-    found : Found
+    found : NamedWords
     """
 
-    def __init__(self, found: Found) -> None:
+    def __init__(self, found: NamedWords) -> None:
         self._found = found
         self._tables: dict[str, _Table] = {}
         self._tallies: dict[str, _Tally] = {}
@@ -196,7 +196,7 @@ class Namer:
             return
         is_429 = batch.topic.startswith(TOPIC_429)
         pieces = self._of_429(batch, table) if is_429 else self._of_1553(batch, table)
-        by_topic: dict[str, list[Piece]] = {}
+        by_topic: dict[str, list[WordSamples]] = {}
         for topic, piece in pieces:
             by_topic.setdefault(topic, []).append(piece)
         for topic, several in by_topic.items():
@@ -216,7 +216,7 @@ class Namer:
         rows = np.logical_or.reduce([column.mask for column in columns.values()] or [np.zeros(len(batch), dtype=bool)])
         return RecordBatch(batch.topic, batch.record_index, batch.device_time_ns, columns).take(rows)
 
-    def _of_429(self, batch: RecordBatch, table: _Table) -> Iterator[tuple[str, Piece]]:
+    def _of_429(self, batch: RecordBatch, table: _Table) -> Iterator[tuple[str, WordSamples]]:
         words = batch.columns["word"].values.astype(np.uint32, copy=False)
         keys = keys_429(batch.columns["sub_channel"].values.astype(np.uint16, copy=False), words)
         wrong = (batch.columns["flags"].values & WRONG_WORD) != 0
@@ -236,7 +236,7 @@ class Namer:
                 fine = {"fine_of": element.fine_of} if element.fine_of else {}
                 yield from self._piece(batch, holder, sound[good], [(element, values[good], None)], **fine)
 
-    def _of_1553(self, batch: RecordBatch, table: _Table) -> Iterator[tuple[str, Piece]]:
+    def _of_1553(self, batch: RecordBatch, table: _Table) -> Iterator[tuple[str, WordSamples]]:
         words, status = words_of(batch), batch.columns["block_status"].values.astype(np.uint16, copy=False)
         counts = batch.columns["word_count"].values.astype(np.int64)
         first, second = keys_1553(words, status)
@@ -252,7 +252,7 @@ class Namer:
 
     def _message(
         self, batch: RecordBatch, holder: Message1553, rows: Any, words: Any, starts: Any, counts: Any, has_error: Any
-    ) -> Iterator[tuple[str, Piece]]:
+    ) -> Iterator[tuple[str, WordSamples]]:
         tally = self._tally(holder)
         sound = rows[~has_error[rows]]
         tally.errors += len(rows) - len(sound)
@@ -291,7 +291,7 @@ class Namer:
         rows: Any,
         decoded: Iterable[tuple[Any, Any, BoolArray | None]],
         **more: str,
-    ) -> Iterator[tuple[str, Piece]]:
+    ) -> Iterator[tuple[str, WordSamples]]:
         """Decoded elements of the same rows, a piece for each topic that they feed."""
         if not len(rows):
             return
@@ -303,7 +303,7 @@ class Namer:
         for topic, fields in topics.items():
             self._sources.setdefault(topic, {})[_title(holder)] = None
             index, time_ns = batch.record_index[rows], batch.device_time_ns.values[rows]
-            yield topic, Piece(holder.name, index, time_ns, fields, **more)
+            yield topic, WordSamples(holder.name, index, time_ns, fields, **more)
 
     def _tally(self, holder: Any) -> _Tally:
         return self._tallies.setdefault(_title(holder), _Tally())

@@ -23,7 +23,7 @@ _WORD_BYTES = 8
 
 
 @dataclass
-class Overview:
+class RecordingOverview:
     """Facts that must be known before the first record is yielded."""
 
     tmats: Tmats = field(default_factory=Tmats)
@@ -32,12 +32,12 @@ class Overview:
     seen: Seen = field(default_factory=Seen)
 
 
-def overview(source: Source, *, with_buses: bool) -> Overview:
+def overview(source: Source, *, with_buses: bool) -> RecordingOverview:
     """Read a recording once.
 
     Several TMATS packets in a row are one text. Reading what is on the buses (``with_buses``) takes longer.
     """
-    found, texts, is_setup = Overview(), [], True
+    found, texts, is_setup = RecordingOverview(), [], True
     for block in Walk(source):
         for packet in block.of(TMATS) if is_setup else ():
             texts.append(block.body(packet))

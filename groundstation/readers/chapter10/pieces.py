@@ -21,7 +21,7 @@ Fields: TypeAlias = Mapping[str, tuple[FloatArray, BoolArray]]
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class WordSamples:
     """Samples of one word or message.
 
     Parameters
@@ -41,13 +41,13 @@ class Piece:
     fields: Fields
     fine_of: str = ""
 
-    def take(self, rows: Int64Array | BoolArray) -> "Piece":
+    def take(self, rows: Int64Array | BoolArray) -> "WordSamples":
         """Return the samples that ``rows`` selects."""
         fields = {name: (values[rows], known[rows]) for name, (values, known) in self.fields.items()}
         return replace(self, index=self.index[rows], time_ns=self.time_ns[rows], fields=fields)
 
 
-def completed(kind: str, pieces: list[Piece], *, has_velocity: bool) -> tuple[list[Piece], bool]:
+def completed(kind: str, pieces: list[WordSamples], *, has_velocity: bool) -> tuple[list[WordSamples], bool]:
     """Add fine parts to pieces and join pairs.
 
     Returns the pieces, and whether velocities were derived from track and speed.
@@ -56,7 +56,7 @@ def completed(kind: str, pieces: list[Piece], *, has_velocity: bool) -> tuple[li
     ----------
     kind : str
         Of the topic: ``ins``, ``gnss``.
-    pieces : list of Piece
+    pieces : list of WordSamples
     has_velocity : bool
         The unit tells its velocities: none are derived.
     """
@@ -79,7 +79,7 @@ def completed(kind: str, pieces: list[Piece], *, has_velocity: bool) -> tuple[li
     return made, is_derived
 
 
-def _with_velocity(piece: Piece, track: str) -> Piece:
+def _with_velocity(piece: WordSamples, track: str) -> WordSamples:
     (track_deg, has_track), (speed, has_speed) = piece.fields[track], piece.fields[SPEED]
     north, east = velocity_from_track(track_deg, speed)
     known = has_track & has_speed
@@ -88,7 +88,7 @@ def _with_velocity(piece: Piece, track: str) -> Piece:
     )
 
 
-def _nearest(one: Piece, other: Piece) -> tuple[Int64Array, Int64Array]:
+def _nearest(one: WordSamples, other: WordSamples) -> tuple[Int64Array, Int64Array]:
     """Return the rows of two pieces that are each other's nearest in time.
 
     They are near enough; there are equally many of both.
@@ -108,7 +108,7 @@ def _closest(times: Int64Array, among: Int64Array) -> Int64Array:
     return np.where(times - among[before] < among[after] - times, before, after)
 
 
-def _with_fine(piece: Piece, fine: Piece) -> Piece:
+def _with_fine(piece: WordSamples, fine: WordSamples) -> WordSamples:
     """Add fine parts to values; a sample without one stays as it is."""
     rows, parts = _nearest(piece, fine)
     fields = dict(piece.fields)
@@ -121,7 +121,7 @@ def _with_fine(piece: Piece, fine: Piece) -> Piece:
     return replace(piece, fields=fields)
 
 
-def _paired(pieces: list[Piece], first: str, second: str) -> list[Piece]:
+def _paired(pieces: list[WordSamples], first: str, second: str) -> list[WordSamples]:
     """Join two fields that come in two words into one sample.
 
     It has the time of the earlier word. Words without a partner stay.
@@ -133,13 +133,15 @@ def _paired(pieces: list[Piece], first: str, second: str) -> list[Piece]:
     one, other = ones[0], others[0]
     rows, partners = _nearest(one, other)
     a, b = one.take(rows), other.take(partners)
-    both = Piece(one.holder, np.minimum(a.index, b.index), np.minimum(a.time_ns, b.time_ns), {**a.fields, **b.fields})
+    both = WordSamples(
+        one.holder, np.minimum(a.index, b.index), np.minimum(a.time_ns, b.time_ns), {**a.fields, **b.fields}
+    )
     left = (np.setdiff1d(np.arange(len(piece.index)), used) for piece, used in ((one, rows), (other, partners)))
     rest = [piece.take(which) for piece, which in zip((one, other), left, strict=True) if len(which)]
     return [*(piece for piece in pieces if piece is not one and piece is not other), both, *rest]
 
 
-def merged(topic: str, pieces: list[Piece], span_ns: int) -> RecordBatch | None:
+def merged(topic: str, pieces: list[WordSamples], span_ns: int) -> RecordBatch | None:
     """Merge pieces into one batch in the order of the log, a record for each sample.
 
     A record has the time and place of its first word. Words are of one sample until one tells a field again, or comes

@@ -9,7 +9,7 @@ from groundstation.base.records import Damage, Item, LogHeader, RecordBatch
 from groundstation.readers.chapter10.bus_words import bounded, messages_1553, words_429
 from groundstation.readers.chapter10.kinds import ARINC_429, EVENT, MIL_STD_1553
 from groundstation.readers.chapter10.naming import named
-from groundstation.readers.chapter10.overview import Overview, overview
+from groundstation.readers.chapter10.overview import RecordingOverview, overview
 from groundstation.readers.chapter10.packets import PacketBlock, Walk
 from groundstation.readers.chapter10.payloads import batch_of
 from groundstation.readers.chapter10.timing import start_of
@@ -36,7 +36,7 @@ def items(source: Source, icds: Sequence[Icd] = ()) -> Iterator[Item]:
     return named(told, icds, found.seen) if icds else told
 
 
-def _recorded(source: Source, found: Overview) -> Iterator[Item]:
+def _recorded(source: Source, found: RecordingOverview) -> Iterator[Item]:
     start = start_of(found.readings, found.dates, found.tmats)
     facts = metadata(found.tmats)
     yield LogHeader(READER, facts, start.utc_of_zero_ns, has_counting_clock=True, utc_readings=start.readings)

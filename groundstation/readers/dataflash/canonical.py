@@ -16,11 +16,11 @@ from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Column, Damage, RecordBatch, Remark, frozen
 from groundstation.readers.dataflash import rules
 from groundstation.readers.dataflash.choices import Choices
-from groundstation.readers.dataflash.overview import Overview, Unit
-from groundstation.readers.dataflash.rules import EVENTS, FIX_2D, FIX_3D, MODES, Rule, UnknownUnits
-from groundstation.readers.dataflash.values import Rows, as_double
+from groundstation.readers.dataflash.overview import DataflashOverview, Unit
+from groundstation.readers.dataflash.rules import EVENTS, FIX_2D, FIX_3D, MODES, FieldRule, UnknownUnits
+from groundstation.readers.dataflash.values import RecordRows, as_double
 from groundstation.readers.layout import velocity_from_track
-from groundstation.readers.parts import Part, bounded, merged, occupied
+from groundstation.readers.parts import TopicPart, bounded, merged, occupied
 from groundstation.readers.places import nowhere
 
 RANGE_GOOD, FACING_DOWN = 4, 25
@@ -31,14 +31,14 @@ class Mapper:
 
     Parameters
     ----------
-    found : Overview
+    found : DataflashOverview
     choices : Choices
         Which of several sources a field is taken from.
     """
 
-    def __init__(self, found: Overview, choices: Choices) -> None:
+    def __init__(self, found: DataflashOverview, choices: Choices) -> None:
         self._found, self._choices = found, choices
-        self._parts: dict[str, list[Part]] = {}
+        self._parts: dict[str, list[TopicPart]] = {}
         self.fields: dict[str, dict[str, None]] = {}  # fields that were yielded, for the remarks
         self._refused: dict[tuple[str, str], int] = {}
         self._nowhere: Counter[str] = Counter()
@@ -46,10 +46,10 @@ class Mapper:
         self._passed_over: dict[tuple[str, str], tuple[float, str]] = {}
         self._takers = self._all_takers()
 
-    def take(self, rows: Rows) -> None:
+    def take(self, rows: RecordRows) -> None:
         """Take in the rows of one sensor; types that map to nothing are passed over."""
         for topic, columns_of in self._takers.get((rows.definition.name, rows.instance), ()):
-            part = occupied(Part(rows.record_index, rows.time_ns, columns_of(topic, rows)))
+            part = occupied(TopicPart(rows.record_index, rows.time_ns, columns_of(topic, rows)))
             if part is not None and len(part.index):
                 self._parts.setdefault(topic, []).append(part)
 
@@ -83,12 +83,12 @@ class Mapper:
         if count:
             self._refused[topic, what] = self._refused.get((topic, what), 0) + count
 
-    def _all_takers(self) -> Mapping[Unit, list[tuple[str, Callable[[str, Rows], dict[str, Column]]]]]:
+    def _all_takers(self) -> Mapping[Unit, list[tuple[str, Callable[[str, RecordRows], dict[str, Column]]]]]:
         """Return, for each sensor, its topics and the functions that make their columns."""
         choices = self._choices
-        takers: dict[Unit, list[tuple[str, Callable[[str, Rows], dict[str, Column]]]]] = {}
+        takers: dict[Unit, list[tuple[str, Callable[[str, RecordRows], dict[str, Column]]]]] = {}
 
-        def add(unit: Unit, topic: str, columns_of: Callable[[str, Rows], dict[str, Column]]) -> None:
+        def add(unit: Unit, topic: str, columns_of: Callable[[str, RecordRows], dict[str, Column]]) -> None:
             takers.setdefault(unit, []).append((topic, columns_of))
 
         by_kind = {
@@ -114,7 +114,7 @@ class Mapper:
             add((name, None), "event", self._event)
         return takers
 
-    def _values(self, topic: str, rows: Rows, wanted: tuple[Rule, ...]) -> dict[str, FloatArray]:
+    def _values(self, topic: str, rows: RecordRows, wanted: tuple[FieldRule, ...]) -> dict[str, FloatArray]:
         """Return the values of the rules whose field the type has, in canonical units.
 
         A field in an unknown unit has none.
@@ -145,44 +145,44 @@ class Mapper:
         self._nowhere[topic] += int(np.count_nonzero(claimed & ~placed))
         return frozen(claimed & placed)
 
-    def _plain(self, wanted: tuple[Rule, ...]) -> Callable[[str, Rows], dict[str, Column]]:
-        def columns_of(topic: str, rows: Rows) -> dict[str, Column]:
+    def _plain(self, wanted: tuple[FieldRule, ...]) -> Callable[[str, RecordRows], dict[str, Column]]:
+        def columns_of(topic: str, rows: RecordRows) -> dict[str, Column]:
             return {name: Column(values) for name, values in self._values(topic, rows, wanted).items()}
 
         return columns_of
 
-    def _with_mode(self, rows: Rows, columns: dict[str, Column]) -> dict[str, Column]:
+    def _with_mode(self, rows: RecordRows, columns: dict[str, Column]) -> dict[str, Column]:
         return {**columns, "mode": self._mode(rows, None)} if columns else {}
 
-    def _mode(self, rows: Rows, present: BoolArray | None) -> Column:
+    def _mode(self, rows: RecordRows, present: BoolArray | None) -> Column:
         return Column(np.broadcast_to(self._choices.mode, len(rows)), present)
 
-    def _attitude(self, topic: str, rows: Rows) -> dict[str, Column]:
+    def _attitude(self, topic: str, rows: RecordRows) -> dict[str, Column]:
         values = self._values(topic, rows, (*rules.ATTITUDE, self._choices.yaw))
         if self._choices.yaw.field in values:
             values[self._choices.yaw.field] = wrap_360(values[self._choices.yaw.field])
         return self._with_mode(rows, {name: Column(column) for name, column in values.items()})
 
-    def _position(self, topic: str, rows: Rows) -> dict[str, Column]:
+    def _position(self, topic: str, rows: RecordRows) -> dict[str, Column]:
         values = self._values(topic, rows, rules.POSITION)
         if not {"latitude_deg", "longitude_deg"} <= values.keys():
             return {}
         known = self._placed(topic, values)
         return self._with_mode(rows, {name: Column(column, known) for name, column in values.items()})
 
-    def _backup(self, topic: str, rows: Rows) -> dict[str, Column]:
+    def _backup(self, topic: str, rows: RecordRows) -> dict[str, Column]:
         return {**self._attitude(topic, rows), **self._position(topic, rows)}
 
     def _of_core(
-        self, core: int | None, wanted: tuple[Rule, ...], is_solution: bool
-    ) -> Callable[[str, Rows], dict[str, Column]]:
+        self, core: int | None, wanted: tuple[FieldRule, ...], is_solution: bool
+    ) -> Callable[[str, RecordRows], dict[str, Column]]:
         """Return the function for columns that are present while this filter core is in use.
 
         Until the log tells the core in use, it is the first one that it tells.
         """
         primary = self._choices.primary_core
 
-        def columns_of(topic: str, rows: Rows) -> dict[str, Column]:
+        def columns_of(topic: str, rows: RecordRows) -> dict[str, Column]:
             values = self._values(topic, rows, wanted)
             used = None
             if core is not None:
@@ -194,7 +194,7 @@ class Mapper:
 
         return columns_of
 
-    def _gnss(self, topic: str, rows: Rows) -> dict[str, Column]:
+    def _gnss(self, topic: str, rows: RecordRows) -> dict[str, Column]:
         position, motion = self._values(topic, rows, rules.POSITION), self._values(topic, rows, rules.GNSS_VELOCITY)
         everywhere = np.ones(len(rows), dtype=bool)
         has_status = rows.definition.has_numbers("Status")
@@ -222,7 +222,7 @@ class Mapper:
         columns |= self._plain(rules.SATELLITES)(topic, rows)
         return columns | self._speed_sigma(rows, has_3d)
 
-    def _speed_sigma(self, rows: Rows, has_fix: BoolArray) -> dict[str, Column]:
+    def _speed_sigma(self, rows: RecordRows, has_fix: BoolArray) -> dict[str, Column]:
         """Return the speed accuracy that the receiver logged separately at the same time."""
         times, sigmas = self._found.speed_sigma.get((rows.definition.name, rows.instance), (None, None))
         if times is None or sigmas is None or not len(times):
@@ -231,11 +231,11 @@ class Mapper:
         known = (times[at] == rows.time_ns.values) & rows.time_ns.mask & has_fix
         return {"velocity_sigma_mps": Column(sigmas[at], known)}
 
-    def _magnetometer(self, topic: str, rows: Rows) -> dict[str, Column]:
+    def _magnetometer(self, topic: str, rows: RecordRows) -> dict[str, Column]:
         healthy = frozen(rows.values("Health") != 0) if rows.definition.has_numbers("Health") else None
         return {name: Column(values, healthy) for name, values in self._values(topic, rows, rules.FIELD).items()}
 
-    def _baro(self, topic: str, rows: Rows) -> dict[str, Column]:
+    def _baro(self, topic: str, rows: RecordRows) -> dict[str, Column]:
         columns = {}
         for name, pressure_pa in self._values(topic, rows, (rules.PRESSURE,)).items():
             altitude, is_refused = pressure_altitude_m(pressure_pa)
@@ -243,25 +243,25 @@ class Mapper:
             columns[name] = Column(altitude, ~is_refused)
         return columns
 
-    def _height(self, topic: str, rows: Rows) -> dict[str, Column]:
+    def _height(self, topic: str, rows: RecordRows) -> dict[str, Column]:
         if not rows.definition.has_numbers("Dist", "Stat", "Orient"):
             return {}
         is_height = frozen((rows.values("Orient") == FACING_DOWN) & (rows.values("Stat") == RANGE_GOOD))
         return {name: Column(values, is_height) for name, values in self._values(topic, rows, rules.HEIGHT).items()}
 
-    def _landed(self, topic: str, rows: Rows) -> dict[str, Column]:
+    def _landed(self, topic: str, rows: RecordRows) -> dict[str, Column]:
         states = self._found.landed
         if not len(states.record_index):
             return {}
         state = states.at(rows.record_index, before=-1)
         return {"weight_on_wheels": Column(state == 1, state >= 0)}
 
-    def _event(self, topic: str, rows: Rows) -> dict[str, Column]:
+    def _event(self, topic: str, rows: RecordRows) -> dict[str, Column]:
         names = event_names(rows, self._choices.vehicle)
         return {} if names is None else {"name": Column(names)}
 
 
-def event_names(rows: Rows, vehicle: str) -> NDArray[np.str_] | None:
+def event_names(rows: RecordRows, vehicle: str) -> NDArray[np.str_] | None:
     """Return a name for each record of EV, ARM, MODE, MSG or ERR.
 
     None when the type lacks the fields.

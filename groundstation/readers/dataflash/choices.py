@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from groundstation.base.records import Remark
 from groundstation.readers.dataflash import rules
-from groundstation.readers.dataflash.overview import Overview, States, Unit
-from groundstation.readers.dataflash.rules import Rule
+from groundstation.readers.dataflash.overview import DataflashOverview, States, Unit
+from groundstation.readers.dataflash.rules import FieldRule
 
 _EKF_OF_TYPE = {2.0: "NKF", 3.0: "XKF"}  # parameter AHRS_EKF_TYPE
 _SECOND_CORE = {"1": "6", "2": "7"}  # old firmware logged the second core under these numbers
@@ -29,7 +29,7 @@ class Choices:
     ekf_velocity, ekf_wind : mapping of sensor to core
         Records of the filter, and the core that wrote them; None where the filter has but one.
     primary_core : States
-    yaw : Rule
+    yaw : FieldRule
         What the autopilot's yaw is: true heading, or magnetic where no declination is set.
     yaw_origin : str
     mode : str
@@ -44,12 +44,12 @@ class Choices:
     ekf_velocity: Mapping[Unit, int | None]
     ekf_wind: Mapping[Unit, int | None]
     primary_core: States
-    yaw: Rule
+    yaw: FieldRule
     yaw_origin: str
     mode: str
     vehicle: str
 
-    def remarks(self, found: Overview, fields: Mapping[str, Iterable[str]]) -> list[Remark]:
+    def remarks(self, found: DataflashOverview, fields: Mapping[str, Iterable[str]]) -> list[Remark]:
         """Return the remarks on the canonical topics that have records.
 
         ``fields`` has the fields of each topic.
@@ -82,7 +82,7 @@ class Choices:
         return remarks
 
 
-def choose(found: Overview, vehicle: str) -> Choices:
+def choose(found: DataflashOverview, vehicle: str) -> Choices:
     """Choose sources by the parameters, and by what has records."""
     ekf = _filter_in_use(found)
     is_second = not ekf and found.parameters.get("AHRS_EKF_USE") == 0.0 and "AHRS_EKF_TYPE" not in found.parameters
@@ -107,11 +107,11 @@ def _instance(unit: Unit) -> int:
     return unit[1] or 0
 
 
-def _units_of(found: Overview, name: str) -> list[Unit]:
+def _units_of(found: DataflashOverview, name: str) -> list[Unit]:
     return [unit for unit in found.sensors if unit[0] == name and _instance(unit) < rules.MOST_SENSORS]
 
 
-def _sensor_topics(found: Overview) -> dict[Unit, str]:
+def _sensor_topics(found: DataflashOverview) -> dict[Unit, str]:
     """Topic of each sensor: the kind alone where there is one sensor, else numbered from 1."""
     topics: dict[Unit, str] = {}
     for kind, groups in rules.SENSOR_TYPES.items():
@@ -124,7 +124,7 @@ def _sensor_topics(found: Overview) -> dict[Unit, str]:
     return topics
 
 
-def _filter_in_use(found: Overview) -> str:
+def _filter_in_use(found: DataflashOverview) -> str:
     """Return the Kalman filter that the parameters name, if it has records.
 
     Without parameters it is the newest filter that has records.
@@ -139,7 +139,7 @@ def _filter_in_use(found: Overview) -> str:
     return next((name for name in candidates if f"{name}1" in found.types), "")
 
 
-def _cores(found: Overview, ekf: str, number: str) -> dict[Unit, int | None]:
+def _cores(found: DataflashOverview, ekf: str, number: str) -> dict[Unit, int | None]:
     """Return the core of each unit of a filter's records ``number``.
 
     The core is told by the instance field, or by the type's number.
@@ -153,7 +153,7 @@ def _cores(found: Overview, ekf: str, number: str) -> dict[Unit, int | None]:
     return {**first, **second}
 
 
-def _yaw(found: Overview, ekf: str) -> tuple[Rule, str]:
+def _yaw(found: DataflashOverview, ekf: str) -> tuple[FieldRule, str]:
     """Return the meaning of the yaw of ATT, by the parameters that set its declination."""
     names = {"XKF": "EKF3", "NKF": "EKF2", "EKF": "the EKF"}
     origin = f"yaw of ATT ({names.get(ekf, 'DCM or a filter that is not logged')})"

@@ -14,7 +14,7 @@ import numpy as np
 from groundstation.base.records import Damage
 from groundstation.readers.dataflash import rules
 from groundstation.readers.dataflash.definitions import FMT_DTYPE, Definition
-from groundstation.readers.dataflash.rules import MOST_SENSORS, Rule
+from groundstation.readers.dataflash.rules import MOST_SENSORS, FieldRule
 
 _NAME = re.compile(rb"[A-Za-z][A-Za-z0-9_]{0,3}")
 _LABELS = re.compile(rb"[A-Za-z][A-Za-z0-9_]*(,[A-Za-z][A-Za-z0-9_]*)*")
@@ -22,7 +22,7 @@ _TEXTS = frozenset(("Name", "Message", "Label", "UnitIds", "MultIds"))
 _TIMES = ("TimeUS", "TimeMS")
 
 
-def _sources(*groups: Sequence[Rule]) -> tuple[str, ...]:
+def _sources(*groups: Sequence[FieldRule]) -> tuple[str, ...]:
     return tuple(rule.source for group in groups for rule in group)
 
 

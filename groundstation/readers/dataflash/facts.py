@@ -9,7 +9,7 @@ from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.source_units import PREFIX
 from groundstation.base.timescales import gps_week_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.dataflash.overview import GpsTimes, Overview
+from groundstation.readers.dataflash.overview import DataflashOverview, GpsTimes
 from groundstation.readers.rollover import Earliest, rollovers
 from groundstation.readers.start import zero_of_readings
 
@@ -41,7 +41,7 @@ _SPREAD_NS = 2 * NS_PER_S
 _DRIFT, _MOST_DRIFT = 1e-3, 0.5  # a quartz is within 1e-4; more than half is no drift
 
 
-def metadata(found: Overview) -> dict[str, str]:
+def metadata(found: DataflashOverview) -> dict[str, str]:
     """Firmware, vehicle, key parameters and units, as texts."""
     facts: dict[str, str] = {}
     for message in found.messages:

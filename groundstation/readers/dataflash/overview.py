@@ -15,7 +15,7 @@ from groundstation.base.records import BoolArray, Damage, Int64Array
 from groundstation.readers.dataflash.blocks import RecordBlock, Scanner
 from groundstation.readers.dataflash.definitions import Definition, Units
 from groundstation.readers.dataflash.rules import FIX_3D, SPEED_SIGMA, UnknownUnits
-from groundstation.readers.dataflash.values import Rows, as_double, by_instance, rows_of
+from groundstation.readers.dataflash.values import RecordRows, as_double, by_instance, rows_of
 
 MESSAGES_KEPT = 100
 MOST_INSTANCES = 32  # more values than that tell no sensors apart
@@ -59,7 +59,7 @@ class GpsTimes:
 
 
 @dataclass(frozen=True, eq=False)
-class Overview:
+class DataflashOverview:
     """Contents of a log, by the first pass over it.
 
     Parameters
@@ -100,7 +100,7 @@ class Overview:
     damages: tuple[Damage, ...]
 
 
-def overview(scanner: Scanner) -> Overview:
+def overview(scanner: Scanner) -> DataflashOverview:
     """Read a log once and return its contents.
 
     The memory it takes does not grow with the file, but for GPS records.
@@ -112,7 +112,7 @@ def overview(scanner: Scanner) -> Overview:
 
 
 class _Survey:
-    """Collector of an :class:`Overview`, block by block."""
+    """Collector of an :class:`DataflashOverview`, block by block."""
 
     def __init__(self) -> None:
         self._units = Units()
@@ -128,7 +128,7 @@ class _Survey:
         self._cores: dict[str, list[tuple[Any, Any]]] = {}
         self._landed: list[tuple[Any, Any]] = []
         self._unread: dict[str, tuple[int, str]] = {}
-        self._takers: dict[str, Callable[[Rows], None]] = {
+        self._takers: dict[str, Callable[[RecordRows], None]] = {
             "UNIT": self._unit,
             "MULT": self._multiplier,
             "FMTU": self._field_units,
@@ -163,13 +163,13 @@ class _Survey:
             if name in self._takers:
                 self._takers[name](rows)
 
-    def result(self, scanner: Scanner) -> Overview:
+    def result(self, scanner: Scanner) -> DataflashOverview:
         """Return the contents found."""
         split = frozenset(key for key, seen in self._instances.items() if 0 < len(seen) <= MOST_INSTANCES)
         sensors: list[Unit] = []
         for key, seen in self._instances.items():
             sensors += [(key[1], value) for value in sorted(seen)] if key in split else [(key[1], None)]
-        return Overview(
+        return DataflashOverview(
             units=self._units,
             types=self._types,
             sensors=tuple(sensors),
@@ -197,43 +197,43 @@ class _Survey:
             found.append(Damage("corrupt", f"behind byte {scanner.refused[-1][0]}", scanner.refused_more, what))
         return found
 
-    def _unit(self, rows: Rows) -> None:
+    def _unit(self, rows: RecordRows) -> None:
         if rows.definition.has_integers("Id") and rows.definition.has_texts("Label"):
             for code, text in zip(rows.values("Id").tolist(), rows.values("Label").tolist(), strict=True):
                 self._units.texts[_character(code)] = str(text).strip()
 
-    def _multiplier(self, rows: Rows) -> None:
+    def _multiplier(self, rows: RecordRows) -> None:
         if rows.definition.has_integers("Id") and rows.definition.has_numbers("Mult"):
             for code, value in zip(rows.values("Id").tolist(), rows.values("Mult").tolist(), strict=True):
                 self._units.multipliers[_character(code)] = float(f"{value:.7g}")  # single precision, logged as double
 
-    def _field_units(self, rows: Rows) -> None:
+    def _field_units(self, rows: RecordRows) -> None:
         if rows.definition.has_integers("FmtType") and rows.definition.has_texts("UnitIds", "MultIds"):
             columns = (rows.values(name).tolist() for name in ("FmtType", "UnitIds", "MultIds"))
             for type_id, unit_ids, multiplier_ids in zip(*columns, strict=True):
                 if type_id in self._definitions:
                     self._units.of_definition[self._definitions[type_id]] = (unit_ids, multiplier_ids)
 
-    def _parameter(self, rows: Rows) -> None:
+    def _parameter(self, rows: RecordRows) -> None:
         if rows.definition.has_texts("Name") and rows.definition.has_numbers("Value"):
             names, values = rows.values("Name").tolist(), rows.values("Value").tolist()
             self._parameters.update(dict(zip(names, values, strict=True)))
 
-    def _message(self, rows: Rows) -> None:
+    def _message(self, rows: RecordRows) -> None:
         if rows.definition.has_texts("Message"):
             self._messages += rows.values("Message")[: MESSAGES_KEPT - len(self._messages)].tolist()
 
-    def _version(self, rows: Rows) -> None:
+    def _version(self, rows: RecordRows) -> None:
         if rows.definition.has_texts("FWS"):
             self._messages.insert(0, str(rows.values("FWS")[0]))
 
-    def _event(self, rows: Rows) -> None:
+    def _event(self, rows: RecordRows) -> None:
         if rows.definition.has_integers("Id"):
             values = rows.values("Id")
             of_land = (values == EV_LANDED) | (values == EV_NOT_LANDED)
             self._landed.append((rows.record_index[of_land], values[of_land] == EV_LANDED))
 
-    def _fixes(self, rows: Rows) -> None:
+    def _fixes(self, rows: RecordRows) -> None:
         definition = rows.definition
         names = next((pair for pair in (("GWk", "GMS"), ("Week", "TimeMS")) if definition.has_integers(*pair)), None)
         fixed = _fixed(rows)
@@ -243,7 +243,7 @@ class _Survey:
             week, week_ms = (rows.values(name).astype(np.int64)[timed] for name in names)
             self._gps.append((week, week_ms, rows.time_ns.values[timed], rows.record_index[timed]))
 
-    def _accuracy(self, rows: Rows) -> None:
+    def _accuracy(self, rows: RecordRows) -> None:
         if not rows.definition.has_numbers("SAcc"):
             return
         instance_field = self._units.instance_field(rows.definition)
@@ -256,7 +256,7 @@ class _Survey:
             sigma = as_double(part.values("SAcc")) * factor
             self._sigma.setdefault(receiver, []).append((part.time_ns.values, sigma))
 
-    def _core(self, rows: Rows) -> None:
+    def _core(self, rows: RecordRows) -> None:
         if rows.definition.has_integers("PI"):
             values = rows.values("PI").astype(np.int64)
             changed = np.flatnonzero(np.diff(values, prepend=-1))
@@ -276,7 +276,7 @@ def _states(parts: list[tuple[Any, Any]]) -> States:
     return States(_joined([index for index, _values in parts]), _joined([values for _index, values in parts]))
 
 
-def _fixed(rows: Rows) -> BoolArray:
+def _fixed(rows: RecordRows) -> BoolArray:
     """Return which records of a receiver have a 3D fix.
 
     A record of a type without a status has one where it has a position.

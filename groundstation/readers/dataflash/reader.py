@@ -11,8 +11,8 @@ from groundstation.readers.dataflash.choices import choose
 from groundstation.readers.dataflash.definitions import Definition
 from groundstation.readers.dataflash.doubts import doubts, odd_instances
 from groundstation.readers.dataflash.facts import metadata, utc_of_power_up, utc_readings
-from groundstation.readers.dataflash.overview import Overview, overview
-from groundstation.readers.dataflash.values import Rows, by_instance, rows_of
+from groundstation.readers.dataflash.overview import DataflashOverview, overview
+from groundstation.readers.dataflash.values import RecordRows, by_instance, rows_of
 from groundstation.readers.source import Source
 
 READER = "dataflash"
@@ -54,7 +54,7 @@ def items(source: Source) -> Iterator[Item]:
             yield Damage("unreadable_cells", topic, count, "times that no clock writes", topic)
 
 
-def _rows(block: RecordBlock, found: Overview) -> Iterator[Rows]:
+def _rows(block: RecordBlock, found: DataflashOverview) -> Iterator[RecordRows]:
     """Rows of each type, and of each instance where the type tells them apart."""
     for definition, which in block.groups():
         if not definition.fields:
@@ -67,7 +67,7 @@ def _rows(block: RecordBlock, found: Overview) -> Iterator[Rows]:
             yield from by_instance(rows, name)
 
 
-def _batches(topic: str, rows: Rows) -> Iterator[RecordBatch]:
+def _batches(topic: str, rows: RecordRows) -> Iterator[RecordBatch]:
     columns = rows.columns()
     batch = RecordBatch(topic, rows.record_index, rows.time_ns, columns)
     for start in range(0, len(batch), MAX_BATCH_ROWS):
@@ -83,7 +83,7 @@ class _Topics:
     def __init__(self) -> None:
         self._layouts: dict[str, tuple[int, object]] = {}
 
-    def of(self, rows: Rows) -> str:
+    def of(self, rows: RecordRows) -> str:
         """Return ``raw.<type>`` or ``raw.<type>.<instance>``."""
         name = self._name(rows.definition)
         return f"raw.{name}" if rows.instance is None else f"raw.{name}.{rows.instance}"

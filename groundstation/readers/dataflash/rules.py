@@ -38,7 +38,7 @@ _OF_OTHER_FIELDS = frozenset(
 
 
 @dataclass(frozen=True)
-class Rule:
+class FieldRule:
     """One field of a record type and the canonical field it becomes.
 
     Parameters
@@ -103,7 +103,7 @@ class UnknownUnits:
     def __init__(self) -> None:
         self._counts: dict[tuple[str, str, str], int] = {}
 
-    def add(self, rule: Rule, definition: Definition, units: Units, count: int, topic: str) -> None:
+    def add(self, rule: FieldRule, definition: Definition, units: Units, count: int, topic: str) -> None:
         """Take in the values of a field in some records."""
         key = (f"{definition.name}.{rule.source}", units.of(definition, rule.source).text, topic)
         self._counts[key] = self._counts.get(key, 0) + count
@@ -116,37 +116,38 @@ class UnknownUnits:
 
 
 ATTITUDE = (
-    Rule("Roll", "roll_deg", "deg", integer_multiplier=0.01),
-    Rule("Pitch", "pitch_deg", "deg", integer_multiplier=0.01),
+    FieldRule("Roll", "roll_deg", "deg", integer_multiplier=0.01),
+    FieldRule("Pitch", "pitch_deg", "deg", integer_multiplier=0.01),
 )
-TRUE_YAW = Rule("Yaw", "true_heading_deg", "deg", integer_multiplier=0.01)
-MAGNETIC_YAW = Rule("Yaw", "magnetic_heading_deg", "deg", integer_multiplier=0.01)
+TRUE_YAW = FieldRule("Yaw", "true_heading_deg", "deg", integer_multiplier=0.01)
+MAGNETIC_YAW = FieldRule("Yaw", "magnetic_heading_deg", "deg", integer_multiplier=0.01)
 POSITION = (
-    Rule("Lat", "latitude_deg", "deg", integer_multiplier=1e-7),
-    Rule("Lng", "longitude_deg", "deg", integer_multiplier=1e-7),
-    Rule("Alt", "altitude_msl_m", "m", integer_multiplier=0.01),
+    FieldRule("Lat", "latitude_deg", "deg", integer_multiplier=1e-7),
+    FieldRule("Lng", "longitude_deg", "deg", integer_multiplier=1e-7),
+    FieldRule("Alt", "altitude_msl_m", "m", integer_multiplier=0.01),
 )
 VELOCITY = tuple(
-    Rule(source, f"velocity_{axis}_mps", "m/s") for source, axis in (("VN", "north"), ("VE", "east"), ("VD", "down"))
+    FieldRule(source, f"velocity_{axis}_mps", "m/s")
+    for source, axis in (("VN", "north"), ("VE", "east"), ("VD", "down"))
 )
-RATES = tuple(Rule(f"Gyr{axis.upper()}", f"rate_{axis}_dps", "rad/s") for axis in "xyz")
-ACCELERATIONS = tuple(Rule(f"Acc{axis.upper()}", f"accel_{axis}_mps2", "m/s/s") for axis in "xyz")
+RATES = tuple(FieldRule(f"Gyr{axis.upper()}", f"rate_{axis}_dps", "rad/s") for axis in "xyz")
+ACCELERATIONS = tuple(FieldRule(f"Acc{axis.upper()}", f"accel_{axis}_mps2", "m/s/s") for axis in "xyz")
 GNSS_VELOCITY = (
-    Rule("Spd", "ground_speed_mps", "m/s", integer_multiplier=0.01),
-    Rule("GCrs", "track_deg", "deg", integer_multiplier=0.01),
-    Rule("VZ", "velocity_down_mps", "m/s", integer_multiplier=0.01),
+    FieldRule("Spd", "ground_speed_mps", "m/s", integer_multiplier=0.01),
+    FieldRule("GCrs", "track_deg", "deg", integer_multiplier=0.01),
+    FieldRule("VZ", "velocity_down_mps", "m/s", integer_multiplier=0.01),
 )
-SPEED_SIGMA = Rule("SAcc", "velocity_sigma_mps", "m/s", integer_multiplier=0.01)
-GNSS_QUALITY = (Rule("HDop", "hdop", integer_multiplier=0.01),)
-SATELLITES = (Rule("NSats", "satellites_used"),)
+SPEED_SIGMA = FieldRule("SAcc", "velocity_sigma_mps", "m/s", integer_multiplier=0.01)
+GNSS_QUALITY = (FieldRule("HDop", "hdop", integer_multiplier=0.01),)
+SATELLITES = (FieldRule("NSats", "satellites_used"),)
 FIELD = tuple(
-    Rule(f"Mag{axis}", f"field_{name}_nt", "Gauss", multiplier=1e-3)
+    FieldRule(f"Mag{axis}", f"field_{name}_nt", "Gauss", multiplier=1e-3)
     for axis, name in (("X", "forward"), ("Y", "right"), ("Z", "down"))
 )
-PRESSURE = Rule("Press", "pressure_altitude_m", "Pa")
-CURRENT = (Rule("Curr", "current_a", "A", integer_multiplier=0.01),)
-WIND = (Rule("VWN", "wind_north_mps", "m/s"), Rule("VWE", "wind_east_mps", "m/s"))
-HEIGHT = (Rule("Dist", "height_m", "m", integer_multiplier=0.01),)
+PRESSURE = FieldRule("Press", "pressure_altitude_m", "Pa")
+CURRENT = (FieldRule("Curr", "current_a", "A", integer_multiplier=0.01),)
+WIND = (FieldRule("VWN", "wind_north_mps", "m/s"), FieldRule("VWE", "wind_east_mps", "m/s"))
+HEIGHT = (FieldRule("Dist", "height_m", "m", integer_multiplier=0.01),)
 
 FIX_2D, FIX_3D = 2, 3  # states of a receiver
 MOST_SENSORS = 16  # sensors of one type; a higher instance is damage

@@ -18,7 +18,7 @@ LATEST_NS = 1 << 61  # 73 years after power-up: a time past it was not written b
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class RecordRows:
     """Records of one type, or of one instance of it, from one block.
 
     Parameters
@@ -59,24 +59,24 @@ class Rows:
                 found[spec.name] = Column(column(self.records, spec))
         return found
 
-    def take(self, which: Any) -> "Rows":
+    def take(self, which: Any) -> "RecordRows":
         """The rows that ``which`` (mask or positions) selects."""
-        return Rows(
+        return RecordRows(
             self.definition, self.instance, self.record_index[which], self.time_ns.take(which), self.records[which]
         )
 
 
-def rows_of(definition: Definition, records: NDArray[Any], record_index: Int64Array) -> Rows:
+def rows_of(definition: Definition, records: NDArray[Any], record_index: Int64Array) -> RecordRows:
     """Rows of a type, all instances together."""
-    return Rows(definition, None, record_index, device_time(definition, records), records)
+    return RecordRows(definition, None, record_index, device_time(definition, records), records)
 
 
-def by_instance(rows: Rows, name: str) -> Iterator[Rows]:
+def by_instance(rows: RecordRows, name: str) -> Iterator[RecordRows]:
     """Rows of each value of an instance field, by increasing value."""
     values = rows.values(name).astype(np.int64)
     for value in np.unique(values).tolist():
         part = rows.take(values == value)
-        yield Rows(part.definition, value, part.record_index, part.time_ns, part.records)
+        yield RecordRows(part.definition, value, part.record_index, part.time_ns, part.records)
 
 
 def device_time(definition: Definition, records: NDArray[Any]) -> Column:

@@ -21,7 +21,7 @@ Way = Literal["plain", "circle", "step"]
 
 
 @dataclass(frozen=True)
-class Rule:
+class ParameterRule:
     """Parameter and the field it feeds: ``sign`` times the value.
 
     ``unit`` counts where the file names none. ``way`` is the way to bring it to another time; ``step`` keeps the last
@@ -36,38 +36,38 @@ class Rule:
 
 
 # Topic -> its rules; of several for one field the first that the file has is taken.
-RULES: Mapping[str, tuple[Rule, ...]] = {
+RULES: Mapping[str, tuple[ParameterRule, ...]] = {
     "ins": (
-        Rule("Latitude", "latitude_deg", "deg"),
-        Rule("Heading True", "true_heading_deg", "deg", way="circle"),
-        Rule("Heading True Continuous", "true_heading_deg", "deg", way="circle"),
-        Rule("Heading", "magnetic_heading_deg", "deg", way="circle"),
-        Rule("Heading Continuous", "magnetic_heading_deg", "deg", way="circle"),
-        Rule("Longitude", "longitude_deg", "deg", way="circle"),
-        Rule("Pitch", "pitch_deg", "deg"),
-        Rule("Roll", "roll_deg", "deg"),
-        Rule("Groundspeed", "ground_speed_mps", "kt"),
+        ParameterRule("Latitude", "latitude_deg", "deg"),
+        ParameterRule("Heading True", "true_heading_deg", "deg", way="circle"),
+        ParameterRule("Heading True Continuous", "true_heading_deg", "deg", way="circle"),
+        ParameterRule("Heading", "magnetic_heading_deg", "deg", way="circle"),
+        ParameterRule("Heading Continuous", "magnetic_heading_deg", "deg", way="circle"),
+        ParameterRule("Longitude", "longitude_deg", "deg", way="circle"),
+        ParameterRule("Pitch", "pitch_deg", "deg"),
+        ParameterRule("Roll", "roll_deg", "deg"),
+        ParameterRule("Groundspeed", "ground_speed_mps", "kt"),
     ),
-    "ins.accelerometer": (Rule("Acceleration Normal", "accel_z_mps2", "g", sign=-1.0),),
+    "ins.accelerometer": (ParameterRule("Acceleration Normal", "accel_z_mps2", "g", sign=-1.0),),
     "guidance": (
         # The recorder's localizer is positive with the aircraft left of the course, its glide slope above the path.
-        Rule("ILS Localizer", "lateral_deviation_dots", "dots", sign=-1.0),
-        Rule("ILS Glideslope", "vertical_deviation_dots", "dots"),
-        Rule("ILS (L) Frequency", "frequency_mhz", "MHz", way="step"),
-        Rule("ILS Frequency", "frequency_mhz", "MHz", way="step"),
+        ParameterRule("ILS Localizer", "lateral_deviation_dots", "dots", sign=-1.0),
+        ParameterRule("ILS Glideslope", "vertical_deviation_dots", "dots"),
+        ParameterRule("ILS (L) Frequency", "frequency_mhz", "MHz", way="step"),
+        ParameterRule("ILS Frequency", "frequency_mhz", "MHz", way="step"),
     ),
-    "radio_altimeter": (Rule("Altitude Radio", "height_m", "ft"),),
-    "radio_altimeter.1": (Rule("Altitude Radio (A)", "height_m", "ft"),),
-    "radio_altimeter.2": (Rule("Altitude Radio (B)", "height_m", "ft"),),
+    "radio_altimeter": (ParameterRule("Altitude Radio", "height_m", "ft"),),
+    "radio_altimeter.1": (ParameterRule("Altitude Radio (A)", "height_m", "ft"),),
+    "radio_altimeter.2": (ParameterRule("Altitude Radio (B)", "height_m", "ft"),),
     "baro": (
-        Rule("Altitude STD", "pressure_altitude_m", "ft"),
-        Rule("Altitude AAL", "height_above_airfield_m", "ft"),
+        ParameterRule("Altitude STD", "pressure_altitude_m", "ft"),
+        ParameterRule("Altitude AAL", "height_above_airfield_m", "ft"),
     ),
     "air": (
-        Rule("Airspeed", "indicated_airspeed_mps", "kt"),
-        Rule("Airspeed True", "true_airspeed_mps", "kt"),
+        ParameterRule("Airspeed", "indicated_airspeed_mps", "kt"),
+        ParameterRule("Airspeed True", "true_airspeed_mps", "kt"),
     ),
-    "discrete": (Rule("Gear On Ground", "weight_on_wheels", "", way="step"),),
+    "discrete": (ParameterRule("Gear On Ground", "weight_on_wheels", "", way="step"),),
 }
 TRACK = "Track True"  # gives the velocities of ins, with Groundspeed
 _SAID: Mapping[str, str] = {

@@ -75,7 +75,7 @@ class Parameter:
         reached = self.times_ns(int(around[0]), int(around[-1]) + 1) >= time_ns
         return min(int(around[np.argmax(reached)]) if reached.any() else int(around[-1]) + 1, self.samples)
 
-    def read(self, first: int, last: int) -> "Samples":
+    def read(self, first: int, last: int) -> "ParameterSamples":
         """Read the samples [first, last) and which of them are valid; lost ones are not.
 
         Raises one of :data:`FAILURES` where the library cannot read it.
@@ -90,11 +90,11 @@ class Parameter:
             part = slice(first + start, first + end)
             values[start:end] = self.data.dataset[part]
             is_valid[start:end] = self.mask.dataset[part] == 0
-        return Samples(values, is_valid, int(is_lost.sum()), spans[0][2] if spans else "")
+        return ParameterSamples(values, is_valid, int(is_lost.sum()), spans[0][2] if spans else "")
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class ParameterSamples:
     """Samples of a parameter; ``lost`` of them cannot be read, for a reason."""
 
     values: FloatArray

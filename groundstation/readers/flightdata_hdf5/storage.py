@@ -20,7 +20,7 @@ _LITERAL, _LONG = 32, 7  # LZF: first control byte of a copy, length that has on
 
 
 @dataclass(frozen=True)
-class Piece:
+class StoredChunk:
     """Piece of a dataset: its place and bytes in the file, and the filters left out (bits)."""
 
     place: int
@@ -40,7 +40,7 @@ class Storage:
         Samples that stand within the file, of a dataset in one block.
     per_piece : int
         Samples of a piece, 0 where the dataset is in one block.
-    pieces : mapping of int to Piece
+    pieces : mapping of int to StoredChunk
         By number; those that were never written are missing.
     filters : tuple of int
     file_bytes : int
@@ -52,7 +52,7 @@ class Storage:
     sample_bytes: int
     whole: int
     per_piece: int
-    pieces: Mapping[int, Piece]
+    pieces: Mapping[int, StoredChunk]
     filters: tuple[int, ...]
     file_bytes: int
     _reasons: dict[int, str] = field(default_factory=dict)
@@ -92,7 +92,7 @@ class Storage:
             self._reasons[number] = NEVER_WRITTEN if piece is None else self._fault(number, piece)
         return self._reasons[number]
 
-    def _fault(self, number: int, piece: Piece) -> str:
+    def _fault(self, number: int, piece: StoredChunk) -> str:
         """Return the fault of a piece; empty for a sound one."""
         if piece.place + piece.nbytes > self.file_bytes:
             return "cut off"
@@ -125,7 +125,7 @@ def storage_of(dataset: Any, part: str, file_bytes: int) -> Storage:
     filters = tuple(layout.get_filter(number)[0] for number in range(layout.get_nfilters()))
     if set(filters) - FILTERS or len(set(filters)) < len(filters) or {DEFLATE, LZF} <= set(filters):
         raise ValueError(f"{part} packed by filters that are not read ({', '.join(map(str, filters))})")
-    kind, whole, per_piece, pieces = layout.get_layout(), samples, 0, dict[int, Piece]()
+    kind, whole, per_piece, pieces = layout.get_layout(), samples, 0, dict[int, StoredChunk]()
     if kind == h5d.CONTIGUOUS:
         place = dataset.id.get_offset()
         if samples and place is None:
@@ -143,12 +143,12 @@ def storage_of(dataset: Any, part: str, file_bytes: int) -> Storage:
     return Storage(dataset, samples, sample_bytes, whole, per_piece, pieces, filters, file_bytes)
 
 
-def _pieces(dataset: Any, per_piece: int) -> dict[int, Piece]:
+def _pieces(dataset: Any, per_piece: int) -> dict[int, StoredChunk]:
     """Pieces of a dataset by number."""
-    found: dict[int, Piece] = {}
+    found: dict[int, StoredChunk] = {}
 
     def add(piece: Any) -> None:
-        found[piece.chunk_offset[0] // per_piece] = Piece(piece.byte_offset, piece.size, piece.filter_mask)
+        found[piece.chunk_offset[0] // per_piece] = StoredChunk(piece.byte_offset, piece.size, piece.filter_mask)
 
     dataset.id.chunk_iter(add)
     return found

@@ -20,7 +20,7 @@ _IN_TEXT = re.compile(rb"HW UBX[^\r\n*]{0,24}?(000[0-9A]0000|00190000)")
 
 
 @dataclass
-class Told:
+class DateFacts:
     """Times and facts of a stream that show its date.
 
     Parameters
@@ -53,7 +53,7 @@ class Dated:
     remarks: tuple[Remark, ...] = ()
 
 
-def dated(told: Told) -> Dated:
+def dated(told: DateFacts) -> Dated:
     """Put the full times of a stream on one date: of its messages, else of its sentences."""
     of_week, weeks = on_one_date(_set(told.of_week), is_gps_time=True)
     of_day, days = on_one_date(_set(told.of_day), is_gps_time=False)
@@ -86,7 +86,7 @@ def _set(anchors: Anchors) -> Anchors:
     return Anchors(anchors.places[is_set], anchors.utc_ns[is_set], anchors.week_ms[is_set])
 
 
-def _leap_seconds(told: Told, last_ns: int) -> int | None:
+def _leap_seconds(told: DateFacts, last_ns: int) -> int | None:
     """Leap seconds that a stream states most often, or its UTC and time of week differ by."""
     leaps = Counter(told.leaps)
     leaps.update(int(text) for text in _LEAP_SECONDS.findall(told.head))
@@ -95,7 +95,7 @@ def _leap_seconds(told: Told, last_ns: int) -> int | None:
     return max(leaps, key=lambda leap_s: (leaps[leap_s], leap_s), default=None)
 
 
-def _earliest(told: Told) -> Earliest | None:
+def _earliest(told: DateFacts) -> Earliest | None:
     """The year of the receiver's hardware, where it is told."""
     in_text = _IN_TEXT.search(told.head)
     number = told.hardware or (in_text[1].decode("ascii") if in_text else "")

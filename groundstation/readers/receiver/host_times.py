@@ -13,7 +13,7 @@ import numpy as np
 from groundstation.base.records import Column, Int64Array, RecordBatch, Remark
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver.host_text import DATE, DAY, HostText
-from groundstation.readers.receiver.nmea import Epochs
+from groundstation.readers.receiver.nmea import SentenceEpochs
 from groundstation.readers.receiver.stream import Frames
 from groundstation.readers.receiver.times import DAY_NS, Anchors, unrolled
 
@@ -43,7 +43,7 @@ def times_of(host: HostText, frames: Frames) -> Column:
     return Column(values, present)
 
 
-def raw_batch(frames: Frames, epochs: Epochs, time: Column) -> RecordBatch | None:
+def raw_batch(frames: Frames, epochs: SentenceEpochs, time: Column) -> RecordBatch | None:
     """Return the text around the sentences of a block, a row for each that has any.
 
     ``time`` is that of the epochs.
@@ -73,7 +73,7 @@ class HostTimes:
     _day_places: list[Int64Array] = field(default_factory=list)
     _day_ns: list[Int64Array] = field(default_factory=list)
 
-    def take(self, frames: Frames, epochs: Epochs) -> None:
+    def take(self, frames: Frames, epochs: SentenceEpochs) -> None:
         """Take in a block, and the receiver's times of the day in it."""
         if frames.texts is not None:
             self.lines += int(np.count_nonzero(frames.texts.any(axis=1)))

@@ -22,7 +22,7 @@ _FIELD = re.compile(r"(?P<name>[\w-]+):(?P<kind>[uirxc])(?P<size>\d+)(?:/(?P<div
 
 
 @dataclass(frozen=True)
-class Field:
+class LayoutField:
     """Field of a message: its name and the name of the structure's member.
 
     ``shift`` and ``width`` are those of bits, else -1 and 0.
@@ -37,14 +37,14 @@ class Field:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class LayoutPart:
     """Head of a message, or the group in it that repeats: a structure and its fields.
 
     ``ends`` is where each member ends, bytes: a message of an older version may be shorter.
     """
 
     dtype: np.dtype[Any]
-    fields: tuple[Field, ...]
+    fields: tuple[LayoutField, ...]
     ends: dict[str, int]
 
     def values(self, records: NDArray[Any], name: str) -> NDArray[Any]:
@@ -64,7 +64,7 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class MessageLayout:
     """Layout of a message: its head, the group that repeats, and the count of groups.
 
     ``count`` names the field with the number of groups (``*``: as many as fit).
@@ -72,8 +72,8 @@ class Layout:
     ``tail`` bytes may stand behind the groups; they are not read.
     """
 
-    head: Part
-    group: Part | None = None
+    head: LayoutPart
+    group: LayoutPart | None = None
     count: str = ""
     tail: int = 0
 
@@ -89,7 +89,7 @@ class Layout:
 
 
 @cache
-def layout(text: str) -> Layout:
+def layout(text: str) -> MessageLayout:
     """Layout of a message from its line of text.
 
     Examples
@@ -103,14 +103,14 @@ def layout(text: str) -> Layout:
     """
     head, group, tail = (*text.split("|"), "", "")[:3]
     count, _, repeated = group.strip().partition(" ")
-    return Layout(_part(head), _part(repeated) if group else None, count, int(tail or 0))
+    return MessageLayout(_part(head), _part(repeated) if group else None, count, int(tail or 0))
 
 
-def _part(text: str) -> Part:
+def _part(text: str) -> LayoutPart:
     names: list[str] = []
     types: list[str] = []
     offsets: list[int] = []
-    fields: list[Field] = []
+    fields: list[LayoutField] = []
     at = 0
     for word in re.findall(r"@\d+|[\w-]+:x\d+\([^)]*\)|\S+", text):
         if word.startswith("@"):
@@ -124,25 +124,25 @@ def _part(text: str) -> Part:
             names.append(name)
             types.append(f"{_TYPES[kind]}{size}" if kind != "c" else f"S{size}")
             offsets.append(at)
-            plain_field = Field(name, name, float(match["divisor"] or 1.0), fine=match["fine"] or "")
+            plain_field = LayoutField(name, name, float(match["divisor"] or 1.0), fine=match["fine"] or "")
             fields += _bits(name, bits.rstrip(")")) if kind == "x" else [plain_field]
         at += size
     dtype = np.dtype({"names": names, "formats": types, "offsets": offsets, "itemsize": at})
     ends = {name: offset + np.dtype(kind).itemsize for name, kind, offset in zip(names, types, offsets, strict=True)}
-    return Part(dtype, tuple(fields), ends)
+    return LayoutPart(dtype, tuple(fields), ends)
 
 
-def _bits(member: str, text: str) -> list[Field]:
+def _bits(member: str, text: str) -> list[LayoutField]:
     fields, shift = [], 0
     for word in text.split():
         name, _, width = word.partition(":")
         if name != "-":
-            fields.append(Field(name, member, shift=shift, width=int(width or 1)))
+            fields.append(LayoutField(name, member, shift=shift, width=int(width or 1)))
         shift += int(width or 1)
     return fields
 
 
-def _values(records: NDArray[Any], field: Field, divisors: dict[str, float]) -> NDArray[Any]:
+def _values(records: NDArray[Any], field: LayoutField, divisors: dict[str, float]) -> NDArray[Any]:
     values = records[field.member]
     if field.width:
         bits = (values >> values.dtype.type(field.shift)) & values.dtype.type((1 << field.width) - 1)

@@ -19,7 +19,7 @@ from groundstation.base.records import (
     Int64Array,
     RecordBatch,
 )
-from groundstation.readers.receiver.layouts import Layout
+from groundstation.readers.receiver.layouts import MessageLayout
 from groundstation.readers.receiver.stream import Frames
 
 PIECE_BYTES = MAX_TEXT_CHARACTERS // 2  # bytes of a payload in one row, as hexadecimal digits
@@ -40,7 +40,7 @@ class Messages:
         Byte of the file at which each begins.
     payload_at, payload_sizes : ndarrays of int64, shape (n,)
         Their payloads in ``frames.data``.
-    layout : Layout or None
+    layout : MessageLayout or None
         None: not known here, the bytes are kept.
     is_sound : bool
         Whether payloads hold all fields of the layout, or of an older version of the message: what is shorter is
@@ -52,7 +52,7 @@ class Messages:
     places: Int64Array
     payload_at: Int64Array
     payload_sizes: Int64Array
-    layout: Layout | None
+    layout: MessageLayout | None
     is_sound: bool = True
 
     def __len__(self) -> int:

@@ -47,7 +47,7 @@ ALL = Choice()
 
 
 @dataclass(frozen=True, eq=False)
-class Epochs:
+class SentenceEpochs:
     """Epochs of a block.
 
     Parameters
@@ -121,7 +121,9 @@ def _arrival(arrivals: Anchors, places: Int64Array) -> Column:
     return Column(arrivals.utc_ns[at], arrivals.places[at] == places)
 
 
-def epochs_of(sentences: Mapping[str, Sentences], choice: Choice = ALL, arrivals: Anchors | None = None) -> Epochs:
+def epochs_of(
+    sentences: Mapping[str, Sentences], choice: Choice = ALL, arrivals: Anchors | None = None
+) -> SentenceEpochs:
     """Group the sentences of a block into epochs."""
     which, day_ns, is_whole = [], [], []
     for one in sentences.values():
@@ -146,7 +148,7 @@ def epochs_of(sentences: Mapping[str, Sentences], choice: Choice = ALL, arrivals
     }
     frames = next(iter(sentences.values())).frames if sentences else None
     places = nothing if frames is None else frames.places[starts]
-    return Epochs(sentences, epoch, told_ns[is_new], places, choice, arrivals)
+    return SentenceEpochs(sentences, epoch, told_ns[is_new], places, choice, arrivals)
 
 
 def _with_fractions(told_ns: Int64Array, is_whole: BoolArray) -> Int64Array:
@@ -214,7 +216,7 @@ class DayTimes:
         self._anchors = anchors
         self._last_ns: int | None = None
 
-    def of(self, epochs: Epochs) -> Column:
+    def of(self, epochs: SentenceEpochs) -> Column:
         """Return the times of the epochs of the next block."""
         time = self._anchors.of_day(epochs.places, epochs.day_ns)
         if len(self._anchors) or not len(time):

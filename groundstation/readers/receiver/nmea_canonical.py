@@ -11,7 +11,7 @@ from groundstation.base.units import MPS_PER_KMH, MPS_PER_KNOT
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.receiver.credible import HEADINGS, credible_attitude, credible_dilution, credible_position
 from groundstation.readers.receiver.messages import Columns, occupied
-from groundstation.readers.receiver.nmea import Epochs
+from groundstation.readers.receiver.nmea import SentenceEpochs
 from groundstation.readers.receiver.nmea_makers import makers_solution
 from groundstation.readers.receiver.sentence_layouts import STANDARD_POSITIONS
 from groundstation.readers.receiver.sentences import Sentences
@@ -38,7 +38,7 @@ _RANKS = np.full(128, 2)
 _RANKS[[0, *map(ord, "NSMEAPDFR")]] = 0, 1, 3, 4, 5, 6, 7, 8, 9, 10
 
 
-def gnss_batch(epochs: Epochs, time: Column, tally: Tally) -> RecordBatch | None:
+def gnss_batch(epochs: SentenceEpochs, time: Column, tally: Tally) -> RecordBatch | None:
     """Return one row for each epoch that has a fix, or says that it has none."""
     columns = makers_solution(epochs)
     for formatter in STANDARD_POSITIONS:  # the last that has a position gives it
@@ -70,7 +70,7 @@ def _merged(columns: Columns, newer: Columns) -> Columns:
 _VALIDITY = {"GGA": ("quality",), "RMC": ("status", "posMode"), "GLL": ("status", "posMode"), "GNS": ("posMode",)}
 
 
-def _position(epochs: Epochs, formatter: str) -> Columns:
+def _position(epochs: SentenceEpochs, formatter: str) -> Columns:
     found = epochs.values(formatter, ("lat", "lon", *_VALIDITY[formatter]))
     if not found:
         return {}
@@ -95,7 +95,7 @@ def _has_fix(formatter: str, found: Columns) -> BoolArray:
     return np.asarray(status.mask & (status.values == "A") & ~(mode.mask & (mode.values == "N")))
 
 
-def _add_heights(epochs: Epochs, columns: Columns, tally: Tally) -> None:
+def _add_heights(epochs: SentenceEpochs, columns: Columns, tally: Tally) -> None:
     """Add the heights of GGA or GNS, metres above the sea and above the ellipsoid.
 
     The latter needs the separation. Where the separation cannot be one the sum is the height above the ellipsoid all
@@ -119,7 +119,7 @@ def _add_heights(epochs: Epochs, columns: Columns, tally: Tally) -> None:
         columns |= _merged(columns, heights)
 
 
-def _velocity(epochs: Epochs) -> Columns:
+def _velocity(epochs: SentenceEpochs) -> Columns:
     """Return speed and track of RMC, which has a time, or of VTG where RMC has none.
 
     Absent where an epoch has no valid fix.
@@ -180,7 +180,7 @@ def _true(value: Column, unit: Column, usual: str) -> Column:
     return Column(value.values, value.mask & (np.where(unit.mask, unit.values, usual) == "T"))
 
 
-def _quality(epochs: Epochs) -> Columns:
+def _quality(epochs: SentenceEpochs) -> Columns:
     columns: Columns = {}
     dilution = epochs.values("GSA", ("PDOP", "HDOP"))
     if dilution:  # a system without a satellite in the solution repeats it, or has nothing to say
@@ -202,7 +202,7 @@ def _has_satellites(sentences: Sentences) -> BoolArray:
     return sentences.columns["svid_01"].mask
 
 
-def _add_solution(epochs: Epochs, columns: Columns, tally: Tally) -> None:
+def _add_solution(epochs: SentenceEpochs, columns: Columns, tally: Tally) -> None:
     """Add the kind of the fix, and whether GNSS gives it.
 
     The latter is absent for a fix in two dimensions, which has no height either.
@@ -225,7 +225,7 @@ def _add_solution(epochs: Epochs, columns: Columns, tally: Tally) -> None:
     columns |= _merged(columns, {"integrity_ok": Column(trusted.values, trusted.mask & ~(flat & trusted.values))})
 
 
-def _kind(epochs: Epochs) -> Column:
+def _kind(epochs: SentenceEpochs) -> Column:
     """Return the kind of solution of each epoch.
 
     It follows from the quality of GGA, else from the mode of GNS or RMC.
@@ -294,7 +294,7 @@ def _attitude(columns: Columns) -> Columns:
     return found
 
 
-def ins_batch(epochs: Epochs, address: str, time: Column, mode: str, tally: Tally) -> RecordBatch | None:
+def ins_batch(epochs: SentenceEpochs, address: str, time: Column, mode: str, tally: Tally) -> RecordBatch | None:
     """Attitude of the vehicle from the sentences with an address, one row each."""
     sentences = epochs.sentences.get(address)
     if sentences is None:

@@ -9,7 +9,7 @@ from groundstation.base.records import Column
 from groundstation.base.units import MPS_PER_KMH
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.receiver.messages import Columns
-from groundstation.readers.receiver.nmea import Epochs
+from groundstation.readers.receiver.nmea import SentenceEpochs
 
 # Status of u-blox's PUBX 00; NF (no fix) and TT (time only) are none.
 _UBX_STATUS = {"DR": "dead_reckoning", "G2": "2d", "G3": "3d", "D2": "2d", "D3": "dgnss", "RK": "gnss_ins"}
@@ -19,7 +19,7 @@ _ABOVE_ELLIPSOID = re.compile(r"EHT([+-]?\d{1,6}(?:\.\d{1,6})?)")
 _POS_KIND = {0: "3d", 1: "dgnss", 2: "rtk_float", 3: "rtk_fixed"}
 
 
-def makers_solution(epochs: Epochs) -> Columns:
+def makers_solution(epochs: SentenceEpochs) -> Columns:
     """Return columns of ``gnss`` from the maker's sentence that was chosen.
 
     There are none where a standard sentence states the position.
@@ -34,7 +34,7 @@ def makers_solution(epochs: Epochs) -> Columns:
     return {}
 
 
-def _of_ublox(epochs: Epochs) -> Columns:
+def _of_ublox(epochs: SentenceEpochs) -> Columns:
     """Return columns of PUBX 00: heights above the ellipsoid, km/h, down positive."""
     numbers = ("altRef", "hAcc", "vAcc", "SOG", "COG", "vVel", "HDOP", "numSVs")
     found = epochs.values("PUBX.00", ("lat", "lon", "navStat", *numbers))
@@ -66,7 +66,7 @@ def _of_ublox(epochs: Epochs) -> Columns:
     }
 
 
-def _of_trimble(epochs: Epochs) -> Columns:
+def _of_trimble(epochs: SentenceEpochs) -> Columns:
     """Return columns of PTNL GGK.
 
     A height of the kind EHT is above the ellipsoid; others are above another surface and stay raw.
@@ -85,7 +85,7 @@ def _of_trimble(epochs: Epochs) -> Columns:
     }
 
 
-def _of_ashtech(epochs: Epochs) -> Columns:
+def _of_ashtech(epochs: SentenceEpochs) -> Columns:
     """Return columns of PASHR POS.
 
     Its height and speed are of several kinds and units by the device, and stay raw.

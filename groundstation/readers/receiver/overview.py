@@ -10,7 +10,7 @@ from groundstation.base.records import Damage, Int64Array, Remark
 from groundstation.base.timescales import utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.receiver import nmea, novatel, novatel_messages, scan, ubx
-from groundstation.readers.receiver.dating import Told, dated
+from groundstation.readers.receiver.dating import DateFacts, dated
 from groundstation.readers.receiver.host_text import HostText
 from groundstation.readers.receiver.host_times import HostTimes
 from groundstation.readers.receiver.host_times import remarks as host_remarks
@@ -34,7 +34,7 @@ MOST_BLOCKS_KEPT = 1
 
 
 @dataclass
-class Overview:
+class StreamOverview:
     """Contents of a stream, by the first pass over it.
 
     Parameters
@@ -76,9 +76,9 @@ class Overview:
     damages: tuple[Damage, ...] = ()
 
 
-def overview(source: Source, bare: bool, host: HostText | None = None) -> Overview:
+def overview(source: Source, bare: bool, host: HostText | None = None) -> StreamOverview:
     """Read a stream once; ``host`` is the form of a computer's text in it."""
-    found, full_times, attitudes, sound = Overview(), ubx.FullTimes(), Counter[str](), set[str]()
+    found, full_times, attitudes, sound = StreamOverview(), ubx.FullTimes(), Counter[str](), set[str]()
     places, utc_ns = [], []
     stream = Stream(source, bare, is_hosts=host.accepts if host else None)
     host_clock = HostTimes(host) if host else None
@@ -124,7 +124,7 @@ def overview(source: Source, bare: bool, host: HostText | None = None) -> Overvi
 _NOTHING: Int64Array = np.zeros(0, dtype=np.int64)
 
 
-def _choose(found: Overview, attitudes: Counter[str], sound: set[str]) -> None:
+def _choose(found: StreamOverview, attitudes: Counter[str], sound: set[str]) -> None:
     """Choose the sources of ``gnss`` and ``ins``, for the whole stream.
 
     Of several the first in the order of the tables counts.
@@ -157,11 +157,11 @@ def _choice_of(counts: Counter[str]) -> nmea.Choice:
 
 
 def _set_times(
-    found: Overview, full_times: ubx.FullTimes, places: Int64Array, utc_ns: Int64Array, source: Source
+    found: StreamOverview, full_times: ubx.FullTimes, places: Int64Array, utc_ns: Int64Array, source: Source
 ) -> None:
     """Note the full times of a stream, and what is odd about them."""
     order = np.argsort(places, kind="stable")
-    told = Told(
+    told = DateFacts(
         of_week=full_times.anchors(),
         of_day=Anchors(places[order], utc_ns[order], np.full(len(places), -1, dtype=np.int64)),
         leaps=full_times.leaps,
@@ -175,7 +175,7 @@ def _set_times(
     found.remarks += times.remarks
 
 
-def _take_hosts(found: Overview, host_clock: HostTimes) -> None:
+def _take_hosts(found: StreamOverview, host_clock: HostTimes) -> None:
     """Take the date, or times of arrival, from the computer's clock.
 
     Only where the stream states none.
@@ -210,7 +210,7 @@ def _rtcm_numbers(frames: Frames) -> Iterator[int]:
     yield from (bytes_[:, 0] << 4 | bytes_[:, 1] >> 4).tolist()
 
 
-def remarks(found: Overview) -> Iterator[Remark]:
+def remarks(found: StreamOverview) -> Iterator[Remark]:
     """Yield remarks on what serves each topic, and what was passed over."""
     yield from found.remarks
     yield from _gnss_remarks(found)
@@ -228,7 +228,7 @@ def remarks(found: Overview) -> Iterator[Remark]:
             )
 
 
-def _gnss_remarks(found: Overview) -> Iterator[Remark]:
+def _gnss_remarks(found: StreamOverview) -> Iterator[Remark]:
     """Yield remarks on the source of ``gnss``, and on other solutions of the receiver.
 
     The others would look like a second receiver.

@@ -21,7 +21,7 @@ from groundstation.readers.receiver import (
 )
 from groundstation.readers.receiver.messages import MessagesByName, bounded, raw_batches, text_batches
 from groundstation.readers.receiver.novatel_messages import INS_SOURCES
-from groundstation.readers.receiver.overview import NAME, Overview, overview, remarks
+from groundstation.readers.receiver.overview import NAME, StreamOverview, overview, remarks
 from groundstation.readers.receiver.sentences import Sentences, by_address
 from groundstation.readers.receiver.stream import Frames, Stream
 from groundstation.readers.receiver.tally import Tally
@@ -53,7 +53,7 @@ def items(source: Source) -> Iterator[Item]:
     yield from found.damages if found.blocks else stream.damages()
 
 
-def _epoch_start_of(found: Overview) -> Callable[[Frames], int]:
+def _epoch_start_of(found: StreamOverview) -> Callable[[Frames], int]:
     if found.leader in ubx_canonical.POSITION_SOURCES:
         return lambda frames: ubx.epoch_start(frames, found.leader)
     if found.leader:
@@ -62,7 +62,7 @@ def _epoch_start_of(found: Overview) -> Callable[[Frames], int]:
 
 
 def _of_block(
-    frames: Frames, sentences: dict[str, Sentences], found: Overview, days: nmea.DayTimes, tally: Tally
+    frames: Frames, sentences: dict[str, Sentences], found: StreamOverview, days: nmea.DayTimes, tally: Tally
 ) -> Iterator[RecordBatch]:
     block = MessagesByName()
     for messages, time in ubx.timed(frames, found.anchors):
@@ -98,7 +98,9 @@ def _of_block(
         yield from bounded(ins)
 
 
-def _ins(block: MessagesByName, epochs: nmea.Epochs, time: Column, found: Overview, tally: Tally) -> RecordBatch | None:
+def _ins(
+    block: MessagesByName, epochs: nmea.SentenceEpochs, time: Column, found: StreamOverview, tally: Tally
+) -> RecordBatch | None:
     if not found.attitude:
         return None
     if found.heading_address:
@@ -108,7 +110,7 @@ def _ins(block: MessagesByName, epochs: nmea.Epochs, time: Column, found: Overvi
     return ubx_canonical.ins_batch(block, found.attitude, found.anchors, tally)
 
 
-def _in_their_week(batch: RecordBatch | None, found: Overview) -> RecordBatch | None:
+def _in_their_week(batch: RecordBatch | None, found: StreamOverview) -> RecordBatch | None:
     """Correct a batch whose times were made of the week that each message states."""
     if batch is None:
         return None

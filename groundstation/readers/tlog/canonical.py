@@ -14,7 +14,7 @@ from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Column
 from groundstation.base.units import DEG_PER_RAD, MPS2_PER_G, NT_PER_GAUSS
 from groundstation.readers.layout import velocity_from_track, wind_from_direction
-from groundstation.readers.mapping import Columns, Numbers, Role, Rule, direction, pressure_altitude
+from groundstation.readers.mapping import Columns, Numbers, Role, SourceRule, direction, pressure_altitude
 
 UNKNOWN_16 = 65_535.0
 ARMED, ON_GROUND = 128, 1
@@ -118,12 +118,12 @@ INSTANCES: Mapping[str, tuple[str, int]] = MappingProxyType({"GPS_RAW_INT": (REC
 _MAG = ("xmag", "ymag", "zmag")
 _CURRENT = ("current_battery",)
 ROLES: tuple[Role, ...] = (
-    Role("ins", (Rule("ATTITUDE", ("roll", "pitch", "yaw"), attitude, _HEADING),)),
-    Role("ins", (Rule("GLOBAL_POSITION_INT", ("lat", "lon", "alt"), global_position),)),
-    Role("gnss", (Rule(RECEIVER, ("lat", "lon", "fix_type"), gnss, _TRACK),), has_instances=True),
-    Role("magnetometer", (Rule("SCALED_IMU", _MAG, field), Rule("RAW_IMU", _MAG, field))),
-    Role("baro", (Rule("SCALED_PRESSURE", ("press_abs",), pressure, _ALTITUDE),)),
-    Role("electric", (Rule("BATTERY_STATUS", _CURRENT, battery), Rule("SYS_STATUS", _CURRENT, battery))),
-    Role("air", (Rule("WIND", ("direction", "speed"), wind),)),
-    Role("discrete", (Rule("EXTENDED_SYS_STATE", ("landed_state",), landed),)),
+    Role("ins", (SourceRule("ATTITUDE", ("roll", "pitch", "yaw"), attitude, _HEADING),)),
+    Role("ins", (SourceRule("GLOBAL_POSITION_INT", ("lat", "lon", "alt"), global_position),)),
+    Role("gnss", (SourceRule(RECEIVER, ("lat", "lon", "fix_type"), gnss, _TRACK),), has_instances=True),
+    Role("magnetometer", (SourceRule("SCALED_IMU", _MAG, field), SourceRule("RAW_IMU", _MAG, field))),
+    Role("baro", (SourceRule("SCALED_PRESSURE", ("press_abs",), pressure, _ALTITUDE),)),
+    Role("electric", (SourceRule("BATTERY_STATUS", _CURRENT, battery), SourceRule("SYS_STATUS", _CURRENT, battery))),
+    Role("air", (SourceRule("WIND", ("direction", "speed"), wind),)),
+    Role("discrete", (SourceRule("EXTENDED_SYS_STATE", ("landed_state",), landed),)),
 )

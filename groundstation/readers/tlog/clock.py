@@ -18,7 +18,15 @@ from groundstation.base.units import NS_PER_S
 from groundstation.readers.clock_offsets import Jump, Offsets, offsets_by
 from groundstation.readers.tlog.dialect import Message, messages
 from groundstation.readers.tlog.frames import FrameBlock
-from groundstation.readers.two_clocks import FEWEST_READINGS, Line, Readings, Stretch, Track, lower_line, stretches_of
+from groundstation.readers.two_clocks import (
+    FEWEST_READINGS,
+    ClockReadings,
+    ClockStretch,
+    ReadingSequence,
+    ReceiptLine,
+    lower_line,
+    stretches_of,
+)
 
 Key: TypeAlias = tuple[int, int, bool]  # sender, number of message, and whether its times count from 1970
 NS_PER_MS, NS_PER_US = 1_000_000, 1_000
@@ -117,7 +125,7 @@ class Epoch:
     """
 
     first: int
-    line: Line
+    line: ReceiptLine
     utc_ns: int | None
 
     def utc_of(self, clock_ns: Int64Array, ground_ns: int) -> Int64Array:
@@ -177,7 +185,7 @@ class SenderClock:
             found[rows] -= self.epochs[place].line.at(clock_ns[rows])
         return np.asarray(found)
 
-    def lateness(self, track: Track, since_1970: bool) -> "Lateness":
+    def lateness(self, track: ReadingSequence, since_1970: bool) -> "Lateness":
         """Return how late the readings of a message arrived.
 
         Only those whose relation to the clock is known.
@@ -244,8 +252,8 @@ class ClockSurvey:
 
     def __init__(self) -> None:
         self._readers: dict[tuple[int, int], TimeReader] = {}
-        self._readings: dict[Key, Readings] = {}
-        self._utc: dict[int, Readings] = {}
+        self._readings: dict[Key, ClockReadings] = {}
+        self._utc: dict[int, ClockReadings] = {}
         self._jumps: list[Jump] = []
         self._last: tuple[int, int] | None = None
 
@@ -269,7 +277,7 @@ class ClockSurvey:
             good = (since_1970 == of_1970) & (time_ns >= 0)
             if good.any():
                 own = which if good.all() else which[good]
-                readings = self._readings.setdefault((sender, number, of_1970), Readings())
+                readings = self._readings.setdefault((sender, number, of_1970), ClockReadings())
                 readings.take(block.record_index[own], block.received.values[own], time_ns[good])
         if messages()[number].name == "SYSTEM_TIME":
             self._take_utc(block, sender, number, which, time_ns)
@@ -278,7 +286,7 @@ class ClockSurvey:
         unix_us = block.rows(which, messages()[number])["time_unix_usec"]
         good = (unix_us >= np.uint64(SINCE_1970_US)) & (unix_us < np.uint64(_LAST_US)) & (boot_ns > 0)
         unix_ns = np.where(good, unix_us, 0).astype(np.int64) * NS_PER_US
-        utc = self._utc.setdefault(sender, Readings())
+        utc = self._utc.setdefault(sender, ClockReadings())
         utc.take(block.record_index[which[good]], unix_ns[good], boot_ns[good])
 
     def _note_jumps(self, index: Int64Array, received: Column) -> None:
@@ -299,7 +307,7 @@ class ClockSurvey:
     def clocks(self, vehicle: int) -> Clocks:
         """Return the clocks that were found."""
         tracks = {key: readings.all() for key, readings in self._readings.items()}
-        parted: dict[int, list[Stretch]] = {}
+        parted: dict[int, list[ClockStretch]] = {}
         found: dict[int, Key] = {}
         for sender in sorted({key[0] for key in tracks}):
             for key in self._ranked(sender, tracks):
@@ -317,7 +325,7 @@ class ClockSurvey:
         ground_ns = _ground_ns(senders, by, vehicle)
         return Clocks(senders, offsets.plus(ground_ns), ground_ns)
 
-    def _ranked(self, sender: int, tracks: Mapping[Key, Track]) -> list[Key]:
+    def _ranked(self, sender: int, tracks: Mapping[Key, ReadingSequence]) -> list[Key]:
         """Rank the messages that may serve as the clock of a sender, the best first."""
         known = messages()
         places = {name: place for place, name in enumerate(_STEADY)}
@@ -329,7 +337,7 @@ class ClockSurvey:
         return sorted((key for key in tracks if key[0] == sender), key=rank)
 
     def _clock_of(
-        self, key: Key, stretches: Sequence[Stretch], tracks: Mapping[Key, Track], offsets: Offsets
+        self, key: Key, stretches: Sequence[ClockStretch], tracks: Mapping[Key, ReadingSequence], offsets: Offsets
     ) -> SenderClock:
         sender, number, of_1970 = key
         lines = [lower_line(one.track) for one in stretches]
@@ -359,14 +367,14 @@ class Lateness(NamedTuple):
     late_ns: Int64Array
 
 
-def _pace(stretches: Sequence[Stretch]) -> float:
+def _pace(stretches: Sequence[ClockStretch]) -> float:
     """Return the pace of a clock: its time over time of receipt."""
     clock = sum(int(np.ptp(one.track.clock_ns)) for one in stretches)
     receipt = sum(int(np.ptp(one.track.receipt_ns)) for one in stretches)
     return clock / receipt if receipt else float(clock > 0)
 
 
-def _level(track: Track) -> int:
+def _level(track: ReadingSequence) -> int:
     """Return the least difference of receipt and clock in the last stretch of readings."""
     return stretches_of(track, receipt_step_s=RECEIPT_STEP_S)[-1].level_ns
 
@@ -383,7 +391,7 @@ def _go_together(reference: Lateness, other: Lateness) -> bool:
     return bool(np.mean(np.abs(np.interp(evenly, other.number, off_ns)) <= OFF_S * NS_PER_S) >= MOST_SHARE)
 
 
-def _utc_within(utc: Track | None, first: int, end: int, line: Line) -> int | None:
+def _utc_within(utc: ReadingSequence | None, first: int, end: int, line: ReceiptLine) -> int | None:
     """Return UTC less the clock by SYSTEM_TIME between two records: its last level.
 
     None where SYSTEM_TIME does not tell.
@@ -399,7 +407,7 @@ def _utc_within(utc: Track | None, first: int, end: int, line: Line) -> int | No
     return None if weeks and abs(away_s - weeks * ROLLOVER_S) < DAY_S else utc_ns  # its receiver counts other weeks
 
 
-def _ground_ns(senders: Mapping[int, SenderClock], by: Mapping[int, Track], vehicle: int) -> int:
+def _ground_ns(senders: Mapping[int, SenderClock], by: Mapping[int, ReadingSequence], vehicle: int) -> int:
     """Return what must be added to the ground station's clock to get UTC.
 
     It follows from the vehicle, or another sender that states UTC.

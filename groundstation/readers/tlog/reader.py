@@ -14,7 +14,7 @@ from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import Column, Damage, Int64Array, Item, LogHeader, Remark
 from groundstation.base.signals import EVENT_SEPARATOR, RAW_PREFIX
 from groundstation.readers.mapping import Assignment, Offer, assigned, mapped
-from groundstation.readers.parts import Part, bounded, merged, occupied, one_row_each
+from groundstation.readers.parts import TopicPart, bounded, merged, occupied, one_row_each
 from groundstation.readers.places import placed
 from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
@@ -118,7 +118,7 @@ def items(source: Source, reader_name: str) -> Iterator[Item]:
     armed, timer = _Arming(), Timer(clocks)
     nowhere: Counter[str] = Counter()
     for block, following in _with_next(frames):
-        canonical: dict[str, list[Part]] = {}
+        canonical: dict[str, list[TopicPart]] = {}
         validity_ns = timer.validity_ns(block, following)
         for system, number, which in block.groups:
             message = known[number]
@@ -170,7 +170,7 @@ def _survey(frames: Iterable[FrameBlock]) -> tuple[int, dict[str, frozenset[str]
     return vehicle, columns, clocks.clocks(vehicle)
 
 
-def _part(block: FrameBlock, which: Int64Array, message: Message, validity_ns: Int64Array | None) -> Part:
+def _part(block: FrameBlock, which: Int64Array, message: Message, validity_ns: Int64Array | None) -> TopicPart:
     """Columns of one message's frames."""
     rows_of = block.rows(which, message)
     columns: dict[str, Column] = {}
@@ -185,7 +185,7 @@ def _part(block: FrameBlock, which: Int64Array, message: Message, validity_ns: I
         else:
             columns[name] = Column(values.copy())
     validity = None if validity_ns is None else validity_ns[which]
-    return Part(block.first_index + which, block.received.take(which), columns, validity)
+    return TopicPart(block.first_index + which, block.received.take(which), columns, validity)
 
 
 def _served(met: Mapping[str, frozenset[str]]) -> dict[str, list[Assignment]]:
@@ -199,7 +199,7 @@ def _served(met: Mapping[str, frozenset[str]]) -> dict[str, list[Assignment]]:
 
 
 def _take(
-    canonical: dict[str, list[Part]], part: Part, assignments: Sequence[Assignment], nowhere: Counter[str]
+    canonical: dict[str, list[TopicPart]], part: TopicPart, assignments: Sequence[Assignment], nowhere: Counter[str]
 ) -> None:
     """Add the values of a message to canonical topics; ``nowhere`` counts missing positions."""
     if not assignments:
@@ -212,7 +212,7 @@ def _take(
         with np.errstate(over="ignore", invalid="ignore"):
             columns, zeros = placed(one.topic, one.rule.columns(numbers))
         nowhere[one.topic] += len(zeros)
-        kept = occupied(Part(part.index, part.time, columns, part.validity_ns))
+        kept = occupied(TopicPart(part.index, part.time, columns, part.validity_ns))
         if kept is not None:
             canonical.setdefault(one.topic, []).append(kept)
 
@@ -223,7 +223,7 @@ class _Arming:
 
     is_armed: bool | None = None
 
-    def take(self, canonical: dict[str, list[Part]], part: Part, name: str) -> None:
+    def take(self, canonical: dict[str, list[TopicPart]], part: TopicPart, name: str) -> None:
         """Add the events of a message."""
         if name == "STATUSTEXT":
             texts = part.columns["text"].values
@@ -237,10 +237,12 @@ class _Arming:
             self.is_armed = bool(armed[-1])
             self._add(canonical, part, changed, np.where(armed[changed], "armed", "disarmed"))
 
-    def _add(self, canonical: dict[str, list[Part]], part: Part, rows: Int64Array, names: NDArray[np.str_]) -> None:
+    def _add(
+        self, canonical: dict[str, list[TopicPart]], part: TopicPart, rows: Int64Array, names: NDArray[np.str_]
+    ) -> None:
         if len(rows):
             validity_ns = None if part.validity_ns is None else part.validity_ns[rows]
-            event = Part(part.index[rows], part.time.take(rows), {"name": Column(names)}, validity_ns)
+            event = TopicPart(part.index[rows], part.time.take(rows), {"name": Column(names)}, validity_ns)
             canonical.setdefault("event", []).append(event)
 
 

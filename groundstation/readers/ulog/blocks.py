@@ -15,7 +15,7 @@ from groundstation.base.records import Damage, Int64Array
 from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 from groundstation.readers.ulog import scan
-from groundstation.readers.ulog.formats import Flattener, Format, Layout, parse_format
+from groundstation.readers.ulog.formats import Flattener, Format, TopicLayout, parse_format
 from groundstation.readers.ulog.messages import FILE_HEADER_BYTES, FLAGS_BYTES, MAGIC, FlagBits, flag_bits, text_of
 
 BLOCK_BYTES = 8 << 20
@@ -37,7 +37,7 @@ class Topic:
     number: int
     name: str
     instance: int
-    layout: Layout | None
+    layout: TopicLayout | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ class UlogBlock:
             if numbers[start] >= 0:
                 yield self.topics[int(numbers[start])], order[start:end].astype(np.int64)
 
-    def rows(self, layout: Layout, which: Int64Array) -> NDArray[Any]:
+    def rows(self, layout: TopicLayout, which: Int64Array) -> NDArray[Any]:
         """Return the data of some messages of one topic as a structured array, shape (n,).
 
         The array is a copy.
@@ -114,7 +114,7 @@ class Definitions:
         self.number = np.full(IDS, NOT_SUBSCRIBED, dtype=np.int64)
         self._formats: dict[str, Format] = {}
         self._flattener = Flattener(self._formats)
-        self._layouts: dict[str, Layout] = {}
+        self._layouts: dict[str, TopicLayout] = {}
         self._known: dict[tuple[str, int], Topic] = {}
 
     def heed(self, kind: str, body: bytes, place: int) -> None:
@@ -143,7 +143,7 @@ class Definitions:
         self.least[message_id] = layout.least_bytes if layout else 0
         self.most[message_id] = layout.most_bytes if layout else scan.NOT_SUBSCRIBED
 
-    def _layout(self, name: str, place: int) -> Layout | None:
+    def _layout(self, name: str, place: int) -> TopicLayout | None:
         if name not in self._layouts:
             try:
                 self._layouts[name] = self._flattener.layout(name)

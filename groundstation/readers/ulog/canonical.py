@@ -18,7 +18,7 @@ from groundstation.readers.mapping import (
     Columns,
     Numbers,
     Role,
-    Rule,
+    SourceRule,
     direction,
     holds,
     pressure_altitude,
@@ -32,7 +32,7 @@ _HPA_BELOW = 1_200.0  # sensor_baro.pressure is in hPa before PX4 1.13, in Pa fr
 _UNKNOWN_CURRENT = -1.0
 
 
-class Rows:
+class TopicRows:
     """Data of some messages of one topic, as floating-point numbers."""
 
     def __init__(self, rows: NDArray[Any]) -> None:
@@ -54,8 +54,8 @@ def _vector(fields: tuple[str, str, str], name: str, factor: float) -> Callable[
     return scaled({field: (f"{name}[{axis}]", factor) for axis, field in enumerate(fields)})
 
 
-def _rule(source: str, fields: Mapping[str, tuple[str, float]], **derived: str) -> Rule:
-    return Rule(source, tuple(name for name, _factor in fields.values()), scaled(fields), derived)
+def _rule(source: str, fields: Mapping[str, tuple[str, float]], **derived: str) -> SourceRule:
+    return SourceRule(source, tuple(name for name, _factor in fields.values()), scaled(fields), derived)
 
 
 def attitude_from_quaternion(rows: Numbers) -> Columns:
@@ -199,11 +199,13 @@ _WIND_NEEDS = ("windspeed_north", "windspeed_east")
 _GNSS_NEEDS = ("fix_type",)
 
 
-def _vector_rule(source: str, name: str, fields: tuple[str, str, str], factor: float = 1.0, **derived: str) -> Rule:
-    return Rule(source, tuple(f"{name}[{axis}]" for axis in range(3)), _vector(fields, name, factor), derived)
+def _vector_rule(
+    source: str, name: str, fields: tuple[str, str, str], factor: float = 1.0, **derived: str
+) -> SourceRule:
+    return SourceRule(source, tuple(f"{name}[{axis}]" for axis in range(3)), _vector(fields, name, factor), derived)
 
 
-def _while_there(sensor: str, rule: Rule) -> Rule:
+def _while_there(sensor: str, rule: SourceRule) -> SourceRule:
     """Return a rule of ``sensor_combined``: values are absent where the sensor is.
 
     The message itself says where.
@@ -217,15 +219,15 @@ def _while_there(sensor: str, rule: Rule) -> Rule:
         is_there = rows[mark] != _INVALID
         return {field: Column(column.values, column.mask & is_there) for field, column in found.items()}
 
-    return Rule(rule.source, rule.needs, columns, rule.derived)
+    return SourceRule(rule.source, rule.needs, columns, rule.derived)
 
 
 ROLES: tuple[Role, ...] = (
     Role(
         "ins",
         (
-            Rule("vehicle_attitude", _QUATERNION, attitude_from_quaternion, _HEADING),
-            Rule("vehicle_attitude", ("roll", "pitch", "yaw"), attitude_from_angles, _HEADING),
+            SourceRule("vehicle_attitude", _QUATERNION, attitude_from_quaternion, _HEADING),
+            SourceRule("vehicle_attitude", ("roll", "pitch", "yaw"), attitude_from_angles, _HEADING),
         ),
     ),
     Role(
@@ -252,17 +254,17 @@ ROLES: tuple[Role, ...] = (
     Role(
         "ins",
         (
-            Rule("vehicle_local_position", ("vx", "vy", "vz"), local_velocity),
+            SourceRule("vehicle_local_position", ("vx", "vy", "vz"), local_velocity),
             _rule(
                 "vehicle_global_position",
                 {f"velocity_{axis}_mps": (f"vel_{axis[0]}", 1.0) for axis in ("north", "east", "down")},
             ),
         ),
     ),
-    Role("ins", (Rule("vehicle_global_position", ("lat", "lon", "alt"), global_position),)),
+    Role("ins", (SourceRule("vehicle_global_position", ("lat", "lon", "alt"), global_position),)),
     Role(
         "gnss",
-        (Rule("vehicle_gps_position", _GNSS_NEEDS, gnss), Rule("sensor_gps", _GNSS_NEEDS, gnss)),
+        (SourceRule("vehicle_gps_position", _GNSS_NEEDS, gnss), SourceRule("sensor_gps", _GNSS_NEEDS, gnss)),
         has_instances=True,
     ),
     Role(
@@ -278,13 +280,13 @@ ROLES: tuple[Role, ...] = (
         ),
         has_instances=True,
     ),
-    Role("electric", (Rule("battery_status", ("current_a",), _current),), has_instances=True),
+    Role("electric", (SourceRule("battery_status", ("current_a",), _current),), has_instances=True),
     Role(
         "baro",
         (
-            Rule("vehicle_air_data", ("baro_pressure_pa",), _air_data, _PRESSURE),
+            SourceRule("vehicle_air_data", ("baro_pressure_pa",), _air_data, _PRESSURE),
             _while_there("baro", _rule("sensor_combined", {"pressure_altitude_m": ("baro_alt_meter", 1.0)})),
-            Rule("sensor_baro", ("pressure",), _barometer, _PRESSURE),
+            SourceRule("sensor_baro", ("pressure",), _barometer, _PRESSURE),
         ),
     ),
     Role(
@@ -294,16 +296,16 @@ ROLES: tuple[Role, ...] = (
             _rule("airspeed", {"true_airspeed_mps": ("true_airspeed_m_s", 1.0)}),
         ),
     ),
-    Role("air", tuple(Rule(name, _WIND_NEEDS, _wind) for name in ("wind", "wind_estimate", "estimator_wind"))),
+    Role("air", tuple(SourceRule(name, _WIND_NEEDS, _wind) for name in ("wind", "wind_estimate", "estimator_wind"))),
     Role(
         "radio_altimeter",
-        (Rule("distance_sensor", ("current_distance", "orientation"), _height),),
+        (SourceRule("distance_sensor", ("current_distance", "orientation"), _height),),
         has_instances=True,
     ),
     Role(
         "discrete",
         (
-            Rule(
+            SourceRule(
                 "vehicle_land_detected",
                 ("landed",),
                 _landed,

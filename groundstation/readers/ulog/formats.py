@@ -52,7 +52,7 @@ class LayoutColumn:
 
 
 @dataclass(frozen=True)
-class Layout:
+class TopicLayout:
     """Columns of a topic and their places in a message's data.
 
     Parameters
@@ -146,7 +146,7 @@ class Flattener:
         self._steps = 0
         self._offset = 0
 
-    def layout(self, name: str) -> Layout:
+    def layout(self, name: str) -> TopicLayout:
         """Flatten a format and those nested in it.
 
         Raises
@@ -163,7 +163,7 @@ class Flattener:
         kept = [column for column in columns[:end] if not _is_padding(column)]
         if len(kept) > MAX_COLUMNS:
             raise GroundstationError(f"format {name!r}", f"{len(kept)} columns", f"at most {MAX_COLUMNS}")
-        return Layout(tuple(_unique(kept)), least, most)
+        return TopicLayout(tuple(_unique(kept)), least, most)
 
     def _columns(self, prefix: str, format_name: str, depth: int) -> Iterator[LayoutColumn]:
         """Columns of a format under a prefix, depth first."""

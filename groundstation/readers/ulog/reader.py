@@ -25,13 +25,13 @@ from groundstation.base.records import (
 )
 from groundstation.base.signals import EVENT_SEPARATOR
 from groundstation.readers.mapping import mapped
-from groundstation.readers.parts import Part, bounded, merged, occupied
+from groundstation.readers.parts import TopicPart, bounded, merged, occupied
 from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
 from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, Topic, UlogBlock, Walk
-from groundstation.readers.ulog.canonical import MODE_NAMES, MODES, Rows
+from groundstation.readers.ulog.canonical import MODE_NAMES, MODES, TopicRows
 from groundstation.readers.ulog.formats import TIMESTAMP
-from groundstation.readers.ulog.survey import Overview, overview
+from groundstation.readers.ulog.survey import UlogOverview, overview
 from groundstation.readers.ulog.texts import MAX_TIME_US, TextTopics, device_time
 
 MAX_NAME_CHARACTERS = 200
@@ -170,16 +170,16 @@ class _RawTopics:
 class _CanonicalTopics:
     """Canonical columns of a block; rows of several sources are put in the order of the log."""
 
-    def __init__(self, losses: _Losses, found: Overview) -> None:
+    def __init__(self, losses: _Losses, found: UlogOverview) -> None:
         self._losses, self._found = losses, found
-        self._parts: dict[str, list[Part]] = {}
+        self._parts: dict[str, list[TopicPart]] = {}
         self._armed: bool | None = None
         self._flight_mode: float | None = None
         self._mode = "gnss_aided" if found.fixed else "attitude"
 
     def take(self, topic: Topic, index: Int64Array, time: Column, rows: NDArray[Any]) -> None:
         """Convert the data that a block has of a PX4 topic."""
-        values = Rows(rows)
+        values = TopicRows(rows)
         of_topic: dict[str, dict[str, Column]] = {}
         for assignment in self._found.assignments.get((topic.name, topic.instance), ()):
             if all(name in values for name in assignment.rule.needs):
@@ -191,7 +191,7 @@ class _CanonicalTopics:
                 self._note_refused(name, columns[_OF_PRESSURE])
             columns, zeros = placed(name, columns)
             self._losses.nowhere[name] += len(zeros)
-            part = occupied(Part(index, time, columns))
+            part = occupied(TopicPart(index, time, columns))
             if part is not None:
                 self._parts.setdefault(name, []).append(part)
         if self._found.arming and topic.instance == 0 and topic.name == self._found.arming[0]:
@@ -210,10 +210,10 @@ class _CanonicalTopics:
         if changed.any():
             names = np.array([f"mode {MODE_NAMES.get(mode) or format(mode, 'g')}" for mode in modes[changed].tolist()])
             self._parts.setdefault("event", []).append(
-                Part(index[changed], time.take(changed), {"name": Column(names)})
+                TopicPart(index[changed], time.take(changed), {"name": Column(names)})
             )
 
-    def _note_arming(self, index: Int64Array, time: Column, values: Rows) -> None:
+    def _note_arming(self, index: Int64Array, time: Column, values: TopicRows) -> None:
         """Changes between armed and disarmed as events, the first state among them."""
         assert self._found.arming is not None
         _source, column, armed_value = self._found.arming
@@ -226,7 +226,7 @@ class _CanonicalTopics:
         self._armed = bool(armed[-1])
         if changed.any():
             names = np.where(armed[changed], "armed", "disarmed")
-            part = Part(index[changed], time.take(changed), {"name": Column(names)})
+            part = TopicPart(index[changed], time.take(changed), {"name": Column(names)})
             self._parts.setdefault("event", []).append(part)
 
     def batches(self) -> Iterator[RecordBatch]:

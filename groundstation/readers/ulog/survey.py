@@ -23,7 +23,7 @@ _KEPT_PREFIXES = ("sys_", "ver_", "time_ref_utc", "log_type", "replay")
 
 
 @dataclass
-class Overview:
+class UlogOverview:
     """Findings of the first pass.
 
     Attributes
@@ -48,10 +48,10 @@ class Overview:
     odd_flags: set[tuple[int, str]] = field(default_factory=set)
 
 
-def overview(blocks: Iterable[UlogBlock], definitions: Definitions) -> Overview:
+def overview(blocks: Iterable[UlogBlock], definitions: Definitions) -> UlogOverview:
     """Go through the blocks of a log once; ``definitions`` are those of their walk."""
     with_data: set[int] = set()
-    found, clocks = Overview(), Clocks()
+    found, clocks = UlogOverview(), Clocks()
     for block in blocks:
         occurring = np.flatnonzero(np.bincount(block.topic[block.topic >= 0])).tolist()
         with_data.update(occurring)
@@ -88,7 +88,7 @@ def _has_fix(block: UlogBlock, topic: Topic) -> bool:
     return bool((rows["fix_type"] >= FIX_3D).any())
 
 
-def _assign(found: Overview, topics: list[Topic]) -> None:
+def _assign(found: UlogOverview, topics: list[Topic]) -> None:
     """Choose the rule of each role among topics with data; of receivers those with a fix."""
     silent = _RECEIVERS - found.fixed if found.fixed else frozenset()
     offers = [

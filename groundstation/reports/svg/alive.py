@@ -26,7 +26,7 @@ from groundstation.plots.marks import (
 from groundstation.plots.ranges import thin
 from groundstation.plots.scales import NO_PLACES, Span
 from groundstation.reports import live
-from groundstation.reports.live import TIME, Frame, Samples
+from groundstation.reports.live import TIME, CursorValues, Frame
 from groundstation.reports.svg import colours
 from groundstation.reports.svg.boxes import PT_PER_MM, Box, Placed
 from groundstation.reports.svg.font import label
@@ -122,7 +122,7 @@ def _single(span: Span) -> tuple[float, float]:
     return low, high
 
 
-def _samples(box: Box) -> Samples | None:
+def _samples(box: Box) -> CursorValues | None:
     """Return the values shown near the cursor: those of samples, else those of cells."""
     told = next((mark for mark in box.panel.marks if isinstance(mark, Told)), None)
     if told is not None:
@@ -136,7 +136,7 @@ def _samples(box: Box) -> Samples | None:
         columns, title = (across.ravel(), up.ravel(), cells.values.ravel()), label(cells.title)
     known = np.flatnonzero(np.isfinite(np.array(columns)).all(axis=0))
     rows = known[thin(len(known), MOST_SAMPLES)]
-    return Samples(title, *(np.clip(column[rows], -LARGEST, LARGEST) for column in columns))
+    return CursorValues(title, *(np.clip(column[rows], -LARGEST, LARGEST) for column in columns))
 
 
 def _grounds(box: Box) -> tuple[tuple[float, float, str, str], ...]:

@@ -13,12 +13,12 @@ from groundstation.systems.cooperative.alone_types import (
     NOBODY,
     RANKED,
     SPLIT,
+    AloneWorkspace,
     Batch,
     Heard,
-    Method,
+    NeighbourRules,
     Own,
     Past,
-    Room,
 )
 from groundstation.systems.cooperative.alone_update import split_update, update
 from groundstation.systems.cooperative.joint import SAME_TIME_S
@@ -34,9 +34,9 @@ from groundstation.systems.cooperative.loop_types import (
     Fleet,
     FloatArray,
     Items,
+    LinearisedEvent,
     Log,
     Points,
-    Rows,
 )
 from groundstation.systems.cooperative.motion import place, position, step, turn_covariance, turn_rows
 from groundstation.systems.cooperative.observation import observe
@@ -51,14 +51,14 @@ def run_alone(
     items: Items,
     begin: int,
     end: int,
-    method: Method,
+    method: NeighbourRules,
     own: Own,
     past: Past,
     heard: Heard,
     rejected: Int64Array,
     batch: Batch,
-    room: Room,
-    rows: Rows,
+    room: AloneWorkspace,
+    rows: LinearisedEvent,
     log: Log,
 ) -> None:
     """Work through the items ``begin`` to ``end``: one window of the error map."""
@@ -109,7 +109,7 @@ def _keep(fleet: Fleet, own: Own, who: int, log: Log) -> None:
 
 
 @in_place
-def _move(fleet: Fleet, own: Own, who: int, to_s: float, room: Room) -> None:
+def _move(fleet: Fleet, own: Own, who: int, to_s: float, room: AloneWorkspace) -> None:
     """Move a vehicle's filter to another time."""
     if abs(to_s - own.time_s[who]) < SAME_TIME_S:
         return
@@ -176,11 +176,11 @@ def _listen(
     fleet: Fleet,
     events: Events,
     event: int,
-    method: Method,
+    method: NeighbourRules,
     own: Own,
     past: Past,
     heard: Heard,
-    room: Room,
+    room: AloneWorkspace,
     log: Log,
 ) -> int:
     """Return the entry of the broadcast of a range's source in its slot.
@@ -247,7 +247,7 @@ def _tell(
     held: FloatArray,
     heard: Heard,
     entry: int,
-    room: Room,
+    room: AloneWorkspace,
 ) -> None:
     """Fill the message: place and clock, and their covariances.
 
@@ -277,7 +277,7 @@ def _tell(
 
 
 @in_place
-def _is_used(events: Events, event: int, method: Method, log: Log) -> bool:
+def _is_used(events: Events, event: int, method: NeighbourRules, log: Log) -> bool:
     """Tell whether a measurement is used: ranked filters hear only vehicles of higher rank."""
     if events.kind[event] != PEER or (method.algorithm != RANKED and method.algorithm != MODIFIED):
         return True
@@ -296,14 +296,14 @@ def _use(
     last: int,
     first: int,
     at_s: float,
-    method: Method,
+    method: NeighbourRules,
     own: Own,
     heard: Heard,
     entry: Int64Array,
     rejected: Int64Array,
     batch: Batch,
-    room: Room,
-    rows: Rows,
+    room: AloneWorkspace,
+    rows: LinearisedEvent,
     log: Log,
 ) -> None:
     """Use one receiver's measurements of a group, from ``start`` on, in one update."""
@@ -353,13 +353,13 @@ def _linearise(
     events: Events,
     event: int,
     by: int,
-    method: Method,
+    method: NeighbourRules,
     own: Own,
     heard: Heard,
     batch: Batch,
     at: int,
-    room: Room,
-    rows: Rows,
+    room: AloneWorkspace,
+    rows: LinearisedEvent,
     log: Log,
 ) -> int:
     """Put the rows of an event into the batch; return how many there are.
@@ -400,7 +400,7 @@ def _linearise(
 
 @in_place
 def _bring(
-    points: Points, events: Events, event: int, by: int, method: Method, heard: Heard, batch: Batch, to: int
+    points: Points, events: Events, event: int, by: int, method: NeighbourRules, heard: Heard, batch: Batch, to: int
 ) -> None:
     """Set the variance that the source adds, and the derivative by errors of uncertain points."""
     for c in range(batch.by_shared.shape[1]):
@@ -426,7 +426,7 @@ def _passes(
     fleet: Fleet,
     events: Events,
     row: int,
-    method: Method,
+    method: NeighbourRules,
     own: Own,
     rejected: Int64Array,
     batch: Batch,

@@ -50,7 +50,7 @@ class Heard(NamedTuple):
     slot: Int64Array  # (k,) slot of that broadcast; NO_SLOT: none
 
 
-class Method(NamedTuple):
+class NeighbourRules(NamedTuple):
     """Settings of how a filter uses its neighbours."""
 
     algorithm: int
@@ -73,7 +73,7 @@ class Batch(NamedTuple):
     brought: FloatArray  # variance that the source brings
 
 
-class Room(NamedTuple):
+class AloneWorkspace(NamedTuple):
     """Work arrays of the loop."""
 
     phi: FloatArray  # (n, n)

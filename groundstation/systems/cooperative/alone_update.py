@@ -10,11 +10,11 @@ from groundstation.systems.cooperative.alone_types import (
     EXACT,
     MODIFIED,
     NOBODY,
+    AloneWorkspace,
     Batch,
     Heard,
-    Method,
+    NeighbourRules,
     Own,
-    Room,
 )
 from groundstation.systems.cooperative.loop_types import (
     PEER,
@@ -101,11 +101,11 @@ def update(
     events: Events,
     who: int,
     count: int,
-    method: Method,
+    method: NeighbourRules,
     own: Own,
     heard: Heard,
     batch: Batch,
-    room: Room,
+    room: AloneWorkspace,
 ) -> None:
     """Run the Kalman update with the noise of the algorithm.
 
@@ -170,7 +170,9 @@ def _told_shared(row: int, c: int, heard: Heard, batch: Batch) -> float:
 
 
 @in_place
-def _common(events: Events, r: int, s: int, method: Method, heard: Heard, batch: Batch, cross: FloatArray) -> float:
+def _common(
+    events: Events, r: int, s: int, method: NeighbourRules, heard: Heard, batch: Batch, cross: FloatArray
+) -> float:
     """Return the covariance of the noise of two rows.
 
     It is all of it for two rows of one neighbour, else (modified) that through the points.
@@ -249,7 +251,7 @@ def _correct_shared(
     n: int,
     count: int,
     gain: FloatArray,
-    method: Method,
+    method: NeighbourRules,
     shared: FloatArray,
     heard: Heard,
     batch: Batch,
@@ -268,7 +270,7 @@ def _correct_shared(
 
 @in_place
 def split_update(
-    fleet: Fleet, who: int, row: int, method: Method, own: Own, heard: Heard, batch: Batch, room: Room
+    fleet: Fleet, who: int, row: int, method: NeighbourRules, own: Own, heard: Heard, batch: Batch, room: AloneWorkspace
 ) -> None:
     """Split covariance intersection with one row, see ``plain.split_covariance``.
 

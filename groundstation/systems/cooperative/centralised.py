@@ -23,7 +23,7 @@ import numpy as np
 
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.joint import Joint, work
-from groundstation.systems.cooperative.loop_types import POINT, SATELLITE, Rules
+from groundstation.systems.cooperative.loop_types import POINT, SATELLITE, LoopRules
 from groundstation.systems.cooperative.messages import report_bytes
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.timeline import SAME_TIME_S, timeline
@@ -46,7 +46,9 @@ def run_centralised(
     """
     together = settings.update == "simultaneous"
     items = timeline(prepared, settings, together=together)
-    rules = Rules(settings.gate_sigma, together, is_about_reckoning(prepared, settings), uses_measurements, innovates)
+    rules = LoopRules(
+        settings.gate_sigma, together, is_about_reckoning(prepared, settings), uses_measurements, innovates
+    )
     log = log_for(prepared, items)
     work(prepared.fleet, prepared.points, prepared.events, items, rules, _start(prepared), log)
     messages = reports(prepared, settings) if uses_measurements else {}

@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import BoolArray
-from groundstation.systems.cooperative.tracks import Track
+from groundstation.systems.cooperative.tracks import VehicleTrack
 from groundstation.tables.session import DeadReckoning, Odometry
 
 DIVERGED = 3.0  # horizontal error over the computed sigma_r
@@ -34,7 +34,7 @@ class Judgement:
         """RMS of the horizontal error over all epochs."""
         return float(np.sqrt(np.nanmean((self.error_m**2).sum(axis=1)))) if np.isfinite(self.error_m).any() else np.nan
 
-    def diverges(self, track: Track) -> bool:
+    def diverges(self, track: VehicleTrack) -> bool:
         """Tell whether the error of the session's last tenth exceeds three computed sigma_r.
 
         An error without a sigma counts as well.
@@ -47,7 +47,9 @@ class Judgement:
         return bool(len(ratio) and not np.sqrt(np.mean(ratio**2)) <= DIVERGED)  # no sigma is no number
 
 
-def judge(track: Track, vehicle: DeadReckoning | Odometry, time_s: FloatArray, position_m: FloatArray) -> Judgement:
+def judge(
+    track: VehicleTrack, vehicle: DeadReckoning | Odometry, time_s: FloatArray, position_m: FloatArray
+) -> Judgement:
     """Compare a track with the true positions of its vehicle (m, 3).
 
     The truth is interpolated to the epochs of the track, not over long gaps.

@@ -28,12 +28,12 @@ from groundstation.systems.cooperative.alone_types import (
     NOBODY,
     RANKED,
     SPLIT,
+    AloneWorkspace,
     Batch,
     Heard,
-    Method,
+    NeighbourRules,
     Own,
     Past,
-    Room,
 )
 from groundstation.systems.cooperative.error_map import blocks, spectral_radius, unit_rows, windows
 from groundstation.systems.cooperative.events import Prepared
@@ -68,7 +68,7 @@ def _work(
     fleet, unit = prepared.fleet, unit_rows(prepared.fleet, settings.map_window_s)
     variance = np.repeat(prepared.points.sigma_m[prepared.points.uncertain >= 0] ** 2, 2)
     ranks = np.array(prepared.ranks, dtype=np.int64)
-    method = Method(NUMBERS[algorithm], settings.gate_sigma, ranks, variance, WEIGHTS)
+    method = NeighbourRules(NUMBERS[algorithm], settings.gate_sigma, ranks, variance, WEIGHTS)
     own = _start(prepared, unit, len(variance))
     k, n, width = unit.shape
     past = _past(own, settings.latency_slots + 1)
@@ -166,8 +166,8 @@ def _batch(most: int, n: int, errors: int) -> Batch:
     )
 
 
-def _room(most: int, n: int, errors: int, width: int) -> Room:
-    return Room(
+def _room(most: int, n: int, errors: int, width: int) -> AloneWorkspace:
+    return AloneWorkspace(
         np.zeros((n, n)),
         np.zeros((n, n)),
         np.zeros((ROOMS, n, n)),

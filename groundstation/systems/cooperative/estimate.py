@@ -24,7 +24,7 @@ DEFAULT = "centralised"
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedRun:
     """One algorithm with its judgement; an empty tuple where no truth is known."""
 
     run: AlgorithmRun
@@ -97,15 +97,15 @@ def estimate_session(
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def _judged(prepared: Prepared, run: AlgorithmRun, truth: Truth) -> Judged:
+def _judged(prepared: Prepared, run: AlgorithmRun, truth: Truth) -> JudgedRun:
     judgements = []
     for track, vehicle in zip(run.tracks, prepared.session.vehicles, strict=True):
         known = truth.get(track.name)
         judgements.append(None if known is None or not len(track.time_s) else judge(track, vehicle, *known))
-    return Judged(run, tuple(judgements))
+    return JudgedRun(run, tuple(judgements))
 
 
-def _algorithm_row(prepared: Prepared, one: Judged, bound: AlgorithmRun, slots: int) -> AlgorithmRow:
+def _algorithm_row(prepared: Prepared, one: JudgedRun, bound: AlgorithmRun, slots: int) -> AlgorithmRow:
     run = one.run
     ends = [float(track.two_sigma_r_m[-1]) for track in run.tracks if len(track.time_s)]
     messages = sum(count for count, _ in run.messages.values())
@@ -143,7 +143,7 @@ def _mean_square_root(values: Sequence[float]) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def _vehicle_rows(prepared: Prepared, one: Judged) -> list[VehicleRow]:
+def _vehicle_rows(prepared: Prepared, one: JudgedRun) -> list[VehicleRow]:
     rows = []
     for track, vehicle, judgement in zip(one.run.tracks, prepared.vehicles, one.judgements, strict=True):
         if not len(track.time_s):
@@ -220,7 +220,7 @@ def _link_rows(prepared: Prepared, run: AlgorithmRun) -> tuple[LinkRow, ...]:
     return tuple(rows)
 
 
-def _findings(judged: Sequence[Judged], settings: CooperativeSettings) -> list[Finding]:
+def _findings(judged: Sequence[JudgedRun], settings: CooperativeSettings) -> list[Finding]:
     """Return findings about the runs themselves."""
     found = []
     for one in judged:

@@ -20,7 +20,7 @@ from groundstation.systems.cooperative.algorithms import run_algorithm
 from groundstation.systems.cooperative.events import prepare
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, SATELLITE, Events
 from groundstation.systems.cooperative.settings import CooperativeSettings
-from groundstation.systems.cooperative.tracks import AlgorithmRun, Track
+from groundstation.systems.cooperative.tracks import AlgorithmRun, VehicleTrack
 from groundstation.systems.cooperative.vehicles import Vehicle
 from groundstation.tables.session import DeadReckoning, Session
 
@@ -101,7 +101,7 @@ def _one(
     vehicle: Vehicle,
     heard: dict[int, dict[tuple[int, int, bytes], int]],
     events: Events,
-    tracks: tuple[Track, ...],
+    tracks: tuple[VehicleTrack, ...],
     index: int,
     settings: CooperativeSettings,
     session: Session,
@@ -136,7 +136,7 @@ def _det(matrix: FloatArray) -> float:
     return max(float(np.linalg.det(matrix)), 0.0)
 
 
-def _position_at(track: Track, time_s: float) -> FloatArray:
+def _position_at(track: VehicleTrack, time_s: float) -> FloatArray:
     """The position of the output nearest to a time."""
     return track.position_m[int(np.argmin(np.abs(track.time_s - time_s)))] if len(track.time_s) else np.full(3, np.nan)
 

@@ -20,10 +20,10 @@ from groundstation.systems.cooperative.loop_types import (
     Fleet,
     FloatArray,
     Items,
+    LinearisedEvent,
     Log,
+    LoopRules,
     Points,
-    Rows,
-    Rules,
     rows_for,
 )
 from groundstation.systems.cooperative.motion import place, position, step
@@ -47,7 +47,7 @@ class Joint(NamedTuple):
     rejected: Int64Array  # (k,) in a row
 
 
-class Room(NamedTuple):
+class JointWorkspace(NamedTuple):
     """Work arrays of the loop: N states in all, n of a vehicle at most."""
 
     x: FloatArray  # (2, n) receiver and source at the time of an event
@@ -79,7 +79,7 @@ class Lines(NamedTuple):
     variance: FloatArray
 
 
-def work(fleet: Fleet, points: Points, events: Events, items: Items, rules: Rules, joint: Joint, log: Log) -> None:
+def work(fleet: Fleet, points: Points, events: Events, items: Items, rules: LoopRules, joint: Joint, log: Log) -> None:
     """Work through a session."""
     size, n = len(joint.x), fleet.density.shape[1]
     most = int(np.max(items.last - items.first, initial=1))
@@ -93,8 +93,8 @@ def work(fleet: Fleet, points: Points, events: Events, items: Items, rules: Rule
     run_joint(fleet, points, events, items, rules, joint, _room(size, n), rows_for(n), lines, log)
 
 
-def _room(size: int, n: int) -> Room:
-    return Room(
+def _room(size: int, n: int) -> JointWorkspace:
+    return JointWorkspace(
         np.zeros((2, n)),
         np.zeros((2, n, n)),
         np.zeros((n, n)),
@@ -121,10 +121,10 @@ def run_joint(
     points: Points,
     events: Events,
     items: Items,
-    rules: Rules,
+    rules: LoopRules,
     joint: Joint,
-    room: Room,
-    rows: Rows,
+    room: JointWorkspace,
+    rows: LinearisedEvent,
     lines: Lines,
     log: Log,
 ) -> None:
@@ -171,7 +171,7 @@ def _is_behind(joint: Joint, who: int, to_s: float) -> bool:
 
 
 @in_place
-def _advance(fleet: Fleet, joint: Joint, who: int, to_s: float, room: Room) -> None:
+def _advance(fleet: Fleet, joint: Joint, who: int, to_s: float, room: JointWorkspace) -> None:
     """Move one vehicle's block on."""
     n, first = fleet.size[who], joint.first[who]
     x, phi, noise = room.x[0], room.phi[0], room.noise
@@ -199,7 +199,7 @@ def _advance(fleet: Fleet, joint: Joint, who: int, to_s: float, room: Room) -> N
 
 
 @inlined
-def _look_at(fleet: Fleet, joint: Joint, who: int, at_s: float, end: int, room: Room) -> bool:
+def _look_at(fleet: Fleet, joint: Joint, who: int, at_s: float, end: int, room: JointWorkspace) -> bool:
     """Fill the state of a vehicle at a time, its place, and the derivative by its state now.
 
     End 0 receives, 1 sends. Return whether the time is another than that of its state.
@@ -221,10 +221,10 @@ def _linearise(
     points: Points,
     events: Events,
     event: int,
-    rules: Rules,
+    rules: LoopRules,
     joint: Joint,
-    room: Room,
-    rows: Rows,
+    room: JointWorkspace,
+    rows: LinearisedEvent,
     lines: Lines,
     at: int,
 ) -> int:
@@ -304,7 +304,7 @@ def _put(n: int, h: FloatArray, is_back: bool, phi: FloatArray, first: int, line
 
 
 @in_place
-def _refer(fleet: Fleet, joint: Joint, who: int, source: int, arm_m: FloatArray, room: Room) -> None:
+def _refer(fleet: Fleet, joint: Joint, who: int, source: int, arm_m: FloatArray, room: JointWorkspace) -> None:
     """Fill the line between two aircraft about which their range is linearised.
 
     Its ends move when known to be wrong.
@@ -341,7 +341,7 @@ def _refer(fleet: Fleet, joint: Joint, who: int, source: int, arm_m: FloatArray,
 
 @inlined
 def _judge(
-    fleet: Fleet, events: Events, event: int, rules: Rules, joint: Joint, lines: Lines, at: int, log: Log
+    fleet: Fleet, events: Events, event: int, rules: LoopRules, joint: Joint, lines: Lines, at: int, log: Log
 ) -> bool:
     """Tell whether a row is inside the gate.
 
@@ -360,7 +360,7 @@ def _judge(
 
 
 @inlined
-def _correct(joint: Joint, room: Room, lines: Lines, at: int, innovation: float) -> None:
+def _correct(joint: Joint, room: JointWorkspace, lines: Lines, at: int, innovation: float) -> None:
     """Use one scalar measurement with the optimal gain, in the core's symmetric form."""
     size = len(joint.x)
     update_covariance(
@@ -386,10 +386,10 @@ def _use(
     events: Events,
     first: int,
     last: int,
-    rules: Rules,
+    rules: LoopRules,
     joint: Joint,
-    room: Room,
-    rows: Rows,
+    room: JointWorkspace,
+    rows: LinearisedEvent,
     lines: Lines,
     log: Log,
 ) -> None:

@@ -94,7 +94,7 @@ class Items(NamedTuple):
     last: Int64Array
 
 
-class Rules(NamedTuple):
+class LoopRules(NamedTuple):
     """Settings of the filters as numbers; see ``CooperativeSettings``."""
 
     gate_sigma: float
@@ -104,7 +104,7 @@ class Rules(NamedTuple):
     innovates: bool
 
 
-class Rows(NamedTuple):
+class LinearisedEvent(NamedTuple):
     """One event linearised, a range or a height; row 0 holds it.
 
     innovation = receiver + place + clock + noise. ``line`` is a work array.
@@ -118,9 +118,9 @@ class Rows(NamedTuple):
     line: FloatArray  # (3, 3)
 
 
-def rows_for(n: int) -> Rows:
+def rows_for(n: int) -> LinearisedEvent:
     """Make empty rows for one event."""
-    return Rows(np.zeros(1), np.zeros((1, n)), np.zeros((1, 3)), np.zeros(1), np.zeros(1), np.zeros((3, 3)))
+    return LinearisedEvent(np.zeros(1), np.zeros((1, n)), np.zeros((1, 3)), np.zeros(1), np.zeros(1), np.zeros((3, 3)))
 
 
 class Log(NamedTuple):

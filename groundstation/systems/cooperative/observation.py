@@ -7,7 +7,15 @@ import numpy as np
 
 from groundstation.base.compile import in_place
 from groundstation.base.geodesy import EARTH_RATE_RADPS
-from groundstation.systems.cooperative.loop_types import HEIGHT, POINT, SATELLITE, Events, Fleet, FloatArray, Rows
+from groundstation.systems.cooperative.loop_types import (
+    HEIGHT,
+    POINT,
+    SATELLITE,
+    Events,
+    Fleet,
+    FloatArray,
+    LinearisedEvent,
+)
 
 LIGHT_MPS = 299_792_458.0
 NEAREST_M = 1e-3  # a source on top of the receiver has no direction
@@ -25,7 +33,7 @@ def observe(
     source_clock_m: float,
     about_m: FloatArray,
     is_about: bool,
-    rows: Rows,
+    rows: LinearisedEvent,
 ) -> int:
     """Linearise one event about the receiver's state and what is known of the source.
 
@@ -44,7 +52,7 @@ def observe(
     about_m : ndarray, shape (3,)
         Where ``is_about``: line from the source to the receiver about which the range is linearised, value and
         direction; else that of the estimate.
-    rows : Rows
+    rows : LinearisedEvent
         Filled.
     """
     who = events.receiver[event]
@@ -82,7 +90,7 @@ def _range_row(
     source_clock_m: float,
     about_m: FloatArray,
     is_about: bool,
-    rows: Rows,
+    rows: LinearisedEvent,
 ) -> None:
     who, kind = events.receiver[event], events.kind[event]
     direction = rows.line[1]

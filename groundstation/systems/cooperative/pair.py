@@ -19,9 +19,9 @@ from groundstation.systems.cooperative.loop_types import (
     Fleet,
     FloatArray,
     Items,
+    LinearisedEvent,
     Log,
     Points,
-    Rows,
 )
 from groundstation.systems.cooperative.motion import place, position, step, turn_covariance, turn_rows
 from groundstation.systems.cooperative.observation import observe
@@ -42,7 +42,7 @@ class Members(NamedTuple):
     rejected: Int64Array  # (k,) in a row
 
 
-class Room(NamedTuple):
+class PairWorkspace(NamedTuple):
     """Work arrays of the loop."""
 
     phi: FloatArray  # (n, n)
@@ -59,9 +59,9 @@ class Room(NamedTuple):
     mixed: FloatArray  # (N,)
 
 
-def room_for(n: int, width: int) -> Room:
+def room_for(n: int, width: int) -> PairWorkspace:
     """Make work arrays for vehicles of n states and an error map of so many columns."""
-    return Room(
+    return PairWorkspace(
         np.zeros((n, n)),
         np.zeros((n, n)),
         np.zeros((ROOMS, n, n)),
@@ -87,8 +87,8 @@ def run_pairs(
     end: int,
     gate_sigma: float,
     members: Members,
-    room: Room,
-    rows: Rows,
+    room: PairWorkspace,
+    rows: LinearisedEvent,
     log: Log,
 ) -> None:
     """Work through the items ``begin`` to ``end``: one window of the error map."""
@@ -107,7 +107,7 @@ def run_pairs(
 
 
 @in_place
-def _advance(fleet: Fleet, members: Members, who: int, to_s: float, room: Room) -> None:
+def _advance(fleet: Fleet, members: Members, who: int, to_s: float, room: PairWorkspace) -> None:
     if to_s <= members.time_s[who] + SAME_TIME_S:
         return
     n = fleet.size[who]
@@ -122,7 +122,7 @@ def _advance(fleet: Fleet, members: Members, who: int, to_s: float, room: Room) 
 
 
 @in_place
-def _scale_factors(n: int, who: int, but: int, by: FloatArray, members: Members, room: Room) -> None:
+def _scale_factors(n: int, who: int, but: int, by: FloatArray, members: Members, room: PairWorkspace) -> None:
     """Multiply the factors of a vehicle towards all others but one by a matrix."""
     for other in range(len(members.time_s)):
         if other != but and members.has_factor[who, other]:
@@ -137,8 +137,8 @@ def _use(
     event: int,
     gate_sigma: float,
     members: Members,
-    room: Room,
-    rows: Rows,
+    room: PairWorkspace,
+    rows: LinearisedEvent,
     log: Log,
 ) -> None:
     """Use one measurement."""
@@ -158,7 +158,9 @@ def _use(
 
 
 @in_place
-def _observe(fleet: Fleet, events: Events, event: int, members: Members, room: Room, rows: Rows) -> int:
+def _observe(
+    fleet: Fleet, events: Events, event: int, members: Members, room: PairWorkspace, rows: LinearisedEvent
+) -> int:
     who, source, at_s, clock_m = events.receiver[event], events.source[event], events.time_s[event], 0.0
     place(fleet, who, at_s, room.reading[0], room.derivative[0])
     for axis in range(3):
@@ -202,8 +204,8 @@ def _private(
     event: int,
     gate_sigma: float,
     members: Members,
-    room: Room,
-    rows: Rows,
+    room: PairWorkspace,
+    rows: LinearisedEvent,
     log: Log,
 ) -> None:
     """Use a range to a point or satellite; no other vehicle is told."""
@@ -243,8 +245,8 @@ def _relative(
     event: int,
     gate_sigma: float,
     members: Members,
-    room: Room,
-    rows: Rows,
+    room: PairWorkspace,
+    rows: LinearisedEvent,
     log: Log,
 ) -> None:
     """Use a range between two vehicles: both are updated as one filter."""
@@ -296,7 +298,7 @@ def _join(fleet: Fleet, one: int, two: int, members: Members, both: FloatArray) 
 
 
 @in_place
-def _share(fleet: Fleet, one: int, two: int, innovation: float, members: Members, room: Room) -> None:
+def _share(fleet: Fleet, one: int, two: int, innovation: float, members: Members, room: PairWorkspace) -> None:
     """Give both vehicles their part of the update.
 
     Factors towards third ones are scaled by P(after) P(before)^-1.
@@ -335,7 +337,7 @@ def _share(fleet: Fleet, one: int, two: int, innovation: float, members: Members
 
 
 @in_place
-def _over(n: int, first: int, both: FloatArray, before: FloatArray, room: Room) -> None:
+def _over(n: int, first: int, both: FloatArray, before: FloatArray, room: PairWorkspace) -> None:
     """Fill ``room.phi`` with after before^-1, scaled by the sigmas.
 
     States differ by eight powers of ten.

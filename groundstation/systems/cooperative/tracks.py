@@ -22,7 +22,7 @@ from groundstation.systems.cooperative.motion import positions
 
 
 @dataclass(frozen=True)
-class Track:
+class VehicleTrack:
     """One vehicle under one algorithm.
 
     Parameters
@@ -74,7 +74,7 @@ class Track:
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedMeasurements:
     """Measurements as the filter judged them: innovation, sigma, used (1) or gated (-1).
 
     Parameters
@@ -106,9 +106,9 @@ class AlgorithmRun:
     Parameters
     ----------
     algorithm, update : str
-    tracks : tuple of Track
+    tracks : tuple of VehicleTrack
         In the order of the vehicles.
-    judged : Judged
+    judged : JudgedMeasurements
     counts : dict
         ``used``, ``gated``, ``lost``, ``unused``, ``clock_leaps``, ``reopened``.
     messages : dict of vehicle to (messages, bytes)
@@ -118,8 +118,8 @@ class AlgorithmRun:
 
     algorithm: str
     update: str
-    tracks: tuple[Track, ...]
-    judged: Judged
+    tracks: tuple[VehicleTrack, ...]
+    judged: JudgedMeasurements
     counts: dict[str, int]
     messages: dict[str, tuple[int, int]]
     map_time_s: FloatArray
@@ -168,7 +168,7 @@ def finished(
         algorithm,
         update,
         tuple(_track(prepared, items, log, who) for who in range(len(prepared.vehicles))),
-        Judged(log.event[:rows], log.innovation[:rows], np.sqrt(log.variance[:rows]), mark),
+        JudgedMeasurements(log.event[:rows], log.innovation[:rows], np.sqrt(log.variance[:rows]), mark),
         {name: count for name, count in counts.items() if count},
         messages,
         np.array(radius[0]),
@@ -176,14 +176,14 @@ def finished(
     )
 
 
-def _track(prepared: Prepared, items: Items, log: Log, who: int) -> Track:
+def _track(prepared: Prepared, items: Items, log: Log, who: int) -> VehicleTrack:
     vehicle, n = prepared.vehicles[who], prepared.vehicles[who].size
     mine = items.vehicle[items.vehicle >= 0] == who
     time_s = items.time_s[items.vehicle == who]
     state, covariance = log.x[mine][:, :n], log.P[mine][:, :n, :n]
     position_m = np.empty((len(time_s), 3))
     positions(prepared.fleet, who, time_s, np.ascontiguousarray(state), np.empty((3, n)), position_m)
-    return Track(vehicle.name, time_s, position_m, state, covariance, vehicle.height)
+    return VehicleTrack(vehicle.name, time_s, position_m, state, covariance, vehicle.height)
 
 
 def counted(prepared: Prepared, sent: Int64Array, size: int) -> dict[str, tuple[int, int]]:

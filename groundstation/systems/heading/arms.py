@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.methods.taxi.gating import NOT_TAXI
-from groundstation.methods.taxi.samples import Samples
+from groundstation.methods.taxi.samples import TaxiSamples
 from groundstation.methods.taxi_error.interval import Differences, Regressor, fixed_noise_estimate, misfit
 from groundstation.methods.taxi_error.priors import PRIOR_MEAN
 from groundstation.systems.heading.settings import HeadingSettings
@@ -52,12 +52,12 @@ class ArmKnowledge:
     is_offset_observable: bool
 
 
-def know_arm(samples: Samples, aircraft: AircraftData, settings: HeadingSettings) -> ArmKnowledge:
+def know_arm(samples: TaxiSamples, aircraft: AircraftData, settings: HeadingSettings) -> ArmKnowledge:
     """Arm and time offset from the aircraft file and the turns.
 
     Parameters
     ----------
-    samples : Samples
+    samples : TaxiSamples
         Gated, with the velocities of the antenna.
     """
     is_known = aircraft.antenna_arm_m is not None
@@ -80,7 +80,7 @@ def know_arm(samples: Samples, aircraft: AircraftData, settings: HeadingSettings
     )
 
 
-def _turning(samples: Samples, settings: HeadingSettings) -> NDArray[np.bool_]:
+def _turning(samples: TaxiSamples, settings: HeadingSettings) -> NDArray[np.bool_]:
     """Find moving epochs outside the straight samples that turn slowly enough.
 
     Their antenna moves sideways no faster than the method holds.
@@ -103,7 +103,7 @@ def _turning(samples: Samples, settings: HeadingSettings) -> NDArray[np.bool_]:
 
 
 def _from_turns(
-    samples: Samples, turning: NDArray[np.bool_], arm: tuple[float, float], settings: HeadingSettings
+    samples: TaxiSamples, turning: NDArray[np.bool_], arm: tuple[float, float], settings: HeadingSettings
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     difference = samples.difference_deg
     error = float(wrap_180(np.median(wrap_180(difference[samples.is_used] - difference[samples.is_used][0]))))
@@ -133,7 +133,7 @@ def _from_turns(
     )
 
 
-def straight_regressors(samples: Samples, knowledge: ArmKnowledge) -> tuple[Regressor, ...]:
+def straight_regressors(samples: TaxiSamples, knowledge: ArmKnowledge) -> tuple[Regressor, ...]:
     """Return regressors of the straight samples for the rest of arm and time offset.
 
     They tell what both may still do inside the gates. ``samples`` are the used ones, with ``applied_arm_m`` taken out.

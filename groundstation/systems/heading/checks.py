@@ -10,7 +10,7 @@ from groundstation.base.quantiles import NORMAL_95, chi_square_quantile
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.methods.intervals import effective_samples
 from groundstation.methods.moving_lines import fitted_lines, window_bounds
-from groundstation.methods.taxi.samples import Samples
+from groundstation.methods.taxi.samples import TaxiSamples
 from groundstation.systems.heading.answer import Standstill, TaxiSegment
 
 FloatArray = NDArray[np.float64]
@@ -67,7 +67,7 @@ def _variance_log_sigma(values: FloatArray) -> float:
 
 
 def variance_ratio(
-    used: Samples, difference_deg: FloatArray, standstill: Standstill | None, line_s: float
+    used: TaxiSamples, difference_deg: FloatArray, standstill: Standstill | None, line_s: float
 ) -> VarianceRatio | None:
     """Compare the variance of the differences with that of track plus heading.
 
@@ -75,7 +75,7 @@ def variance_ratio(
 
     Parameters
     ----------
-    used : Samples
+    used : TaxiSamples
         The used samples alone, arm taken out.
     difference_deg : ndarray, shape (n,)
         Their differences, what the wind makes in each direction taken off.
@@ -147,7 +147,7 @@ def disagreement(parts: tuple[TaxiSegment, ...], probability: float, wind_deg: F
     return Disagreement(float(off @ inverse @ off) / freedom, limit, told)
 
 
-def held_seconds(samples: Samples) -> float | None:
+def held_seconds(samples: TaxiSamples) -> float | None:
     """Return the time the INS turns while the receiver's track does not.
 
     None where the taxi has no turn. A receiver that holds its velocity goes on straight: what follows the turn is off

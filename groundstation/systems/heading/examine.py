@@ -4,7 +4,7 @@ from itertools import groupby
 
 import numpy as np
 
-from groundstation.methods.taxi.samples import HEADING_AND_VELOCITY, Samples
+from groundstation.methods.taxi.samples import HEADING_AND_VELOCITY, TaxiSamples
 from groundstation.results.roles import Delays
 from groundstation.systems.analysis import Shortfall
 from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings
@@ -57,14 +57,14 @@ def examine_heading(flight: Flight, known: Known, settings: HeadingSettings) -> 
     )
 
 
-def taxi_spans(samples: Samples) -> Spans:
+def taxi_spans(samples: TaxiSamples) -> Spans:
     """Flight seconds of the straight segments used."""
     used = np.flatnonzero(samples.is_used)
     runs = [list(rows) for _, rows in groupby(used, key=lambda row: samples.segment[row])]
     return tuple((float(samples.time_s[rows[0]]), float(samples.time_s[rows[-1]])) for rows in runs)
 
 
-def _unestimated(samples: Samples, taxi: Spans) -> Figures:
+def _unestimated(samples: TaxiSamples, taxi: Spans) -> Figures:
     """Figures of the gates without those that an estimate gives."""
     seconds = sum(end_s - start_s + samples.interval_s for start_s, end_s in taxi)
     nan = float("nan")

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.angles import wrap_180
-from groundstation.methods.taxi.samples import Samples
+from groundstation.methods.taxi.samples import TaxiSamples
 from groundstation.results.arrays.typed import joined
 from groundstation.results.figures import FigureData
 from groundstation.systems.heading.arrays import (
@@ -32,7 +32,7 @@ PAUSE_S = 30.0  # a longer one between epochs (a flight between ground runs) bre
 IN_PAUSE = "no ground run"
 
 
-def _moving_part(samples: Samples) -> slice:
+def _moving_part(samples: TaxiSamples) -> slice:
     moving = np.flatnonzero((samples.speed_mps > FIRST_MOTION_MPS) | samples.is_used)
     return slice(int(moving[0]), len(samples)) if len(moving) else slice(0, len(samples))
 
@@ -43,7 +43,7 @@ def _pauses(time_s: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
     return before, time_s[before] + (float(np.median(np.diff(time_s))) if len(before) else 0.0)
 
 
-def samples_figure(samples: Samples, error_deg: float, weight: FloatArray) -> HeadingSamples:
+def samples_figure(samples: TaxiSamples, error_deg: float, weight: FloatArray) -> HeadingSamples:
     """Return every epoch from first motion to lift-off, used or not and why.
 
     ``weight`` has mean 1 over the used samples.
@@ -68,7 +68,7 @@ def samples_figure(samples: Samples, error_deg: float, weight: FloatArray) -> He
     return found.with_breaks(before, time_s=break_s, gate=IN_PAUSE)
 
 
-def lanes_figure(samples: Samples) -> HeadingLanes:
+def lanes_figure(samples: TaxiSamples) -> HeadingLanes:
     """Runs of equal gate, from first motion on."""
     part = _moving_part(samples)
     before, break_s = _pauses(samples.time_s[part])
@@ -143,7 +143,7 @@ def distribution_figures(time_s: FloatArray, difference_deg: FloatArray, steps: 
     )
 
 
-def standstill_figures(samples: Samples, standstill: StandstillData) -> tuple[FigureData, ...]:
+def standstill_figures(samples: TaxiSamples, standstill: StandstillData) -> tuple[FigureData, ...]:
     """Return the velocity at standstill, and the density of the speed of its mean.
 
     The mean is over 10 s and 30 s.
@@ -160,7 +160,7 @@ def standstill_figures(samples: Samples, standstill: StandstillData) -> tuple[Fi
     return velocity, joined([_mean_speed_density(samples, standstill, window_s) for window_s in (10.0, 30.0)])
 
 
-def _mean_speed_density(samples: Samples, standstill: StandstillData, window_s: float) -> StandstillMeanSpeed:
+def _mean_speed_density(samples: TaxiSamples, standstill: StandstillData, window_s: float) -> StandstillMeanSpeed:
     """Return the histogram of the length of the mean velocity over windows.
 
     Windows overlap by three quarters.

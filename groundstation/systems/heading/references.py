@@ -12,7 +12,7 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.methods.ins_noise import class_names, load_class
 from groundstation.methods.intervals import effective_samples
-from groundstation.methods.taxi.samples import Samples
+from groundstation.methods.taxi.samples import TaxiSamples
 from groundstation.systems.heading.answer import HeadingResult, OnboardComparison, RunwayCheck
 from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.known import SiteData
@@ -180,7 +180,7 @@ def reference_findings(result: HeadingResult, flight_metadata: Mapping[str, str]
 
 
 def parking_heading(
-    samples: Samples,
+    samples: TaxiSamples,
     in_interval: NDArray[np.bool_],
     flight: Flight,
     site: SiteData,
@@ -218,7 +218,7 @@ def parking_heading(
 
 
 def runway_checks(
-    samples: Samples, site: SiteData, error_deg: float, sigma_deg: float, settings: HeadingSettings
+    samples: TaxiSamples, site: SiteData, error_deg: float, sigma_deg: float, settings: HeadingSettings
 ) -> tuple[RunwayCheck, ...]:
     """Compare the INS heading on the take-off run with the true bearing of the runway.
 

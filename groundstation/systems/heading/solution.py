@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import mean_heading, wrap_180, wrap_360
 from groundstation.base.records import BoolArray
-from groundstation.methods.taxi.samples import Samples, take_samples, without_arm
+from groundstation.methods.taxi.samples import TaxiSamples, take_samples, without_arm
 from groundstation.methods.taxi_error.interval import (
     Differences,
     Regressor,
@@ -45,7 +45,7 @@ class Solution:
 
     Parameters
     ----------
-    samples, used : Samples
+    samples, used : TaxiSamples
         All and the used ones, the applied arm taken out.
     differences : Differences
         Of the used samples, without a jump at +-180 deg, the mean sideslip of a known wind taken off.
@@ -76,8 +76,8 @@ class Solution:
         Mean of the unit vectors of motion, by those weights: a wind's part across it is what the sideslip is made by.
     """
 
-    samples: Samples
-    used: Samples
+    samples: TaxiSamples
+    used: TaxiSamples
     differences: Differences
     posterior: ErrorPosterior
     without_wind_deg: FloatArray
@@ -105,7 +105,7 @@ def _centred(difference_deg: FloatArray) -> FloatArray:
 
 
 def _differences(
-    used: Samples, knowledge: ArmKnowledge, steady: SteadyPrior, steps: tuple[HeadingStep, ...]
+    used: TaxiSamples, knowledge: ArmKnowledge, steady: SteadyPrior, steps: tuple[HeadingStep, ...]
 ) -> Differences:
     difference = _centred(used.difference_deg)
     direction = wrap_360(used.heading_deg - np.median(difference))
@@ -120,7 +120,7 @@ def _differences(
     )
 
 
-def _before(used: Samples, steps: tuple[HeadingStep, ...]) -> tuple[Regressor, ...]:
+def _before(used: TaxiSamples, steps: tuple[HeadingStep, ...]) -> tuple[Regressor, ...]:
     """Return regressors of the steps in the heading, 1 before each step.
 
     The error is that after the last step; differences before a step are smaller by its size. Of more than
@@ -143,7 +143,7 @@ def _before(used: Samples, steps: tuple[HeadingStep, ...]) -> tuple[Regressor, .
 
 
 def solve(
-    antenna: Samples,
+    antenna: TaxiSamples,
     standstill: StandstillData,
     aircraft: AircraftData,
     settings: HeadingSettings,
@@ -207,7 +207,7 @@ def _part(differences: Differences, index: slice | BoolArray) -> Differences:
 
 
 def _velocities(
-    antenna: Samples, standstill: StandstillData, taxi_start_s: float, settings: HeadingSettings
+    antenna: TaxiSamples, standstill: StandstillData, taxi_start_s: float, settings: HeadingSettings
 ) -> StandstillVelocities:
     """Return the standstill velocities for the noise model.
 
@@ -238,7 +238,7 @@ def _drift(differences: Differences, reference_time_s: float, draws: FloatArray)
     return float(mean[-1]) * 3600.0, float(sigma[-1]) * 3600.0
 
 
-def _segment(differences: Differences, used: Samples, mask: BoolArray, draws: FloatArray) -> TaxiSegment:
+def _segment(differences: Differences, used: TaxiSamples, mask: BoolArray, draws: FloatArray) -> TaxiSegment:
     mean, sigma = fixed_noise_estimate(without_apart(_part(differences, mask)), draws)
     return TaxiSegment(
         start_s=float(used.time_s[mask][0]),
@@ -253,7 +253,7 @@ def _segment(differences: Differences, used: Samples, mask: BoolArray, draws: Fl
 
 def _parts(
     differences: Differences,
-    used: Samples,
+    used: TaxiSamples,
     segments: tuple[TaxiSegment, ...],
     draws: FloatArray,
     longest_s: float,
@@ -298,7 +298,7 @@ def _wind_of(parts: tuple[TaxiSegment, ...], differences: Differences) -> FloatA
 
 
 def _directions(
-    differences: Differences, used: Samples, segments: tuple[TaxiSegment, ...], draws: FloatArray
+    differences: Differences, used: TaxiSamples, segments: tuple[TaxiSegment, ...], draws: FloatArray
 ) -> tuple[TaxiSegment, ...]:
     """Estimate the error out and back; empty if the taxi went one way.
 

@@ -10,7 +10,7 @@ from groundstation.base.quantiles import length_quantile
 from groundstation.base.records import BoolArray
 from groundstation.methods.intervals import effective_samples
 from groundstation.methods.moving_lines import window_bounds
-from groundstation.methods.taxi.samples import Samples
+from groundstation.methods.taxi.samples import TaxiSamples
 from groundstation.systems.heading.answer import Standstill
 from groundstation.systems.heading.settings import HeadingSettings
 
@@ -42,7 +42,7 @@ class StandstillData:
     stretches: tuple[tuple[int, int], ...]
     is_informative: bool
 
-    def start_s(self, samples: Samples) -> float:
+    def start_s(self, samples: TaxiSamples) -> float:
         """Start of the interval assessed; without one, of the used samples."""
         return float(samples.time_s[self.in_interval if self.in_interval.any() else samples.is_used][0])
 
@@ -53,7 +53,7 @@ def _moving_mean(time_s: FloatArray, values: FloatArray, window_s: float) -> Flo
     return np.asarray((total[high] - total[low]) / (high - low))
 
 
-def find_standstill(samples: Samples, settings: HeadingSettings) -> StandstillData:
+def find_standstill(samples: TaxiSamples, settings: HeadingSettings) -> StandstillData:
     """Find the standstill before the first straight taxi, and assess its last 10 to 30 s.
 
     At standstill: ground contact proven where anything proves it, length of the 1-s mean velocity within the limit, INS
@@ -97,7 +97,7 @@ def find_standstill(samples: Samples, settings: HeadingSettings) -> StandstillDa
 
 
 def _last_long(
-    samples: Samples, stretches: tuple[tuple[int, int], ...], before: int, settings: HeadingSettings
+    samples: TaxiSamples, stretches: tuple[tuple[int, int], ...], before: int, settings: HeadingSettings
 ) -> slice | None:
     """The last ``standstill_max_s`` of the last stretch long enough that ends before an epoch."""
     for first, end in reversed(stretches):
@@ -114,7 +114,7 @@ def _is_heading_still(heading_deg: FloatArray, settings: HeadingSettings) -> boo
     return bool(len(known)) and float(np.ptp(unwrap(known))) <= settings.standstill_still_deg
 
 
-def _stretches(samples: Samples, still: BoolArray, settings: HeadingSettings) -> tuple[tuple[int, int], ...]:
+def _stretches(samples: TaxiSamples, still: BoolArray, settings: HeadingSettings) -> tuple[tuple[int, int], ...]:
     gap = np.concatenate([[False], np.diff(samples.time_s) > max(settings.gnss_gap_max_s, 2.5 * samples.interval_s)])
     found = []
     start = None
@@ -133,7 +133,7 @@ def _stretches(samples: Samples, still: BoolArray, settings: HeadingSettings) ->
     return tuple(found)
 
 
-def _is_informative(samples: Samples, still: BoolArray) -> bool:
+def _is_informative(samples: TaxiSamples, still: BoolArray) -> bool:
     """Tell whether the velocity says anything at standstill.
 
     A receiver that holds its velocity repeats itself; one with coarse steps has few distinct values.
@@ -156,7 +156,7 @@ def speed_bound_mps(length_mps: float, sigma_mps: float) -> float:
     return length_quantile(PROBABILITY, length_mps, sigma_mps)
 
 
-def assess_standstill(samples: Samples, part: slice, settings: HeadingSettings) -> Standstill:
+def assess_standstill(samples: TaxiSamples, part: slice, settings: HeadingSettings) -> Standstill:
     """Return mean and spread of the velocity over one interval.
 
     Both readings of the paper's mean speed are given.

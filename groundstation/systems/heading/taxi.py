@@ -5,7 +5,7 @@ import numpy as np
 from groundstation.base.errors import NotAssessableError
 from groundstation.methods.taxi.delay import KnownDelay, known_delay
 from groundstation.methods.taxi.gating import gate_samples
-from groundstation.methods.taxi.samples import HeadingOf, OnGround, Samples, pair_samples
+from groundstation.methods.taxi.samples import HeadingOf, OnGround, TaxiSamples, pair_samples
 from groundstation.results.roles import Delays
 from groundstation.systems.heading.settings import HeadingRequest, HeadingSettings
 from groundstation.systems.known import AircraftData
@@ -24,7 +24,7 @@ def straight_taxi(
     heading: HeadingOf | None = None,
     phases: Phases | None = None,
     gnss_latency_s: float = 0.0,
-) -> Samples:
+) -> TaxiSamples:
     """Pair GNSS epochs with the INS heading and say which are used.
 
     Used are those before take-off, all where these are too few.
@@ -35,7 +35,7 @@ def straight_taxi(
         When fewer than two are used, with the reason.
     """
 
-    def gated(with_later_runs: bool) -> Samples:
+    def gated(with_later_runs: bool) -> TaxiSamples:
         paired = pair_samples(
             *(flight, ins_topic, gnss_topic),
             settings=settings,
@@ -68,7 +68,7 @@ def delay_of(
     return known_delay(pair, found, aircraft.gnss_latency_s, aircraft.gnss_latency_sigma_s)
 
 
-def _refuse_too_little(samples: Samples, settings: HeadingSettings) -> None:
+def _refuse_too_little(samples: TaxiSamples, settings: HeadingSettings) -> None:
     """Refuse an estimate with next to no straight taxi before take-off."""
     is_wanted = samples.is_used if settings.runs == "all_ground" else samples.is_used & ~samples.is_after_lift_off
     seconds, later = (float(np.sum(mask)) * samples.interval_s for mask in (is_wanted, samples.is_used & ~is_wanted))
@@ -80,7 +80,7 @@ def _refuse_too_little(samples: Samples, settings: HeadingSettings) -> None:
     raise NotAssessableError("heading", f"{text} ({later:.0f} s after the flight do not count)" if later else text)
 
 
-def _why_nothing_is_used(samples: Samples, settings: HeadingSettings) -> str:
+def _why_nothing_is_used(samples: TaxiSamples, settings: HeadingSettings) -> str:
     limit = settings.taxi_speed_min_mps
     highest = float(np.max(samples.speed_mps)) if len(samples) else 0.0
     if not np.isfinite(samples.heading_deg).any():

@@ -8,7 +8,7 @@ import numpy as np
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.units import ARCMIN_PER_DEG
 from groundstation.methods.taxi.gating import NOT_TAXI, is_straight_and_fast
-from groundstation.methods.taxi.samples import VELOCITY_SIGMA, Samples
+from groundstation.methods.taxi.samples import VELOCITY_SIGMA, TaxiSamples
 from groundstation.results.gates import Bound, Gate, judged_gate
 from groundstation.results.rules import Rejudged
 from groundstation.systems.heading.answer import HeadingResult, HeadingStep, Standstill, Verdict
@@ -99,7 +99,7 @@ def _required_by(settings: HeadingSettings) -> dict[str, bool]:
 
 
 def build_gates(
-    samples: Samples, standstill: Standstill | None, figures: Figures, settings: HeadingSettings
+    samples: TaxiSamples, standstill: Standstill | None, figures: Figures, settings: HeadingSettings
 ) -> tuple[Gate, ...]:
     """Build every gate of the method in the order of the paper.
 
@@ -117,7 +117,7 @@ def build_gates(
 
 
 def _throughout_gates(
-    samples: Samples, figures: Figures, settings: HeadingSettings, bounds: Bounds
+    samples: TaxiSamples, figures: Figures, settings: HeadingSettings, bounds: Bounds
 ) -> tuple[Gate, ...]:
     judged = is_straight_and_fast(samples, settings) & np.isin(
         samples.gate, ["used", "geometry", "integrity", "outlier"]
@@ -199,7 +199,7 @@ def _standstill_gates(standstill: Standstill | None, bounds: Bounds) -> tuple[Ga
     )
 
 
-def _taxi_gates(samples: Samples, figures: Figures, settings: HeadingSettings, bounds: Bounds) -> tuple[Gate, ...]:
+def _taxi_gates(samples: TaxiSamples, figures: Figures, settings: HeadingSettings, bounds: Bounds) -> tuple[Gate, ...]:
     outliers, used = int(np.sum(samples.gate == "outlier")), int(samples.is_used.sum())
     later = int(samples.is_after_lift_off[samples.is_used].sum())
     run = is_straight_and_fast(samples, settings) & np.isin(samples.gate, NOT_TAXI)

@@ -15,7 +15,7 @@ from groundstation.methods.ins_noise import RADPS_PER_DPH
 from groundstation.methods.intervals import BOUND95
 from groundstation.results.roles import AzimuthEstimate, EarlyAzimuth
 from groundstation.systems.inertial.differences import Differences
-from groundstation.systems.inertial.filter import Epochs, FilterRun, run_filter
+from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, run_filter
 from groundstation.systems.inertial.model import VELOCITY, FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.velocity_changes import (
@@ -203,7 +203,9 @@ def _refused(changes: int, largest: float, reason: str) -> AzimuthEstimate:
     return AzimuthEstimate(False, None, None, changes, largest, reason)
 
 
-def _without_azimuth(differences: Differences, parameters: FloatArray, reference_s: float, known: BoolArray) -> Epochs:
+def _without_azimuth(
+    differences: Differences, parameters: FloatArray, reference_s: float, known: BoolArray
+) -> DifferenceEpochs:
     """Return the velocity differences less the effect of an azimuth error on the velocity.
 
     Positions are left out.
@@ -212,7 +214,7 @@ def _without_azimuth(differences: Differences, parameters: FloatArray, reference
     azimuth_rad = parameters[AZIMUTH] + parameters[AZIMUTH_DRIFT] * (epochs.time_s - reference_s)
     velocity = epochs.velocity_mps - azimuth_rad[:, None] * turned(differences.velocity_mps)
     velocity = np.where(known[:, None], velocity, np.nan)
-    return Epochs(epochs.time_s, np.full_like(velocity, np.nan), velocity, epochs.drag_per_s, epochs.is_reset)
+    return DifferenceEpochs(epochs.time_s, np.full_like(velocity, np.nan), velocity, epochs.drag_per_s, epochs.is_reset)
 
 
 def _unpredicted(run: FilterRun, changes: Changes) -> tuple[FloatArray, FloatArray]:

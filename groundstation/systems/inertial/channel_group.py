@@ -22,7 +22,7 @@ KINDS = np.array([POSITION, VELOCITY])
 
 
 @dataclass(frozen=True)
-class Part:
+class GroupRun:
     """Run of the channels of a group, with its steps and the seams that widened some of them.
 
     ``mark`` (n, 2): rejected -1, absent 0, used 1; rejected too what was odd at a seam and not shown to the filter.
@@ -80,7 +80,7 @@ class ChannelGroup:
     gate: float
     start: kalman.Start
 
-    def run_over_seams(self, steps: Steps) -> Part:
+    def run_over_seams(self, steps: Steps) -> GroupRun:
         """Run the filter, and widen outages after which GNSS is beyond the gate yet consistent.
 
         Each seam is judged by what was known at
@@ -94,13 +94,13 @@ class ChannelGroup:
                 part = self._part(steps.widened(seams), seams)
         return part
 
-    def _part(self, steps: Steps, seams: tuple[Seam, ...]) -> Part:
+    def _part(self, steps: Steps, seams: tuple[Seam, ...]) -> GroupRun:
         odd = np.zeros(len(self.time_s), dtype=bool)
         for seam in seams:
             odd[seam.first : seam.back] = True
         run = self._run(steps, np.where(odd[:, None, None], np.nan, self.measured))
         is_rejected = odd[:, None] & np.isfinite(self.measured).all(axis=2)
-        return Part(run, np.where(is_rejected, np.int8(REJECTED), run.mark.reshape(-1, 2)), steps, seams)
+        return GroupRun(run, np.where(is_rejected, np.int8(REJECTED), run.mark.reshape(-1, 2)), steps, seams)
 
     def _run(self, steps: Steps, z: FloatArray) -> kalman.FilterRun:
         """Run over the steps: two rows, position and velocity, at every epoch."""
@@ -115,13 +115,13 @@ class ChannelGroup:
             step,
             kalman.Measurements(np.repeat(np.arange(n), 2), z.reshape(2 * n, channels), np.tile(both, n), lines),
             self.start,
-            gate=kalman.Gate(float(np.sqrt(self.gate)), self.patience, is_by_innovation=True),
+            gate=kalman.InnovationGate(float(np.sqrt(self.gate)), self.patience, is_by_innovation=True),
             jump=np.where(self.is_reset, 0, NO_STEP),
             jumps=opened,
             drive=self.drive,
         )
 
-    def _seam_at(self, part: Part, back: int) -> Seam | None:
+    def _seam_at(self, part: GroupRun, back: int) -> Seam | None:
         """Return the seam at a return of GNSS, or None.
 
         None where the gate let it pass, fixes disagree, or no factor explains them.

@@ -8,7 +8,7 @@ from groundstation.base.records import frozen
 from groundstation.methods.ins_noise import InsNoise
 from groundstation.methods.kalman.arrays import USED
 from groundstation.systems.inertial.differences import mean_in
-from groundstation.systems.inertial.filter import Epochs, FilterRun
+from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun
 from groundstation.systems.inertial.model import FloatArray
 
 COARSE_S = 10.0  # a Schuler period has 500 of them
@@ -22,7 +22,7 @@ class Coarse:
     ----------
     flown : FilterRun
         The flight's own filter over its own epochs; what it rejected is in no mean.
-    epochs : Epochs
+    epochs : DifferenceEpochs
         Each at the mean time of the samples that measured; a reset of the INS begins one.
     begin_s, end_s : ndarrays, shape (n,)
         Times of the first and the last sample in each.
@@ -31,7 +31,7 @@ class Coarse:
     """
 
     flown: FilterRun
-    epochs: Epochs
+    epochs: DifferenceEpochs
     begin_s: FloatArray
     end_s: FloatArray
     samples: float
@@ -59,14 +59,14 @@ class Coarse:
         count = np.bincount(interval[measures[0] | measures[1]], minlength=bins)
         samples = float(np.median(count[count > 0])) if count.any() else 1.0
         first, last = (np.searchsorted(interval, np.arange(bins), side=side) for side in ("left", "right"))
-        means = Epochs(time_s, position, velocity, drag.reshape(-1, 2, 2), is_reset)
+        means = DifferenceEpochs(time_s, position, velocity, drag.reshape(-1, 2, 2), is_reset)
         return cls(run, means, epochs.time_s[first], epochs.time_s[last - 1], samples)
 
     def noise(self, noise: InsNoise) -> InsNoise:
         """A class's noise for these epochs: the white part of GNSS falls in a mean."""
         return replace(noise, gnss=noise.gnss.averaged(self.samples))
 
-    def blinded(self, epoch: int, begin_s: float, end_s: float, behind_s: float) -> Epochs:
+    def blinded(self, epoch: int, begin_s: float, end_s: float, behind_s: float) -> DifferenceEpochs:
         """Return epochs from one of the flight to a time behind a gap without measurements.
 
         The first epoch is included.
@@ -80,4 +80,4 @@ class Coarse:
         ]
         columns[1:3] = [np.where(is_blind, np.nan, part) for part in columns[1:3]]
         columns[4][0] = False
-        return Epochs(*columns)
+        return DifferenceEpochs(*columns)

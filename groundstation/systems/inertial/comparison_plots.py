@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.chapters.plots.common import has_values, label, positive
-from groundstation.chapters.plots.comparison import Compared, Overlay, Side, TimeLine, overlaid
+from groundstation.chapters.plots.comparison import Compared, Overlay, PlottedSide, TimeLine, overlaid
 from groundstation.plots.marks import Curve, Dash, Emphasis
 from groundstation.plots.plot import Axis, Panel, Plot, one_panel
 from groundstation.systems.inertial.arrays import InertialStates, InertialTrack
@@ -33,7 +33,7 @@ def _east_velocity(data: InertialStates) -> TimeLine:
     return TimeLine(data.time_s, data.east.velocity_mps, NORMAL_95 * data.east.velocity_sigma_mps)
 
 
-def growth(sides: Sequence[Side]) -> Plot | None:
+def growth(sides: Sequence[PlottedSide]) -> Plot | None:
     """Return the RMS of the forecast by horizon, the shipped method and the INS without one."""
     marks = []
     for side in sides:
@@ -59,7 +59,7 @@ def growth(sides: Sequence[Side]) -> Plot | None:
     )
 
 
-def _default_method(side: Side) -> str:
+def _default_method(side: PlottedSide) -> str:
     forecast = side.flight.results.answer(ForecastResult)
     return "" if forecast is None else forecast.default_method
 

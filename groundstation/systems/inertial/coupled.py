@@ -25,7 +25,7 @@ from groundstation.methods.kalman.transition import Transition
 from groundstation.systems.inertial.channel_group import RESET_POSITION_M, RESET_VELOCITY_MPS
 from groundstation.systems.inertial.craft_motion import CraftMotion, latitude_rad, radii_m, rates_radps
 from groundstation.systems.inertial.differences import Differences, only_used
-from groundstation.systems.inertial.filter import Epochs, measurement_variances, patience_of
+from groundstation.systems.inertial.filter import DifferenceEpochs, measurement_variances, patience_of
 from groundstation.systems.inertial.model import POSITION, VELOCITY, FloatArray
 from groundstation.systems.inertial.seams import Fixes, fixes_since, returns_of
 from groundstation.systems.inertial.settings import InertialSettings
@@ -56,7 +56,7 @@ COLUMNS = np.array([column for _, column in PATTERN], dtype=np.int64)
 RATES = Rates(SIZE, ROWS, COLUMNS)
 LONGEST_STEP_S = 10.0  # (Earth and Schuler rate x step)^5 / 120: below 1e-10 of the state
 AT_ONCE = 4096  # epochs whose transitions are held in memory, 3 MB
-KEPT = kalman.Kept(gains=False, variances=True, judged=True)
+KEPT = kalman.KeptArrays(gains=False, variances=True, judged=True)
 EVERY = 10  # epochs from one covariance that is kept to the next
 
 
@@ -95,7 +95,7 @@ class CoupledRun:
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     @property
-    def epochs(self) -> Epochs:
+    def epochs(self) -> DifferenceEpochs:
         """The epochs it ran over."""
         return self.differences.epochs
 
@@ -174,7 +174,7 @@ def run_coupled(
     reset = np.zeros(SIZE)
     reset[CHANNELS[:, [POSITION, VELOCITY]]] = _opened_variances(noise, epochs)
     opened = np.where(np.isin(np.arange(SIZE), CHANNELS[:, POSITION]), 0.0, reset)
-    gate = kalman.Gate(settings.gate_sigmas, patience_of(epochs), opened, is_by_innovation=True)
+    gate = kalman.InnovationGate(settings.gate_sigmas, patience_of(epochs), opened, is_by_innovation=True)
     lines, z = lines_of(epochs, noise), np.stack([epochs.position_m, epochs.velocity_mps], axis=1).reshape(-1, 4)
     parts, start, odd = [], kalman.Start(np.zeros(SIZE), covariance), np.zeros(n, dtype=bool)
     returns = returns_of(epochs.time_s, epochs.has_gnss)
@@ -233,7 +233,7 @@ class _Stretch:
 def _seam_at(
     back: int,
     start: kalman.Start,
-    epochs: Epochs,
+    epochs: DifferenceEpochs,
     values: FloatArray,
     interval_s: FloatArray,
     densities: FloatArray,
@@ -250,7 +250,7 @@ def _seam_at(
     use, rows = slice(back, int(fixes[-1]) + 1), fixes - back
     stretch = _Stretch.over(values[use], interval_s[use], densities, is_first=back == 0)
     unseen = kalman.Measurements(np.zeros(0, np.int64), np.zeros((0, 1)), np.zeros(0, np.int64), lines)
-    ahead = kalman.run_filter(stretch.transition, stretch.step, unseen, start, kept=kalman.Kept(gains=False))
+    ahead = kalman.run_filter(stretch.transition, stretch.step, unseen, start, kept=kalman.KeptArrays(gains=False))
     at, states = stretch.last[rows], CHANNELS[:, [POSITION, VELOCITY]].T.ravel()
     measured = np.stack([epochs.position_m[fixes], epochs.velocity_mps[fixes]], axis=1)
     predicted, covariance = ahead.x[at][:, states, 0].reshape(-1, 2, 2), ahead.P[at][:, states][:, :, states]
@@ -266,7 +266,7 @@ def _at_epochs(run: kalman.FilterRun, last: Int64Array) -> tuple[FloatArray, Flo
     return run.x[last, :, 0], run.record.variance[last]
 
 
-def lines_of(epochs: Epochs, noise: InsNoise) -> Lines:
+def lines_of(epochs: DifferenceEpochs, noise: InsNoise) -> Lines:
     """Position north and east, velocity north and east; the two of a kind are judged together."""
     weighted, believed = measurement_variances(epochs, noise)
     states = CHANNELS[:, [POSITION, VELOCITY]].T.ravel()
@@ -276,7 +276,7 @@ def lines_of(epochs: Epochs, noise: InsNoise) -> Lines:
 
 
 def noise_of(
-    noise: InsNoise, differences: Differences, epochs: Epochs, heading_rad: float
+    noise: InsNoise, differences: Differences, epochs: DifferenceEpochs, heading_rad: float
 ) -> tuple[FloatArray, FloatArray]:
     """Covariance at the start, shape (16, 16), and densities (16,).
 
@@ -299,7 +299,7 @@ def noise_of(
     return covariance, np.array([*density, *density, walk, 0.0, 0.0, 0.0])
 
 
-def _opened_variances(noise: InsNoise, epochs: Epochs) -> FloatArray:
+def _opened_variances(noise: InsNoise, epochs: DifferenceEpochs) -> FloatArray:
     """Variances of a position and a velocity error of which nothing is known, shape (2,).
 
     The class's for the position where GNSS never measures it: it enters the Earth rate, and an unknown one of tens of

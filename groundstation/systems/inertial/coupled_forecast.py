@@ -75,7 +75,7 @@ def coupled_variance(run: CoupledRun, at: Int64Array, lead_s: FloatArray) -> Flo
     _, densities = noise_of(run.noise, run.differences, run.epochs, 0.0)
     seconds, nothing = np.full(len(elapsed) - 1, step_s), lines_of(run.epochs, run.noise)
     unseen = kalman.Measurements(np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0, np.int64), nothing)
-    kept = kalman.Kept(states=False, covariances=False, gains=False, variances=True)
+    kept = kalman.KeptArrays(states=False, covariances=False, gains=False, variances=True)
     for index, epoch in enumerate(at):
         values = _values_along(run, float(run.epochs.time_s[epoch]), elapsed)
         start = np.array(run.P[epoch // run.every])

@@ -12,7 +12,7 @@ from groundstation.base.geodesy import curvature_radii_m, on_earth
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.inertial import screening
-from groundstation.systems.inertial.filter import Epochs
+from groundstation.systems.inertial.filter import DifferenceEpochs
 from groundstation.systems.inertial.model import FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.tables.gaps import seconds_covered
@@ -39,7 +39,7 @@ class Differences:
     Parameters
     ----------
     ins_topic, gnss_topic : str
-    epochs : Epochs, n of them
+    epochs : DifferenceEpochs, n of them
     latitude_deg, longitude_deg, altitude_m : ndarrays, shape (n,)
         Of the INS; NaN where unknown.
     velocity_mps : ndarray, shape (n, 2)
@@ -54,7 +54,7 @@ class Differences:
 
     ins_topic: str
     gnss_topic: str
-    epochs: Epochs
+    epochs: DifferenceEpochs
     latitude_deg: FloatArray
     longitude_deg: FloatArray
     altitude_m: FloatArray
@@ -146,7 +146,7 @@ def differences(
     )
     latitude, longitude = on_earth(at.values("latitude_deg"), at.values("longitude_deg"))
     ins_velocity = np.stack([at.values(name) for name in VELOCITY_FIELDS], axis=1)
-    epochs = Epochs(
+    epochs = DifferenceEpochs(
         time_s,
         columns[:, 0:2],
         columns[:, 2:4],
@@ -176,7 +176,7 @@ def drag_per_s(latitude_deg: FloatArray, altitude_m: FloatArray, velocity_mps: F
     return np.nan_to_num(out)
 
 
-def only_used(epochs: Epochs, settings: InertialSettings) -> Epochs:
+def only_used(epochs: DifferenceEpochs, settings: InertialSettings) -> DifferenceEpochs:
     """Return the epochs without what the settings keep from the filter."""
     position = epochs.position_m if settings.use_position else np.full_like(epochs.position_m, np.nan)
     velocity = epochs.velocity_mps if settings.use_velocity else np.full_like(epochs.velocity_mps, np.nan)

@@ -18,7 +18,7 @@ from groundstation.systems.inertial.azimuth import estimate_azimuth
 from groundstation.systems.inertial.coupled import CoupledRun
 from groundstation.systems.inertial.differences import Differences, differences, only_used
 from groundstation.systems.inertial.filter import (
-    Epochs,
+    DifferenceEpochs,
     FilterRun,
     Smoothed,
     initial_of,
@@ -258,7 +258,7 @@ def _channel(run: FilterRun, visible: FloatArray, channel: int) -> ChannelResult
 Rates = tuple[float, float, float] | tuple[None, None, None]
 
 
-def _radial_rates(epochs: Epochs, radial_m: FloatArray, start_s: float | None) -> Rates:
+def _radial_rates(epochs: DifferenceEpochs, radial_m: FloatArray, start_s: float | None) -> Rates:
     """Return the radial error rate, nmi/h: median, 95 %, and the fit.
 
     It is over the time since navigation began or the INS was last reset. Median and 95 % over epochs later than ten

@@ -12,7 +12,7 @@ from groundstation.methods.ins_noise import InsNoise
 from groundstation.methods.kalman import filter as kalman
 from groundstation.methods.kalman import smoother
 from groundstation.methods.kalman.arrays import REJECTED, Drive
-from groundstation.systems.inertial.channel_group import ChannelGroup, Part
+from groundstation.systems.inertial.channel_group import ChannelGroup, GroupRun
 from groundstation.systems.inertial.model import POSITION, SIZE, VELOCITY, ChannelModel, FloatArray
 from groundstation.systems.inertial.seams import PATIENCE_S, Seam
 from groundstation.systems.inertial.steps import Steps
@@ -23,7 +23,7 @@ STANDARD_GATE = 25.0  # squared sigmas
 
 
 @dataclass(frozen=True)
-class Epochs:
+class DifferenceEpochs:
     """Inputs of the filter: differences INS minus GNSS on one strictly increasing time axis.
 
     Parameters
@@ -53,7 +53,7 @@ class Epochs:
         return len(self.time_s)
 
     @classmethod
-    def plain(cls, time_s: FloatArray, position_m: FloatArray, velocity_mps: FloatArray) -> "Epochs":
+    def plain(cls, time_s: FloatArray, position_m: FloatArray, velocity_mps: FloatArray) -> "DifferenceEpochs":
         """Epochs of an INS that was never reset, without the effect of the sphere."""
         n = len(time_s)
         return cls(time_s, position_m, velocity_mps, np.zeros((n, 2, 2)), np.zeros(n, dtype=bool))
@@ -121,7 +121,7 @@ class FilterRun:
         Of each part the outages at whose end GNSS was used although it was beyond the gate.
     """
 
-    epochs: Epochs
+    epochs: DifferenceEpochs
     model: ChannelModel
     noise: InsNoise
     steps: Steps
@@ -173,7 +173,7 @@ class FilterRun:
     def covariance_without_data(self) -> FloatArray:
         """Covariance Pi of the true states at every epoch without measurements, shape (n, 6, 6)."""
         nothing = np.full((len(self.epochs), 1), np.nan)
-        blind = replace(Epochs.plain(self.epochs.time_s, nothing, nothing), is_reset=self.epochs.is_reset)
+        blind = replace(DifferenceEpochs.plain(self.epochs.time_s, nothing, nothing), is_reset=self.epochs.is_reset)
         return frozen(run_filter(blind, self.model, self.noise, steps=self.steps).P[0])
 
     def sigma(self, channel: int) -> FloatArray:
@@ -181,7 +181,7 @@ class FilterRun:
         return np.asarray(np.sqrt(np.maximum(np.einsum("nii->ni", self.covariance(channel)), 0.0)))
 
 
-def initial_of(epochs: Epochs, noise: InsNoise) -> Initial:
+def initial_of(epochs: DifferenceEpochs, noise: InsNoise) -> Initial:
     """Return a start from what the first samples show.
 
     A recording may begin in flight, hours after the alignment of the INS. Position and velocity error are the medians
@@ -197,7 +197,7 @@ def initial_of(epochs: Epochs, noise: InsNoise) -> Initial:
 
 
 def run_filter(
-    epochs: Epochs,
+    epochs: DifferenceEpochs,
     model: ChannelModel,
     noise: InsNoise,
     *,
@@ -209,7 +209,7 @@ def run_filter(
 
     Parameters
     ----------
-    epochs : Epochs, n >= 1
+    epochs : DifferenceEpochs, n >= 1
     model : ChannelModel
     noise : InsNoise
     gate : float
@@ -233,7 +233,7 @@ def run_filter(
     drag = epochs.drag_per_s * np.diff(epochs.time_s, prepend=epochs.time_s[:1])[:, None, None]
     first = initial or Initial(np.zeros((SIZE, channels)), np.diag(noise.initial_variances())[None])
     weighted, believed = measurement_variances(epochs, noise)
-    patience, parts = patience_of(epochs), list[Part]()
+    patience, parts = patience_of(epochs), list[GroupRun]()
     for group in groups:  # the channel north comes first: it is not dragged by the other
         own, measured = (drag, z) if together else (np.ascontiguousarray(drag[:, group][:, :, group]), z[:, :, group])
         drive = Drive(POSITION, own, _pushed(drag, group, [part.run.x for part in parts]))
@@ -277,7 +277,7 @@ def _stacked(parts: list[FloatArray]) -> FloatArray:
     return parts[0][None] if len(parts) == 1 else np.stack(parts)
 
 
-def measurement_variances(epochs: Epochs, noise: InsNoise) -> tuple[FloatArray, FloatArray]:
+def measurement_variances(epochs: DifferenceEpochs, noise: InsNoise) -> tuple[FloatArray, FloatArray]:
     """Return the variances of position and velocity for weighting and for the gate.
 
     Shape (2,) each: as they are weighted, and as a single one errs. The first are inflated for slow errors; the second
@@ -289,7 +289,7 @@ def measurement_variances(epochs: Epochs, noise: InsNoise) -> tuple[FloatArray, 
     return np.array(weighted), ROOM_OF_THE_GATE**2 * np.array(believed)
 
 
-def patience_of(epochs: Epochs) -> Int64Array:
+def patience_of(epochs: DifferenceEpochs) -> Int64Array:
     """Return the count of rejections in a row after which GNSS is taken to be right.
 
     Shape (2,), one of each kind.

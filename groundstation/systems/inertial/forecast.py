@@ -20,7 +20,7 @@ from groundstation.systems.inertial.gaps import gap_rows
 from groundstation.systems.inertial.hindcast import Hindcast, hindcast
 from groundstation.systems.inertial.leads import leads_of, start_epochs
 from groundstation.systems.inertial.model import POSITION, FloatArray
-from groundstation.systems.inertial.replay import LEAST_STARTS, Plan, map_grid, plan_replay
+from groundstation.systems.inertial.replay import LEAST_STARTS, ReplayPlan, map_grid, plan_replay
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import calibration_rows, claimed_sigma, skill_rows
 from groundstation.tables.sources import UNKNOWN
@@ -122,7 +122,7 @@ def _with_own_variance(replay: Hindcast, coupled: CoupledRun, settings: Inertial
     return replace(replay, variance_m2=replay.variance_m2 | own)
 
 
-def _lengths_that_fit(plan: Plan) -> tuple[float, ...]:
+def _lengths_that_fit(plan: ReplayPlan) -> tuple[float, ...]:
     return tuple(length for length in plan.horizons_min if 10.0 <= length <= 90.0)
 
 

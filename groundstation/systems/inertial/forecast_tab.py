@@ -17,7 +17,7 @@ from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.inertial.forecast_arrays import ForecastFan, ForecastMap
 from groundstation.systems.inertial.forecast_chapter import forecast as chapter
 from groundstation.viewer import colours
-from groundstation.viewer.chart import Axis, Chart
+from groundstation.viewer.chart import Chart, ChartAxis
 from groundstation.viewer.names import words
 from groundstation.viewer.plot_views import panels_of, plot_of
 from groundstation.viewer.recorder import Line, Recorder
@@ -71,12 +71,12 @@ def _fan(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     if fan is None or not np.isfinite(fan.lead_s).any():
         return []
     minutes = fan.lead_s / 60.0
-    x = Axis("lead, min", 0.0, max(float(np.nanmax(minutes)), 1.0))
+    x = ChartAxis("lead, min", 0.0, max(float(np.nanmax(minutes)), 1.0))
     views: list[rrb.View] = []
     for channel, one in (("north", fan.north), ("east", fan.east)):
         expected, actual, half = one.forecast_m, one.actual_m, NORMAL_95 * one.sigma_m
         size = _largest(expected, actual, np.abs(expected) + half)
-        axis = Axis(f"{channel.capitalize()} error, m,", -size, size)
+        axis = ChartAxis(f"{channel.capitalize()} error, m,", -size, size)
         chart = Chart(recorder, f"forecast/fan_{channel}", x, axis, FAN_HEIGHT)
         chart.legend([FORECAST, CLAIMED, SHOWN])
         _starts(chart, fan, minutes, [(expected, FORECAST), (actual, SHOWN)], (expected - half, expected + half))
@@ -84,7 +84,7 @@ def _fan(recorder: Recorder, results: FlightResults) -> list[rrb.View]:
     return [*views, _radial(recorder, fan, minutes, x)]
 
 
-def _radial(recorder: Recorder, fan: ForecastFan, minutes: FloatArray, x: Axis) -> rrb.View:
+def _radial(recorder: Recorder, fan: ForecastFan, minutes: FloatArray, x: ChartAxis) -> rrb.View:
     """Log the distance between forecast and GNSS, the claimed error, and the raw INS error."""
     east, north = fan.east, fan.north
     raw = np.hypot(east.actual_m, north.actual_m)
@@ -95,7 +95,7 @@ def _radial(recorder: Recorder, fan: ForecastFan, minutes: FloatArray, x: Axis) 
         (claim, Line("radial σ claimed", colours.HONEST, THIN)),
         (left, Line("left after forecast", colours.ANSWER, BOLD)),
     )
-    axis = Axis("Radial error, m,", 0.0, _largest(raw, left, claim))
+    axis = ChartAxis("Radial error, m,", 0.0, _largest(raw, left, claim))
     chart = Chart(recorder, "forecast/fan_radial", x, axis, FAN_HEIGHT)
     chart.legend([line for _, line in lines])
     _starts(chart, fan, minutes, list(lines))

@@ -10,7 +10,7 @@ import numpy as np
 
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.systems.inertial.coarse import Coarse
-from groundstation.systems.inertial.filter import Epochs, FilterRun, Initial, run_filter, smooth
+from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, Initial, run_filter, smooth
 from groundstation.systems.inertial.forecast_answer import GapRow
 from groundstation.systems.inertial.model import POSITION, FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
@@ -106,6 +106,6 @@ def _replay(
     return _Replayed(radial, covered)
 
 
-def _at(time_s: FloatArray, epochs: Epochs, values: FloatArray) -> FloatArray:
+def _at(time_s: FloatArray, epochs: DifferenceEpochs, values: FloatArray) -> FloatArray:
     """Columns of values at the epochs, (n, c), between them."""
     return np.stack([np.interp(time_s, epochs.time_s, column) for column in values.T], axis=1)

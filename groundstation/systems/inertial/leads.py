@@ -11,7 +11,7 @@ from groundstation.base.records import Int64Array
 from groundstation.methods.kalman.arrays import Drive
 from groundstation.methods.kalman.filter import forecast
 from groundstation.methods.kalman.transition import Transition
-from groundstation.systems.inertial.filter import Epochs, FilterRun
+from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun
 from groundstation.systems.inertial.model import POSITION, SIZE, VELOCITY, ChannelModel, FloatArray
 
 NEAREST_S = 1.0
@@ -19,7 +19,7 @@ PAST_FROM_S = 1800.0  # outages replayed from here on tell of later ones
 MEMORY_S = 1200.0  # errors of outages that start nearer than this to each other are not independent
 
 
-def start_epochs(epochs: Epochs, first_s: float, step_s: float) -> Int64Array:
+def start_epochs(epochs: DifferenceEpochs, first_s: float, step_s: float) -> Int64Array:
     """Epochs with GNSS at or just after ``first_s``, ``first_s + step_s`` ... , as indices."""
     if not len(epochs):
         return np.zeros(0, dtype=np.int64)
@@ -38,7 +38,7 @@ def leads_of(step_s: float, longest_s: float) -> FloatArray:
     return step_s * np.arange(1, max(1, int(longest_s / step_s + 1e-6)) + 1, dtype=np.float64)
 
 
-def built_up(epochs: Epochs, at: Int64Array, lead_s: FloatArray) -> FloatArray:
+def built_up(epochs: DifferenceEpochs, at: Int64Array, lead_s: FloatArray) -> FloatArray:
     """Return the position error built up from each start to each lead, as GNSS showed it.
 
     Shape (s, l, c), NaN unknown. Unknown too where the INS was reset in between: what built up then is none of the
@@ -60,7 +60,7 @@ def built_up(epochs: Epochs, at: Int64Array, lead_s: FloatArray) -> FloatArray:
     return np.where(is_shown[:, :, None], change, np.nan)
 
 
-def nearest_s(epochs: Epochs) -> float:
+def nearest_s(epochs: DifferenceEpochs) -> float:
     """Return how far from a start or lead the epoch compared with it may be.
 
     It is one interval of GNSS, a second at least.

@@ -21,7 +21,7 @@ MOST_STEPS_OF_MAP = 100
 
 
 @dataclass(frozen=True)
-class Plan:
+class ReplayPlan:
     """Starts of the replayed outages and the horizons that fit.
 
     Parameters
@@ -48,7 +48,7 @@ class Plan:
     reason: str
 
 
-def plan_replay(run: FilterRun, settings: InertialSettings) -> Plan:
+def plan_replay(run: FilterRun, settings: InertialSettings) -> ReplayPlan:
     """Choose the starts of the replay.
 
     They are the settings' where they show half an hour of forecast, else from 40 % of the flight on. A start counts
@@ -73,7 +73,7 @@ def plan_replay(run: FilterRun, settings: InertialSettings) -> Plan:
     )
     lead_s = leads_of(LEAD_STEP_S, 60.0 * max(horizons, default=1.0))
     at = start_epochs(run.epochs, first - past * step, step)
-    return Plan(first, step, at, horizons, lead_s, not reason, reason)
+    return ReplayPlan(first, step, at, horizons, lead_s, not reason, reason)
 
 
 def _judged(run: FilterRun, first_s: float, step_s: float, horizon_min: float) -> int:

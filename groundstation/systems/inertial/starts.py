@@ -22,13 +22,13 @@ LAG_STEP_S = 20.0  # of the sums over past estimates that are carried forward on
 
 
 @dataclass(frozen=True)
-class Window:
+class AveragingWindow:
     """Averaging length per state, seconds; 0 takes the last estimate."""
 
     lengths_s: tuple[float, ...]
 
     @classmethod
-    def of(cls, settings: InertialSettings, *states: int) -> "Window":
+    def of(cls, settings: InertialSettings, *states: int) -> "AveragingWindow":
         """The settings' lengths for the states named, the last estimate for the others."""
         lengths = {
             TILT: settings.tilt_window_s,
@@ -38,10 +38,10 @@ class Window:
         return cls(tuple(lengths[state] if state in states else 0.0 for state in range(SIZE)))
 
 
-def windows_of(method: str, settings: InertialSettings) -> Window:
+def windows_of(method: str, settings: InertialSettings) -> AveragingWindow:
     """Window of each method that has one."""
     states = (DRIFT, DRIFT_RATE) if method == "drift_windows" else (TILT, DRIFT, DRIFT_RATE)
-    return Window.of(settings, *states)
+    return AveragingWindow.of(settings, *states)
 
 
 def start_states(method: str, run: FilterRun, at: Int64Array, settings: InertialSettings) -> FloatArray:
@@ -125,7 +125,7 @@ def _schuler_fit(run: FilterRun, at: Int64Array, length_s: float) -> FloatArray:
     return states
 
 
-def _averaged(run: FilterRun, at: Int64Array, window: Window) -> FloatArray:
+def _averaged(run: FilterRun, at: Int64Array, window: AveragingWindow) -> FloatArray:
     """Average past estimates over the paper's windows: plain means, one length per state.
 
     Only epochs that had GNSS count.
@@ -143,7 +143,7 @@ def _averaged(run: FilterRun, at: Int64Array, window: Window) -> FloatArray:
     return states
 
 
-def _carried_average(run: FilterRun, at: Int64Array, window: Window) -> FloatArray:
+def _carried_average(run: FilterRun, at: Int64Array, window: AveragingWindow) -> FloatArray:
     """Average past estimates, each carried to the start by the model first.
 
     Nothing true is smoothed away.

@@ -25,7 +25,7 @@ ROLL_OUT_S, ROLL_OUT_MIN_MPS = 40.0, 12.0
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class FittedLine:
     """A line through positions: a place on it, its direction, and the scatter about it."""
 
     latitude_deg: float
@@ -51,7 +51,7 @@ class Against:
     vertical_dot_m: FloatArray
 
 
-def line_through(path: FlightPath, rows: slice, shift_m: FloatArray | None = None) -> Line:
+def line_through(path: FlightPath, rows: slice, shift_m: FloatArray | None = None) -> FittedLine:
     """Total least squares line through the positions of some rows, in the direction of flight.
 
     ``shift_m`` (n, 2) moves them north and east first.
@@ -65,7 +65,7 @@ def line_through(path: FlightPath, rows: slice, shift_m: FloatArray | None = Non
     middle_latitude, middle_longitude = latitude_longitude_deg(middle[0], middle[1], latitude, longitude)
     course_deg = float(direction_of(direction[0], direction[1]))
     scatter_m = float(sizes[1] / np.sqrt(len(place)))
-    return Line(float(middle_latitude), float(middle_longitude), course_deg, scatter_m, float(np.ptp(along)))
+    return FittedLine(float(middle_latitude), float(middle_longitude), course_deg, scatter_m, float(np.ptp(along)))
 
 
 def runway_of(path: FlightPath, final: Final, settings: LandingSettings) -> RunwayUsed:
@@ -97,7 +97,7 @@ def runway_of(path: FlightPath, final: Final, settings: LandingSettings) -> Runw
     return replace(_placed(line, latitude, longitude, settings), course_sigma_deg=sigma_deg, place_reason=reason)
 
 
-def _placed(line: Line, latitude_deg: float, longitude_deg: float, settings: LandingSettings) -> RunwayUsed:
+def _placed(line: FittedLine, latitude_deg: float, longitude_deg: float, settings: LandingSettings) -> RunwayUsed:
     """A runway on a line, with the aids of the settings."""
     return RunwayUsed(
         "",
@@ -114,7 +114,7 @@ def _placed(line: Line, latitude_deg: float, longitude_deg: float, settings: Lan
     )
 
 
-def _course_line(path: FlightPath, final: Final, settings: LandingSettings) -> Line:
+def _course_line(path: FlightPath, final: Final, settings: LandingSettings) -> FittedLine:
     """Return the course line that positions show.
 
     It is fitted to the positions less the deviations that the guidance shows.
@@ -145,7 +145,7 @@ def _line_rows(path: FlightPath, final: Final) -> slice:
     return slice(final.first + int(np.argmax(distance_m <= LINE_M)), final.last)
 
 
-def _threshold(path: FlightPath, final: Final, line: Line, settings: LandingSettings) -> tuple[float, float, str]:
+def _threshold(path: FlightPath, final: Final, line: FittedLine, settings: LandingSettings) -> tuple[float, float, str]:
     """Return latitude and longitude of the threshold of an unlisted runway, and their source."""
     end = final.last - 1
     course_rad = np.deg2rad(line.course_deg)

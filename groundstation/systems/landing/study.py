@@ -16,7 +16,7 @@ from groundstation.results.figures import FigureData
 from groundstation.results.landing_categories import LINEAR_95
 from groundstation.simulation.approach import (
     ApproachScenario,
-    Flown,
+    FinalMotion,
     Recorded,
     SimulatedApproach,
     TrueRunway,
@@ -134,7 +134,7 @@ DIGITS = {
 def drawn(rng: np.random.Generator) -> ApproachScenario:
     """Return a member of the plain family."""
     runway = TrueRunway(float(rng.uniform(-60, 60)), float(rng.uniform(-179, 179)), float(rng.uniform(0, 360)))
-    flown = Flown(
+    flown = FinalMotion(
         start_distance_m=float(rng.uniform(12_000.0, 26_000.0)),
         start_across_m=float(rng.normal(0.0, 1_000.0)),
         speed_mps=float(rng.uniform(60.0, 80.0)),

@@ -50,7 +50,7 @@ class GroundRuns:
 
 
 @dataclass(frozen=True)
-class Window:
+class AlignmentWindow:
     """Window of flight seconds in which the alignment may look.
 
     It tells whether an event bounds it, and since what it runs.
@@ -115,7 +115,7 @@ def find_ground_runs(
     return GroundRuns(fast, taxi, speed_min_mps, why_not, why_not_taxi, window.since if fast else since)
 
 
-def _begins_before(heading: HeadingByTrack | None, window: Window) -> bool:
+def _begins_before(heading: HeadingByTrack | None, window: AlignmentWindow) -> bool:
     """Tell whether an answer rests on data before a window."""
     return heading is None or heading.begins_s is None or heading.begins_s < window.start_s
 
@@ -132,7 +132,7 @@ def gyros_at_standstill(flight: Flight, ins_topic: str, phases: Phases, settings
     return gyro_drift(flight, ins_topic, phases, window.start_s, window.end_s)
 
 
-def alignment_window(flight: Flight, phases: Phases, settings: MagneticSettings) -> Window:
+def alignment_window(flight: Flight, phases: Phases, settings: MagneticSettings) -> AlignmentWindow:
     """Return the window up to the first lift-off less a margin.
 
     It begins with the last ``alignment_event`` and ends with the ``release_event`` after it. A correction entered on
@@ -159,7 +159,7 @@ def alignment_window(flight: Flight, phases: Phases, settings: MagneticSettings)
     if settings.release_event:
         released = [time for time in event_times_s(flight, settings.release_event) if start_s < time < end_s]
         end_s, is_by_event = min([end_s, *released]), is_by_event or bool(released)
-    return Window(start_s, end_s, is_by_event, since)
+    return AlignmentWindow(start_s, end_s, is_by_event, since)
 
 
 def event_times_s(flight: Flight, name: str) -> list[float]:
@@ -171,7 +171,7 @@ def event_times_s(flight: Flight, name: str) -> list[float]:
     return sorted(found)
 
 
-def _gnss_within(flight: Flight, window: Window) -> Flight:
+def _gnss_within(flight: Flight, window: AlignmentWindow) -> Flight:
     """The flight with the GNSS epochs of a window alone: those decide what system 1 looks at."""
     cut = {}
     for topic in topics_of_kind("gnss", flight.topics()):

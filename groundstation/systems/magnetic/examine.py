@@ -7,7 +7,7 @@ from groundstation.results.roles import Delays
 from groundstation.systems.analysis import Shortfall
 from groundstation.systems.known import Known
 from groundstation.systems.magnetic.earth import earth_field
-from groundstation.systems.magnetic.flown import Flown, find_flown
+from groundstation.systems.magnetic.flown import FlownTurns, find_flown
 from groundstation.systems.magnetic.held_out import find_unseen, is_level
 from groundstation.systems.magnetic.readings import choose_topics
 from groundstation.systems.magnetic.settings import MagneticSettings
@@ -45,6 +45,6 @@ def _kinds(flight: Flight, known: Known) -> dict[str, str]:
     return {} if kinds is None else kinds.find(flight)
 
 
-def _level_readings(flown: Flown, settings: MagneticSettings) -> int:
+def _level_readings(flown: FlownTurns, settings: MagneticSettings) -> int:
     unseen = find_unseen(flown.readings, flown.is_airborne, flown.figures, settings)
     return int(np.count_nonzero(unseen & is_level(flown.readings, settings)))

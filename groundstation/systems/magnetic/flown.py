@@ -21,7 +21,7 @@ IN_THE_AIR = ("airborne", "unknown")  # ground contact is a phase of its own whe
 
 
 @dataclass(frozen=True)
-class Flown:
+class FlownTurns:
     """Readings, those in the air, figures and turns found, and the latency taken off."""
 
     readings: Readings
@@ -38,7 +38,7 @@ def find_flown(
     kinds: Mapping[str, str],
     latencies: Delays | None,
     settings: MagneticSettings,
-) -> Flown:
+) -> FlownTurns:
     """Find the opposite turns of a flight; parameters as of ``estimate_deviation``.
 
     Raises
@@ -54,7 +54,7 @@ def find_flown(
     figures, turns = find_figures(readings, find_turns(readings, is_airborne, settings), settings)
     if not figures:
         raise NotAssessableError(ANALYSIS, _why_no_figure(turns))
-    return Flown(readings, is_airborne, figures, turns, latency_s)
+    return FlownTurns(readings, is_airborne, figures, turns, latency_s)
 
 
 def _why_no_figure(turns: list[FoundTurn]) -> str:

@@ -13,7 +13,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.signals import topics_of_kind
 from groundstation.methods.taxi.delay import known_delay
 from groundstation.methods.taxi.gating import gate_samples
-from groundstation.methods.taxi.samples import USED, HeadingValues, OnGround, Samples, pair_samples
+from groundstation.methods.taxi.samples import USED, HeadingValues, OnGround, TaxiSamples, pair_samples
 from groundstation.methods.taxi.settings import GroundLimits
 from groundstation.results.chosen import Interval
 from groundstation.results.roles import Delays
@@ -46,10 +46,10 @@ WHY_LEFT_OUT = {
 
 
 @dataclass(frozen=True)
-class Epochs:
+class GroundEpochs:
     """Epochs of the straight runs with what was looked at, shapes (n,); ``run`` counts from 0."""
 
-    samples: Samples
+    samples: TaxiSamples
     declination_deg: FloatArray
     run: NDArray[np.int64]
 
@@ -67,7 +67,7 @@ def gated(
     aircraft: AircraftData,
     latencies: Delays | None,
     excluded_s: Sequence[tuple[float, float]],
-) -> Samples:
+) -> TaxiSamples:
     """Return the epochs on the ground, gated as system 1 gates taxi.
 
     The magnetic heading stands in the place of the true one.
@@ -95,7 +95,7 @@ def gated(
     return _settled(gate_samples(samples, limits, intervals), settings)
 
 
-def _settled(samples: Samples, settings: MagneticGroundSettings) -> Samples:
+def _settled(samples: TaxiSamples, settings: MagneticGroundSettings) -> TaxiSamples:
     """Leave out the samples just after a turn at any speed.
 
     A heading that lags has not caught up yet.
@@ -112,7 +112,7 @@ def _settled(samples: Samples, settings: MagneticGroundSettings) -> Samples:
     return replace(samples, gate=gate, segment=np.where(gate == USED, samples.segment, 0))
 
 
-def count_left_out(flight: Flight, topics: tuple[str, str], samples: Samples) -> tuple[LeftOut, ...]:
+def count_left_out(flight: Flight, topics: tuple[str, str], samples: TaxiSamples) -> tuple[LeftOut, ...]:
     """Count the GNSS epochs that belong to no run, by reason, most first."""
     counts = Counter(WHY_LEFT_OUT.get(str(gate), str(gate)) for gate in samples.gate[~samples.is_used])
     counts[WHY_LEFT_OUT[NOT_GROUND]] += len(distinct_epochs(flight[topics[1]])) - len(samples)
@@ -122,7 +122,7 @@ def count_left_out(flight: Flight, topics: tuple[str, str], samples: Samples) ->
 def declination_at(
     flight: Flight,
     topics: tuple[str, str],
-    samples: Samples,
+    samples: TaxiSamples,
     chosen: NDArray[np.intp],
     settings: MagneticGroundSettings,
 ) -> tuple[FloatArray, DeclinationUsed]:

@@ -14,7 +14,7 @@ from groundstation.base.angles import FloatArray, mean_heading, unwrap, wrap_180
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.methods.moving_lines import fitted_lines, window_bounds
-from groundstation.methods.taxi.samples import OnGround, Samples, take_samples
+from groundstation.methods.taxi.samples import OnGround, TaxiSamples, take_samples
 from groundstation.methods.taxi_error.interval import Differences, Regressor, error_posterior
 from groundstation.results.figures import FigureData
 from groundstation.results.roles import Delays
@@ -26,7 +26,7 @@ from groundstation.systems.magnetic.ground_answer import GroundDeviation, Ground
 from groundstation.systems.magnetic.ground_epochs import (
     ANALYSIS,
     PAIR,
-    Epochs,
+    GroundEpochs,
     count_left_out,
     declination_at,
     gated,
@@ -113,7 +113,7 @@ def estimate_ground_deviation(
         raise NotAssessableError(ANALYSIS, _why_no_run(samples, left_out, settings))
     declination, used = declination_at(flight, topics, samples, chosen, settings)
     numbers = np.unique(samples.segment[chosen], return_inverse=True)[1]
-    epochs = Epochs(take_samples(samples, chosen), declination, numbers)
+    epochs = GroundEpochs(take_samples(samples, chosen), declination, numbers)
     runs = _runs(epochs, phases, settings)
     if not any(run.state == "used" for run in runs):
         raise NotAssessableError(ANALYSIS, _why_no_run(samples, left_out, settings, runs))
@@ -123,7 +123,7 @@ def estimate_ground_deviation(
 
 
 def _why_no_run(
-    samples: Samples,
+    samples: TaxiSamples,
     left_out: Sequence[LeftOut],
     settings: MagneticGroundSettings,
     rejected: Sequence[GroundRun] = (),
@@ -140,7 +140,7 @@ def _why_no_run(
     return f"no straight run on the ground above {limit:g} m/s; epochs: {told}"
 
 
-def _runs(epochs: Epochs, phases: Phases, settings: MagneticGroundSettings) -> tuple[GroundRun, ...]:
+def _runs(epochs: GroundEpochs, phases: Phases, settings: MagneticGroundSettings) -> tuple[GroundRun, ...]:
     """Every straight run, without its error yet; too short and curved ones with the reason."""
     rows = []
     for number in range(int(epochs.run.max()) + 1):
@@ -208,7 +208,7 @@ def _step_deg(table: Table, name: str) -> float | None:
 
 def _with_errors(
     runs: tuple[GroundRun, ...],
-    epochs: Epochs,
+    epochs: GroundEpochs,
     declination_sigma_deg: float,
     steps_deg: Sequence[float | None],
     settings: MagneticGroundSettings,
@@ -250,7 +250,7 @@ def _with_errors(
 def _answer(
     flight: Flight,
     topics: tuple[str, str],
-    epochs: Epochs,
+    epochs: GroundEpochs,
     runs: tuple[GroundRun, ...],
     left_out: tuple[LeftOut, ...],
     declination: DeclinationUsed,
@@ -284,7 +284,7 @@ def _answer(
     return replace(result, remarks=_remarks(result, epochs.samples.interval_s, settings))
 
 
-def _logged_variation_deg(flight: Flight, ins_topic: str, epochs: Epochs) -> float | None:
+def _logged_variation_deg(flight: Flight, ins_topic: str, epochs: GroundEpochs) -> float | None:
     """Return the mean of true minus magnetic heading that the log's variation makes.
 
     It is known where the reader made the one from the other with that variation.
@@ -299,7 +299,7 @@ def _logged_variation_deg(flight: Flight, ins_topic: str, epochs: Epochs) -> flo
 
 
 def _figures(
-    epochs: Epochs,
+    epochs: GroundEpochs,
     runs: Sequence[GroundRun],
     fit: CurveFit,
     declination_sigma_deg: float,

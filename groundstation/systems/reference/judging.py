@@ -19,7 +19,7 @@ LEAST_SIGMA = 1e-9  # m, m/s or deg: no device measures so well, and a smaller o
 
 
 @dataclass(frozen=True)
-class Axis:
+class JudgedAxis:
     """One axis of an error: values (n,), NaN where unknown; ``sigma`` names the claim on it.
 
     ``parts`` (n, c) are its components: north and east of a length, which the sigma counts together; else itself.
@@ -56,7 +56,7 @@ class Checked:
     is_inside: BoolArray
 
 
-def axes_of(errors: Errors, settings: ReferenceSettings) -> Iterator[Axis]:
+def axes_of(errors: Errors, settings: ReferenceSettings) -> Iterator[JudgedAxis]:
     """Every axis with a known value."""
     for quantity, unit, sigma, vectors in (
         ("position", "m", "horizontal_sigma_m", errors.position_m),
@@ -72,11 +72,11 @@ def axes_of(errors: Errors, settings: ReferenceSettings) -> Iterator[Axis]:
         )
         for name, values, claim, parts in listed:
             if np.isfinite(values).any():
-                yield Axis(quantity, name, unit, values, claim, parts)  # type: ignore[arg-type]
+                yield JudgedAxis(quantity, name, unit, values, claim, parts)  # type: ignore[arg-type]
     for name, sigma, values in zip(ANGLE_AXES, ANGLE_SIGMAS, errors.angles_deg.T, strict=True):
         if np.isfinite(values).any():
             whole = _about_its_mean(values)
-            yield Axis("attitude", name, "deg", whole, sigma, whole[:, None])
+            yield JudgedAxis("attitude", name, "deg", whole, sigma, whole[:, None])
 
 
 def _about_its_mean(angle_deg: FloatArray) -> FloatArray:
@@ -86,7 +86,7 @@ def _about_its_mean(angle_deg: FloatArray) -> FloatArray:
     return middle + np.where(np.isfinite(angle_deg), wrap_180(np.nan_to_num(angle_deg) - middle), np.nan)
 
 
-def error_row(errors: Errors, axis: Axis, settings: ReferenceSettings) -> ErrorRow:
+def error_row(errors: Errors, axis: JudgedAxis, settings: ReferenceSettings) -> ErrorRow:
     """Statistics of one axis, and whether the reference's own sigma is too large to see it."""
     known = np.isfinite(axis.values)
     spread, sigma = spread_of(axis.values[known]), _rms_of(errors.reference, _reference_sigma(axis), known)
@@ -96,7 +96,7 @@ def error_row(errors: Errors, axis: Axis, settings: ReferenceSettings) -> ErrorR
     return ErrorRow(errors.subject, axis.quantity, axis.name, axis.unit, spread, sigma, bool(is_coarse))
 
 
-def _reference_sigma(axis: Axis) -> str:
+def _reference_sigma(axis: JudgedAxis) -> str:
     """Name the sigma of the reference on an axis.
 
     A single horizontal component has the sigma of both.
@@ -114,7 +114,7 @@ def _rms_of(sigmas: Mapping[str, FloatArray], name: str, rows: BoolArray) -> flo
     return float(np.sqrt(np.mean(np.square(known)))) if known.size else None
 
 
-def checked(errors: Errors, axis: Axis) -> Checked | None:
+def checked(errors: Errors, axis: JudgedAxis) -> Checked | None:
     """Check an error against the 95 % region that subject and reference claim together.
 
     None without a claim.

@@ -30,7 +30,7 @@ LEAST_WEIGHT = 1  # altitudes alone
 
 
 @dataclass(frozen=True)
-class Side:
+class TopicSignals:
     """Signals of one topic: seconds since the start of its flight (n,), and values (n, c).
 
     The times increase. ``attitude_deg``: roll, pitch and heading (n, 3) where it has a heading, for the arm between two
@@ -42,10 +42,10 @@ class Side:
     values: FloatArray
     attitude_deg: FloatArray | None = None
 
-    def take(self, index: BoolArray) -> "Side":
+    def take(self, index: BoolArray) -> "TopicSignals":
         """Some of the rows."""
         attitude = None if self.attitude_deg is None else self.attitude_deg[index]
-        return Side(self.topic, self.time_s[index], self.values[index], attitude)
+        return TopicSignals(self.topic, self.time_s[index], self.values[index], attitude)
 
     @property
     def interval_s(self) -> float:
@@ -58,8 +58,8 @@ class Pair:
     """The same signals (``names``, c of them) of two logs."""
 
     names: tuple[str, ...]
-    first: Side
-    other: Side
+    first: TopicSignals
+    other: TopicSignals
 
 
 def pair_of(
@@ -93,7 +93,7 @@ def pair_of(
     return best
 
 
-def side_of(flight: Flight, topic: str, names: tuple[str, ...]) -> Side | None:
+def side_of(flight: Flight, topic: str, names: tuple[str, ...]) -> TopicSignals | None:
     """Some signals of a topic; None where it lacks one or has hardly any sample."""
     found = _channels(flight, topic)
     if any(name not in found.values for name in names):
@@ -115,14 +115,14 @@ class _Channels:
     values: Mapping[str, FloatArray]
     attitude_deg: FloatArray | None
 
-    def side(self, names: tuple[str, ...]) -> Side:
+    def side(self, names: tuple[str, ...]) -> TopicSignals:
         """Return the rows that have all of the named signals."""
         values = np.column_stack([self.values[name] for name in names])
         known = np.isfinite(values).all(axis=1)
         if self.attitude_deg is None:
-            return Side(self.topic, self.time_s[known], values[known])
+            return TopicSignals(self.topic, self.time_s[known], values[known])
         known &= np.isfinite(self.attitude_deg).all(axis=1)
-        return Side(self.topic, self.time_s[known], values[known], self.attitude_deg[known])
+        return TopicSignals(self.topic, self.time_s[known], values[known], self.attitude_deg[known])
 
 
 def _common(a: _Channels, b: _Channels) -> tuple[str, ...]:
@@ -186,7 +186,7 @@ def _turn(table: Table, time_s: FloatArray, heading_deg: FloatArray) -> FloatArr
     return np.asarray(np.gradient(heading_deg, time_s))
 
 
-def averaged(side: Side, step_s: float) -> Side:
+def averaged(side: TopicSignals, step_s: float) -> TopicSignals:
     """Means over ``step_s``, at their mean times; a slower side as it is."""
     cell = np.floor((side.time_s - side.time_s[0]) / max(step_s, 1.0 / NS_PER_S) + 1e-6).astype(np.int64)
     starts = np.flatnonzero(np.diff(cell, prepend=-1))
@@ -194,7 +194,7 @@ def averaged(side: Side, step_s: float) -> Side:
         return side
     count = np.diff(np.append(starts, len(side.time_s)))
     attitude = side.attitude_deg
-    return Side(
+    return TopicSignals(
         side.topic,
         np.add.reduceat(side.time_s, starts) / count,
         np.add.reduceat(side.values, starts, axis=0) / count[:, None],
@@ -202,7 +202,7 @@ def averaged(side: Side, step_s: float) -> Side:
     )
 
 
-def running_mean(side: Side, nodes: int) -> Side:
+def running_mean(side: TopicSignals, nodes: int) -> TopicSignals:
     """Means over an odd number of samples, two in that length; those at the ends are left out."""
     if len(side.time_s) <= nodes:
         return side
@@ -215,4 +215,4 @@ def running_mean(side: Side, nodes: int) -> Side:
         return np.asarray((sums[nodes:] - sums[:-nodes])[::step] / nodes)
 
     attitude = None if side.attitude_deg is None else means(side.attitude_deg)
-    return Side(side.topic, side.time_s[rows], means(side.values), attitude)
+    return TopicSignals(side.topic, side.time_s[rows], means(side.values), attitude)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.systems.several_logs.channels import Pair, Side
+from groundstation.systems.several_logs.channels import Pair, TopicSignals
 from groundstation.systems.several_logs.settings import TwoClocksSettings
 
 GAP_S = 2.5  # nothing is interpolated over a longer one
@@ -17,7 +17,7 @@ LIVELY = 0.1  # share of the usual motion that a stretch must have to be judged
 
 
 @dataclass(frozen=True)
-class Place:
+class CoarseLag:
     """Lag between two logs: ``lag_s`` added to seconds of the other gives those of the first.
 
     ``correlation`` is that of the two motions at this lag, ``rival`` the next best fit as a share of the best.
@@ -54,7 +54,7 @@ def grids_of(pair: Pair, settings: TwoClocksSettings) -> Grids:
     return Grids(first, other, first_start_s, other_start_s, step_s)
 
 
-def _grid(side: Side, step_s: float, high_pass_s: float) -> tuple[FloatArray, float]:
+def _grid(side: TopicSignals, step_s: float, high_pass_s: float) -> tuple[FloatArray, float]:
     start_s = float(np.floor(side.time_s[0] / step_s) * step_s)
     at_s = np.arange(start_s, side.time_s[-1] + step_s, step_s)
     after = np.clip(np.searchsorted(side.time_s, at_s), 1, len(side.time_s) - 1)
@@ -82,7 +82,7 @@ def _spread(values: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.sum(values**2, axis=1) / count))
 
 
-def place_of(grids: Grids, settings: TwoClocksSettings, near_s: tuple[float, float] | None) -> Place | None:
+def place_of(grids: Grids, settings: TwoClocksSettings, near_s: tuple[float, float] | None) -> CoarseLag | None:
     """Find the lag at which the two motions fit best; ``near_s`` bounds it.
 
     None where they never overlap. The product of the two motions is held against what chance gives, its standard
@@ -113,10 +113,10 @@ def place_of(grids: Grids, settings: TwoClocksSettings, near_s: tuple[float, flo
     away = np.abs(lag_s - lag_s[best]) > 0.5 * settings.high_pass_s
     rival = float(np.max(np.where(away, fit, -np.inf))) / max(float(fit[best]), 1e-9)
     correlation = float(both[best] / max(float(energy[best]), 1e-9))
-    return Place(float(lag_s[best]), correlation, max(rival, 0.0), float(together[best]))
+    return CoarseLag(float(lag_s[best]), correlation, max(rival, 0.0), float(together[best]))
 
 
-def steps_of(grids: Grids, place: Place, settings: TwoClocksSettings) -> list[tuple[float, float]]:
+def steps_of(grids: Grids, place: CoarseLag, settings: TwoClocksSettings) -> list[tuple[float, float]]:
     """Find the stretches between steps of a clock.
 
     Each is given by its begin, in seconds of the other log, and its lag. The lag is found anew in windows of the other
@@ -142,7 +142,7 @@ def steps_of(grids: Grids, place: Place, settings: TwoClocksSettings) -> list[tu
     return begins
 
 
-def _local_lags(grids: Grids, place: Place, settings: TwoClocksSettings) -> tuple[FloatArray, FloatArray]:
+def _local_lags(grids: Grids, place: CoarseLag, settings: TwoClocksSettings) -> tuple[FloatArray, FloatArray]:
     """Return the lag in windows of the other log that move, with their middles, shapes (k,).
 
     The middles are in seconds of the other log.

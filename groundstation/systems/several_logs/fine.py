@@ -13,7 +13,7 @@ from groundstation.base.quantiles import NORMAL_95, student_quantile
 from groundstation.methods.lag.fit import DelayFit, fit_delay
 from groundstation.methods.lag.settings import SLOW_MPS, LatencySettings
 from groundstation.methods.lag.windows import Series, Windows, cut_windows, too_few_windows
-from groundstation.systems.several_logs.channels import Pair, Side, averaged, running_mean
+from groundstation.systems.several_logs.channels import Pair, TopicSignals, averaged, running_mean
 from groundstation.systems.several_logs.settings import TwoClocksSettings
 
 REFERENCE_STEP_S, OTHER_STEP_S, SLOW_S = 0.1, 0.4, 0.35
@@ -109,7 +109,7 @@ def _why_not(fit: DelayFit, settings: TwoClocksSettings) -> str:
     return "" if fit.is_converged else "no minimum near the place of the first search"
 
 
-def _hidden_by_arm_s(pair: Pair, other: Side, settings: TwoClocksSettings) -> float:
+def _hidden_by_arm_s(pair: Pair, other: TopicSignals, settings: TwoClocksSettings) -> float:
     """Return the lag, one sigma, that a lever arm between two antennas can hide.
 
     It is the length of the arm over the speed, where no attitude tells the two apart. In a turn of one radius an
@@ -125,7 +125,7 @@ def _slow(interval_s: float) -> float:
     return interval_s if interval_s > SLOW_S else 0.0
 
 
-def _is_reference(first: Side, other: Side) -> bool:
+def _is_reference(first: TopicSignals, other: TopicSignals) -> bool:
     """Tell whether the first side is to be the reference.
 
     An INS goes before GNSS, whose noise would draw the fit to its samples. Between two of a kind it is the faster one.
@@ -134,7 +134,7 @@ def _is_reference(first: Side, other: Side) -> bool:
     return first_is_ins > other_is_ins or (first_is_ins == other_is_ins and first.interval_s <= other.interval_s)
 
 
-def _is_quiet(side: Side) -> bool:
+def _is_quiet(side: TopicSignals) -> bool:
     """Tell whether single samples have little noise, as those of a fast INS."""
     return side.topic.startswith("ins") and side.interval_s <= SLOW_S
 
@@ -145,7 +145,7 @@ def _nodes(width_s: float, interval_s: float) -> int:
 
 
 def _fit(
-    names: tuple[str, ...], fast: Side, slow: Side, middle_s: float, settings: TwoClocksSettings
+    names: tuple[str, ...], fast: TopicSignals, slow: TopicSignals, middle_s: float, settings: TwoClocksSettings
 ) -> tuple[DelayFit, float] | str:
     """Fit one side (``slow``) to the reference (``fast``); return the fit and its middle time.
 
@@ -178,7 +178,7 @@ def _fit(
     return fit_delay(series, windows, priors, fine, wanted=drift), middle_s
 
 
-def _noise(names: tuple[str, ...], reference: Side, sensor: Side) -> FloatArray:
+def _noise(names: tuple[str, ...], reference: TopicSignals, sensor: TopicSignals) -> FloatArray:
     """Return the noise of each signal of the sensor, shape (c,).
 
     It is the scatter about the reference from sample to sample; north has that of east.
@@ -202,7 +202,7 @@ def _noise(names: tuple[str, ...], reference: Side, sensor: Side) -> FloatArray:
 
 def _series(
     names: tuple[str, ...],
-    side: Side,
+    side: TopicSignals,
     size: FloatArray,
     middle_s: float,
     width_s: float,
@@ -237,7 +237,7 @@ def _series(
     return series.smoothed(_nodes(width_s, side.interval_s)), np.array(sigma), 0
 
 
-def _arms(names: tuple[str, ...], side: Side, size: FloatArray) -> FloatArray:
+def _arms(names: tuple[str, ...], side: TopicSignals, size: FloatArray) -> FloatArray:
     """Return what a lever arm of 1 m along each body axis adds to the signals, shape (n, 3 c).
 
     It adds the velocity of a turning body.

@@ -11,7 +11,7 @@ from groundstation.base.findings import Finding
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.serial import to_json_exactly
 from groundstation.base.units import NS_PER_S
-from groundstation.systems.joining import JoinStep, PlacedLog, Told, name_in_flight
+from groundstation.systems.joining import JoinRecord, JoinStep, PlacedLog, name_in_flight
 from groundstation.systems.several_logs.answer import JoinedLog, JoinedStretch, Joining
 from groundstation.systems.several_logs.gnss_time import gnss_time_of
 from groundstation.systems.several_logs.relate import relate
@@ -20,7 +20,7 @@ from groundstation.systems.several_logs.settings import TwoClocksSettings
 from groundstation.tables.table import Flight
 
 
-def told(logs: Sequence[PlacedLog], start_ns: int) -> Told:
+def told(logs: Sequence[PlacedLog], start_ns: int) -> JoinRecord:
     """Return the record of a joining for the MCAP, and findings.
 
     Parameters
@@ -31,7 +31,7 @@ def told(logs: Sequence[PlacedLog], start_ns: int) -> Told:
         Start of the flight.
     """
     joined = tuple(_joined(log, start_ns) for log in logs)
-    return Told(json.dumps(to_json_exactly(Joining(joined)), sort_keys=True), tuple(_findings(joined)))
+    return JoinRecord(json.dumps(to_json_exactly(Joining(joined)), sort_keys=True), tuple(_findings(joined)))
 
 
 def _joined(log: PlacedLog, start_ns: int) -> JoinedLog:

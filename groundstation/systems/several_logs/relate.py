@@ -11,10 +11,10 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.base.timescales import duration_text, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.joining import NotOneFlightError
-from groundstation.systems.several_logs.channels import Pair, Side, pair_of
-from groundstation.systems.several_logs.coarse import Place, grids_of, place_of, steps_of
+from groundstation.systems.several_logs.channels import Pair, TopicSignals, pair_of
+from groundstation.systems.several_logs.coarse import CoarseLag, grids_of, place_of, steps_of
 from groundstation.systems.several_logs.fine import MotionFit, fit_motion
-from groundstation.systems.several_logs.relation import LogRelation, Stretch, TimedLog
+from groundstation.systems.several_logs.relation import LogRelation, RelationStretch, TimedLog
 from groundstation.systems.several_logs.settings import TwoClocksSettings
 from groundstation.tables.resample import join
 from groundstation.tables.table import Flight, Table
@@ -94,13 +94,13 @@ def _both_utc(first: TimedLog, other: TimedLog) -> bool:
     return first.flight.has_utc and other.flight.has_utc
 
 
-def _by_file_time(lag_s: float | None) -> tuple[Stretch, ...]:
+def _by_file_time(lag_s: float | None) -> tuple[RelationStretch, ...]:
     if lag_s is None:
         return ()
-    return (Stretch(-np.inf, 0.0, lag_s, np.inf, 0.0, 0.0, "file_time"),)
+    return (RelationStretch(-np.inf, 0.0, lag_s, np.inf, 0.0, 0.0, "file_time"),)
 
 
-def _by_gnss_time(first: TimedLog, other: TimedLog, settings: TwoClocksSettings) -> tuple[Stretch, ...]:
+def _by_gnss_time(first: TimedLog, other: TimedLog, settings: TwoClocksSettings) -> tuple[RelationStretch, ...]:
     """Relate the logs by the GNSS time of both; empty where one does not have it.
 
     There is a stretch for each pair of theirs.
@@ -123,13 +123,15 @@ def _by_gnss_time(first: TimedLog, other: TimedLog, settings: TwoClocksSettings)
         drift_sigma = max(float(np.hypot(a.drift_sigma, b.drift_sigma)), LEAST_DRIFT_SIGMA)
         begin_s = -np.inf if begin_ns == start_ns else (begin_ns - start_ns) / NS_PER_S
         middle_s = (middle_ns - start_ns) / NS_PER_S
-        stretches.append(Stretch(begin_s, middle_s, lag_s, sigma_s, b.drift - a.drift, drift_sigma, "gnss_time"))
+        stretches.append(
+            RelationStretch(begin_s, middle_s, lag_s, sigma_s, b.drift - a.drift, drift_sigma, "gnss_time")
+        )
     return tuple(stretches)
 
 
 def _placed(
-    pair: Pair | None, by_gnss: tuple[Stretch, ...], files_lag_s: float | None, settings: TwoClocksSettings
-) -> tuple[Place | None, str]:
+    pair: Pair | None, by_gnss: tuple[RelationStretch, ...], files_lag_s: float | None, settings: TwoClocksSettings
+) -> tuple[CoarseLag | None, str]:
     """Return the lag at which the motions fit; or None, and why the motion does not tell it.
 
     If several lags fit alike, the one nearest to the times of the files is taken, where both are in UTC.
@@ -157,7 +159,7 @@ def _placed(
     return place, ""
 
 
-def _moves(names: tuple[str, ...], side: Side, settings: TwoClocksSettings) -> bool:
+def _moves(names: tuple[str, ...], side: TopicSignals, settings: TwoClocksSettings) -> bool:
     for name, column in zip(names, side.values.T, strict=True):
         low, high = np.quantile(column, (0.01, 0.99))
         if name in ("north", "east", "speed") and high - low > settings.moving_mps:
@@ -172,8 +174,8 @@ def _moves(names: tuple[str, ...], side: Side, settings: TwoClocksSettings) -> b
 def _by_motion(
     found: LogRelation,
     pair: Pair,
-    place: Place,
-    by_gnss: tuple[Stretch, ...],
+    place: CoarseLag,
+    by_gnss: tuple[RelationStretch, ...],
     logs: tuple[TimedLog, TimedLog],
     settings: TwoClocksSettings,
 ) -> tuple[LogRelation | None, str]:
@@ -219,13 +221,13 @@ def _by_motion(
 
 
 def _settled(
-    begin_s: float, fit: MotionFit, prior: Stretch | None, settings: TwoClocksSettings
-) -> tuple[Stretch, tuple[float, float] | None]:
+    begin_s: float, fit: MotionFit, prior: RelationStretch | None, settings: TwoClocksSettings
+) -> tuple[RelationStretch, tuple[float, float] | None]:
     """Return a stretch by the motion, weighed with GNSS time where the two agree.
 
     Also returns GNSS time less motion with its sigma.
     """
-    moving = Stretch(begin_s, fit.middle_s, fit.lag_s, fit.lag_sigma_s, fit.drift, fit.drift_sigma, "motion")
+    moving = RelationStretch(begin_s, fit.middle_s, fit.lag_s, fit.lag_sigma_s, fit.drift, fit.drift_sigma, "motion")
     if prior is None:
         return moving, None
     gap_s = float(prior.lag_at(fit.middle_s)) - fit.lag_s
@@ -243,7 +245,7 @@ def _stamps_late(log: TimedLog) -> bool:
     return not is_own and any(topic.startswith("ins") for topic in log.flight.topics())
 
 
-def _hidden_s(*sides: tuple[TimedLog, Side], settings: TwoClocksSettings) -> float:
+def _hidden_s(*sides: tuple[TimedLog, TopicSignals], settings: TwoClocksSettings) -> float:
     """Return one sigma of the lag that the motion does not show.
 
     It comes from INS filters that GNSS corrects, and from GNSS messages that came late.
@@ -253,7 +255,7 @@ def _hidden_s(*sides: tuple[TimedLog, Side], settings: TwoClocksSettings) -> flo
     return float(np.linalg.norm(hidden)) if hidden else 0.0
 
 
-def _is_aided(log: TimedLog, side: Side) -> bool:
+def _is_aided(log: TimedLog, side: TopicSignals) -> bool:
     if log.flight.metadata.get("ins_kind", "").lower() == "gnss_aided" and side.topic.startswith("ins"):
         return True
     modes = log.flight[side.topic].text("mode")
@@ -261,16 +263,20 @@ def _is_aided(log: TimedLog, side: Side) -> bool:
 
 
 def _unfitted(
-    prior: Stretch | None, begin_s: float, span_s: tuple[float, float], lag_s: float, settings: TwoClocksSettings
-) -> Stretch:
+    prior: RelationStretch | None,
+    begin_s: float,
+    span_s: tuple[float, float],
+    lag_s: float,
+    settings: TwoClocksSettings,
+) -> RelationStretch:
     """Return a stretch that only the coarse search placed; by GNSS time where that is known."""
     if prior is not None:
         return replace(prior, begin_s=begin_s)
     sigma = 1e-6 * settings.drift_sigma_ppm
-    return Stretch(begin_s, 0.5 * sum(span_s), lag_s, settings.search_s, 0.0, sigma, "motion")
+    return RelationStretch(begin_s, 0.5 * sum(span_s), lag_s, settings.search_s, 0.0, sigma, "motion")
 
 
-def _weighed(motion: Stretch, prior: Stretch) -> Stretch:
+def _weighed(motion: RelationStretch, prior: RelationStretch) -> RelationStretch:
     """Return the mean of both stretches, weighted by their variances.
 
     It is taken at the middle of the motion, where its offset and drift are uncorrelated.
@@ -279,7 +285,9 @@ def _weighed(motion: Stretch, prior: Stretch) -> Stretch:
         motion.lag_s, motion.lag_sigma_s, float(prior.lag_at(motion.middle_s)), float(prior.sigma_at(motion.middle_s))
     )
     drift, drift_sigma = _mean(motion.drift, motion.drift_sigma, prior.drift, prior.drift_sigma)
-    return Stretch(motion.begin_s, motion.middle_s, lag_s, lag_sigma_s, drift, drift_sigma, "gnss_time_and_motion")
+    return RelationStretch(
+        motion.begin_s, motion.middle_s, lag_s, lag_sigma_s, drift, drift_sigma, "gnss_time_and_motion"
+    )
 
 
 def _mean(a: float, a_sigma: float, b: float, b_sigma: float) -> tuple[float, float]:
@@ -293,7 +301,7 @@ def _named(gap_s: float) -> str:
     return ", equal to the leap seconds between GPS time and UTC" if is_leap else ""
 
 
-def _require_overlap(first: TimedLog, other: TimedLog, stretches: tuple[Stretch, ...]) -> None:
+def _require_overlap(first: TimedLog, other: TimedLog, stretches: tuple[RelationStretch, ...]) -> None:
     begin_s = float(stretches[0].lag_at(0.0))
     end_s = other.flight.duration_s + float(stretches[-1].lag_at(other.flight.duration_s))
     if begin_s < first.flight.duration_s and end_s > 0.0:

@@ -34,7 +34,7 @@ class TimedLog:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class RelationStretch:
     """Lag and drift between the clocks of two logs over one stretch.
 
     First time = other time + ``lag_s`` - ``drift`` (other time - ``middle_s``), seconds of both flights. Sigmas are
@@ -67,7 +67,7 @@ class LogRelation:
     ----------
     first_start_ns, other_start_ns : int
         Starts of the two flights, each on its own clock.
-    stretches : tuple of Stretch
+    stretches : tuple of RelationStretch
         In order of time; more than one where a clock was set.
     signals : tuple of str
         What of the motion was compared, of ``first_topic`` and ``other_topic``; empty where nothing could be.
@@ -83,7 +83,7 @@ class LogRelation:
 
     first_start_ns: int
     other_start_ns: int
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[RelationStretch, ...]
     first_topic: str = ""
     other_topic: str = ""
     signals: tuple[str, ...] = ()

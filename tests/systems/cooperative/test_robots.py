@@ -13,7 +13,7 @@ from groundstation.systems.cooperative.plain.sighting import sighting_of
 from groundstation.systems.cooperative.plain.split_covariance import fuse
 from groundstation.systems.cooperative.plain.steps import Event
 from groundstation.systems.cooperative.settings import CameraBelief, CooperativeSettings, OdometryBelief
-from groundstation.systems.cooperative.tracks import Track
+from groundstation.systems.cooperative.tracks import VehicleTrack
 from groundstation.systems.cooperative.wheeled_vehicle import WheeledVehicle
 from groundstation.tables.session import NO_SLOT, GroundPoint, Odometry, Ranges, Session
 
@@ -231,7 +231,7 @@ def test_fusion_is_never_too_sure_whatever_the_correlation() -> None:
 
 def test_epochs_inside_a_gap_of_the_truth_are_not_judged() -> None:
     time_s = np.arange(0.0, 10.0, 0.5)
-    track = Track("R1", time_s, np.zeros((20, 3)), np.zeros((20, 2)), np.tile(np.eye(2), (20, 1, 1)))
+    track = VehicleTrack("R1", time_s, np.zeros((20, 3)), np.zeros((20, 2)), np.tile(np.eye(2), (20, 1, 1)))
     true_s = np.concatenate([np.arange(0.0, 3.1, 0.1), np.arange(7.0, 12.0, 0.1)])
     vehicle = Odometry("R1", time_s, np.zeros(20), np.zeros(20), (0.0, 0.0), 0.0)
     judged = judge(track, vehicle, true_s, np.zeros((len(true_s), 3)))

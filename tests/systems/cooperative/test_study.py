@@ -10,12 +10,12 @@ from groundstation.systems.cooperative.geometry import dilution
 from groundstation.systems.cooperative.study.cases import CASES, FIRST_SEED, settings_of
 from groundstation.systems.cooperative.study.cooperative import study_cooperative
 from groundstation.systems.cooperative.study.page import is_near, measured
-from groundstation.systems.cooperative.study.runs import Outcome, diverges
+from groundstation.systems.cooperative.study.runs import CaseRun, diverges
 
 
-def outcome(error_m: tuple[float, float], late_ratio: float = 1.0) -> Outcome:
+def outcome(error_m: tuple[float, float], late_ratio: float = 1.0) -> CaseRun:
     error, sigma = np.array(error_m), np.array([3.0, 4.0])
-    return Outcome(error, sigma, 2.0, 3.0 * error, 2.0 * sigma, error[::-1], late_ratio, 1.0, float("nan"), 0.0)
+    return CaseRun(error, sigma, 2.0, 3.0 * error, 2.0 * sigma, error[::-1], late_ratio, 1.0, float("nan"), 0.0)
 
 
 def test_every_case_names_a_session_and_one_of_its_aircraft() -> None:

@@ -14,7 +14,7 @@ from groundstation.base.records import Column
 from groundstation.base.toml_settings import settings_from
 from groundstation.methods.intervals import effective_samples
 from groundstation.methods.taxi.gating import gate_samples, intervals_without_epoch
-from groundstation.methods.taxi.samples import Samples, pair_samples, window_slope, without_arm
+from groundstation.methods.taxi.samples import TaxiSamples, pair_samples, window_slope, without_arm
 from groundstation.methods.taxi.settings import GroundLimits
 from groundstation.results.chosen import Interval
 from groundstation.results.gates import Gate
@@ -46,15 +46,15 @@ ROUNDING_DEG = 1e-9
 TWO_TURNS = TaxiCase(segments_s=(30.0, 30.0, 30.0), turns_deg=(90.0, -100.0), antenna_arm_m=4.0)
 
 
-def paired(case: TaxiCase, seed: int = 0, settings: HeadingSettings = SETTINGS) -> Samples:
+def paired(case: TaxiCase, seed: int = 0, settings: HeadingSettings = SETTINGS) -> TaxiSamples:
     flight = taxi_flight(simulate_taxi(case, np.random.default_rng(seed)))
     return gate_samples(pair_samples(flight, "ins", "gnss", settings=settings), settings)
 
 
-def simple_samples(time_s: np.ndarray, north: np.ndarray, east: np.ndarray, heading: np.ndarray) -> Samples:
+def simple_samples(time_s: np.ndarray, north: np.ndarray, east: np.ndarray, heading: np.ndarray) -> TaxiSamples:
     count = len(time_s)
     zeros, nothing = np.zeros(count), np.full(count, np.nan)
-    return Samples(
+    return TaxiSamples(
         time_s, (time_s * 1e9).astype(np.int64), heading, north, east, zeros, zeros, nothing, nothing,
         np.ones(count, dtype=bool), np.zeros(count, dtype=bool), np.full(count, "", dtype="U20"),
         np.zeros(count, dtype=np.int64),

@@ -13,7 +13,7 @@ from groundstation.simulation.ins_errors import SensorErrors, TrueMotion, propag
 from groundstation.systems.inertial import azimuth, velocity_changes
 from groundstation.systems.inertial.azimuth import estimate_azimuth
 from groundstation.systems.inertial.differences import Differences, drag_per_s
-from groundstation.systems.inertial.filter import Epochs, FilterRun, run_filter
+from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, run_filter
 from groundstation.systems.inertial.model import ChannelModel, FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
 
@@ -39,7 +39,7 @@ def flying(velocity: FloatArray, error_mps: FloatArray) -> Differences:
     latitude, altitude = np.full(n, 50.0), np.zeros(n)
     time_s = np.arange(float(n))
     drag = drag_per_s(latitude, altitude, velocity)
-    epochs = Epochs(time_s, np.full((n, 2), np.nan), error_mps, drag, np.zeros(n, dtype=bool))
+    epochs = DifferenceEpochs(time_s, np.full((n, 2), np.nan), error_mps, drag, np.zeros(n, dtype=bool))
     return Differences("ins", "gnss", epochs, latitude, np.zeros(n), altitude, velocity, 0.0, ())
 
 

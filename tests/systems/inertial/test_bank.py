@@ -11,7 +11,7 @@ from groundstation.methods.ins_noise import BankFactors, Calibration, GnssNoise,
 from groundstation.systems.inertial.bank import NoiseBank, run_bank
 from groundstation.systems.inertial.coarse import COARSE_S, Coarse
 from groundstation.systems.inertial.estimate import estimate_ins_errors
-from groundstation.systems.inertial.filter import Epochs, FilterRun, initial_of, run_filter
+from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, initial_of, run_filter
 from groundstation.systems.inertial.hindcast import hindcast
 from groundstation.systems.inertial.leads import leads_of, past_mean, start_epochs
 from groundstation.systems.inertial.settings import InertialSettings
@@ -67,7 +67,7 @@ def test_slow_gnss_and_a_reset_have_epochs_of_their_own() -> None:
     time_s = np.arange(0.0, 600.0)
     position = np.where((np.arange(600) % 15 == 4)[:, None], time_s[:, None] * [1.0, -2.0], np.nan)
     is_reset = time_s == 87.0
-    epochs = replace(Epochs.plain(time_s, position, np.full_like(position, np.nan)), is_reset=is_reset)
+    epochs = replace(DifferenceEpochs.plain(time_s, position, np.full_like(position, np.nan)), is_reset=is_reset)
     noise = load_class("navigation")
     model = estimate_ins_errors(flight_of(batch_of(duration_s=600.0))).run.model
     run = run_filter(epochs, model, noise, initial=initial_of(epochs, noise), gate=1e12)

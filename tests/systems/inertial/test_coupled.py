@@ -22,7 +22,7 @@ from groundstation.systems.inertial.coupled import (
 )
 from groundstation.systems.inertial.craft_motion import CraftMotion
 from groundstation.systems.inertial.differences import Differences, drag_per_s
-from groundstation.systems.inertial.filter import Epochs, run_filter
+from groundstation.systems.inertial.filter import DifferenceEpochs, run_filter
 from groundstation.systems.inertial.hindcast import hindcast
 from groundstation.systems.inertial.leads import built_up, start_epochs
 from groundstation.systems.inertial.model import (
@@ -64,7 +64,7 @@ def differences_of(motion: TrueMotion, position: FloatArray, velocity: FloatArra
     speed = np.stack([motion.velocity_north_mps[0], motion.velocity_east_mps[0]], axis=1)
     latitude, altitude = motion.latitude_deg[0], motion.altitude_m[0]
     drag = drag_per_s(latitude, altitude, speed)
-    epochs = Epochs(motion.time_s, position, velocity, drag, np.zeros(n, dtype=bool))
+    epochs = DifferenceEpochs(motion.time_s, position, velocity, drag, np.zeros(n, dtype=bool))
     return Differences("ins", "gnss", epochs, latitude, np.zeros(n), altitude, speed, 0.0, ())
 
 

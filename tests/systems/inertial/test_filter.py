@@ -15,7 +15,7 @@ from groundstation.methods.kalman import smoother
 from groundstation.simulation.channel_truth import RADIUS_M
 from groundstation.systems.inertial.channel_group import RESET_POSITION_M, RESET_VELOCITY_MPS
 from groundstation.systems.inertial.filter import (
-    Epochs,
+    DifferenceEpochs,
     FilterRun,
     measurement_variances,
     run_filter,
@@ -69,7 +69,7 @@ def unscaled(matrix: FloatArray) -> FloatArray:
     return np.asarray(matrix * TYPICAL[:, None] / TYPICAL[None, :])
 
 
-def irregular_epochs(seed: int = SEED, n: int = 400) -> Epochs:
+def irregular_epochs(seed: int = SEED, n: int = 400) -> DifferenceEpochs:
     """Epochs with jittered intervals, a gap, missing positions and velocities, a drag and an INS reset."""
     rng = np.random.default_rng(seed)
     interval = np.round(rng.choice([0.5, 1.0, 1.0, 2.5, 13.0], n) + rng.uniform(-0.05, 0.05, n), 3)
@@ -83,7 +83,7 @@ def irregular_epochs(seed: int = SEED, n: int = 400) -> Epochs:
     drag = 1e-5 * rng.normal(size=(n, 2, 2))
     reset = np.zeros(n, dtype=bool)
     reset[300] = True
-    return Epochs(time_s, position, velocity, drag, reset)
+    return DifferenceEpochs(time_s, position, velocity, drag, reset)
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def textbook_run() -> tuple[FilterRun, Textbook]:
     return run_filter(epochs, MODEL, NOISE, gate=NO_GATE), textbook(epochs, MODEL, NOISE)
 
 
-def textbook(epochs: Epochs, model: ChannelModel, noise: InsNoise) -> Textbook:
+def textbook(epochs: DifferenceEpochs, model: ChannelModel, noise: InsNoise) -> Textbook:
     """Kalman's filter with full matrices, both channels in twelve states, all measurements of an epoch at once.
 
     Source: Grewal and Andrews, Kalman Filtering, 4th ed. 2015, table 4.3; P in Joseph's form.
@@ -309,7 +309,7 @@ def test_nothing_depends_on_the_origin_of_time_or_on_which_channel_is_first() ->
     run = run_filter(epochs, MODEL, NOISE)
     later = run_filter(replace(epochs, time_s=epochs.time_s + 65_536.0), MODEL, NOISE)
     assert sigmas_apart(run, later.x) < ROUNDING
-    swapped = Epochs(
+    swapped = DifferenceEpochs(
         epochs.time_s,
         epochs.position_m[:, ::-1],
         epochs.velocity_mps[:, ::-1],

@@ -8,7 +8,7 @@ import pytest
 
 from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.systems.inertial.estimate import Estimation, estimate_ins_errors
-from groundstation.systems.inertial.filter import Epochs, FilterRun, initial_of, run_filter
+from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, initial_of, run_filter
 from groundstation.systems.inertial.forecast import assess_forecast
 from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.inertial.hindcast import hindcast
@@ -47,7 +47,7 @@ def cut(run: FilterRun, epoch: int) -> FilterRun:
     """The run of a flight that ended at an epoch."""
     part = slice(0, epoch + 1)
     epochs = run.epochs
-    past = Epochs(
+    past = DifferenceEpochs(
         epochs.time_s[part],
         epochs.position_m[part],
         epochs.velocity_mps[part],
@@ -162,7 +162,7 @@ def test_a_short_flight_says_that_it_is_not_calibrated() -> None:
 def test_held_velocity_and_raw_ins_are_what_they_say() -> None:
     time_s = np.arange(4000.0)
     velocity = np.tile([0.5, -0.25], (4000, 1))
-    epochs = Epochs.plain(time_s, velocity * time_s[:, None], velocity)
+    epochs = DifferenceEpochs.plain(time_s, velocity * time_s[:, None], velocity)
     found = estimate_ins_errors(flight_of(batch_of(duration_s=1200.0)))
     run = run_filter(epochs, found.run.model, found.noise)
     replay = hindcast(run, np.array([2000]), leads_of(60.0, 600.0), ["raw_ins", "hold_velocity"], SETTINGS)

@@ -10,7 +10,7 @@ from groundstation.simulation.inertial_family import ErrorBatch, simulate_family
 from groundstation.systems.inertial import coupled
 from groundstation.systems.inertial.channel_group import ChannelGroup
 from groundstation.systems.inertial.estimate import Estimation, estimate_ins_errors
-from groundstation.systems.inertial.filter import Epochs, FilterRun, Initial, run_filter, smooth
+from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, Initial, run_filter, smooth
 from groundstation.systems.inertial.model import POSITION, FloatArray
 from groundstation.systems.inertial.seams import FACTOR_MAX, PATIENCE_S, factor_of, fixes_since, returns_of
 from groundstation.systems.inertial.settings import InertialSettings
@@ -48,7 +48,7 @@ def replayed(
     for name, values in columns.items():
         values[:gap_s] = np.nan
         values[gap_s:] += changes.get(name, 0.0)
-    cut = Epochs(
+    cut = DifferenceEpochs(
         epochs.time_s[use], columns["position_m"], columns["velocity_mps"], epochs.drag_per_s[use], epochs.is_reset[use]
     )
     initial = Initial(flown.x[start], flown.P[:, start])

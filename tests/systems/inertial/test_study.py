@@ -18,7 +18,7 @@ from groundstation.systems.inertial.hindcast import Hindcast
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.study import forecast
 from groundstation.systems.inertial.study import tables as forecast_tables
-from groundstation.systems.inertial.study.cases import FIRST_SEED, NEW_ROUTES, Case, epochs_of, study_cases
+from groundstation.systems.inertial.study.cases import FIRST_SEED, NEW_ROUTES, FilterCase, epochs_of, study_cases
 from groundstation.systems.inertial.study.coupled_bank import LEAD_STEP_S, LEADS, SetForecasts, fly_bank
 from groundstation.systems.inertial.study.forecast import study_forecast
 from groundstation.systems.inertial.study.outages import fly_with_outages, outages_of
@@ -26,7 +26,7 @@ from groundstation.systems.inertial.study.runs import (
     COUPLED,
     METHOD_NAMES,
     STUDY_HORIZONS_MIN,
-    Outcome,
+    CaseFlight,
     replay_flight,
     run_cases,
 )
@@ -45,12 +45,12 @@ ROUNDING_M = 1e-9
 
 
 @pytest.fixture(scope="module")
-def outcomes() -> dict[str, tuple[Outcome, ...]]:
+def outcomes() -> dict[str, tuple[CaseFlight, ...]]:
     return run_cases([CASES[name] for name in SHORT], FLIGHTS, FLIGHTS, SETTINGS)
 
 
 @pytest.fixture(scope="module")
-def samples(outcomes: dict[str, tuple[Outcome, ...]]) -> dict[str, Resampled]:
+def samples(outcomes: dict[str, tuple[CaseFlight, ...]]) -> dict[str, Resampled]:
     return {name: Resampled.of(several, SEED) for name, several in outcomes.items()}
 
 
@@ -90,7 +90,7 @@ def test_windows_of_a_walking_drift_hurt_at_first_and_help_beyond_an_hour(sample
 
 
 @pytest.mark.slow
-def test_sigma_of_the_matched_last_estimate_is_honest(outcomes: dict[str, tuple[Outcome, ...]]) -> None:
+def test_sigma_of_the_matched_last_estimate_is_honest(outcomes: dict[str, tuple[CaseFlight, ...]]) -> None:
     table = forecast_tables.honesty_table({"matched": outcomes["matched"]})
     chosen = (table["method"] == "last_estimate") & (table["horizon_min"] <= 30.0)
     assert table["coverage95"][chosen] == pytest.approx(0.95, abs=COVERAGE_SPREAD)
@@ -145,11 +145,11 @@ def test_a_case_measures_what_it_says() -> None:
     assert np.isnan(epochs_of(CASES["matched"], batch, 0).velocity_mps).all()
 
 
-def flat(value: float) -> Outcome:
+def flat(value: float) -> CaseFlight:
     """A flight on which every method errs by ``value`` metres, the windows by half as much again."""
     squares = np.full((len(METHOD_NAMES), 5, len(STUDY_HORIZONS_MIN)), value**2)
     squares[METHOD_NAMES.index("windows")] *= 1.5**2
-    return Outcome(squares, 0.0, None)
+    return CaseFlight(squares, 0.0, None)
 
 
 def test_rms_ratios_and_limits_of_known_flights() -> None:
@@ -166,7 +166,7 @@ def test_rms_ratios_and_limits_of_known_flights() -> None:
 
 
 def test_held_out_winner_is_the_least_geometric_mean() -> None:
-    case: Case = CASES["straight"]
+    case: FilterCase = CASES["straight"]
     table = forecast_tables.held_out_table([case], {case.name: Resampled.of([flat(3.0), flat(4.0)], seed=1)})
     assert table["method"][-1] == "windows"
     assert table["score"][-1] == pytest.approx(1.5)

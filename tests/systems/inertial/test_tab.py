@@ -16,7 +16,7 @@ from groundstation.results.flight import FlightResults, NotAssessable
 from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.tables.table import Flight
-from groundstation.viewer.chart import Axis, Chart
+from groundstation.viewer.chart import Chart, ChartAxis
 from groundstation.viewer.recorder import Line, Recorder
 from tests.recording_contents import Contents
 from tests.systems.inertial.example import AIDED, aided_figures, inertial_result
@@ -167,7 +167,9 @@ def test_a_recording_is_written_whatever_the_figures_lack(
 def test_a_chart_scales_values_into_its_box(tmp_path: Path) -> None:
     with rr.RecordingStream("a") as stream:
         stream.save(tmp_path / "a.rrd")
-        chart = Chart(Recorder(stream, START_NS, True), "chart", Axis("x", 0.0, 10.0), Axis("y", 1.0, 100.0, "log"))
+        chart = Chart(
+            Recorder(stream, START_NS, True), "chart", ChartAxis("x", 0.0, 10.0), ChartAxis("y", 1.0, 100.0, "log")
+        )
         chart.curves("line", [(np.array([0.0, 5.0]), np.array([1.0, np.nan]), Line("a", (0, 0, 0, 255)))])
         points = chart.points(np.array([0.0, 5.0, 10.0, 11.0]), np.array([1.0, 10.0, 100.0, 10.0]))
     np.testing.assert_allclose(points[:3], [[0.0, 100.0], [80.0, 50.0], [160.0, 0.0]], atol=1e-9)

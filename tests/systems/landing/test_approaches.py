@@ -14,7 +14,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.api import open_flight
 from groundstation.simulation.approach import (
     ApproachScenario,
-    Flown,
+    FinalMotion,
     Recorded,
     SimulatedApproach,
     TrueRunway,
@@ -33,7 +33,7 @@ from tests.real_logs import real_log
 
 CAPTURE_DEG = 0.5  # an offset that dies away along the final turns the line through its positions
 RUNWAY = TrueRunway(56.0, 38.0, 47.0)
-PLAIN = ApproachScenario(RUNWAY, flown=Flown(start_distance_m=18_000.0, start_across_m=600.0))
+PLAIN = ApproachScenario(RUNWAY, flown=FinalMotion(start_distance_m=18_000.0, start_across_m=600.0))
 EXACT = Recorded(step_deg=0.0, dot_step=1e-6)
 
 

@@ -9,7 +9,7 @@ import pytest
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
 from groundstation.simulation.flight import simulate
-from groundstation.simulation.readings import Readings
+from groundstation.simulation.readings import TopicReadings
 from groundstation.simulation.scenario import GnssSettings, InsSettings
 from groundstation.simulation.sensors import gnss_readings, ins_readings
 from groundstation.simulation.trajectory import Trajectory
@@ -59,7 +59,7 @@ def recorded(trajectory: Trajectory, seed: int, latency_s: float, gnss_hz: float
     return flight_of(ins_readings(trajectory, ins, rng), gnss_readings(trajectory, gnss, rng))
 
 
-def flight_of(*parts: Readings) -> Flight:
+def flight_of(*parts: TopicReadings) -> Flight:
     tables = {
         part.topic: Table(part.topic, part.time_ns, part.columns, np.arange(len(part.time_ns)), Column(part.time_ns))
         for part in parts

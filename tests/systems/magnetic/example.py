@@ -15,7 +15,7 @@ from groundstation.base.units import MPS2_PER_G, NS_PER_S
 from groundstation.methods.harmonics import fit
 from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.magnetic.attitude import field_in_body, levelled_heading_deg
-from groundstation.tables.phases import Interval, Phases
+from groundstation.tables.phases import PhaseInterval, Phases
 from groundstation.tables.table import Flight, Table
 
 START_NS = iso_to_utc_ns("2026-05-09T08:00:00Z")[0]
@@ -103,7 +103,7 @@ def make(**changes: Any) -> Made:
     if case.current_nt_per_a is not None:
         tables["electric"] = table("electric", time_ns, {"current_a": current})
     flight = Flight(tables, {"aircraft": "SIM-3"}, START_NS, True, "made.csv")
-    phases = Phases((Interval(0.0, flight.duration_s, "airborne"),), "made")
+    phases = Phases((PhaseInterval(0.0, flight.duration_s, "airborne"),), "made")
     values = level_truth(case, horizontal, down)
     return Made(flight, float(earth.values_deg[0]), horizontal, down, values, phases)
 

@@ -46,7 +46,7 @@ from groundstation.systems.magnetic.entered import corrections_entered
 from groundstation.systems.magnetic.estimate import estimate_deviation
 from groundstation.systems.magnetic.gyros import EARTH_DEG_PER_H, GyroDrift, gyro_drift
 from groundstation.systems.magnetic.settings import MagneticSettings
-from groundstation.tables.phases import Interval, Phases, flight_phases
+from groundstation.tables.phases import PhaseInterval, Phases, flight_phases
 from groundstation.tables.table import Flight
 from tests.simulated_flights import QUIET_GNSS, QUIET_GROUND, QUIET_INS, scenario
 from tests.systems.inertial.example import inertial_result
@@ -442,7 +442,7 @@ def standing(drift_deg_per_h: tuple[float, float, float], earth: float = 1.0, no
 
 
 def drift_of(flight: Flight) -> GyroDrift | None:
-    return gyro_drift(flight, "ins", Phases((Interval(0.0, 120.0, "standstill"),), "made"), 0.0, 120.0)
+    return gyro_drift(flight, "ins", Phases((PhaseInterval(0.0, 120.0, "standstill"),), "made"), 0.0, 120.0)
 
 
 @pytest.mark.parametrize("earth", [1.0, 0.0])

@@ -30,8 +30,8 @@ from groundstation.systems.magnetic.study.flights import Hangar, judged_outcome
 from groundstation.systems.magnetic.study.judge import (
     METHODS,
     NOT_ASSESSABLE,
-    Judged,
-    Outcome,
+    JudgedAnswer,
+    JudgedMethod,
     errors_deg,
     level_circle,
 )
@@ -43,7 +43,7 @@ from groundstation.systems.magnetic.study.page import (
     refusal_text,
     residual_claim,
 )
-from groundstation.systems.magnetic.study.runs import Job, RunOutcome, fly_job, run_jobs
+from groundstation.systems.magnetic.study.runs import RunOutcome, SeedJob, fly_job, run_jobs
 from groundstation.systems.magnetic.study.tables import (
     BETTER,
     HELD_OUT,
@@ -58,19 +58,19 @@ from groundstation.systems.magnetic.study.tables import (
     samples_of,
 )
 from groundstation.systems.study import StudyResult
-from groundstation.tables.phases import Interval, Phases
+from groundstation.tables.phases import PhaseInterval, Phases
 
 SEED, FEW = 5, 4
 MANY, MANY_SEED = 200, 71
 EXACT_IRON_DEG = 0.02  # readings rounded to 1 nT of 17 000, attitude noise of 0.005 deg times Z / H
 SHIFTED_BINS_DEG = 0.02  # the readings fall into other bins of the table
 WIDE_EXPONENT = 0.35  # of a few irons: harmonics of the bank itself and of the bins of the table
-AIRBORNE = Phases((Interval(0.0, 1e5, "airborne"),), "made")
+AIRBORNE = Phases((PhaseInterval(0.0, 1e5, "airborne"),), "made")
 CLAIMED = tuple(setup for _bank, setup in CLAIM.points)
 
 
-def job(run: int, flown: tuple[Setup, ...] = (), *, is_incomplete: bool = False, judged: bool = False) -> Job:
-    return Job(run, seed_of(SEED, run), flown, MagneticFamilySettings() if judged else None, is_incomplete)
+def job(run: int, flown: tuple[Setup, ...] = (), *, is_incomplete: bool = False, judged: bool = False) -> SeedJob:
+    return SeedJob(run, seed_of(SEED, run), flown, MagneticFamilySettings() if judged else None, is_incomplete)
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def claimed() -> tuple[RunOutcome, ...]:
     return run_jobs([job(run, CLAIMED) for run in range(FEW)])
 
 
-def of_method(outcome: Outcome, method: str, *, whole: bool = True) -> float:
+def of_method(outcome: JudgedAnswer, method: str, *, whole: bool = True) -> float:
     return float((outcome.rms_deg if whole else outcome.shape_deg)[METHODS.index(method)])
 
 
@@ -192,16 +192,16 @@ def test_power_is_found_above_a_floor_of_noise(exponent: float, floor: float) ->
 # Tables and words of known outcomes
 
 
-def known(rms_deg: float, ratio: float, verdict: str = "accept", reason: str = "") -> Outcome:
+def known(rms_deg: float, ratio: float, verdict: str = "accept", reason: str = "") -> JudgedAnswer:
     """A flight on which every method errs by a figure and both judged ones by so many sigmas."""
-    judged = Judged(np.full(5, ratio), np.array([abs(ratio) <= k for k in (1, 2, 3)], dtype=float),
+    judged = JudgedMethod(np.full(5, ratio), np.array([abs(ratio) <= k for k in (1, 2, 3)], dtype=float),
                     float(abs(ratio) <= 1.96), abs(ratio), ratio, ratio, rms_deg, rms_deg)  # fmt: skip
     errors = np.full(len(METHODS), rms_deg)
-    return Outcome(verdict, reason, errors, errors, True, 70.0, 17e3, {TABLE: judged, IRON: judged}, 2.0 * rms_deg,
+    return JudgedAnswer(verdict, reason, errors, errors, True, 70.0, 17e3, {TABLE: judged, IRON: judged}, 2.0 * rms_deg,
                    IRON)  # fmt: skip
 
 
-def sample(outcomes: list[Outcome]) -> Sample:
+def sample(outcomes: list[JudgedAnswer]) -> Sample:
     return Sample(tuple(outcomes), resampling(len(outcomes), 1))
 
 

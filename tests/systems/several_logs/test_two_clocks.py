@@ -12,7 +12,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.systems.joining import NotOneFlightError
 from groundstation.systems.several_logs.gnss_time import GnssStretch, GnssTime, gnss_time_of
 from groundstation.systems.several_logs.relate import relate
-from groundstation.systems.several_logs.relation import LogRelation, Stretch, TimedLog
+from groundstation.systems.several_logs.relation import LogRelation, RelationStretch, TimedLog
 from groundstation.tables.table import Flight
 from tests.systems.several_logs.example import RECEIVER_TIME, UTC_NS, Twice, recorded_twice, retimed, with_gnss_time
 
@@ -56,7 +56,7 @@ def test_motion_alone_places_a_log_on_a_clock_of_its_own(twice: Twice) -> None:
 
 
 def test_a_clock_that_was_set_many_times_has_as_many_stretches() -> None:
-    stretches = tuple(Stretch(10.0 * n, 10.0 * n, float(n), 0.5 * n, 0.0, 0.0, "gnss_time") for n in range(100))
+    stretches = tuple(RelationStretch(10.0 * n, 10.0 * n, float(n), 0.5 * n, 0.0, 0.0, "gnss_time") for n in range(100))
     found = LogRelation(0, 0, (replace(stretches[0], begin_s=-np.inf), *stretches[1:]))
     own_ns = np.array([5, 15, 995]) * NS_PER_S
     assert found.first_time_ns(own_ns).tolist() == [5 * NS_PER_S, 16 * NS_PER_S, 1094 * NS_PER_S]

@@ -22,7 +22,7 @@ _NOT_JOINED = "groundstation-mcap"  # how readers of MCAPs that we wrote begin: 
 
 
 @dataclass(frozen=True)
-class Stretch:
+class ConsecutiveLogs:
     """Consecutive logs as far as they are known to be of one flight.
 
     Parameters
@@ -45,14 +45,14 @@ class Stretch:
         """The log with which it ends."""
         return self.parts[-1]
 
-    def with_next(self, other: "Stretch") -> "Stretch":
+    def with_next(self, other: "ConsecutiveLogs") -> "ConsecutiveLogs":
         """Both, one behind the other."""
-        return Stretch((*self.parts, *other.parts), (*self.numbers, *other.numbers))
+        return ConsecutiveLogs((*self.parts, *other.parts), (*self.numbers, *other.numbers))
 
 
 def flights_of_parts(
     outcomes: Mapping[int, Outcome], known: KnownFlights, configuration: Configuration
-) -> list[Stretch]:
+) -> list[ConsecutiveLogs]:
     """Flights that consist of several logs, and are not so in OUT yet.
 
     This run has at least one log of each.
@@ -66,7 +66,11 @@ def flights_of_parts(
     configuration : Configuration
         How logs are read.
     """
-    own = [Stretch(one.parts, (number,)) for number, one in outcomes.items() if one.flight_id and _may_join(one.parts)]
+    own = [
+        ConsecutiveLogs(one.parts, (number,))
+        for number, one in outcomes.items()
+        if one.flight_id and _may_join(one.parts)
+    ]
     strangers = {Path(one.source).absolute(): number for number, one in outcomes.items() if not one.flight_id}
     stretches = [*own, *_others(own, strangers, known)]
     folders = _Folders()
@@ -75,7 +79,7 @@ def flights_of_parts(
     return [one for one in _chained(grown, folders) if one.numbers and _digests(one) not in known_ones]
 
 
-def _digests(stretch: Stretch) -> tuple[str, ...]:
+def _digests(stretch: ConsecutiveLogs) -> tuple[str, ...]:
     return tuple(part.sha256 for part in stretch.parts)
 
 
@@ -108,7 +112,9 @@ def _may_join(parts: Sequence[PartOfRun]) -> bool:
     return bool(parts) and not parts[0].reader.startswith(_NOT_JOINED)
 
 
-def _others(own: Sequence[Stretch], strangers: Iterable[Path], known: KnownFlights) -> Iterator[Stretch]:
+def _others(
+    own: Sequence[ConsecutiveLogs], strangers: Iterable[Path], known: KnownFlights
+) -> Iterator[ConsecutiveLogs]:
     """Flights of OUT that are near those of the run.
 
     What the run has anew of their parts is left out of them.
@@ -122,14 +128,14 @@ def _others(own: Sequence[Stretch], strangers: Iterable[Path], known: KnownFligh
             continue
         left = [part for part in manifest.parts if part.sha256 not in mine and part.path not in paths]
         if len(left) == len(manifest.parts):
-            yield Stretch(manifest.parts)
+            yield ConsecutiveLogs(manifest.parts)
         else:
-            yield from (Stretch((part,)) for part in left)
+            yield from (ConsecutiveLogs((part,)) for part in left)
 
 
 def _with_strangers(
-    stretch: Stretch, strangers: Mapping[Path, int], folders: _Folders, configuration: Configuration
-) -> Stretch:
+    stretch: ConsecutiveLogs, strangers: Mapping[Path, int], folders: _Folders, configuration: Configuration
+) -> ConsecutiveLogs:
     """Stretch with the files behind it that cannot be read alone.
 
     By name they follow, by content they go on.
@@ -144,11 +150,11 @@ def _with_strangers(
         part = behind_it(first, stretch.last, path)
         if part is None or not goes_on(stretch.last, part, is_beside=True):
             break
-        stretch = Stretch((*stretch.parts, part), (*stretch.numbers, strangers[path]))
+        stretch = ConsecutiveLogs((*stretch.parts, part), (*stretch.numbers, strangers[path]))
     return stretch
 
 
-def _chained(stretches: Sequence[Stretch], folders: _Folders) -> list[Stretch]:
+def _chained(stretches: Sequence[ConsecutiveLogs], folders: _Folders) -> list[ConsecutiveLogs]:
     """Stretches put behind one another where exactly one goes on from another."""
     behind: dict[int, list[int]] = {}
     before: dict[int, list[int]] = {}
@@ -172,7 +178,7 @@ def _chained(stretches: Sequence[Stretch], folders: _Folders) -> list[Stretch]:
     return chains
 
 
-def _nearest(stretches: Sequence[Stretch], others: Sequence[int], *, is_behind: bool) -> list[int]:
+def _nearest(stretches: Sequence[ConsecutiveLogs], others: Sequence[int], *, is_behind: bool) -> list[int]:
     """Stretches next behind (or before) another one, out of several.
 
     They are not behind (or before) one of themselves.
@@ -186,11 +192,11 @@ def _nearest(stretches: Sequence[Stretch], others: Sequence[int], *, is_behind: 
     return [other for other in others if not any(comes_first(one, other) for one in others if one != other)]
 
 
-def _first_ns(stretch: Stretch) -> int:
+def _first_ns(stretch: ConsecutiveLogs) -> int:
     return stretch.first.utc_ns[0] if stretch.first.utc_ns else stretch.first.device_ns[0]
 
 
-def _only(stretches: Sequence[Stretch], one: int, others: Sequence[int]) -> int | None:
+def _only(stretches: Sequence[ConsecutiveLogs], one: int, others: Sequence[int]) -> int | None:
     """Stretch that goes with another one, out of several.
 
     Where there are more, it is that of the same family of names.
@@ -202,7 +208,7 @@ def _only(stretches: Sequence[Stretch], one: int, others: Sequence[int]) -> int 
     return akin[0] if len(akin) == 1 else None
 
 
-def _pairs(stretches: Sequence[Stretch], folders: _Folders) -> Iterator[tuple[int, int]]:
+def _pairs(stretches: Sequence[ConsecutiveLogs], folders: _Folders) -> Iterator[tuple[int, int]]:
     """Numbers of stretches of which the second goes on from the first."""
     by_start = sorted((start, number) for number, one in enumerate(stretches) for start in _moments(one.first, 0))
     for number, one in enumerate(stretches):

@@ -168,10 +168,10 @@ def heard_span_ns(mcap: Path) -> Span | None:
 
     None where there is none.
     """
-    from groundstation.store.reader import Part, read
+    from groundstation.store.reader import StorePart, read
 
     everything = np.iinfo(np.int64)
-    part = Part(everything.min, everything.max, lambda topic: kind_of(topic) == "link")
+    part = StorePart(everything.min, everything.max, lambda topic: kind_of(topic) == "link")
     batches = (item for item in read(mcap, part) if isinstance(item, RecordBatch))
     flight = flight_from_batches(batches, metadata={}, has_utc=False, source_name=mcap.name)
     heard = [sent[known] for sent, known in map(transmission_ns, flight.tables.values())]

@@ -12,7 +12,7 @@ from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.loop_types import GATED, USED
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.timeline import timeline
-from groundstation.systems.cooperative.tracks import AlgorithmRun, Judged, Track
+from groundstation.systems.cooperative.tracks import AlgorithmRun, JudgedMeasurements, VehicleTrack
 from groundstation.systems.cooperative.vehicles import Vehicle
 
 Group = tuple[float, tuple["Event", ...]]
@@ -87,7 +87,7 @@ class Recorder:
         for vehicle, rows in zip(self.vehicles, self._rows, strict=True):
             n, m = len(rows), vehicle.size
             tracks.append(
-                Track(
+                VehicleTrack(
                     vehicle.name,
                     np.array([row[0] for row in rows]),
                     np.array([row[1] for row in rows]).reshape(n, 3),
@@ -101,7 +101,7 @@ class Recorder:
             algorithm,
             update,
             tuple(tracks),
-            Judged(judged[0].astype(np.int64), judged[1], judged[2], judged[3].astype(np.int64)),
+            JudgedMeasurements(judged[0].astype(np.int64), judged[1], judged[2], judged[3].astype(np.int64)),
             dict(self.counts),
             dict(self.messages),
             np.array(self.map_time_s),

@@ -12,7 +12,7 @@ Metric = Literal["two_sigma_r_m", "sigma_r_m", "sigma_axis_m", "gain_over_ins", 
 
 
 @dataclass(frozen=True)
-class Case:
+class PublishedCase:
     """One published figure.
 
     Parameters
@@ -53,12 +53,12 @@ class Case:
     why: str = ""
 
 
-def _global(name: str, title: str, low: float, high: float, published: str, why: str = "") -> Case:
-    return Case(name, title, name, "centralised", "two_sigma_r_m", low, high, published, why=why)
+def _global(name: str, title: str, low: float, high: float, published: str, why: str = "") -> PublishedCase:
+    return PublishedCase(name, title, name, "centralised", "two_sigma_r_m", low, high, published, why=why)
 
 
 INFINITE, NONE = float("inf"), float("nan")
-CASES: tuple[Case, ...] = (
+CASES: tuple[PublishedCase, ...] = (
     _global("three-no-gnss", "3 aircraft, no GNSS", 245, 300, "245-300 m"),
     _global("three-no-gnss-turn", "3 aircraft, no GNSS, one turns", 180, 220, "180-220 m"),
     _global("one-four-satellites", "1 aircraft, 4 satellites", 3, 4, "3-4 m"),
@@ -79,7 +79,7 @@ CASES: tuple[Case, ...] = (
     _global("three-two-satellites-turn", "3 aircraft, 2 satellites, one turns", 3, 7, "3-7 m"),
     _global("three-one-satellite-turn", "3 aircraft, 1 satellite, one turns", 150, 170, "150-170 m"),
     _global("two-one-satellite-turn", "2 aircraft, 1 satellite, one turns", 330, INFINITE, "330 m or more, growing"),
-    Case(
+    PublishedCase(
         "alone",
         "local, 3 aircraft alone at 500 s",
         "local-three-alone",
@@ -89,7 +89,7 @@ CASES: tuple[Case, ...] = (
         1.25,
         "15-20 % better than INS",
     ),
-    Case(
+    PublishedCase(
         "alone-in-line",
         "local, 3 aircraft alone, in line",
         "local-three-in-line",
@@ -99,7 +99,7 @@ CASES: tuple[Case, ...] = (
         1.25,
         "15-20 % better than INS",
     ),
-    Case(
+    PublishedCase(
         "one-point",
         "local, 3 aircraft, 1 reference point",
         "local-three-one-point",
@@ -109,7 +109,7 @@ CASES: tuple[Case, ...] = (
         INFINITE,
         "2.5 times and more",
     ),
-    Case(
+    PublishedCase(
         "two-points",
         "local, 3 aircraft, 2 reference points",
         "local-three-two-points",
@@ -119,7 +119,7 @@ CASES: tuple[Case, ...] = (
         3,
         "about 3 m (one sigma)",
     ),
-    Case(
+    PublishedCase(
         "six-alone",
         "local, 6 aircraft alone",
         "local-six-alone",
@@ -131,7 +131,7 @@ CASES: tuple[Case, ...] = (
         why="A net whose form is known has three unknowns left of 2 k: the bound is "
         "sqrt(2 k / 3) = 2 for six aircraft. The published limit is refuted.",
     ),
-    Case(
+    PublishedCase(
         "exact-alone",
         "DA, 3 aircraft alone",
         "local-three-alone",
@@ -141,7 +141,7 @@ CASES: tuple[Case, ...] = (
         NONE,
         "diverges",
     ),
-    Case(
+    PublishedCase(
         "exact-two-points",
         "DA, 2 reference points, aircraft close, clocks known",
         "local-close-two-points",
@@ -152,7 +152,7 @@ CASES: tuple[Case, ...] = (
         "stable, metres",
         why="The geometry of its figure 7 is not given. This one is stable, and over-confident all the same.",
     ),
-    Case(
+    PublishedCase(
         "exact-two-points-apart",
         "DA, 2 reference points, aircraft 30 km apart",
         "local-three-two-points",
@@ -165,7 +165,7 @@ CASES: tuple[Case, ...] = (
         "clock, not both, and what is missing comes from neighbours who lack it too. Stable where clocks are known and "
         "the aircraft fly close to one another, see above.",
     ),
-    Case(
+    PublishedCase(
         "exact-loses-point",
         "DA, one of two points lost",
         "local-loses-point",
@@ -175,7 +175,7 @@ CASES: tuple[Case, ...] = (
         NONE,
         "diverges",
     ),
-    Case(
+    PublishedCase(
         "split-alone",
         "split covariance intersection, 3 aircraft alone",
         "local-three-alone",
@@ -185,7 +185,7 @@ CASES: tuple[Case, ...] = (
         NONE,
         "none (beyond the source)",
     ),
-    Case(
+    PublishedCase(
         "pairwise-alone",
         "pairwise cross-covariances, 3 aircraft alone",
         "local-three-alone",
@@ -195,7 +195,7 @@ CASES: tuple[Case, ...] = (
         NONE,
         "none (beyond the source)",
     ),
-    Case(
+    PublishedCase(
         "multilevel",
         "multilevel: 2 primaries, 1 secondary",
         "ranked-points",
@@ -207,7 +207,7 @@ CASES: tuple[Case, ...] = (
         "C",
         why="Errors of the primaries last for minutes and are taken for white noise: over-confident, not divergent.",
     ),
-    Case(
+    PublishedCase(
         "multilevel-gain",
         "multilevel against the INS",
         "ranked-points",
@@ -219,7 +219,7 @@ CASES: tuple[Case, ...] = (
         "C",
         why="As above.",
     ),
-    Case(
+    PublishedCase(
         "correlation",
         "errors of two primaries, 25 deg apart",
         "ranked-known-clocks",
@@ -234,7 +234,7 @@ CASES: tuple[Case, ...] = (
         "1 / (1 + (own / common)^2): 0.954 where the primaries' own errors are 0.22 of the common one. With clocks of "
         "30 m and 3 m/s one range to it cannot tell place from clock, and no geometry of one range each reaches it.",
     ),
-    Case(
+    PublishedCase(
         "modified",
         "modified against multilevel, 2 primaries",
         "ranked-two-primaries",
@@ -249,7 +249,7 @@ CASES: tuple[Case, ...] = (
         "whose whole error is common. Here part of it is their own and ranges gather for minutes: neither the computed "
         "sigma nor the error against truth gains.",
     ),
-    Case(
+    PublishedCase(
         "modified-three",
         "modified against multilevel, 3 primaries",
         "ranked-three-primaries",
@@ -262,7 +262,7 @@ CASES: tuple[Case, ...] = (
         against="ranked",
         why="As above.",
     ),
-    Case(
+    PublishedCase(
         "turn-before",
         "2 primaries on 2 points, before the turn",
         "ranked-points-turn",
@@ -276,7 +276,7 @@ CASES: tuple[Case, ...] = (
         why="The computed sigma is the source's; errors against truth are larger because those of the primaries last "
         "for minutes and are taken for white noise: over-confident, not divergent.",
     ),
-    Case(
+    PublishedCase(
         "turn-after",
         "2 primaries on 2 points, one has turned",
         "ranked-points-turn",
@@ -290,7 +290,7 @@ CASES: tuple[Case, ...] = (
         "for minutes and are taken for white noise: over-confident, not divergent. It is not the linearisation: with "
         "all errors a tenth of theirs the NEES is the same. The centralised filter of the same session is honest.",
     ),
-    Case(
+    PublishedCase(
         "turn-after-centralised",
         "2 primaries on 2 points, one has turned",
         "ranked-points-turn",
@@ -304,7 +304,7 @@ CASES: tuple[Case, ...] = (
 )
 
 
-def settings_of(scenario: SessionScenario, case: Case) -> CooperativeSettings:
+def settings_of(scenario: SessionScenario, case: PublishedCase) -> CooperativeSettings:
     """Return settings whose belief is exactly what the session draws from; no gate.
 
     The source has no gate either.

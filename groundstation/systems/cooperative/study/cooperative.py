@@ -5,7 +5,7 @@ Every published figure with ours beside it, and how honest ours is.
 
 from collections.abc import Sequence
 
-from groundstation.systems.cooperative.study.cases import CASES, FIRST_SEED, Case
+from groundstation.systems.cooperative.study.cases import CASES, FIRST_SEED, PublishedCase
 from groundstation.systems.cooperative.study.page import page, study_table
 from groundstation.systems.cooperative.study.runs import WORKERS, Progress, run_cases
 from groundstation.systems.study import StudyResult
@@ -16,7 +16,7 @@ def study_cooperative(
     seed: int = 0,
     progress: Progress | None = None,
     *,
-    cases: Sequence[Case] = CASES,
+    cases: Sequence[PublishedCase] = CASES,
     workers: int = WORKERS,
 ) -> StudyResult:
     """Fly every published case and compare.
@@ -29,7 +29,7 @@ def study_cooperative(
         The runs' seed is ``FIRST_SEED + seed``.
     progress : callable, optional
         Called with one line for each case.
-    cases : sequence of Case
+    cases : sequence of PublishedCase
     workers : int
         Processes; the answer does not depend on them.
     """

@@ -8,14 +8,14 @@ from groundstation.chapters.parts import Section
 from groundstation.methods.intervals import nees_limits
 from groundstation.results.figures import FigureData
 from groundstation.systems.cooperative.consistency import DIVERGED
-from groundstation.systems.cooperative.study.cases import FACTOR, Case
-from groundstation.systems.cooperative.study.runs import Outcome, diverges
+from groundstation.systems.cooperative.study.cases import FACTOR, PublishedCase
+from groundstation.systems.cooperative.study.runs import CaseRun, diverges
 from groundstation.systems.study import grid, section
 
 HONEST_SHARE = 0.99  # of honest filters inside the limits: some twenty are judged at once
 
 
-def measured(case: Case, outcomes: Sequence[Outcome]) -> tuple[float, float]:
+def measured(case: PublishedCase, outcomes: Sequence[CaseRun]) -> tuple[float, float]:
     """Return the figure by the filter's covariance, and by its errors over the runs."""
     error = np.array([one.error_m for one in outcomes])
     sigma = np.array([one.sigma_m for one in outcomes])
@@ -37,7 +37,7 @@ def measured(case: Case, outcomes: Sequence[Outcome]) -> tuple[float, float]:
     return claimed_r, real_r
 
 
-def is_near(case: Case, value: float) -> bool | None:
+def is_near(case: PublishedCase, value: float) -> bool | None:
     """Tell whether a figure lies within a factor of two of the published one.
 
     None where none was published.
@@ -47,7 +47,7 @@ def is_near(case: Case, value: float) -> bool | None:
     return bool(case.low / FACTOR <= value <= case.high * FACTOR)
 
 
-def study_table(cases: Sequence[Case], outcomes: dict[str, tuple[Outcome, ...]]) -> FigureData:
+def study_table(cases: Sequence[PublishedCase], outcomes: dict[str, tuple[CaseRun, ...]]) -> FigureData:
     """Tabulate our figures beside the published ones, with both verdicts."""
     rows = []
     for case in cases:
@@ -92,7 +92,7 @@ def study_table(cases: Sequence[Case], outcomes: dict[str, tuple[Outcome, ...]])
     return FigureData("cooperative_published", columns, digits | {"measured": 3})
 
 
-def page(cases: Sequence[Case], table: FigureData, runs: int, seed: int) -> tuple[Section, ...]:
+def page(cases: Sequence[PublishedCase], table: FigureData, runs: int, seed: int) -> tuple[Section, ...]:
     """Return the study in sections."""
     head = ("case", "algorithm", "published", "computed", "measured", "factor 2", "NEES (2)", "consistent", "diverges")
     body = []
@@ -134,7 +134,7 @@ def page(cases: Sequence[Case], table: FigureData, runs: int, seed: int) -> tupl
     )
 
 
-def _outside(case: Case, measured_: float) -> str:
+def _outside(case: PublishedCase, measured_: float) -> str:
     return f"{case.title}: published {case.published}, ours {measured_:.3g}. {case.why}"
 
 

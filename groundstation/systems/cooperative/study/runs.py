@@ -18,7 +18,7 @@ from groundstation.simulation.session_scenario import load_session
 from groundstation.systems.cooperative.algorithms import run_algorithm
 from groundstation.systems.cooperative.consistency import DIVERGED, normalised
 from groundstation.systems.cooperative.events import prepare
-from groundstation.systems.cooperative.study.cases import Case, settings_of
+from groundstation.systems.cooperative.study.cases import PublishedCase, settings_of
 
 Progress = Callable[[str], None]
 WORKERS = 2
@@ -26,7 +26,7 @@ MANY_RUNS = 20  # from which on compiling the filters pays
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CaseRun:
     """One run of one case.
 
     Parameters
@@ -65,13 +65,13 @@ class Outcome:
 
 
 def run_cases(
-    cases: Sequence[Case], runs: int, seed: int, progress: Progress | None = None, workers: int = WORKERS
-) -> dict[str, tuple[Outcome, ...]]:
+    cases: Sequence[PublishedCase], runs: int, seed: int, progress: Progress | None = None, workers: int = WORKERS
+) -> dict[str, tuple[CaseRun, ...]]:
     """Run every case ``runs`` times.
 
     Cases of one session see the same flights, whatever the number of workers.
     """
-    outcomes: dict[str, tuple[Outcome, ...]] = {}
+    outcomes: dict[str, tuple[CaseRun, ...]] = {}
     is_repeated = runs >= MANY_RUNS
     jobs = [(case, seed, run, is_repeated) for case in cases for run in range(runs)]
     if workers <= 1 or len(jobs) < 8:
@@ -89,7 +89,7 @@ def run_cases(
     return outcomes
 
 
-def fly(case: Case, seed: int, run: int, is_repeated: bool) -> Outcome:
+def fly(case: PublishedCase, seed: int, run: int, is_repeated: bool) -> CaseRun:
     """Simulate and filter one run of a case."""
     scenario = load_session(case.session)
     settings = settings_of(scenario, case)
@@ -111,7 +111,7 @@ def fly(case: Case, seed: int, run: int, is_repeated: bool) -> Outcome:
     other_track = other.tracks[who]
     frames = scenario.duration_s / scenario.link.frame_s
     half = len(done.map_radius) // 2
-    return Outcome(
+    return CaseRun(
         error_m=errors[who][place],
         sigma_m=np.sqrt(np.diag(covariance)),
         nees=float(normalised(errors[who][place][None], covariance[None])[0]),
@@ -134,7 +134,7 @@ def _ratio(errors: list[FloatArray], tracks: Sequence[object], first: float, las
     return float(np.sqrt(np.mean(squares)))
 
 
-def diverges(outcomes: Sequence[Outcome]) -> bool:
+def diverges(outcomes: Sequence[CaseRun]) -> bool:
     """Tell whether the late errors of all runs are beyond three computed sigma_r.
 
     Late: the last tenth of a run.

@@ -6,7 +6,7 @@ Acceptance, coverage, both numbers.
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from groundstation.systems.heading.estimate import estimate_heading_error
 from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.heading.steady import FACTORS
 from groundstation.systems.known import AircraftClass, AircraftData
-from groundstation.systems.study import StudyResult, section, table
+from groundstation.systems.study import RunStore, StudyResult, section, table
 from groundstation.tables.phases import flight_phases
 
 FloatArray = NDArray[np.float64]
@@ -169,20 +169,12 @@ def _changed(run: TaxiRun, kind: Kind, rng: np.random.Generator, same_deg: float
     )
 
 
-class Kept(Protocol):
-    """Outcomes of runs that ended before, by a name for kind and seed, and by number."""
-
-    def get(self, name: str, number: int) -> CrewOutcome | None: ...
-
-    def put(self, name: str, number: int, outcome: CrewOutcome) -> None: ...
-
-
 def study_crew(
     runs: int = 200,
     seed: int = 71,
     progress: Callable[[str], None] | None = None,
     *,
-    kept: Kept | None = None,
+    kept: RunStore[CrewOutcome] | None = None,
     minutes: float | None = None,
 ) -> StudyResult:
     """Run the estimator over the third family of docs/heading-family.md.
@@ -196,7 +188,7 @@ def study_crew(
     seed : int
     progress : callable, optional
         Called with one line for each run.
-    kept : Kept, optional
+    kept : RunStore, optional
         Runs of an earlier call: these are not made again.
     minutes : float, optional
         Time after which no further run is begun; the page is then that of the runs made so far.

@@ -6,7 +6,7 @@ Errors, coverage of both intervals, acceptance by gate.
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Protocol, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from groundstation.systems.heading.arrays import HeadingRunning
 from groundstation.systems.heading.estimate import estimate_heading_error
 from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.known import AircraftClass, AircraftData
+from groundstation.systems.study import RunStore
 from groundstation.tables.phases import flight_phases
 
 BoolArray = NDArray[np.bool_]
@@ -125,20 +126,12 @@ def outcome_of(number: int, case: TaxiCase, result: HeadingResult, truth_deg: fl
     )
 
 
-class Kept(Protocol):
-    """Outcomes of runs that ended before, by a name for family and seed, and by number."""
-
-    def get(self, name: str, number: int) -> RunOutcome | None: ...
-
-    def put(self, name: str, number: int, outcome: RunOutcome) -> None: ...
-
-
 def run_families(
     families: Sequence[tuple[Family, int]],
     runs: int,
     progress: Progress | None = None,
     *,
-    kept: Kept | None = None,
+    kept: RunStore[RunOutcome] | None = None,
     is_over: Callable[[], bool] | None = None,
 ) -> dict[Family, tuple[RunOutcome, ...]]:
     """Run 0 to ``runs`` - 1 of each family and seed, by turns.
@@ -151,7 +144,7 @@ def run_families(
     runs : int
     progress : callable, optional
         Called with a line for each run that is made.
-    kept : Kept, optional
+    kept : RunStore, optional
         Runs that it has are taken from there; those that are made are put there.
     is_over : callable, optional
         Asked before each number but the first whether to stop.

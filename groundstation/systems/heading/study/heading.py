@@ -12,7 +12,6 @@ from groundstation.chapters.parts import Section
 from groundstation.results.figures import FigureData
 from groundstation.simulation.taxi import Family
 from groundstation.systems.heading.study.family import (
-    Kept,
     Progress,
     RunOutcome,
     coverage_table,
@@ -23,7 +22,7 @@ from groundstation.systems.heading.study.family import (
     time_to_precision_table,
 )
 from groundstation.systems.heading.study.paper import arm_table, precision_table, quality_table, standstill_tables
-from groundstation.systems.study import StudyResult, section, table
+from groundstation.systems.study import RunStore, StudyResult, section, table
 
 PUBLISHED: tuple[Family, ...] = ("grid", "continuous")  # families that the published figures are compared with
 PAPER_RUNS = 2000  # realisations of the plain processes: the paper had more than 500 at standstill
@@ -34,7 +33,7 @@ def study_heading(
     seed: int = 71,
     progress: Progress | None = None,
     *,
-    kept: Kept | None = None,
+    kept: RunStore[RunOutcome] | None = None,
     minutes: float | None = None,
 ) -> StudyResult:
     """Run the estimator over the families of docs/heading-family.md and measure it.
@@ -47,7 +46,7 @@ def study_heading(
         Seed of family grid; families continuous and wide take the next two.
     progress : callable, optional
         Called with one line for each run.
-    kept : Kept, optional
+    kept : RunStore, optional
         Runs of an earlier call: these are not made again.
     minutes : float, optional
         Time after which no further run is begun; the page is then that of the runs made so far.

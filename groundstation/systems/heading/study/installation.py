@@ -24,8 +24,8 @@ from groundstation.systems.heading.study.installation_family import (
     FlownFlight,
     draw_fleet,
 )
-from groundstation.systems.heading.study.installation_pool import Kept, Progress, TaxiOfPool, draw_pool, pool_figure
-from groundstation.systems.study import StudyResult, section, table
+from groundstation.systems.heading.study.installation_pool import Progress, TaxiOfPool, draw_pool, pool_figure
+from groundstation.systems.study import RunStore, StudyResult, section, table
 
 LEAST_POOL = FLIGHTS
 ORDER = [family.name for family in FAMILIES]
@@ -33,7 +33,7 @@ CHANGING = frozenset(family.name for family in FAMILIES if family.change)
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedFlight:
     """One flight of a fleet against the truth; errors are estimate minus truth, degrees.
 
     ``flight`` counts from 1, ``taught`` earlier flights taught, another unit first flew ``since`` flights ago.
@@ -59,7 +59,7 @@ def study_installation(
     seed: int = 71,
     progress: Progress | None = None,
     *,
-    kept: Kept | None = None,
+    kept: RunStore[TaxiOfPool] | None = None,
     minutes: float | None = None,
 ) -> StudyResult:
     """Draw fleets of every family and judge each flight by what earlier ones taught.
@@ -71,7 +71,7 @@ def study_installation(
     seed : int
         Of pool and fleets.
     progress : callable, optional
-    kept : Kept, optional
+    kept : RunStore, optional
         Taxis of an earlier call.
     minutes : float, optional
         Time after which no further taxi is drawn; the fleets are then made of those there are.
@@ -85,7 +85,7 @@ def study_installation(
         return least < 0 and time.monotonic() > end_s
 
     pool = draw_pool(seed, runs, progress, kept=kept, is_over=is_over)
-    judged: list[Judged] = []
+    judged: list[JudgedFlight] = []
     for number, family in enumerate(FAMILIES):
         if progress is not None:
             progress(f"family {family.name}")
@@ -105,7 +105,7 @@ def judge_family(
     pool: Sequence[TaxiOfPool],
     settings: InstallationSettings | None = None,
     aircraft: int = AIRCRAFT,
-) -> list[Judged]:
+) -> list[JudgedFlight]:
     """Judge every flight of the fleets of a family."""
     settings = settings or InstallationSettings()
     found = []
@@ -118,11 +118,11 @@ def judge_family(
     return found
 
 
-def _judged(family: str, place: int, flown: FlownFlight, answer: InstallationResult) -> Judged:
+def _judged(family: str, place: int, flown: FlownFlight, answer: InstallationResult) -> JudgedFlight:
     platform_deg = answer.platform_error_deg
     assert platform_deg is not None
     platform_ends = answer.platform_confidence95_deg or (np.nan, np.nan)
-    return Judged(
+    return JudgedFlight(
         family,
         place,
         answer.flights,
@@ -144,12 +144,12 @@ def _holds(ends_deg: tuple[float, float], truth_deg: float) -> bool:
     return abs(float(wrap_180(truth_deg - middle))) <= 0.5 * (ends_deg[1] - ends_deg[0])
 
 
-def table_by(judged: Sequence[Judged], by: str, name: str) -> FigureData:
+def table_by(judged: Sequence[JudgedFlight], by: str, name: str) -> FigureData:
     """Tabulate one row for each family and each value of ``by``.
 
     ``by``: the number of the flight, or of flights since a change.
     """
-    found: dict[tuple[str, int], list[Judged]] = {}
+    found: dict[tuple[str, int], list[JudgedFlight]] = {}
     for one in sorted(judged, key=lambda one: (ORDER.index(one.family), getattr(one, by))):
         found.setdefault((one.family, getattr(one, by)), []).append(one)
     groups = list(found.items())
@@ -158,7 +158,7 @@ def table_by(judged: Sequence[Judged], by: str, name: str) -> FigureData:
         by: np.array([key[1] for key, _ in groups]),
         "flights": np.array([len(mine) for _, mine in groups]),
     }
-    figures: dict[str, Callable[[Sequence[Judged]], float]] = {
+    figures: dict[str, Callable[[Sequence[JudgedFlight]], float]] = {
         "coverage": lambda mine: _share(one.is_inside for one in mine),
         "half_width_arcmin": lambda mine: _median(one.half_width_deg for one in mine),
         "alone_arcmin": lambda mine: _median(one.alone_half_width_deg for one in mine),

@@ -5,7 +5,6 @@ Fleets of docs/installation-family.md draw from it.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.estimate import estimate_heading_error
 from groundstation.systems.heading.verdict import STANDSTILL_GATE, WHOLE
 from groundstation.systems.known import AircraftData
+from groundstation.systems.study import RunStore
 from groundstation.tables.phases import flight_phases
 
 Progress = Callable[[str], None]
@@ -76,20 +76,12 @@ def taxi_of(found: HeadingResult, error_deg: float) -> TaxiOfPool:
     return TaxiOfPool(error_deg, taxi.sigma_deg, taxi.half_width_deg, found.segments[0].mean_track_deg, failed)
 
 
-class Kept(Protocol):
-    """Taxis of earlier calls, by a name for their seed, and by number."""
-
-    def get(self, name: str, number: int) -> TaxiOfPool | None: ...
-
-    def put(self, name: str, number: int, outcome: TaxiOfPool) -> None: ...
-
-
 def draw_pool(
     seed: int,
     runs: int,
     progress: Progress | None = None,
     *,
-    kept: Kept | None = None,
+    kept: RunStore[TaxiOfPool] | None = None,
     is_over: Callable[[], bool] = lambda: False,
 ) -> tuple[TaxiOfPool, ...]:
     """Draw the first ``runs`` runs of a pool, fewer where time is over.

@@ -13,7 +13,7 @@ from groundstation.simulation.inertial_family import GnssNoise as SimulatedGnss
 from groundstation.simulation.ins_class import InsClass, load_ins_class
 from groundstation.simulation.routes import RouteKind
 from groundstation.systems.inertial.differences import Differences, drag_per_s
-from groundstation.systems.inertial.filter import STANDARD_GATE, Epochs
+from groundstation.systems.inertial.filter import STANDARD_GATE, DifferenceEpochs
 from groundstation.systems.inertial.model import ChannelModel
 
 FIRST_SEED = 50_000  # no smaller seed belongs to a study: those below were used for tuning the classes
@@ -40,7 +40,7 @@ RECEIVER = SimulatedGnss(
 
 
 @dataclass(frozen=True)
-class Case:
+class FilterCase:
     """One truth and one filter.
 
     Parameters
@@ -78,7 +78,7 @@ class Case:
     is_new: bool = False
 
 
-def study_cases(seed: int) -> tuple[Case, ...]:
+def study_cases(seed: int) -> tuple[FilterCase, ...]:
     """Return all cases of a study; their seeds grow from ``FIRST_SEED``.
 
     None of the seeds was used for tuning.
@@ -101,12 +101,12 @@ def study_cases(seed: int) -> tuple[Case, ...]:
     taken, walked = f"{title} taken for white {TAKEN_FOR_M:g} m", "drift taken for a walk of"
     gate, second = f"innovations gated at {STANDARD_GATE**0.5:g} sigma", first + 1
     simple = (
-        Case("matched", "the model is exactly true", white, first, matched, is_calibrated=True),
-        Case("coloured", f"{taken}, no gate", coloured, second, naive, NO_GATE, is_misled=True),
-        Case("gated", f"the same, {gate}", coloured, second, naive, is_misled=True),
-        Case("inflated", f"{title}, R inflated honestly", coloured, second, inflated),
+        FilterCase("matched", "the model is exactly true", white, first, matched, is_calibrated=True),
+        FilterCase("coloured", f"{taken}, no gate", coloured, second, naive, NO_GATE, is_misled=True),
+        FilterCase("gated", f"the same, {gate}", coloured, second, naive, is_misled=True),
+        FilterCase("inflated", f"{title}, R inflated honestly", coloured, second, inflated),
         *(
-            Case(
+            FilterCase(
                 name,
                 f"{walked} {noise.drift_walk_dph_per_sqrt_h:g} deg/h per sqrt(h)",
                 white,
@@ -126,21 +126,21 @@ def study_cases(seed: int) -> tuple[Case, ...]:
     )
 
 
-def full_case(name: str, title: str, ins_class: str, route: RouteKind, seed: int) -> Case:
+def full_case(name: str, title: str, ins_class: str, route: RouteKind, seed: int) -> FilterCase:
     """Return a case of full truth, filtered with the noise of its class as shipped."""
     family = FamilySettings(ins=ins_class, route=route, gnss=RECEIVER)
     noise = load_class(ins_class)
-    return Case(name, title, family, seed, noise, uses_velocity=True, is_calibrated=True, is_held_out=True)
+    return FilterCase(name, title, family, seed, noise, uses_velocity=True, is_calibrated=True, is_held_out=True)
 
 
-def own_case(name: str, route: RouteKind, seed: int) -> Case:
+def own_case(name: str, route: RouteKind, seed: int) -> FilterCase:
     """Return a case of a route nothing was tuned on, each flight with its own instrument."""
     title = f"navigation grade, {route.replace('_', ' ')}, each flight its own instrument"
     case = full_case(name, title, "navigation", route, seed)
     return replace(case, family=replace(case.family, each_its_own=True), is_new=True)
 
 
-def differences_of(batch: ErrorBatch, row: int, epochs: Epochs) -> Differences:
+def differences_of(batch: ErrorBatch, row: int, epochs: DifferenceEpochs) -> Differences:
     """Return epochs of one simulated flight with the motion of its INS."""
     velocity = np.stack([batch.velocity_north_mps[row], batch.velocity_east_mps[row]], axis=1)
     place = (batch.latitude_deg[row], batch.longitude_deg[row], batch.altitude_m[row])
@@ -164,20 +164,20 @@ def matched_noise(ins: InsClass, gnss: GnssNoise) -> InsNoise:
     )
 
 
-def epochs_of(case: Case, batch: ErrorBatch, row: int) -> Epochs:
+def epochs_of(case: FilterCase, batch: ErrorBatch, row: int) -> DifferenceEpochs:
     """Return the filter's input of one simulated flight: INS minus GNSS at every epoch."""
     position = batch.position_error_m[row] - batch.gnss_position_error_m[row]
     velocity = batch.velocity_error_mps[row] - batch.gnss_velocity_error_mps[row]
     if not case.uses_velocity:
         velocity = np.full_like(velocity, np.nan)
     if case.family.truth == "channel":
-        return Epochs.plain(batch.time_s, position, velocity)
+        return DifferenceEpochs.plain(batch.time_s, position, velocity)
     ground = np.stack([batch.velocity_north_mps[row], batch.velocity_east_mps[row]], axis=1)
     drag = drag_per_s(batch.latitude_deg[row], batch.altitude_m[row], ground)
-    return Epochs(batch.time_s, position, velocity, drag, np.zeros(len(batch.time_s), dtype=bool))
+    return DifferenceEpochs(batch.time_s, position, velocity, drag, np.zeros(len(batch.time_s), dtype=bool))
 
 
-def model_of(case: Case, batch: ErrorBatch, row: int) -> ChannelModel:
+def model_of(case: FilterCase, batch: ErrorBatch, row: int) -> ChannelModel:
     """Return the channel model of a flight.
 
     Gravity and radius are the truth's own, or those of the flight's mean place.

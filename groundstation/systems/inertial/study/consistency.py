@@ -14,7 +14,7 @@ from groundstation.methods.ins_noise import GnssNoise
 from groundstation.results.figures import FigureData
 from groundstation.simulation.channel_truth import POSITION, RADIUS_M, VELOCITY, channel_truth
 from groundstation.simulation.ins_class import load_ins_class
-from groundstation.systems.inertial.filter import Epochs, FilterRun, run_filter
+from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, run_filter
 from groundstation.systems.inertial.model import SIZE, ChannelModel
 from groundstation.systems.inertial.study.cases import matched_noise
 
@@ -57,7 +57,7 @@ def matched_run(seed: int, number: int, *, duration_s: int = DURATION_S, uses_ve
     noise = matched_noise(ins, GnssNoise(POSITION_M, 0.0, 0.0, VELOCITY_MPS, 0.0, 0.0, is_inflated=False))
     white = rng.standard_normal((2, *states[:, POSITION].shape))
     velocity = states[:, VELOCITY] + VELOCITY_MPS * white[1]
-    epochs = Epochs.plain(
+    epochs = DifferenceEpochs.plain(
         np.arange(duration_s + 1, dtype=np.float64),
         states[:, POSITION] + POSITION_M * white[0],
         velocity if uses_velocity else np.full_like(velocity, np.nan),

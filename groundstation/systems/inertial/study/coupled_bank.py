@@ -32,14 +32,14 @@ from groundstation.systems.inertial.coupled import (
 from groundstation.systems.inertial.coupled_forecast import coupled_variance, hindcast_coupled
 from groundstation.systems.inertial.craft_motion import CraftMotion
 from groundstation.systems.inertial.differences import Differences
-from groundstation.systems.inertial.filter import Epochs, FilterRun, run_filter
+from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, run_filter
 from groundstation.systems.inertial.hindcast import Hindcast
 from groundstation.systems.inertial.leads import PAST_FROM_S, built_up, past_mean, start_epochs
 from groundstation.systems.inertial.model import POSITION, RANDOM_DRIFT
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import QUANTILES, claimed_sigma
 from groundstation.systems.inertial.start_covariance import lead_growth
-from groundstation.systems.inertial.study.cases import Case, differences_of, epochs_of, model_of
+from groundstation.systems.inertial.study.cases import FilterCase, differences_of, epochs_of, model_of
 from groundstation.systems.inertial.study.runs import WORKERS
 
 LEAD_STEP_S, LEADS = 600.0, 12
@@ -164,7 +164,7 @@ def _grown(run: CoupledRun, values: FloatArray, P: FloatArray) -> FloatArray:
         np.arange(len(values)),
         unseen,
         kalman.Start(np.zeros((SIZE, 0)), P),
-        kept=kalman.Kept(states=False, covariances=False, gains=False, variances=True),
+        kept=kalman.KeptArrays(states=False, covariances=False, gains=False, variances=True),
     )
     every = round(LEAD_STEP_S / VARIANCE_STEP_S)
     return np.asarray(carried.record.variance[every - 1 :: every][:, PLACES])
@@ -185,7 +185,9 @@ class BankOutcome:
 METHODS = ("coupled", ALONE, WITH_CLASS)
 
 
-def judge_bank(differences: Differences, flown: FilterRun, truth: Epochs, settings: InertialSettings) -> BankOutcome:
+def judge_bank(
+    differences: Differences, flown: FilterRun, truth: DifferenceEpochs, settings: InertialSettings
+) -> BankOutcome:
     """Replay outages of a flight by the three methods.
 
     Errors are judged against ``truth``, bands against GNSS.
@@ -226,16 +228,16 @@ def judge_bank(differences: Differences, flown: FilterRun, truth: Epochs, settin
     return BankOutcome(np.array(squares), np.array(inside))
 
 
-def fly_bank(case: Case, run: int, settings: InertialSettings) -> BankOutcome:
+def fly_bank(case: FilterCase, run: int, settings: InertialSettings) -> BankOutcome:
     """Fly one flight of a case and judge the bank on it."""
     batch = simulate_family(case.family, 1, case.seed, first_run=run)
     epochs = epochs_of(case, batch, 0)
     flown = run_filter(epochs, model_of(case, batch, 0), case.noise, gate=case.gate)
-    truth = Epochs.plain(epochs.time_s, batch.position_error_m[0], batch.velocity_error_mps[0])
+    truth = DifferenceEpochs.plain(epochs.time_s, batch.position_error_m[0], batch.velocity_error_mps[0])
     return judge_bank(differences_of(batch, 0, epochs), flown, truth, settings)
 
 
-def fly_banks(cases: Sequence[Case], runs: int, settings: InertialSettings) -> dict[str, list[BankOutcome]]:
+def fly_banks(cases: Sequence[FilterCase], runs: int, settings: InertialSettings) -> dict[str, list[BankOutcome]]:
     """Fly so many flights of every case that stands for real ones."""
     chosen = [case for case in cases if case.is_held_out]
     with ThreadPoolExecutor(min(WORKERS, os.cpu_count() or 1)) as pool:

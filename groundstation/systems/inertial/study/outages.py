@@ -17,14 +17,14 @@ from groundstation.results.figures import FigureData
 from groundstation.simulation.inertial_family import simulate_family
 from groundstation.systems.inertial.coupled import CoupledRun, run_coupled
 from groundstation.systems.inertial.coupled_forecast import coupled_variance, hindcast_coupled
-from groundstation.systems.inertial.filter import Epochs, FilterRun, run_filter, smooth
+from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, run_filter, smooth
 from groundstation.systems.inertial.hindcast import hindcast
 from groundstation.systems.inertial.leads import built_up, leads_of, start_epochs
 from groundstation.systems.inertial.model import POSITION
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import QUANTILES, claimed_sigma
 from groundstation.systems.inertial.start_covariance import lead_growth
-from groundstation.systems.inertial.study.cases import NO_GATE, Case, differences_of, epochs_of, model_of
+from groundstation.systems.inertial.study.cases import NO_GATE, FilterCase, differences_of, epochs_of, model_of
 from groundstation.systems.inertial.study.runs import WORKERS, mean_known
 
 FIRST_S, LENGTHS_S, BETWEEN_S = 3600.0, (60.0, 3600.0), (900.0, 1800.0)
@@ -75,7 +75,7 @@ def outages_of(time_s: FloatArray, seed: int, run: int) -> list[tuple[float, flo
         begin += length + float(rng.uniform(*BETWEEN_S))
 
 
-def fly_with_outages(case: Case, run: int, settings: InertialSettings) -> OutageOutcome:
+def fly_with_outages(case: FilterCase, run: int, settings: InertialSettings) -> OutageOutcome:
     """Fly one flight of a case with outages in its log and judge what is made of them."""
     batch = simulate_family(case.family, 1, case.seed, first_run=run)
     whole = epochs_of(case, batch, 0)
@@ -122,7 +122,7 @@ def _through(
     flown: FilterRun,
     coupled: CoupledRun,
     gaps: Sequence[tuple[float, float]],
-    whole: Epochs,
+    whole: DifferenceEpochs,
     settings: InertialSettings,
 ) -> FloatArray:
     """Return the share of channels in the forecast's 95 % band at the end of each outage."""
@@ -139,7 +139,7 @@ def _through(
 
 
 def _after(
-    flown: FilterRun, coupled: CoupledRun, at: Int64Array, whole: Epochs, settings: InertialSettings
+    flown: FilterRun, coupled: CoupledRun, at: Int64Array, whole: DifferenceEpochs, settings: InertialSettings
 ) -> FloatArray:
     """Return the coverage of the default's 95 % band from the starts ``at``, by horizon.
 
@@ -162,7 +162,7 @@ def _after(
     return np.where(count > 0, (inside & known).sum(axis=(0, 2)) / np.maximum(count, 1), np.nan)
 
 
-def fly_outages(cases: Sequence[Case], runs: int, settings: InertialSettings) -> dict[str, list[OutageOutcome]]:
+def fly_outages(cases: Sequence[FilterCase], runs: int, settings: InertialSettings) -> dict[str, list[OutageOutcome]]:
     """Fly so many flights of every case that stands for real ones, with outages in their logs."""
     chosen = [case for case in cases if case.is_held_out]
     with ThreadPoolExecutor(min(WORKERS, os.cpu_count() or 1)) as pool:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from groundstation.chapters.parts import Grid, Section
 from groundstation.results.figures import FigureData
 from groundstation.results.forecast_methods import FORECAST_METHODS
-from groundstation.systems.inertial.study.cases import Case
+from groundstation.systems.inertial.study.cases import FilterCase
 from groundstation.systems.inertial.study.runs import COUPLED, METHOD_NAMES, SETS_OF_STARTS, STUDY_HORIZONS_MIN
 from groundstation.systems.inertial.study.tables import BETTER, COMPARED, REFERENCE, UNDECIDED, WORSE
 from groundstation.systems.study import grid, section, table
@@ -21,7 +21,7 @@ CONFIRMED = {BETTER: "confirmed", WORSE: "refuted", UNDECIDED: "neither shown"}
 
 
 def page(
-    cases: Sequence[Case], tables: dict[str, FigureData], runs: int, calibrated_runs: int, default_method: str
+    cases: Sequence[FilterCase], tables: dict[str, FigureData], runs: int, calibrated_runs: int, default_method: str
 ) -> tuple[Section, ...]:
     """Return the study in sections."""
     return (
@@ -47,7 +47,7 @@ def page(
     )
 
 
-def _windows(cases: Sequence[Case], ratios: FigureData) -> Section:
+def _windows(cases: Sequence[FilterCase], ratios: FigureData) -> Section:
     """Return the section that compares windows: sentences, then ratios."""
     said = []
     for title, group in (
@@ -84,7 +84,7 @@ def _in_words(ratios: FigureData, case: str, method: str) -> str:
     return "; ".join(parts)
 
 
-def _later(cases: Sequence[Case], later: FigureData) -> Section:
+def _later(cases: Sequence[FilterCase], later: FigureData) -> Section:
     cells = [
         [case.name, method, *_cell(later, "ratio", 2, case=case.name, method=method), _claim(later, case.name, method)]
         for case in cases
@@ -103,7 +103,7 @@ def _claim(later: FigureData, case: str, method: str) -> str:
     return ", ".join(f"{word} {says.count(verdict)}" for verdict, word in CONFIRMED.items() if verdict in says)
 
 
-def _held_out(cases: Sequence[Case], tables: dict[str, FigureData], default_method: str) -> Section:
+def _held_out(cases: Sequence[FilterCase], tables: dict[str, FigureData], default_method: str) -> Section:
     """Return the section on the best method on flights that stand for real ones."""
     held_out, rms = tables["forecast_held_out"], tables["forecast_rms"]
     order = [str(name) for name in held_out["method"]]
@@ -190,12 +190,12 @@ def _outages(outages: FigureData) -> Section:
     )
 
 
-def _rms_of(case: Case, rms: FigureData) -> tuple[str, Grid]:
+def _rms_of(case: FilterCase, rms: FigureData) -> tuple[str, Grid]:
     cells = [[method, *_cell(rms, "rms_m", 0, case=case.name, method=method, starts="all")] for method in METHOD_NAMES]
     return f"{case.name}: {case.title}", grid(["method", *HORIZON_HEAD], cells)
 
 
-def _classic(cases: Sequence[Case], rms: FigureData) -> Grid:
+def _classic(cases: Sequence[FilterCase], rms: FigureData) -> Grid:
     cells = [
         [case.name, starts, method, *_cell(rms, "rms_m", 0, case=case.name, method=method, starts=starts)]
         for case in cases

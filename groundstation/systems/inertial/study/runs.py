@@ -16,13 +16,13 @@ from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.simulation.inertial_family import ErrorBatch, simulate_family
 from groundstation.systems.inertial.coupled import run_coupled
 from groundstation.systems.inertial.coupled_forecast import coupled_variance, hindcast_coupled
-from groundstation.systems.inertial.filter import Epochs, FilterRun, run_filter
+from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, run_filter
 from groundstation.systems.inertial.hindcast import Hindcast, hindcast
 from groundstation.systems.inertial.leads import MEMORY_S, built_up
 from groundstation.systems.inertial.replay import plan_replay
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.skill import QUANTILES, WITH_SIGMA, Claimed, claimed_sigma
-from groundstation.systems.inertial.study.cases import Case, differences_of, epochs_of, model_of
+from groundstation.systems.inertial.study.cases import FilterCase, differences_of, epochs_of, model_of
 
 Progress = Callable[[str], None]
 
@@ -68,7 +68,7 @@ class Honesty:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CaseFlight:
     """One flight in one case.
 
     Parameters
@@ -90,15 +90,19 @@ class Outcome:
 
 
 def run_cases(
-    cases: Sequence[Case], runs: int, calibrated_runs: int, settings: InertialSettings, progress: Progress | None = None
-) -> dict[str, tuple[Outcome, ...]]:
+    cases: Sequence[FilterCase],
+    runs: int,
+    calibrated_runs: int,
+    settings: InertialSettings,
+    progress: Progress | None = None,
+) -> dict[str, tuple[CaseFlight, ...]]:
     """Replay ``runs`` flights of every case.
 
     Cases of one family and seed see the same flights.
 
     Parameters
     ----------
-    cases : sequence of Case
+    cases : sequence of FilterCase
     runs : int
     calibrated_runs : int
         So many flights of each case look at the sigma too, which takes four times as long.
@@ -111,14 +115,14 @@ def run_cases(
     dict of case name to tuple of Outcome
         In the order of the flights, whatever the number of threads.
     """
-    flights: list[tuple[list[Case], int]] = []
+    flights: list[tuple[list[FilterCase], int]] = []
     for seed in dict.fromkeys(case.seed for case in cases):
         together = [case for case in cases if case.seed == seed]
         flown = calibrated_runs if together[0].is_new else runs
         flights += [(together, run) for run in range(flown)]
-    outcomes: dict[str, list[Outcome]] = {case.name: [] for case in cases}
+    outcomes: dict[str, list[CaseFlight]] = {case.name: [] for case in cases}
 
-    def fly(flight: tuple[list[Case], int]) -> list[Outcome]:
+    def fly(flight: tuple[list[FilterCase], int]) -> list[CaseFlight]:
         together, run = flight
         return _fly(together, run, run < calibrated_runs, settings)
 
@@ -131,12 +135,14 @@ def run_cases(
     return {name: tuple(several) for name, several in outcomes.items()}
 
 
-def _fly(cases: list[Case], run: int, is_calibrated: bool, settings: InertialSettings) -> list[Outcome]:
+def _fly(cases: list[FilterCase], run: int, is_calibrated: bool, settings: InertialSettings) -> list[CaseFlight]:
     batch = simulate_family(cases[0].family, 1, cases[0].seed, first_run=run)
     return [replay_flight(case, batch, 0, is_calibrated and case.is_calibrated, settings) for case in cases]
 
 
-def replay_flight(case: Case, batch: ErrorBatch, row: int, is_calibrated: bool, settings: InertialSettings) -> Outcome:
+def replay_flight(
+    case: FilterCase, batch: ErrorBatch, row: int, is_calibrated: bool, settings: InertialSettings
+) -> CaseFlight:
     """Filter a flight of a batch and replay its outages with every method.
 
     The truth judges the forecasts.
@@ -148,17 +154,19 @@ def replay_flight(case: Case, batch: ErrorBatch, row: int, is_calibrated: bool, 
     if case.is_held_out:
         replay = _with_coupled(replay, case, batch, row, settings)
     since = slice(int(np.searchsorted(replay.start_s, settings.first_start_s - 1e-6)), None)
-    truth = Epochs.plain(epochs.time_s, batch.position_error_m[row], batch.velocity_error_mps[row])
+    truth = DifferenceEpochs.plain(epochs.time_s, batch.position_error_m[row], batch.velocity_error_mps[row])
     judged = replay.of(since)
     judged = replace(judged, actual_m=built_up(truth, judged.at, judged.lead_s))
-    return Outcome(
+    return CaseFlight(
         mean_squares(judged),
         float(np.mean(run.used[:, 0] < 0)),
         _honesty(run, replay, since, settings) if is_calibrated else None,
     )
 
 
-def _with_coupled(replay: Hindcast, case: Case, batch: ErrorBatch, row: int, settings: InertialSettings) -> Hindcast:
+def _with_coupled(
+    replay: Hindcast, case: FilterCase, batch: ErrorBatch, row: int, settings: InertialSettings
+) -> Hindcast:
     """Return the replay with the last estimate of the coupled model beside the others."""
     run = run_coupled(differences_of(batch, row, epochs_of(case, batch, row)), case.noise, settings)
     forecast = hindcast_coupled(run, replay.at, replay.lead_s, settings)

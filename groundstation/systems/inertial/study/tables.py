@@ -12,7 +12,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.records import frozen
 from groundstation.results.figures import FigureData
-from groundstation.systems.inertial.study.cases import Case
+from groundstation.systems.inertial.study.cases import FilterCase
 from groundstation.systems.inertial.study.runs import (
     COUPLED,
     JUDGED_NAMES,
@@ -20,8 +20,8 @@ from groundstation.systems.inertial.study.runs import (
     METHOD_NAMES,
     SETS_OF_STARTS,
     STUDY_HORIZONS_MIN,
+    CaseFlight,
     Honesty,
-    Outcome,
 )
 
 DRAWS = 1000  # of the bootstrap: 95 % limits are good to 2 % of their distance
@@ -54,7 +54,7 @@ class Resampled:
         object.__setattr__(self, "mean_square_m2", frozen(self.mean_square_m2))
 
     @classmethod
-    def of(cls, outcomes: Sequence[Outcome], seed: int) -> "Resampled":
+    def of(cls, outcomes: Sequence[CaseFlight], seed: int) -> "Resampled":
         """Return a case with ``DRAWS`` bootstrap draws of its flights.
 
         Cases with equally many flights get the same draws.
@@ -155,7 +155,7 @@ def cure_table(windows: Resampled, cure: Resampled) -> FigureData:
     return _table("forecast_cure", names, rows, digits)
 
 
-def held_out_table(cases: Sequence[Case], samples: dict[str, Resampled]) -> FigureData:
+def held_out_table(cases: Sequence[FilterCase], samples: dict[str, Resampled]) -> FigureData:
     """Tabulate the score of every method on the held-out flights, best first.
 
     ``score`` is the geometric mean, over cases and horizons (all starts), of RMS over that of the last estimate;
@@ -177,7 +177,7 @@ def held_out_table(cases: Sequence[Case], samples: dict[str, Resampled]) -> Figu
     return _table("forecast_held_out", names, rows, dict.fromkeys(names[1:], 3))
 
 
-def honesty_table(outcomes: dict[str, tuple[Outcome, ...]], flights_at_least: int = 2) -> FigureData:
+def honesty_table(outcomes: dict[str, tuple[CaseFlight, ...]], flights_at_least: int = 2) -> FigureData:
     """Tabulate coverage of the 50, 68 and 95 % bands, and NEES, by case, method and horizon.
 
     ``nees`` is the mean over all starts (1 is honest); ``first`` the mean over the first start of each flight, whose
@@ -238,7 +238,7 @@ def _flights_within(known: Sequence[Honesty]) -> FloatArray:
     return np.asarray(np.mean(inside, axis=0))
 
 
-def gate_table(outcomes: dict[str, tuple[Outcome, ...]]) -> FigureData:
+def gate_table(outcomes: dict[str, tuple[CaseFlight, ...]]) -> FigureData:
     """Tabulate the share of the position measurements that the gate rejected.
 
     Mean over flights, and largest.

@@ -11,12 +11,12 @@ from groundstation.base.quantiles import NORMAL_95
 from groundstation.results.figures import FigureData
 from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.study.cases import Setup, Sweep
-from groundstation.systems.magnetic.study.judge import METHODS, Judged, Outcome
+from groundstation.systems.magnetic.study.judge import METHODS, JudgedAnswer, JudgedMethod
 from groundstation.systems.magnetic.study.tables import IRON, TABLE, Sample
 
 FIRST, SECOND = "first", "wide"
 D = LETTERS.index("D")
-Cell = tuple[str, str, Sequence[Outcome]]
+Cell = tuple[str, str, Sequence[JudgedAnswer]]
 
 
 def first_cells(judged: Sample, sweeps: Sequence[Sweep], samples: Mapping[Setup, Sample]) -> Iterable[Cell]:
@@ -43,7 +43,7 @@ def coverage_table(cells: Iterable[Cell]) -> FigureData:
     return FigureData("magnetic_coverage", columns, dict.fromkeys(names[4:], 2))
 
 
-def _row(outcomes: Sequence[Outcome]) -> tuple[float, ...]:
+def _row(outcomes: Sequence[JudgedAnswer]) -> tuple[float, ...]:
     kept = [outcome for outcome in outcomes if outcome.verdict == "accept"]
     table, iron = ([one.judged[method] for one in kept if method in one.judged] for method in (TABLE, IRON))
     recommended = [one.judged[one.recommended] for one in kept if one.recommended in one.judged]
@@ -58,7 +58,7 @@ def _row(outcomes: Sequence[Outcome]) -> tuple[float, ...]:
     )
 
 
-def _inside(judged: Judged) -> float:
+def _inside(judged: JudgedMethod) -> float:
     return float(np.mean(np.abs(judged.coefficient_ratio) <= NORMAL_95))
 
 

@@ -15,14 +15,14 @@ from groundstation.simulation.flight import simulate
 from groundstation.simulation.legs import Fly
 from groundstation.simulation.magnetic_family import FIGURE_ALTITUDE_M, MagneticFamilySettings, draw_magnetic_scenario
 from groundstation.simulation.magnetometer import magnetometer_readings, world_field_nt
-from groundstation.simulation.readings import Readings, generator
+from groundstation.simulation.readings import TopicReadings, generator
 from groundstation.simulation.scenario import InsSettings, Scenario
 from groundstation.simulation.sensors import ins_readings
 from groundstation.simulation.trajectory import Trajectory, fly
 from groundstation.systems.answers_by_role import answered
 from groundstation.systems.magnetic.study.cases import Legs, Setup, WideCell, with_figure
-from groundstation.systems.magnetic.study.judge import Flown, Outcome, judge
-from groundstation.tables.phases import Interval, Phases
+from groundstation.systems.magnetic.study.judge import FlightWithTruth, JudgedAnswer, judge
+from groundstation.tables.phases import PhaseInterval, Phases
 from groundstation.tables.table import Flight, Table
 
 LEGS_TO_LIFT_OFF = 6
@@ -39,7 +39,7 @@ class Hangar:
         self._motions: dict[Scenario, Trajectory] = {}
         self._taxis: dict[float, HeadingByTrack | None] = {}
 
-    def outcome(self, setup: Setup, figure: Legs | None = None) -> Outcome:
+    def outcome(self, setup: Setup, figure: Legs | None = None) -> JudgedAnswer:
         """Fly one setup and judge the estimator's answer.
 
         ``figure``: flown instead of that of the family.
@@ -51,11 +51,11 @@ class Hangar:
         heading = self._taxi(setup.family) if setup.is_aligned else None
         if heading is not None and setup.hours_since_taxi:
             heading = _earlier(heading, 3600.0 * setup.hours_since_taxi)
-        phases = Phases((Interval(0.0, flown.flight.duration_s + 1.0, "airborne"),), "truth")
+        phases = Phases((PhaseInterval(0.0, flown.flight.duration_s + 1.0, "airborne"),), "truth")
         on_ground = answered(flown.flight, phases, ()).role(HeadingOnGround)
         return judge(flown, heading=heading, on_ground=on_ground, phases=phases)
 
-    def flown(self, scenario: Scenario, setup: Setup) -> Flown:
+    def flown(self, scenario: Scenario, setup: Setup) -> FlightWithTruth:
         """Return the level part of a flight."""
         motion = self._motion(scenario)
         assert scenario.magnetometer is not None
@@ -67,7 +67,7 @@ class Hangar:
             ins_readings(motion, moved, generator(self.seed, "ins"), self.seed).only(INS_FIELDS),
             magnetometer_readings(motion, scenario, scenario.magnetometer, generator(self.seed, "magnetometer")),
         ]
-        return Flown(scenario, _flight(scenario, tables), motion, field)
+        return FlightWithTruth(scenario, _flight(scenario, tables), motion, field)
 
     def _motion(self, scenario: Scenario) -> Trajectory:
         key = replace(scenario, ins=InsSettings(), magnetometer=None)
@@ -91,7 +91,7 @@ class Hangar:
         return self._taxis[sigma]
 
 
-def wide_outcome(cell: WideCell, seed: int) -> Outcome:
+def wide_outcome(cell: WideCell, seed: int) -> JudgedAnswer:
     """Fly a whole flight from stand to landing and answer it as the pipeline does.
 
     Latencies, taxi, deviation.
@@ -105,14 +105,14 @@ def wide_outcome(cell: WideCell, seed: int) -> Outcome:
     heading = answered(flight, UNTOLD, (HeadingByTrack,)).answer_meeting(HeadingByTrack)
     known = answered(flight, UNTOLD, (Delays,))
     return judge(
-        Flown(scenario, flight, motion, field),
+        FlightWithTruth(scenario, flight, motion, field),
         heading=heading,
         on_ground=known.role(HeadingOnGround),
         latencies=known.answer_meeting(Delays),
     )
 
 
-def judged_outcome(family: MagneticFamilySettings, seed: int) -> Outcome:
+def judged_outcome(family: MagneticFamilySettings, seed: int) -> JudgedAnswer:
     """Return a whole flight of a family."""
     return wide_outcome(WideCell(family), seed)
 
@@ -124,7 +124,7 @@ def _earlier(heading: HeadingByTrack, by_s: float) -> HeadingByTrack:
     return earlier
 
 
-def _flight(scenario: Scenario, readings: list[Readings]) -> Flight:
+def _flight(scenario: Scenario, readings: list[TopicReadings]) -> Flight:
     """Return readings as the tables of a flight."""
     zero_ns = scenario.start_utc_ns or 0
     tables = {

@@ -35,7 +35,7 @@ NOT_ASSESSABLE = "not assessable"
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedMethod:
     """Comparison of one method's sigmas with its errors on one flight.
 
     Parameters
@@ -72,7 +72,7 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class JudgedAnswer:
     """One flight: the estimator's answer, and the remaining heading error against the truth.
 
     Parameters
@@ -86,7 +86,7 @@ class Outcome:
         Whether the estimator's own limits refuse it.
     dip_deg, horizontal_nt : float
         Of the world.
-    judged : mapping of method to Judged
+    judged : mapping of method to JudgedMethod
     before_rms_deg : float
         Uncorrected RMS error of the readings on the held-out part.
     recommended : str
@@ -100,7 +100,7 @@ class Outcome:
     is_modulus_refused: bool
     dip_deg: float
     horizontal_nt: float
-    judged: dict[str, Judged]
+    judged: dict[str, JudgedMethod]
     before_rms_deg: float = float("nan")
     recommended: str = ""
 
@@ -110,7 +110,7 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Flown:
+class FlightWithTruth:
     """Flight with its truth.
 
     ``motion`` at the rate of the log, ``field_ned_nt`` (n, 3) of the world along it.
@@ -129,13 +129,13 @@ class Flown:
 
 
 def judge(
-    flown: Flown,
+    flown: FlightWithTruth,
     *,
     heading: HeadingByTrack | None = None,
     on_ground: HeadingOnGround | None = None,
     latencies: Delays | None = None,
     phases: Phases | None = None,
-) -> Outcome:
+) -> JudgedAnswer:
     """Return the answer of the estimator on a flight, and the errors of its methods.
 
     Errors are against the truth.
@@ -149,7 +149,7 @@ def judge(
         )
     except NotAssessableError as error:
         nothing = np.full(len(METHODS), np.nan)
-        return Outcome(NOT_ASSESSABLE, error.found, nothing, nothing, False, dip, horizontal, {})
+        return JudgedAnswer(NOT_ASSESSABLE, error.found, nothing, nothing, False, dip, horizontal, {})
     circle = level_circle(flown, middle)
     left = errors_deg(circle, result)
     rms = np.array([_rms(np.stack(left[name])) for name in METHODS])
@@ -157,12 +157,12 @@ def judge(
     rms[METHODS.index("constant_modulus")] = np.nan  # it cannot see A
     truth = _coefficients(flown, middle)
     held_out = _held_out(flown, result)
-    judged: dict[str, Judged] = {
+    judged: dict[str, JudgedMethod] = {
         name: _judged(name, result, truth, circle.shown_deg, left[name][0], held_out)
         for name in JUDGED_METHODS
         if result.method(name).coefficients_sigma_deg
     }
-    return Outcome(
+    return JudgedAnswer(
         verdict=result.verdict,
         reason=result.verdict_reason,
         rms_deg=rms,
@@ -194,7 +194,7 @@ class Circle:
         return levelled_heading_deg(self.field_nt, self.roll_deg, self.pitch_deg)
 
 
-def level_circle(flown: Flown, field_ned_nt: FloatArray) -> Circle:
+def level_circle(flown: FlightWithTruth, field_ned_nt: FloatArray) -> Circle:
     """Return readings of a flight's magnetometer in level flight, with the INS attitude.
 
     The attitude is that with which the INS would level it.
@@ -248,7 +248,7 @@ def _by_iron(circle: Circle, parameters: PoissonParameters | None) -> FloatArray
     return corrected_by_iron(circle.field_nt, circle.roll_deg, circle.pitch_deg, parameters)
 
 
-def _coefficients(flown: Flown, field_ned_nt: FloatArray) -> FloatArray:
+def _coefficients(flown: FlightWithTruth, field_ned_nt: FloatArray) -> FloatArray:
     """Return A to E of level flight, shape (5,), as the truth has them."""
     ins = flown.scenario.ins
     truth = deviation_truth(
@@ -261,7 +261,7 @@ def _coefficients(flown: Flown, field_ned_nt: FloatArray) -> FloatArray:
     return np.array([truth.coefficients_deg[letter] for letter in LETTERS])
 
 
-def _held_out(flown: Flown, result: MagneticResult) -> dict[str, FloatArray]:
+def _held_out(flown: FlightWithTruth, result: MagneticResult) -> dict[str, FloatArray]:
     """Return errors on the held-out part, and the uncorrected heading; empty without one.
 
     Errors are against the true magnetic heading.
@@ -289,7 +289,7 @@ def _judged(
     shown_deg: FloatArray,
     left_deg: FloatArray,
     held_out: dict[str, FloatArray],
-) -> Judged:
+) -> JudgedMethod:
     row = result.method(name)
     values, sigma = (
         np.array([of[letter] for letter in LETTERS]) for of in (row.coefficients_deg, row.coefficients_sigma_deg)
@@ -305,7 +305,7 @@ def _judged(
         held_ratio = float(np.mean(held_out[name]) / np.sqrt(mean_columns**2 @ sigma**2))
         held_rms = _rms(held_out[name])
     own = row.held_out_mean_deg, row.held_out_mean_sigma_deg
-    return Judged(
+    return JudgedMethod(
         coefficient_ratio=error / sigma,
         curve_inside=np.array([np.mean(ratio <= limit) for limit in SIGMAS]),
         curve_inside95=float(np.mean(ratio <= NORMAL_95)),

@@ -23,7 +23,7 @@ from groundstation.systems.magnetic.study.cases import (
     seed_of,
 )
 from groundstation.systems.magnetic.study.flights import Hangar, judged_outcome, wide_outcome
-from groundstation.systems.magnetic.study.judge import Outcome
+from groundstation.systems.magnetic.study.judge import JudgedAnswer
 from groundstation.systems.magnetic.study.taxis import TaxiOutcome, taxi_cells, taxi_outcome
 
 Progress = Callable[[str], None]
@@ -35,7 +35,7 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
-class Job:
+class SeedJob:
     """Flights of one seed.
 
     ``wide`` is the cell of the second family, ``taxi`` that of the third.
@@ -57,34 +57,34 @@ class RunOutcome:
     Parameters
     ----------
     run : int
-    swept : tuple of Outcome
+    swept : tuple of JudgedAnswer
         In the order of the setups; empty where this seed does not fly them.
-    judged : Outcome or None
+    judged : JudgedAnswer or None
         The whole flight of the judged family.
-    incomplete : mapping of kind of figure to Outcome
+    incomplete : mapping of kind of figure to JudgedAnswer
     biases : Biases
         Of this seed's iron, by formula.
-    wide : mapping of cell to Outcome
+    wide : mapping of cell to JudgedAnswer
         The flight of the second family.
     taxi : TaxiOutcome or None
         The flight of the third family.
     """
 
     run: int
-    swept: tuple[Outcome, ...]
-    judged: Outcome | None
-    incomplete: dict[str, Outcome]
+    swept: tuple[JudgedAnswer, ...]
+    judged: JudgedAnswer | None
+    incomplete: dict[str, JudgedAnswer]
     biases: Biases
-    wide: dict[str, Outcome] = field(default_factory=dict)
+    wide: dict[str, JudgedAnswer] = field(default_factory=dict)
     taxi: TaxiOutcome | None = None
 
 
-def jobs_of(runs: int, seed: int, swept_setups: tuple[Setup, ...]) -> list[Job]:
+def jobs_of(runs: int, seed: int, swept_setups: tuple[Setup, ...]) -> list[SeedJob]:
     """Return one job for each run; the seed alone decides how each setup is flown."""
     cells, taxis = tuple(WIDE), tuple(taxi_cells())
     swept, incomplete = (max(2, round(share * runs)) for share in (SWEPT_SHARE, INCOMPLETE_SHARE))
     return [
-        Job(
+        SeedJob(
             run,
             seed_of(seed, run),
             swept_setups if run < swept else (),
@@ -97,7 +97,7 @@ def jobs_of(runs: int, seed: int, swept_setups: tuple[Setup, ...]) -> list[Job]:
     ]
 
 
-def run_jobs(jobs: Sequence[Job], progress: Progress | None = None) -> tuple[RunOutcome, ...]:
+def run_jobs(jobs: Sequence[SeedJob], progress: Progress | None = None) -> tuple[RunOutcome, ...]:
     """Fly all jobs, on as many processes as there are cores.
 
     The outcomes are in the order of the jobs.
@@ -111,7 +111,7 @@ def run_jobs(jobs: Sequence[Job], progress: Progress | None = None) -> tuple[Run
     return tuple(found)
 
 
-def fly_job(job: Job) -> RunOutcome:
+def fly_job(job: SeedJob) -> RunOutcome:
     """Fly everything of one seed."""
     hangar = Hangar(job.seed)
     iron = draw_magnetic_scenario(EXACT, job.seed).magnetometer
@@ -140,7 +140,9 @@ def _told(outcome: RunOutcome) -> str:
 
 
 @contextmanager
-def _mapped(jobs: int) -> Iterator[Callable[[Callable[[Job], RunOutcome], Sequence[Job]], Iterator[RunOutcome]]]:
+def _mapped(
+    jobs: int,
+) -> Iterator[Callable[[Callable[[SeedJob], RunOutcome], Sequence[SeedJob]], Iterator[RunOutcome]]]:
     """Return a map over jobs: in this process for a few, else in single-threaded processes."""
     workers = min(jobs, os.cpu_count() or 1)
     if jobs < POOLED_FROM or workers < 2:

@@ -17,7 +17,14 @@ from groundstation.results.figures import FigureData
 from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.study.bias import bank_at, power_law, power_law_above_floor
 from groundstation.systems.magnetic.study.cases import BANK, CLAIM, EXACT_BANKS_DEG, PUBLISHED_BIAS_DEG, Setup, Sweep
-from groundstation.systems.magnetic.study.judge import JUDGED_METHODS, LIMITS, METHODS, NOT_ASSESSABLE, Judged, Outcome
+from groundstation.systems.magnetic.study.judge import (
+    JUDGED_METHODS,
+    LIMITS,
+    METHODS,
+    NOT_ASSESSABLE,
+    JudgedAnswer,
+    JudgedMethod,
+)
 from groundstation.systems.magnetic.study.runs import RunOutcome
 
 DRAWS = 1000  # of the bootstrap: 95 % limits are good to 2 % of their distance
@@ -40,13 +47,13 @@ class Sample:
     point.
     """
 
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[JudgedAnswer, ...]
     weights: FloatArray
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", frozen(self.weights))
 
-    def each(self, value: Callable[[Outcome], float]) -> FloatArray:
+    def each(self, value: Callable[[JudgedAnswer], float]) -> FloatArray:
         """Return a figure of every run, shape (runs,), NaN where it has none."""
         return np.array([value(outcome) for outcome in self.outcomes], dtype=np.float64)
 
@@ -66,7 +73,7 @@ class Sample:
         place = METHODS.index(method)
         return self.each(lambda outcome: float((outcome.rms_deg if whole else outcome.shape_deg)[place]))
 
-    def judged(self, method: str, value: Callable[[Judged], float]) -> FloatArray:
+    def judged(self, method: str, value: Callable[[JudgedMethod], float]) -> FloatArray:
         """Return a figure of the sigmas of a method on every run."""
         return self.each(lambda outcome: value(outcome.judged[method]) if method in outcome.judged else float("nan"))
 
@@ -334,7 +341,7 @@ def incomplete_table(runs: Sequence[RunOutcome]) -> FigureData:
     return _table("magnetic_incomplete", names, rows, {"share": 2, "low": 2, "high": 2})
 
 
-def reasons_of(outcomes: Iterable[Outcome]) -> Counter[str]:
+def reasons_of(outcomes: Iterable[JudgedAnswer]) -> Counter[str]:
     """Count each reason: the first one of each flight, without its numbers."""
     return Counter(plain_reason(outcome.reason) for outcome in outcomes)
 

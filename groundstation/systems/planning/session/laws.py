@@ -16,7 +16,7 @@ from groundstation.base.records import frozen
 from groundstation.systems.planning.session.accuracy import PLACE, AccuracyModel
 from groundstation.systems.planning.session.descent import Minimum, minimise, nearest_law
 from groundstation.systems.planning.session.measures import Geometry, geometry_of, loss, loss_by_direction
-from groundstation.systems.planning.session.motion import Motion
+from groundstation.systems.planning.session.motion import SessionMotion
 from groundstation.systems.planning.session.scenario import NEAREST_M, LocalCriterion, SessionPlan
 
 LOCAL_ITERATIONS, LOCAL_TOLERANCE = 60, 1e-9
@@ -55,7 +55,7 @@ class Session:
     """Session with the motion and accuracy that the criteria ask for."""
 
     def __init__(self, plan: SessionPlan) -> None:
-        self.plan, self.motion, self.model = plan, Motion(plan), AccuracyModel(plan)
+        self.plan, self.motion, self.model = plan, SessionMotion(plan), AccuracyModel(plan)
         size = self.model.size
         self.theta = np.zeros((size, size))
         steered = {bound.aircraft for bound in self.motion.bounds}

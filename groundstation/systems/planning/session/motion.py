@@ -54,7 +54,7 @@ class Paths:
 
 
 @dataclass(frozen=True)
-class Motion:
+class SessionMotion:
     """Motion of a session: aircraft first, then ground points, in the order of the scenario."""
 
     plan: SessionPlan

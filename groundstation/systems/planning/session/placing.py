@@ -16,7 +16,7 @@ from groundstation.base.errors import GroundstationError
 from groundstation.systems.planning.session.accuracy import PLACE, AccuracyModel
 from groundstation.systems.planning.session.descent import Minimum, minimise
 from groundstation.systems.planning.session.measures import geometry_of, loss, loss_by_direction
-from groundstation.systems.planning.session.motion import Motion
+from groundstation.systems.planning.session.motion import SessionMotion
 from groundstation.systems.planning.session.region import Region, polygon
 from groundstation.systems.planning.session.scenario import NEAREST_M, Criterion, LocalCriterion, SessionPlan
 
@@ -40,7 +40,7 @@ class Site:
 
     def __init__(self, plan: SessionPlan) -> None:
         self.plan, count = plan, len(plan.aircraft)
-        motion = Motion(plan)
+        motion = SessionMotion(plan)
         self.way = motion.paths(motion.uncontrolled).position_m
         self.placed = [number for number, point in enumerate(plan.points) if point.is_placed]
         names = [plan.points[number].name for number in self.placed]

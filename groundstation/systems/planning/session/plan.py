@@ -28,7 +28,7 @@ SPREAD = 0.01  # of the losses of several starts: more is worth a remark
 
 
 @dataclass(frozen=True)
-class Flown:
+class LawResult:
     """One law and what follows from it."""
 
     name: str
@@ -74,10 +74,10 @@ def _control(plan: SessionPlan) -> tuple[ControlPlan, tuple[Finding, ...]]:
     return answer, _findings(session, flown, answer)
 
 
-def _flown(session: Session, name: str, law: Law) -> Flown:
+def _flown(session: Session, name: str, law: Law) -> LawResult:
     paths = session.motion.paths(law.controls)
     accuracy = session.model.accuracy(paths.position_m)
-    return Flown(name, law, paths, accuracy, session.geometry(paths.position_m))
+    return LawResult(name, law, paths, accuracy, session.geometry(paths.position_m))
 
 
 def _require_distance(session: Session) -> None:
@@ -95,7 +95,7 @@ def _require_distance(session: Session) -> None:
         )
 
 
-def _answer(session: Session, flown: dict[str, Flown], recommended: str) -> ControlPlan:
+def _answer(session: Session, flown: dict[str, LawResult], recommended: str) -> ControlPlan:
     plan, nominal, best = session.plan, flown[UNCONTROLLED], flown[recommended]
     variances = [float((session.theta * one.accuracy.covariance[-1]).sum()) for one in (nominal, best)]
     return ControlPlan(
@@ -120,7 +120,7 @@ def _two_sigma(session: Session, accuracy: Accuracy) -> FloatArray:
     return np.asarray(2.0 * np.sqrt(np.column_stack([variance, variance[:, :2].sum(axis=1)])))
 
 
-def _row(session: Session, one: Flown) -> LawRow:
+def _row(session: Session, one: LawResult) -> LawRow:
     links, law, geometry = one.accuracy.links, one.law, one.geometry
     north, east, up, both = _two_sigma(session, one.accuracy)[-1].tolist()
     dop = geometry.dilution()
@@ -170,7 +170,7 @@ def _bounded_share(session: Session, law: Law) -> float:
     return float(np.mean(at)) if at else 0.0
 
 
-def _controls(session: Session, best: Flown) -> tuple[ControlRow, ...]:
+def _controls(session: Session, best: LawResult) -> tuple[ControlRow, ...]:
     rows = []
     for bound, values in zip(session.motion.bounds, best.law.controls, strict=True):
         speed = bound.kind == "speed"
@@ -191,7 +191,7 @@ def _settings(plan: SessionPlan) -> dict[str, float | str | bool]:
     return flat
 
 
-def _figures(session: Session, flown: dict[str, Flown]) -> tuple[FigureData, ...]:
+def _figures(session: Session, flown: dict[str, LawResult]) -> tuple[FigureData, ...]:
     plan, time_s = session.plan, session.plan.step_s * np.arange(session.plan.steps + 1)
     names, count = [one.name for one in plan.aircraft], len(plan.aircraft)
     laws, places = list(flown), np.stack([one.paths.position_m[:, :count] for one in flown.values()])
@@ -241,7 +241,7 @@ def _figures(session: Session, flown: dict[str, Flown]) -> tuple[FigureData, ...
     return tuple(found)
 
 
-def _findings(session: Session, flown: dict[str, Flown], answer: ControlPlan) -> tuple[Finding, ...]:
+def _findings(session: Session, flown: dict[str, LawResult], answer: ControlPlan) -> tuple[Finding, ...]:
     best, row = flown[answer.recommended], answer.law(answer.recommended)
     found: list[Finding] = []
     if not session.motion.bounds:

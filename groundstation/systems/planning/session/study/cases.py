@@ -23,7 +23,7 @@ CORRELATED_S = (0.0, 1.0, 10.0)
 
 
 @dataclass(frozen=True)
-class Case:
+class PublishedFigure:
     """One published figure: its plan, its value, and the function that reads ours.
 
     A value of NaN: only a direction is published.
@@ -75,10 +75,14 @@ INDEPENDENT = (
     "All of it rests on 3 m of independent noise 100 times a second; the study of landing has a table of correlated "
     "errors."
 )
-CASES: tuple[Case, ...] = (
-    Case("speed-x", SPEED, "2 sigma_x 7.8 m at the end", 7.8, lambda answer: answer.law(LAW).two_sigma_north_m),
-    Case("speed-y", SPEED, "2 sigma_y 7.2 m at the end", 7.2, lambda answer: answer.law(LAW).two_sigma_east_m),
-    Case(
+CASES: tuple[PublishedFigure, ...] = (
+    PublishedFigure(
+        "speed-x", SPEED, "2 sigma_x 7.8 m at the end", 7.8, lambda answer: answer.law(LAW).two_sigma_north_m
+    ),
+    PublishedFigure(
+        "speed-y", SPEED, "2 sigma_y 7.2 m at the end", 7.2, lambda answer: answer.law(LAW).two_sigma_east_m
+    ),
+    PublishedFigure(
         "speed-measure",
         SPEED,
         "the measure of observability rises",
@@ -86,11 +90,19 @@ CASES: tuple[Case, ...] = (
         lambda answer: _ratio(answer, "determinant"),
         "Over that without control, at the end, local criterion.",
     ),
-    Case("speed-dop", SPEED, "the geometric factor falls", NONE, lambda answer: _ratio(answer, "dop"), "As above."),
-    Case("moving-x", MOVING, "sigma_x 0.29 m, least", 0.29, lambda answer: least_sigma_m(answer, "north"), INDEPENDENT),
-    Case("moving-y", MOVING, "sigma_y 0.23 m, least", 0.23, lambda answer: least_sigma_m(answer, "east"), "As above."),
-    Case("moving-z", MOVING, "sigma_z 0.6 m, least", 0.6, lambda answer: least_sigma_m(answer, "up"), "As above."),
-    Case(
+    PublishedFigure(
+        "speed-dop", SPEED, "the geometric factor falls", NONE, lambda answer: _ratio(answer, "dop"), "As above."
+    ),
+    PublishedFigure(
+        "moving-x", MOVING, "sigma_x 0.29 m, least", 0.29, lambda answer: least_sigma_m(answer, "north"), INDEPENDENT
+    ),
+    PublishedFigure(
+        "moving-y", MOVING, "sigma_y 0.23 m, least", 0.23, lambda answer: least_sigma_m(answer, "east"), "As above."
+    ),
+    PublishedFigure(
+        "moving-z", MOVING, "sigma_z 0.6 m, least", 0.6, lambda answer: least_sigma_m(answer, "up"), "As above."
+    ),
+    PublishedFigure(
         "moving-touchdown",
         MOVING,
         "sigma_z 1.6-1.8 m at touchdown",

@@ -18,7 +18,7 @@ PASSES = 3  # linearisations of each epoch: one is not enough 300 m off at range
 
 
 @dataclass(frozen=True)
-class Flown:
+class EndErrors:
     """Errors of many flights at the end: rms north and east (m), and NEES of both.
 
     ``runs`` is the number of flights.
@@ -30,7 +30,7 @@ class Flown:
     runs: int
 
 
-def fly(session: Session, paths: Paths, runs: int, rng: np.random.Generator) -> Flown:
+def fly(session: Session, paths: Paths, runs: int, rng: np.random.Generator) -> EndErrors:
     """Fly one law many times; only the judged aircraft is estimated, all others are exact.
 
     The filter is an iterated extended one (Bell and Cathey, 1993): at each epoch the ranges are taken anew about the
@@ -44,7 +44,7 @@ def fly(session: Session, paths: Paths, runs: int, rng: np.random.Generator) -> 
         errors[run] = off
         nees[run] = off @ np.linalg.solve(P[np.ix_([NORTH, EAST], [NORTH, EAST])], off)
     rms = np.sqrt(np.mean(errors**2, axis=0))
-    return Flown(float(rms[0]), float(rms[1]), float(nees.mean()), runs)
+    return EndErrors(float(rms[0]), float(rms[1]), float(nees.mean()), runs)
 
 
 def _one(
