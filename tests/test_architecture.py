@@ -87,6 +87,7 @@ MAY_BE_SHORT = {  # beside __init__.py
     "systems/latency/arrays.py": "arrays of a system: who looks for them looks there",
     "systems/several_logs/arrays.py": "the same",
 }
+TESTS = Path(__file__).parent
 ONLY_ROOM_OF = {"mcap": "store", "google": "store", "foxglove_schemas_protobuf": "store", "rerun": "viewer"}
 NOT_PUBLIC = re.compile(r"/?(rerun_|rerun-[a-z]+-|re_viewer|RERUN_|rerun\.(.*\.)?_)")
 OF_TUPLES = ("_replace", "_fields", "_asdict", "_make")  # public methods of named tuples, which cannot have others
@@ -250,6 +251,19 @@ def test_an_analysis_is_named_by_no_string_outside_its_folder() -> None:
 
 def _is_at(place: str, files: tuple[str, ...]) -> bool:
     return any(place == one or (one.endswith("/") and place.startswith(one)) for one in files)
+
+
+def test_tests_of_a_system_import_no_tests_of_another() -> None:
+    """What tests of several systems use stands beside their folders."""
+    forbidden = []
+    for path in sorted((TESTS / "systems").rglob("*.py")):
+        system = path.relative_to(TESTS / "systems").parts[0]
+        assert (PACKAGE / "systems" / system).is_dir(), f"{path}: no system of that name"
+        for name, line in imports_of(path):
+            parts = [*name.split("."), "", ""]
+            if parts[:2] == ["tests", "systems"] and parts[2] != system:
+                forbidden.append(f"{path}:{line}: {name}")
+    assert not forbidden
 
 
 def test_no_file_imports_itself_through_others() -> None:

@@ -1,9 +1,9 @@
 """INS heading aligned on taxi and take-off run: true within its sigma, blind to the air, silent with a reason."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.results.answer import Answer, by_analysis
 from groundstation.results.flight import FlightResults, Source
 from groundstation.results.gates import Gate
-from groundstation.results.roles import AzimuthEstimate
+from groundstation.results.roles import AzimuthByTurns, AzimuthEstimate
 from groundstation.simulation.flight import Simulated, simulate
 from groundstation.simulation.flight_errors import heading_error_deg
 from groundstation.simulation.magnetic_family import MagneticFamilySettings, simulate_magnetic_family
@@ -31,7 +31,6 @@ from groundstation.systems.heading.answer import HeadingResult
 from groundstation.systems.heading.estimate import estimate_heading_error
 from groundstation.systems.heading.on_ground import Estimator
 from groundstation.systems.heading.settings import HeadingSettings
-from groundstation.systems.inertial.answer import InertialResult
 from groundstation.systems.known import AircraftData
 from groundstation.systems.magnetic.alignment import NOT_IN_INTERVAL, against_heading, align, refused
 from groundstation.systems.magnetic.answer import Alignment, MagneticResult
@@ -49,7 +48,6 @@ from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.tables.phases import PhaseInterval, Phases, flight_phases
 from groundstation.tables.table import Flight
 from tests.simulated_flights import QUIET_GNSS, QUIET_GROUND, QUIET_INS, scenario
-from tests.systems.inertial.example import inertial_result
 from tests.systems.magnetic.example import START_NS, table, taxi_heading
 
 EXACT_DEG = 0.002  # INS heading and velocities are rounded to 0.001 deg and 0.001 m/s
@@ -295,9 +293,18 @@ def test_the_airframes_number_aligns_and_the_mounting_has_no_sigma_in_it() -> No
     assert (found.error_deg, found.sigma_deg) == pytest.approx((0.7, 0.2))
 
 
-def turned_by(error_deg: float, sigma_deg: float = 0.03, ins_topic: str = "ins") -> InertialResult:
-    azimuth = AzimuthEstimate(True, error_deg, sigma_deg, 6, 100.0, "6 turns", 1800.0)
-    return inertial_result(ins_topic=ins_topic, azimuth=azimuth)
+@dataclass(frozen=True)
+class Turned(Answer, AzimuthByTurns):
+    """Answer of whatever system sees the azimuth in turns."""
+
+    analysis: ClassVar[str] = "turns"
+
+    ins_topic: str
+    azimuth: AzimuthEstimate | None
+
+
+def turned_by(error_deg: float, sigma_deg: float = 0.03, ins_topic: str = "ins") -> Turned:
+    return Turned(ins_topic, AzimuthEstimate(True, error_deg, sigma_deg, 6, 100.0, "6 turns", 1800.0))
 
 
 def test_azimuth_by_turns_aligns_alone_and_is_weighed_with_taxi() -> None:

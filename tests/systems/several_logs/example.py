@@ -10,7 +10,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.systems.several_logs.gnss_time import GnssStretch, GnssTime
 from groundstation.systems.several_logs.relation import LogRelation, TimedLog
 from groundstation.tables.table import Flight
-from tests.systems.latency.test_coverage import motion, recorded
+from tests.drawn_flights import motion, recorded
 
 LARGEST_DRIFT, LARGEST_OFFSET_NS = 50e-6, 3_000_000_000_000
 UTC_NS = iso_to_utc_ns("2026-05-04T06:00:00Z")[0]
