@@ -111,7 +111,7 @@ def test_types_hold_without_a_system(name: str, tmp_path: Path, tmp_path_factory
 @EVERY
 def test_others_pass_their_tests_without_a_system(name: str, tmp_path: Path) -> None:
     gone = taken_out(tmp_path, name)
-    for folder in ("tests", "sample_logs"):
+    for folder in ("tests", "sample_logs", "schemas"):
         shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__", *gone))
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
     some = [f"tests/systems/{path}" for path in SOME_TESTS if path.partition("/")[0] not in gone]

@@ -15,7 +15,7 @@ OutcomeT = TypeVar("OutcomeT")
 
 
 class RunStore(Protocol[OutcomeT]):
-    """Outcomes of runs of earlier calls, by a name for what was run and its seed, and by number."""
+    """Outcomes of earlier calls, by a name for what was run, its seed and number."""
 
     def get(self, name: str, number: int) -> OutcomeT | None:
         """Return the outcome of a run, None where it has not ended."""

@@ -123,7 +123,7 @@ def _sentence(answers: Answers) -> str:
 
 
 def _is_main_of_forecast(path: str, saved: tuple[Mapping[str, Any], ...]) -> bool:
-    """Tell the main numbers: the default method, and its errors; of two methods, those of both."""
+    """Tell the main numbers: the default methods, and the errors of each."""
     parts = path.split(".")
     if parts[0] != "skill" or len(parts) == 1:
         return path == "default_method"
