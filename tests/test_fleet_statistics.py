@@ -16,6 +16,7 @@ from groundstation.methods.fleet.outliers import find_outliers
 from groundstation.methods.fleet.skill import SkillMerger
 from groundstation.methods.intervals import share_interval
 from groundstation.pipeline.many_flights.fleet.columns import FLIGHT_COLUMNS
+from groundstation.results.columns import READ_BY_FLEETS
 from groundstation.results.figures import FigureData
 from groundstation.results.fleet_share import SkillOfFlight
 from tests.fleet_example import flights_table
@@ -344,3 +345,9 @@ def test_rejected_and_nameless_flights_are_told_and_not_compared() -> None:
         ("F0000", 0, None),
         ("F0002", 0, None),
     ]
+
+
+def test_columns_that_statistics_read_are_those_that_systems_give() -> None:
+    """A table of flights has them even without the system; a name told twice must not drift."""
+    given = {column.name: column.kind for column in FLIGHT_COLUMNS}
+    assert {name: given.get(name) for name in READ_BY_FLEETS} == READ_BY_FLEETS
