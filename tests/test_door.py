@@ -1,16 +1,20 @@
 """A system can be taken out: without its folder and its line all else runs, type-checks and passes its tests."""
 
+import ast
 import os
 import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Collection
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 from groundstation.systems import OURS, systems
+from tests.architecture_picture import import_nodes
 from tests.test_architecture import ALLOWED_TO_NAME
 from tests.test_extending import LONGEST_S, ROOT, groundstation
 
@@ -117,3 +121,39 @@ def test_others_pass_their_tests_without_a_system(name: str, tmp_path: Path) -> 
     some = [f"tests/systems/{path}" for path in SOME_TESTS if path.partition("/")[0] not in gone]
     tested = _python(tmp_path, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *some)
     assert tested.returncode == 0, tested.stdout[-4000:]
+
+
+@cache
+def named_by(path: Path) -> frozenset[str]:
+    """Systems that a file of the tests names by its imports, by itself and through other files of the tests."""
+    named: set[str] = set()
+    left, seen = [path], {path}
+    while left:
+        for node in import_nodes(left.pop()):
+            modules = [alias.name for alias in node.names]
+            if isinstance(node, ast.ImportFrom):
+                modules = [node.module or "", *(f"{node.module}.{one}" for one in modules)]
+            for module in modules:
+                parts = module.split(".")
+                if parts[:2] == ["groundstation", "systems"] and len(parts) > 2:
+                    named.add(parts[2])
+                imported = ROOT / Path(*parts).with_suffix(".py")
+                if parts[0] == "tests" and imported.is_file() and imported not in seen:
+                    seen.add(imported)
+                    left.append(imported)
+    return frozenset(named)
+
+
+def remaining(gone: Collection[str]) -> list[str]:
+    """Files of the systems' tests that stay when some systems go."""
+    staying = [one for one in NAMES if one not in gone]
+    files = [path for one in staying for path in sorted((ROOT / "tests" / "systems" / one).glob("test_*.py"))]
+    return [path.relative_to(ROOT).as_posix() for path in files if not named_by(path) & set(gone)]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_most_tests_of_the_others_stand_without_a_system(name: str) -> None:
+    """Every system that stays keeps tests which do not know the one that went."""
+    gone = [name, *_requiring(name)]
+    left = {path.split("/")[2] for path in remaining(gone)}
+    assert left == set(NAMES) - set(gone)

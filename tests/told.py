@@ -110,3 +110,8 @@ def shipped_but(**parts: Any) -> Systems:
     found = Systems(systems().every)
     found.__dict__.update(parts)
     return found
+
+
+def missing_in(text: str, *wanted: str) -> list[str]:
+    """What a sentence lacks of the numbers, names and verdicts it has to tell; its other words are free."""
+    return [one for one in wanted if one not in text]
