@@ -22,7 +22,7 @@ import pyarrow as pa
 
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.fleet.index import write_index_of
-from groundstation.pipeline.many_flights.fleet.keys import Key, Keys, month_of
+from groundstation.pipeline.many_flights.fleet.keys import FlightKeys, Key, month_of
 from groundstation.pipeline.many_flights.fleet.refresh import put_month, refresh
 from groundstation.pipeline.many_flights.fleet.rows import share_of
 from groundstation.pipeline.many_flights.fleet.samples import SAMPLES
@@ -107,7 +107,7 @@ def make_fleet(out: Path, templates: list[Path], flights: int, with_folders: boo
             Key(name, stamp_of(out, name) or 0, f"/logs/{one}.ulg", f"{one:064x}", "", "", start * NS_PER_S, None, file)
             for one, name, start, file in zip(numbers, names, starts, files, strict=True)
         ]
-        put_month(out, month, table, Keys.of(keys))
+        put_month(out, month, table, FlightKeys.of(keys))
 
 
 def timed(what: str, work: Callable[[], Any]) -> Any:

@@ -19,8 +19,8 @@ from numpy.typing import NDArray  # noqa: E402
 
 from groundstation.results.forecast_methods import FORECAST_METHODS  # noqa: E402
 from groundstation.systems.inertial.filter import (  # noqa: E402
-    FilterRun,
-    Smoothed,
+    ChannelsRun,
+    SmoothedErrors,
     measurement_variances,
     run_filter,
     smooth,
@@ -42,7 +42,7 @@ Array = NDArray[np.float64]
 Peer = tuple[Array, Array, Array]
 
 
-def by_filterpy(run: FilterRun) -> Peer:
+def by_filterpy(run: ChannelsRun) -> Peer:
     """Filtered and smoothed states, shapes (n, 6, 2), and sigmas of the smoothed, by filterpy."""
     phi, Q = run.steps.transitions[run.steps.index[1]], run.steps.noises[run.steps.index[1]]
     n, parts = len(run.epochs), []
@@ -64,7 +64,7 @@ def by_filterpy(run: FilterRun) -> Peer:
     return filtered, smoothed, sigma
 
 
-def by_us(run: FilterRun) -> tuple[FilterRun, Smoothed]:
+def by_us(run: ChannelsRun) -> tuple[ChannelsRun, SmoothedErrors]:
     """The same by ours."""
     again = run_filter(run.epochs, run.model, run.noise)
     return again, smooth(again)
@@ -78,7 +78,7 @@ def seconds_of(do: Callable[[], object], times: int = 1) -> float:
     return (time.process_time() - begin) / times
 
 
-def full_map(run: FilterRun, methods: Sequence[str] = tuple(FORECAST_METHODS)) -> int:
+def full_map(run: ChannelsRun, methods: Sequence[str] = tuple(FORECAST_METHODS)) -> int:
     """Errors from every minute's start to every minute's lead until the end of the flight, by some methods."""
     span_s = float(run.epochs.time_s[-1])
     at = start_epochs(run.epochs, GRID_S, GRID_S)
@@ -86,7 +86,7 @@ def full_map(run: FilterRun, methods: Sequence[str] = tuple(FORECAST_METHODS)) -
     return sum(int(np.isfinite(replay.radial_m(method)).sum()) for method in methods)
 
 
-def largest_difference(run: FilterRun) -> float:
+def largest_difference(run: ChannelsRun) -> float:
     """Largest difference between the two, in sigmas: filtered and smoothed."""
     ours, smoothed = by_us(run)
     filtered, theirs, _ = by_filterpy(run)

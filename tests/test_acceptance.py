@@ -23,10 +23,10 @@ from groundstation.methods.fleet.confidence import (
 )
 from groundstation.methods.fleet.ins_errors import growth_of, ins_errors
 from groundstation.pipeline.verbs.acceptance import STANDARDS, accept, accept_to, read_standard
-from groundstation.results.acceptance import ENSEMBLE, UNKNOWN_INS, Bound, FlightError, Limit, Standard
+from groundstation.results.acceptance import ENSEMBLE, UNKNOWN_INS, AcceptanceLimit, Bound, FlightError, Standard
 from tests.acceptance_example import save_fleet, save_flight
 
-LIMIT = Limit("rate", "Rate", (Bound("radial_rate_fit_nmiph", 2.0),))
+LIMIT = AcceptanceLimit("rate", "Rate", (Bound("radial_rate_fit_nmiph", 2.0),))
 
 
 def flights_of(rates: list[float], units: list[str] | None = None, hours: float = 3.0) -> list[FlightError]:

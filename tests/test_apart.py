@@ -15,7 +15,7 @@ import pytest
 from groundstation.base.errors import GroundstationError, SettingsError, UsageError
 from groundstation.pipeline.many_flights.processes import apart
 from groundstation.pipeline.many_flights.processes.apart import DIED, bounds_of, outcomes_apart
-from groundstation.pipeline.many_flights.processes.confined import Bounds
+from groundstation.pipeline.many_flights.processes.confined import ProcessLimits
 from groundstation.pipeline.many_flights.processes.crews import crew_for
 from groundstation.pipeline.many_flights.runs import batch as batch_of_logs
 from groundstation.pipeline.many_flights.runs.batch import run_many
@@ -29,7 +29,7 @@ from groundstation.pipeline.verbs.check import check_many
 from groundstation.pipeline.verbs.check_apart import check_apart, describe_apart
 from groundstation.pipeline.verbs.conversions import convert_many
 from groundstation.pipeline.verbs.describe import describe
-from groundstation.pipeline.verbs.watched_batch import Batch
+from groundstation.pipeline.verbs.watched_batch import WatchedLogs
 from groundstation.readers import registry
 from groundstation.results.flight import Source
 from tests.apart_deeds import Deed, act
@@ -38,10 +38,12 @@ from tests.test_resume import SAMPLES, SHORT, assert_equal_runs
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="no limits for processes here")
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells of the processes below another")
-ISOLATED = Bounds(60.0, memory_bytes=1 << 30, file_bytes=1 << 20, is_isolated=True)
+ISOLATED = ProcessLimits(60.0, memory_bytes=1 << 30, file_bytes=1 << 20, is_isolated=True)
 
 
-def run(names: list[str], out: Path, bounds: Bounds, *, workers: int = 2, listen: Listener = silent) -> list[Outcome]:
+def run(
+    names: list[str], out: Path, bounds: ProcessLimits, *, workers: int = 2, listen: Listener = silent
+) -> list[Outcome]:
     jobs = [Deed(name, out) for name in names]
     ended = dict(outcomes_apart(enumerate(jobs), act, workers=workers, listen=listen, bounds=bounds))
     return [ended[number] for number in range(len(jobs))]
@@ -72,7 +74,7 @@ def test_each_limit_costs_the_log_that_goes_beyond_it_alone(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("is_isolated", [True, False])
 def test_a_log_that_takes_too_long_is_ended(tmp_path: Path, is_isolated: bool) -> None:
-    (late,) = run(["hangs"], tmp_path, Bounds(1.0, is_isolated=is_isolated))
+    (late,) = run(["hangs"], tmp_path, ProcessLimits(1.0, is_isolated=is_isolated))
     assert late.text == "hangs: not done within 1 s (--timeout), ended"
     assert not multiprocessing.active_children()
 
@@ -119,7 +121,7 @@ def test_a_run_that_is_killed_takes_the_processes_of_its_logs_with_it(tmp_path: 
 )
 def test_what_cannot_be_understood_is_a_log_that_failed(message: bytes, tmp_path: Path) -> None:
     receiver, sender = multiprocessing.Pipe(duplex=False)
-    one = apart._Running(0, Deed("log", tmp_path), multiprocessing.Process(), receiver, Bounds(), float("inf"))
+    one = apart._Running(0, Deed("log", tmp_path), multiprocessing.Process(), receiver, ProcessLimits(), float("inf"))
     sender.send_bytes(message)
     sender.close()
     while not one.is_ended:
@@ -140,7 +142,7 @@ def test_an_isolated_run_gives_what_any_other_gives_and_is_continued(tmp_path: P
 
 
 def test_checks_and_descriptions_are_those_of_this_process() -> None:
-    logs, bounds = [SAMPLES / "taxi-damaged.csv", SAMPLES / "README.md"], Bounds(120.0)
+    logs, bounds = [SAMPLES / "taxi-damaged.csv", SAMPLES / "README.md"], ProcessLimits(120.0)
     assert check_apart(logs, Configuration(), bounds, purpose="heading") == check_many(
         logs, Configuration(), purpose="heading"
     )
@@ -168,13 +170,13 @@ def test_the_verbs_keep_a_limit_of_time(tmp_path: Path) -> None:
 
 
 def test_conversions_apart_give_the_same_file(tmp_path: Path) -> None:
-    for name, bounds in (("a", None), ("b", Bounds(300.0))):
+    for name, bounds in (("a", None), ("b", ProcessLimits(300.0))):
         assert convert_many([SHORT], tmp_path / name, bounds=bounds)[0].state == "done"
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
 def test_the_shorter_limit_of_time_counts_and_is_named() -> None:
-    assert bounds_of(None, 5.0) == Bounds(5.0)
+    assert bounds_of(None, 5.0) == ProcessLimits(5.0)
     by_option, by_settings = bounds_of(Isolation(), 5.0), bounds_of(Isolation(time_s=3.0), 5.0)
     assert (by_option.time_s, by_option.time_from) == (5.0, "--timeout")
     assert (by_settings.time_s, by_settings.time_from) == (3.0, "isolation.time_s")
@@ -229,7 +231,7 @@ def test_a_watch_that_isolates_reads_no_log_in_its_own_process(tmp_path: Path, m
     monkeypatch.setattr(batch_of_logs, "run_many", take)
     monkeypatch.setattr(watched_batch, "_list_too", lambda *_: None)
     paths = tuple(tmp_path / name for name in ("a.csv", "a.csv.gz", "note.txt"))
-    one = Batch(paths, tmp_path / "out", Configuration(), "none", False, 1, None, False, True, is_isolated=True)
+    one = WatchedLogs(paths, tmp_path / "out", Configuration(), "none", False, 1, None, False, True, is_isolated=True)
     assert [outcome.state for outcome in watched_batch._outcomes(one, silent)] == ["skipped", "done"]
     assert given == [(["a.csv", "a.csv.gz"], [tmp_path / "note.txt"], True)]
 

@@ -7,7 +7,7 @@ import pytest
 
 from groundstation.base.errors import SettingsError
 from groundstation.integrity.limits import shipped
-from groundstation.pipeline.one_flight.configuration import Configuration, Interval, load_configuration
+from groundstation.pipeline.one_flight.configuration import Configuration, WrittenInterval, load_configuration
 from groundstation.systems.heading.settings import HeadingSettings
 
 
@@ -32,7 +32,7 @@ def test_a_file_for_a_section_wins_over_the_section(tmp_path: Path) -> None:
 
 def test_intervals_are_read_with_their_reasons(tmp_path: Path) -> None:
     path = written(tmp_path, "i.toml", '[[exclude]]\nfrom = "+01:00"\nto = "+01:30"\nreason = "towed"\n')
-    assert load_configuration(intervals=path).exclude == (Interval("+01:00", "+01:30", "towed"),)
+    assert load_configuration(intervals=path).exclude == (WrittenInterval("+01:00", "+01:30", "towed"),)
 
 
 @pytest.mark.parametrize(

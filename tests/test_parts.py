@@ -25,7 +25,7 @@ from groundstation.pipeline.one_flight.log import open_parts
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.parts import goes_on
 from groundstation.pipeline.one_flight.progress import silent
-from groundstation.pipeline.verbs.watched_batch import Batch, run_batch
+from groundstation.pipeline.verbs.watched_batch import WatchedLogs, run_batch
 from groundstation.readers.joined import JoinedSource
 from groundstation.readers.source import Source
 from groundstation.results.files import load_document, load_manifest
@@ -327,7 +327,7 @@ def test_watch_joins_a_part_that_comes(tmp_path: Path, kind: str) -> None:
     folder.mkdir()
     for number, path in enumerate(paths):
         new = path.rename(folder / path.name)
-        batch = Batch((new,), out, Configuration(), "none", False, 1, None, False, number == 0, only_results=True)
+        batch = WatchedLogs((new,), out, Configuration(), "none", False, 1, None, False, number == 0, only_results=True)
         assert isinstance(run_batch(batch, silent), tuple)
     assert_is_the_whole(out, KINDS[kind], tmp_path)
 

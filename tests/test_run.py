@@ -17,7 +17,7 @@ from mcap.reader import make_reader
 from groundstation.pipeline.many_flights.fleet.publishing import report_again
 from groundstation.pipeline.many_flights.inputs import flight_folders
 from groundstation.pipeline.many_flights.runs.batch import run_many
-from groundstation.pipeline.one_flight.configuration import Configuration, Interval
+from groundstation.pipeline.one_flight.configuration import Configuration, WrittenInterval
 from groundstation.pipeline.one_flight.flight import Job, run_flight
 from groundstation.pipeline.one_flight.outcome import Outcome, worst_code
 from groundstation.pipeline.verbs.conversions import convert_many
@@ -99,7 +99,7 @@ def test_the_report_is_made_again_from_the_saved_results_alone(good: Outcome, tm
 
 def test_excluding_an_interval_changes_the_answer_and_is_kept(good: Outcome, tmp_path: Path) -> None:
     segment = load(Path(good.folder)).summary["results"]["heading"]["segments"][0]
-    excluded = Interval(str(segment["start_s"]), str(segment["end_s"]), "for the test")
+    excluded = WrittenInterval(str(segment["start_s"]), str(segment["end_s"]), "for the test")
     job = Job(SAMPLES / "taxi-good.csv", tmp_path, Configuration(exclude=(excluded,)), only_results=True)
     outcome = run_flight(job)
     heading = load(Path(outcome.folder)).summary["results"]["heading"]
@@ -330,7 +330,7 @@ def test_what_is_no_regular_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_utc_intervals_of_a_flight_without_utc_are_a_finding(tmp_path: Path) -> None:
-    interval = Interval("2026-05-04T06:00:00Z", "2026-05-04T06:01:00Z")
+    interval = WrittenInterval("2026-05-04T06:00:00Z", "2026-05-04T06:01:00Z")
     outcome = run_flight(
         Job(SAMPLES / "taxi-notime.csv", tmp_path, Configuration(exclude=(interval,)), only_results=True)
     )

@@ -17,7 +17,7 @@ from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import silent
 from groundstation.pipeline.verbs import watching
-from groundstation.pipeline.verbs.watched_batch import Batch, run_batch
+from groundstation.pipeline.verbs.watched_batch import WatchedLogs, run_batch
 from groundstation.pipeline.verbs.watching import signature_of, watch
 
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
@@ -36,7 +36,7 @@ class Looks:
         self._refused = list(refused)
         monkeypatch.setattr(watching, "run_batch", self._run)
 
-    def _run(self, batch: Batch, _listen: object) -> tuple[Outcome, ...] | str:
+    def _run(self, batch: WatchedLogs, _listen: object) -> tuple[Outcome, ...] | str:
         if self._refused:
             return self._refused.pop(0)
         self.batches.append([path.name for path in batch.paths])
@@ -74,7 +74,7 @@ def test_a_log_is_run_once_when_it_has_stopped_growing(tmp_path: Path, monkeypat
 
 def test_a_batch_has_the_limits_that_the_watch_was_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "a.csv").write_text("1")
-    batches = list[Batch]()
+    batches = list[WatchedLogs]()
     monkeypatch.setattr(watching, "run_batch", lambda batch, _listen: batches.append(batch) or ())
     options = {"only_results": True, "timeout_s": 7.0, "wait": lambda _seconds: None, "say": print}
     list(watch(tmp_path, tmp_path / "out", Configuration(), every_s=1.0, once=True, **options))
@@ -153,8 +153,8 @@ def test_a_folder_that_is_not_there_or_is_the_results_is_a_usage_error(tmp_path:
             next(watch(folder, tmp_path, Configuration(), every_s=0.1, say=print))
 
 
-def batch_of(out: Path, *paths: Path, is_first: bool = False) -> Batch:
-    return Batch(paths, out, Configuration(), "none", False, 1, None, False, is_first)
+def batch_of(out: Path, *paths: Path, is_first: bool = False) -> WatchedLogs:
+    return WatchedLogs(paths, out, Configuration(), "none", False, 1, None, False, is_first)
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from groundstation.chapters.acceptance_front import MARKS, at_least, bound_text, headline, is_worth_less, stated, wanted
 from groundstation.chapters.parts import Cell, Facts, Figure, Grid, Head, Note, Part, Section, Signatures, kept
 from groundstation.chapters.wording import ABSENT, clean, number, sentence
-from groundstation.results.acceptance import ENSEMBLE, Acceptance, InsRow, Judgement, Limit
+from groundstation.results.acceptance import ENSEMBLE, Acceptance, AcceptanceLimit, InsRow, Judgement
 
 CLAIMS = {
     "type": (
@@ -95,7 +95,7 @@ def _objective(found: Acceptance) -> str:
 
 
 LIMIT_HEADS = (
-    *(Head("Limit"), Head("Flights", True), Head("Over", True), Head("INS", True), Head("Worth", True)),
+    *(Head("AcceptanceLimit"), Head("Flights", True), Head("Over", True), Head("INS", True), Head("Worth", True)),
     *(Head("Within, at least", True), Head("Share stays below", True), Head("Reference ratio", True)),
     *(Head("More flights", True), Head("Verdict")),
 )
@@ -117,7 +117,7 @@ def _limits(found: Acceptance) -> Grid | None:
     return Grid("All flights", LIMIT_HEADS, rows, caption) if rows else None
 
 
-def _judged(limit: Limit, one: Judgement) -> tuple[Cell, ...]:
+def _judged(limit: AcceptanceLimit, one: Judgement) -> tuple[Cell, ...]:
     more = number(one.more_with_none_over, 0)
     if one.over and one.more_with_none_over:
         more += f" ({'never' if one.more_at_present_share is None else number(one.more_at_present_share, 0)})"

@@ -10,12 +10,12 @@ from groundstation.results.acceptance import (
     ENSEMBLE,
     QUANTITIES,
     Acceptance,
+    AcceptanceLimit,
     Bound,
     Decision,
     FlightError,
     InsRow,
     Judgement,
-    Limit,
 )
 
 MARKS: dict[Decision, Mark] = {
@@ -130,12 +130,12 @@ def _missing(one: Judgement) -> str:
     return f"{more}, {at_share}."
 
 
-def wanted(limit: Limit) -> str:
+def wanted(limit: AcceptanceLimit) -> str:
     """Return the bounds of a limit in words.
 
     Examples
     --------
-    >>> wanted(Limit("a", "", (Bound("radial_rate_fit_nmiph", 2.0),)))
+    >>> wanted(AcceptanceLimit("a", "", (Bound("radial_rate_fit_nmiph", 2.0),)))
     'radial error rate, time-position fit ≤ 2\u202fnmi/h'
     """
     return " and ".join(f"{QUANTITIES[one.quantity].title} ≤ {_of_bound(one, one.at_most)}" for one in limit.bounds)
@@ -145,7 +145,7 @@ def _of_bound(bound: Bound, value: float) -> str:
     return number_with_unit(significant(value, 3), QUANTITIES[bound.quantity].unit)
 
 
-def bound_text(limit: Limit, one: Judgement) -> str:
+def bound_text(limit: AcceptanceLimit, one: Judgement) -> str:
     """Return the upper bound of the share, in the unit of the limit where it has one bound."""
     if one.share_bound is None:
         return ABSENT

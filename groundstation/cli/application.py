@@ -18,7 +18,7 @@ from groundstation.cli.text import say as say
 from groundstation.cli.text import tell as tell
 
 if TYPE_CHECKING:
-    from groundstation.pipeline.many_flights.processes.confined import Bounds
+    from groundstation.pipeline.many_flights.processes.confined import ProcessLimits
     from groundstation.pipeline.one_flight.isolation import Isolation
 
 DONE, FAILED, USAGE, DATA_LOST, LIMIT_REACHED = 0, 1, 2, 3, 4
@@ -268,7 +268,7 @@ def tell_failures(found: Iterable[Failure], *, with_traces: bool = False) -> int
     return code
 
 
-def time_bound(timeout: float | None, isolation: "Isolation | None" = None) -> "Bounds | None":
+def time_bound(timeout: float | None, isolation: "Isolation | None" = None) -> "ProcessLimits | None":
     """Return the bounds for one log; None with neither a limit of time nor ``--isolate``.
 
     Raises

@@ -11,13 +11,13 @@ from groundstation.chapters.parts import Grid, Head
 from groundstation.chapters.terminal import grid_text
 from groundstation.cli.printing import tell_errors, totals
 from groundstation.cli.text import as_json, printable, say, tell
-from groundstation.pipeline.verbs.check import Checked
+from groundstation.pipeline.verbs.check import CheckedLog
 
 MOST_LISTED = 8  # gaps or stretches of one topic; all are in the JSON
 
 
 def show(
-    checked: Sequence[Checked], *, as_json_text: bool = False, quiet: bool = False, everything: bool = False
+    checked: Sequence[CheckedLog], *, as_json_text: bool = False, quiet: bool = False, everything: bool = False
 ) -> None:
     """Print what was found in each log; failures with their reasons on stderr, then totals.
 
@@ -37,7 +37,7 @@ def show(
         say(totals([one.outcome for one in checked]))
 
 
-def text_of(one: Checked, everything: bool = False) -> str:
+def text_of(one: CheckedLog, everything: bool = False) -> str:
     """Return the ledger of one log as text."""
     topics = one.ledger.topics
     shown = {name: topic for name, topic in topics.items() if everything or is_canonical(name) or _is_odd(topic)}
@@ -60,7 +60,7 @@ def text_of(one: Checked, everything: bool = False) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
-def _head(one: Checked) -> str:
+def _head(one: CheckedLog) -> str:
     wanted = ("file", "size", "sha256", "format", "first sample", "last sample")
     rows = [[f"{key}:", printable(one.facts[key])] for key in wanted if key in one.facts]
     used = one.ledger.thresholds

@@ -18,7 +18,7 @@ from groundstation.base.records import Column, Int64Array, RecordBatch, frozen
 from groundstation.base.timescales import duration_text, iso_to_utc_ns, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.integrity.clock_relation import ClockRelation, mistake_of_step
-from groundstation.integrity.clock_steps import ClockSettings, ClockStep, Steps
+from groundstation.integrity.clock_steps import ClockSettings, ClockStep, ClockSteps
 from groundstation.integrity.power_ups import Wrap
 
 LARGEST_NS = 2**62  # largest time, and largest offset: sums fit 64 bits
@@ -250,7 +250,7 @@ def estimate_clock(
         index, time = index[timed], time[timed]
     if not len(time):
         return ClockModel(missing_times=len(record_index))
-    found = Steps(index, time, settings or ClockSettings())
+    found = ClockSteps(index, time, settings or ClockSettings())
     if any(abs(offset) > LARGEST_NS for offset in found.offsets_ns()):
         found.sort()
     offsets = np.array(found.offsets_ns(), dtype=np.int64)

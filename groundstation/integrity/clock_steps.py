@@ -92,7 +92,7 @@ def quantile(ordered: Int64Array, share: float) -> float:
     return below + (at - low) * (above - below)
 
 
-class Steps:
+class ClockSteps:
     """Clock steps and stray rows among the timed records.
 
     Positions here count timed records only.

@@ -14,9 +14,9 @@ from groundstation.integrity.contradictions import Contradiction, contradictions
 from groundstation.integrity.ledger import FieldCounts
 from groundstation.integrity.limits import Thresholds
 from groundstation.integrity.sequence import Counter, Sequence, counters_of
-from groundstation.integrity.spans import Dropout, Timeline
+from groundstation.integrity.spans import RecorderDropout, Timeline
 from groundstation.integrity.stretches import Constancy, RecordPlace, Sampler
-from groundstation.integrity.stuck import Judge, MotionSampler, Stuck, is_watched
+from groundstation.integrity.stuck import Judge, MotionSampler, StuckPlace, is_watched
 
 FloatArray = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ class _FieldTally:
         first, last = (RecordPlace(int(record_index[one]), int(device_ns[one])) for one in (at[0], at[-1]))
         self.first, self.last = self.first or first, last
 
-    def ledger(self, name: str, clock: ClockModel, stuck: tuple[Stuck, ...]) -> FieldCounts:
+    def ledger(self, name: str, clock: ClockModel, stuck: tuple[StuckPlace, ...]) -> FieldCounts:
         return FieldCounts(
             name,
             self.present,
@@ -176,9 +176,9 @@ class Contents:
         counters = self._topics[topic].counters or {}
         return tuple(told for told in (counter.sequence(clock) for counter in counters.values()) if told is not None)
 
-    def dropouts(self, clock: ClockModel) -> tuple[Dropout, ...]:
+    def dropouts(self, clock: ClockModel) -> tuple[RecorderDropout, ...]:
         """Drop-outs that the recorder marked."""
-        return tuple(Dropout(place.time_ns(clock), length_s) for place, length_s in self._dropouts)
+        return tuple(RecorderDropout(place.time_ns(clock), length_s) for place, length_s in self._dropouts)
 
     def timeline(self, clock: ClockModel) -> Timeline:
         """Times of rows."""

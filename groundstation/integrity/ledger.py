@@ -28,8 +28,8 @@ from groundstation.integrity.limits import Thresholds, shipped
 from groundstation.integrity.rhythm import rhythm_of
 from groundstation.integrity.sequence import Sequence
 from groundstation.integrity.source_clock import PowerUpClock
-from groundstation.integrity.spans import Dropout, Span, Timeline, skipped_bytes, spans_of, truncation
-from groundstation.integrity.stuck import Stuck
+from groundstation.integrity.spans import RecorderDropout, Span, Timeline, skipped_bytes, spans_of, truncation
+from groundstation.integrity.stuck import StuckPlace
 
 GAPS_LISTED = STUCK_LISTED = SPANS_LISTED = 100
 
@@ -51,7 +51,7 @@ class FieldCounts:
     high: float = float("inf")
     first_outside_ns: int | None = None
     last_outside_ns: int | None = None
-    stuck: tuple[Stuck, ...] = ()
+    stuck: tuple[StuckPlace, ...] = ()
 
     @property
     def is_odd(self) -> bool:
@@ -166,7 +166,7 @@ class LedgerCounts:
     damages: tuple[Damage, ...] = ()
     remarks: tuple[Remark, ...] = ()
     thresholds: Thresholds = field(default_factory=shipped)
-    dropouts: tuple[Dropout, ...] = ()
+    dropouts: tuple[RecorderDropout, ...] = ()
     timeline: Timeline | None = None
     contradictions: tuple[Contradiction, ...] = ()
     power_ups: tuple[PowerUpClock, ...] = ()

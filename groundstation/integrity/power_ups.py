@@ -36,7 +36,7 @@ PLAUSIBLE_NS = NS_PER_S  # from the last record before a wrap to the first behin
 _LATE_NS = 30 * NS_PER_S  # records of the time before a wrap come no later
 
 
-class Run(NamedTuple):
+class RecordRun(NamedTuple):
     """Records whose times follow one another: place and device time of both ends, and number."""
 
     first_index: int
@@ -155,24 +155,24 @@ def power_ups(windows: Iterable[tuple[Int64Array, Int64Array]], evidence: Eviden
     return _Walk(runs, evidence).result()
 
 
-def _runs(windows: Iterable[tuple[Int64Array, Int64Array]], tolerance_ns: int) -> list[Run]:
+def _runs(windows: Iterable[tuple[Int64Array, Int64Array]], tolerance_ns: int) -> list[RecordRun]:
     """Return the runs of the records of all windows, in order.
 
     Where there are more than ``MOST_RUNS``, the list only shows that there are too many.
     """
-    runs: list[Run] = []
+    runs: list[RecordRun] = []
     for index, time in windows:
         if not len(time):
             continue
         starts = np.concatenate(([0], np.flatnonzero(np.abs(np.diff(time)) > tolerance_ns) + 1))
         if len(starts) + len(runs) > MOST_RUNS:
-            return runs + [Run(0, 0, 0, 0, 0)] * (MOST_RUNS + 1)
+            return runs + [RecordRun(0, 0, 0, 0, 0)] * (MOST_RUNS + 1)
         last = np.append(starts[1:], len(time)) - 1
         columns = index[starts], index[last], time[starts], time[last], last - starts + 1
-        new = [Run(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
+        new = [RecordRun(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
         if runs and abs(new[0].first_ns - runs[-1].last_ns) <= tolerance_ns:
             before, first = runs.pop(), new[0]
-            new[0] = Run(
+            new[0] = RecordRun(
                 before.first_index, first.last_index, before.first_ns, first.last_ns, before.records + first.records
             )
         runs += new
@@ -202,7 +202,7 @@ class _Walk:
     Short runs belong to whatever is around them.
     """
 
-    runs: Sequence[Run]
+    runs: Sequence[RecordRun]
     evidence: Evidence
     found: list[PowerUp] = field(default_factory=lambda: [PowerUp()])
 
@@ -259,7 +259,7 @@ class _Walk:
             return True
         return not self.evidence.is_utc and step_ns < -LEAST_NS and self._is_at_its_start(level, run)
 
-    def _is_at_its_start(self, level: _Level, run: Run) -> bool:
+    def _is_at_its_start(self, level: _Level, run: RecordRun) -> bool:
         """Tell whether a counter is back near its first value, or near zero."""
         near_ns = max(NEAR_NS, round(NEAR_SHARE * level.length_ns))
         is_near = abs(run.first_ns - level.first_ns) <= near_ns or 0 <= run.first_ns <= BOOT_NS

@@ -19,7 +19,7 @@ _BYTES = re.compile(r"\bbytes? (\d+)(?: to (\d+))?$")
 _TIMES = re.compile(r", (\d{4}-\S+Z) to (\d{4}-\S+Z): ")
 
 
-class Dropout(NamedTuple):
+class RecorderDropout(NamedTuple):
     """Time in which the recorder could not write.
 
     It has the corrected time of the newest record before it, and its length.
@@ -98,7 +98,9 @@ class Timeline:
         return times[0], times[1]
 
 
-def spans_of(damages: Sequence[Damage], dropouts: Sequence[Dropout], timeline: Timeline, end_ns: int) -> list[Span]:
+def spans_of(
+    damages: Sequence[Damage], dropouts: Sequence[RecorderDropout], timeline: Timeline, end_ns: int
+) -> list[Span]:
     """Return the spans of what the reader lost, where their place in time is known.
 
     Rows of a table, and bytes of a binary log that were skipped, lie between the records around them; what the end of a
@@ -119,7 +121,7 @@ def spans_of(damages: Sequence[Damage], dropouts: Sequence[Dropout], timeline: T
     return found
 
 
-def _ms(dropout: Dropout) -> int:
+def _ms(dropout: RecorderDropout) -> int:
     return round(dropout.length_s * 1e3)
 
 

@@ -36,7 +36,7 @@ _KINDS = ("ins", "gnss", "baro", "magnetometer")
 
 
 @dataclass(frozen=True)
-class Stuck:
+class StuckPlace:
     """Stretch in which a field was stuck.
 
     It has its place, corrected time, length, samples, value, and the evidence.
@@ -127,7 +127,7 @@ class Judge:
         self._sources = motion.sources()
         self._clock, self._limits = clock, limits
 
-    def stuck(self, topic: str, fields: dict[str, Constancy]) -> dict[str, tuple[Stuck, ...]]:
+    def stuck(self, topic: str, fields: dict[str, Constancy]) -> dict[str, tuple[StuckPlace, ...]]:
         """Return the stuck stretches of a topic, by field."""
         long = {name: list(self._long(name, constancy)) for name, constancy in fields.items()}
         found = {}
@@ -151,10 +151,10 @@ class Judge:
     def _seconds(self, stretch: ConstantStretch) -> float:
         return (stretch.last.time_ns(self._clock) - stretch.first.time_ns(self._clock)) / NS_PER_S
 
-    def _told(self, stretch: ConstantStretch, why: str) -> Stuck:
+    def _told(self, stretch: ConstantStretch, why: str) -> StuckPlace:
         start_ns = stretch.first.time_ns(self._clock)
         index = stretch.first.record_index
-        return Stuck(index, start_ns, self._seconds(stretch), stretch.samples, stretch.value, why)
+        return StuckPlace(index, start_ns, self._seconds(stretch), stretch.samples, stretch.value, why)
 
     def _why(
         self,

@@ -22,7 +22,7 @@ from groundstation.plots.marks import (
 )
 from groundstation.plots.plot import Panel
 from groundstation.plots.ranges import finite
-from groundstation.plots.scales import NO_PLACES, Span, span_of
+from groundstation.plots.scales import NO_PLACES, ScaleSpan, span_of
 
 ABOVE_ROWS, BELOW_ROWS = 0.6, 0.6  # share of a row before the first and behind the last
 
@@ -106,14 +106,14 @@ def has_rows(panel: Panel) -> bool:
     return any(isinstance(mark, Lanes | Intervals) for mark in panel.marks)
 
 
-def y_spans(panel: Panel, count: int) -> tuple[Span, ...]:
+def y_spans(panel: Panel, count: int) -> tuple[ScaleSpan, ...]:
     """Ends of the vertical axis in each of so many windows."""
     whole = y_span(panel)
     own = panel.y.ranges if len(panel.y.ranges) == count else ()
     return tuple(span_of(whole.scale, *ends, NO_PLACES, whole.linear_to) for ends in own) or (whole,) * count
 
 
-def y_span(panel: Panel) -> Span:
+def y_span(panel: Panel) -> ScaleSpan:
     """Ends of the vertical axis."""
     axis, drawn = panel.y, y_extent(panel.marks)
     if has_rows(panel):
@@ -127,7 +127,7 @@ def y_span(panel: Panel) -> Span:
     return span_of(axis.scale, low, axis.high, drawn, axis.linear_to, is_tight=_is_grid(panel))
 
 
-def x_span(panel: Panel, drawn: Floats) -> Span:
+def x_span(panel: Panel, drawn: Floats) -> ScaleSpan:
     """Return the ends of the horizontal axis.
 
     ``drawn`` are those of what stands on it and on panels that share it.
@@ -147,7 +147,7 @@ def _is_grid(panel: Panel) -> bool:
     return any(isinstance(mark, Cells) for mark in panel.marks)
 
 
-def windows_of(panel: Panel, span: Span) -> tuple[Span, ...]:
+def windows_of(panel: Panel, span: ScaleSpan) -> tuple[ScaleSpan, ...]:
     """Return the spans of the horizontal axis that have a frame each.
 
     There is one, or the windows of a broken axis.
@@ -158,12 +158,12 @@ def windows_of(panel: Panel, span: Span) -> tuple[Span, ...]:
     return tuple(span_of(span.scale, *ends, NO_PLACES, span.linear_to, is_tight=True) for ends in known)
 
 
-def equal(x: Span, y: Span, width_pt: float, height_pt: float) -> tuple[Span, Span]:
+def equal(x: ScaleSpan, y: ScaleSpan, width_pt: float, height_pt: float) -> tuple[ScaleSpan, ScaleSpan]:
     """Bring both axes of a map to one scale; the one with room to spare shows more.
 
     Examples
     --------
-    >>> x, y = equal(Span("linear", 0.0, 10.0), Span("linear", 0.0, 10.0), 200.0, 100.0)
+    >>> x, y = equal(ScaleSpan("linear", 0.0, 10.0), ScaleSpan("linear", 0.0, 10.0), 200.0, 100.0)
     >>> x.low, x.high, y.low, y.high
     (-5.0, 15.0, 0.0, 10.0)
     """
@@ -171,6 +171,6 @@ def equal(x: Span, y: Span, width_pt: float, height_pt: float) -> tuple[Span, Sp
     return _grown(x, per_pt * width_pt), _grown(y, per_pt * height_pt)
 
 
-def _grown(span: Span, length: float) -> Span:
+def _grown(span: ScaleSpan, length: float) -> ScaleSpan:
     middle, half = 0.5 * (span.low + span.high), 0.5 * np.copysign(length, span.high - span.low)
     return span_of(span.scale, float(middle - half), float(middle + half), NO_PLACES, is_tight=True)

@@ -19,7 +19,7 @@ NO_PLACES: Floats = np.zeros(0)
 
 
 @dataclass(frozen=True)
-class Span:
+class ScaleSpan:
     """Scale with its ends; one that runs backwards has the greater first."""
 
     scale: Scale
@@ -57,7 +57,7 @@ def span_of(
     linear_to: float = 1.0,
     *,
     is_tight: bool = False,
-) -> Span:
+) -> ScaleSpan:
     """Return the scale with ends: its own, else those of what is drawn.
 
     The latter get a little around them unless ``is_tight``.
@@ -83,7 +83,7 @@ def span_of(
     first, last = _apart(scale, first, last)
     if not is_tight:
         first, last = _wider(scale, (first, last), (given[0] is None, given[1] is None), linear_to)
-    return Span(scale, last, first, linear_to) if is_reversed else Span(scale, first, last, linear_to)
+    return ScaleSpan(scale, last, first, linear_to) if is_reversed else ScaleSpan(scale, first, last, linear_to)
 
 
 def _about(scale: Scale, low: float | None, high: float | None) -> list[float]:
@@ -110,7 +110,7 @@ def _wider(
     scale: Scale, ends: tuple[float, float], is_open: tuple[bool, bool], linear_to: float
 ) -> tuple[float, float]:
     """Return the ends with a margin where they are not given."""
-    span = Span(scale, *ends, linear_to)
+    span = ScaleSpan(scale, *ends, linear_to)
     if scale == "log":
         factor = 10.0 ** (MARGIN * (math.log10(ends[1]) - math.log10(ends[0])))
         return ends[0] / (factor if is_open[0] else 1.0), ends[1] * (factor if is_open[1] else 1.0)

@@ -32,7 +32,7 @@ _NOT_TEXT = r"[\x00-\x08\x0a-\x1e\x7f\x{FFFD}]"
 
 
 @dataclass(frozen=True)
-class Cells:
+class TableCells:
     """Column as read: its values, the unreadable cells, and the texts that were cut.
 
     Each has shape (n,).
@@ -65,7 +65,7 @@ def _column(array: Any, filler: float | int) -> Column:
     return Column(arrow.values(array, filler), arrow.is_valid(array) if array.null_count else None)
 
 
-def numbers(text: Any) -> Cells:
+def numbers(text: Any) -> TableCells:
     """Convert decimal numbers to float64; ``nan`` in a cell is a NaN that the device wrote.
 
     Examples
@@ -77,12 +77,12 @@ def numbers(text: Any) -> Cells:
     array, unreadable = _cast(text, pa.float64(), _NUMBER)
     if unreadable.any():
         array, unreadable = _cast(_one_sign(text), pa.float64(), _NUMBER)
-    return Cells(_column(array, float("nan")), unreadable)
+    return TableCells(_column(array, float("nan")), unreadable)
 
 
-def ready_numbers(array: Any) -> Cells:
+def ready_numbers(array: Any) -> TableCells:
     """Wrap a float64 column that the CSV parser itself has converted."""
-    return Cells(_column(array, float("nan")), np.zeros(len(array), dtype=bool))
+    return TableCells(_column(array, float("nan")), np.zeros(len(array), dtype=bool))
 
 
 def are_numbers(text: Any) -> bool:
@@ -99,7 +99,7 @@ def _one_sign(text: Any) -> Any:
     return pc.replace_substring_regex(text, _TWO_SIGNS, "-")
 
 
-def flags(text: Any) -> Cells:
+def flags(text: Any) -> TableCells:
     """Convert ``0``, ``1``, ``true``, ``false`` (any case) to bool.
 
     Examples
@@ -112,10 +112,10 @@ def flags(text: Any) -> Cells:
     true, false = (
         arrow.mask(pc.is_in(lower, value_set=arrow.texts(words))) for words in (["1", "true"], ["0", "false"])
     )
-    return Cells(Column(true, true | false), arrow.is_valid(text) & ~true & ~false)
+    return TableCells(Column(true, true | false), arrow.is_valid(text) & ~true & ~false)
 
 
-def words(text: Any, restore: Callable[[str], str] = str) -> Cells:
+def words(text: Any, restore: Callable[[str], str] = str) -> TableCells:
     """Convert cells to fixed-width unicode.
 
     Cells with control characters or broken encoding are unreadable.
@@ -135,10 +135,10 @@ def words(text: Any, restore: Callable[[str], str] = str) -> Cells:
     index = arrow.values(coded.indices, 0)
     long = np.array([len(word) > MAX_TEXT_CHARACTERS for word in distinct])
     values = np.array([word[:MAX_TEXT_CHARACTERS] for word in distinct], dtype=np.str_)
-    return Cells(Column(values[index], present), strange, long[index] if long.any() else None)
+    return TableCells(Column(values[index], present), strange, long[index] if long.any() else None)
 
 
-def decimal_ns(text: Any, digits: int = 9, multiple: int = 1) -> Cells:
+def decimal_ns(text: Any, digits: int = 9, multiple: int = 1) -> TableCells:
     """Convert decimal numbers of a unit of time to integer nanoseconds, exactly.
 
     Digits below a nanosecond are cut off.
@@ -182,23 +182,23 @@ def _exact(text: str, digits: int) -> int | None:
     return whole if abs(whole) < MAX_TIME_NS else None
 
 
-def integers_ns(text: Any) -> Cells:
+def integers_ns(text: Any) -> TableCells:
     """Convert whole numbers of nanoseconds."""
     array, unreadable = _cast(text, pa.int64(), _INTEGER)
     filled = arrow.is_valid(text)
     return _times(arrow.values(array, 0), filled, filled & ~unreadable)
 
 
-def _times(values: Int64Array, filled: BoolArray, readable: BoolArray) -> Cells:
+def _times(values: Int64Array, filled: BoolArray, readable: BoolArray) -> TableCells:
     """Return the times of cells that are filled and readable.
 
     A time beyond the range of :data:`MAX_TIME_NS` counts as unreadable.
     """
     present = readable & (values > -MAX_TIME_NS) & (values < MAX_TIME_NS)  # of the least integer abs() is negative
-    return Cells(Column(np.where(present, values, 0), present), filled & ~present)
+    return TableCells(Column(np.where(present, values, 0), present), filled & ~present)
 
 
-def iso_ns(text: Any) -> tuple[Cells, BoolArray]:
+def iso_ns(text: Any) -> tuple[TableCells, BoolArray]:
     """ISO 8601 times as UTC nanoseconds since 1970, and where no zone was named (read as UTC).
 
     Examples
@@ -218,7 +218,7 @@ def iso_ns(text: Any) -> tuple[Cells, BoolArray]:
     return _iso_one_by_one(text)
 
 
-def _iso_one_by_one(text: Any) -> tuple[Cells, BoolArray]:
+def _iso_one_by_one(text: Any) -> tuple[TableCells, BoolArray]:
     values = np.zeros(len(text), dtype=np.int64)
     readable, zoneless = np.zeros(len(text), dtype=bool), np.zeros(len(text), dtype=bool)
     for at, cell in enumerate(text.to_pylist()):

@@ -14,7 +14,7 @@ from groundstation.base.records import Int64Array
 from groundstation.readers.two_clocks import ClockStretch, ReadingSequence
 
 
-class Jump(NamedTuple):
+class ClockJump(NamedTuple):
     """Two consecutive records between which the receiver's clock falls, or leaps.
 
     ``number`` is the place of the second among those of its source; then records and times of both.
@@ -82,7 +82,7 @@ class _Step(NamedTuple):
     by: int
 
 
-def offsets_by(clocks: Mapping[int, Sequence[ClockStretch]], jumps: Sequence[Jump] = ()) -> Offsets:
+def offsets_by(clocks: Mapping[int, Sequence[ClockStretch]], jumps: Sequence[ClockJump] = ()) -> Offsets:
     """Return offsets that make times of receipt follow the readings of some clocks smoothly.
 
     The offset is zero before the first step.
@@ -91,7 +91,7 @@ def offsets_by(clocks: Mapping[int, Sequence[ClockStretch]], jumps: Sequence[Jum
     ----------
     clocks : mapping of number to sequence of ClockStretch
         Readings of each clock, parted where one of the two was set.
-    jumps : sequence of Jump
+    jumps : sequence of ClockJump
         Of records without a reading as well: where between two readings the clock was set.
     """
     starts, added, by = [0], [0], list[int]()
@@ -113,7 +113,7 @@ def _steps(clocks: Mapping[int, Sequence[ClockStretch]]) -> list[_Step]:
     return found
 
 
-def _united(steps: list[_Step], jumps: Sequence[Jump]) -> list[_Step]:
+def _united(steps: list[_Step], jumps: Sequence[ClockJump]) -> list[_Step]:
     """Merge steps that several clocks show into one.
 
     It is placed at the first record that is known to be behind it.
@@ -129,7 +129,7 @@ def _united(steps: list[_Step], jumps: Sequence[Jump]) -> list[_Step]:
     return [step._replace(first=min([step.first, *_behind(step, jumps)])) for step in united]
 
 
-def _behind(step: _Step, jumps: Sequence[Jump]) -> Iterable[int]:
+def _behind(step: _Step, jumps: Sequence[ClockJump]) -> Iterable[int]:
     """Yield records after the step, by jumps of about its size between its readings."""
     for jump in jumps:
         if step.after < jump.record < step.first and abs(jump.time_ns - jump.before_ns) > abs(step.size_ns) // 2:

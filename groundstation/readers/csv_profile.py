@@ -18,7 +18,7 @@ from groundstation.readers.misnamed import misnamed
 from groundstation.readers.profile import Profile, load, shipped
 from groundstation.readers.profile_fit import Fit, delimiter_of, fit_at, fit_below
 from groundstation.readers.profile_layout import layout_of
-from groundstation.readers.sections import MOST, Section, header_places, left_out, mark_of, told
+from groundstation.readers.sections import MOST, TableSection, header_places, left_out, mark_of, told
 from groundstation.readers.source import Claim, Source
 from groundstation.readers.start import unusable_references, utc_of_zero
 
@@ -125,7 +125,9 @@ def read(source: Source, profile: Path | None = None) -> Iterator[Item]:
         return
     sections, section_remarks = _sections(source, fit, utc_of_zero_ns)
     above = _rows_of_another(fit)
-    items = TableReader(source, [*([Section(above, sections[0].layout)] if above else []), *sections]).items(header)
+    items = TableReader(source, [*([TableSection(above, sections[0].layout)] if above else []), *sections]).items(
+        header
+    )
     yield next(items)
     yield from dict.fromkeys([*remarks, *section_remarks, *unusable_references(metadata)])
     yield from () if above else _above(fit)
@@ -176,7 +178,9 @@ def _above(fit: Fit) -> Iterator[Damage]:
         yield Damage("dropped_rows", place, len(fit.rows_above), "rows above the header that names their columns")
 
 
-def _sections(source: Source, first: Fit, utc_of_zero_ns: int | None) -> tuple[list[Section], list[Remark | Damage]]:
+def _sections(
+    source: Source, first: Fit, utc_of_zero_ns: int | None
+) -> tuple[list[TableSection], list[Remark | Damage]]:
     """Rows below each header that names other columns or another zero of time."""
     fits, ends, shifts = [first], list[int](), [0]
     remarks: list[Remark | Damage] = []
@@ -205,11 +209,11 @@ def _sections(source: Source, first: Fit, utc_of_zero_ns: int | None) -> tuple[l
             break
         remarks.append(told(place, is_same))
         fits, ends, shifts = [*fits, found], [*ends, end_byte], [*shifts, shift_ns]
-    sections = list[Section]()
+    sections = list[TableSection]()
     for fit, end, shift_ns in zip(fits, (*ends, last_byte), shifts, strict=True):
         layout, more = layout_of(fit, source, utc_of_zero_ns, end)
         facts = _metadata(fit) if sections else {}
-        sections.append(Section(fit.dialect_to(end, stands_again), layout, shift_ns, facts))
+        sections.append(TableSection(fit.dialect_to(end, stands_again), layout, shift_ns, facts))
         remarks += more
     return sections, remarks
 

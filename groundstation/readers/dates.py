@@ -9,7 +9,7 @@ import pyarrow.compute as pc
 from groundstation.base import arrow_values as arrow
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.cells import MAX_TIME_NS, Cells
+from groundstation.readers.cells import MAX_TIME_NS, TableCells
 
 _NS_PER_DAY = 86_400 * NS_PER_S
 _EPOCH_DAY = datetime(1970, 1, 1).toordinal()
@@ -57,7 +57,7 @@ def _each_distinct(text: Any, parse: Any, formats: tuple[str, ...]) -> tuple[Int
     return values[index], known[index], filled & ~known[index]
 
 
-def local_ns(date: Any, time: Any, offset: Any | None, date_formats: tuple[str, ...]) -> Cells:
+def local_ns(date: Any, time: Any, offset: Any | None, date_formats: tuple[str, ...]) -> TableCells:
     """UTC nanoseconds since 1970 of local date and time: date + time - offset.
 
     A row has a time when date and time are there; an empty offset is zero, an unreadable one makes the time unreadable.
@@ -79,4 +79,4 @@ def local_ns(date: Any, time: Any, offset: Any | None, date_formats: tuple[str, 
         offsets, _known, bad_offset = _each_distinct(offset, _offset_ns, ())
         unreadable = unreadable | (bad_offset & has_day & has_time)
     present = has_day & has_time & ~unreadable
-    return Cells(Column(np.where(present, days + times - offsets, 0), present), unreadable)
+    return TableCells(Column(np.where(present, days + times - offsets, 0), present), unreadable)

@@ -34,7 +34,7 @@ from groundstation.readers.misnamed import misnamed
 from groundstation.readers.sections import (
     MOST,
     HeaderPlace,
-    Section,
+    TableSection,
     ended,
     header_places,
     left_out,
@@ -189,9 +189,9 @@ def read(source: Source) -> Iterator[Item]:
 
 def _sections(
     source: Source, top: _Top, layout: TableLayout, utc_of_zero_ns: int | None
-) -> tuple[list[Section], list[Remark | Damage]]:
+) -> tuple[list[TableSection], list[Remark | Damage]]:
     """Rows below each header that names other columns or another zero of time."""
-    sections, remarks = [Section(top.dialect, layout)], list[Remark | Damage]()
+    sections, remarks = [TableSection(top.dialect, layout)], list[Remark | Damage]()
     last, last_utc_ns, stands_again = top, utc_of_zero_ns, False
     for place in header_places(source, top.header, top.encoding, _MARK, _is_header):
         stands_again = True
@@ -211,7 +211,7 @@ def _sections(
         utc_ns, clock_remarks = _utc_of_zero(source, found.dialect, found_layout, metadata, names)
         shift_ns = _shift_ns(utc_of_zero_ns, utc_ns, found, last, sections[-1].shift_ns)
         sections[-1] = ended(sections[-1], first_byte)
-        sections.append(Section(found.dialect, found_layout, shift_ns, metadata))
+        sections.append(TableSection(found.dialect, found_layout, shift_ns, metadata))
         remarks += [told(place, is_same, shift_ns), *more, *_mistakes(found), *clock_remarks]
         last, last_utc_ns = found, last_utc_ns if utc_ns is None else utc_ns
     return sections if stands_again else [without_headers(sections[0])], remarks

@@ -17,7 +17,7 @@ from groundstation.base.records import BoolArray, Column, Remark
 Columns: TypeAlias = dict[str, Column]
 
 
-class Numbers(Protocol):
+class NumericColumns(Protocol):
     """Columns of messages by name, as floating-point numbers."""
 
     def __contains__(self, name: str, /) -> bool: ...
@@ -43,7 +43,7 @@ class SourceRule:
 
     source: str
     needs: tuple[str, ...]
-    columns: Callable[[Numbers], Columns]
+    columns: Callable[[NumericColumns], Columns]
     derived: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def told(self, topic: str) -> Iterator[Remark]:
@@ -66,7 +66,7 @@ class Role:
 
 
 @dataclass(frozen=True)
-class Offer:
+class OfferedMessages:
     """Messages that a log has: their name, number of the source, and columns.
 
     ``instance`` tells apart several sources of one name.
@@ -85,12 +85,12 @@ class Offer:
 class Assignment:
     """Messages, and the canonical topic that they feed by a rule."""
 
-    offer: Offer
+    offer: OfferedMessages
     topic: str
     rule: SourceRule
 
 
-def assigned(roles: Iterable[Role], offers: Sequence[Offer]) -> Iterator[Assignment]:
+def assigned(roles: Iterable[Role], offers: Sequence[OfferedMessages]) -> Iterator[Assignment]:
     """Yield, for each role, the first rule that the log serves and the messages that serve it.
 
     A role without instances takes only the first of these messages.
@@ -114,16 +114,16 @@ def mapped(sources: Mapping[str, Sequence[str]]) -> Iterator[Remark]:
         )
 
 
-def scaled(fields: Mapping[str, tuple[str, float]]) -> Callable[[Numbers], Columns]:
+def scaled(fields: Mapping[str, tuple[str, float]]) -> Callable[[NumericColumns], Columns]:
     """Return columns of plain factors: canonical field -> (column, factor)."""
 
-    def columns(numbers: Numbers) -> Columns:
+    def columns(numbers: NumericColumns) -> Columns:
         return {field: Column(numbers[name] * factor) for field, (name, factor) in fields.items() if name in numbers}
 
     return columns
 
 
-def holds(numbers: Numbers, name: str) -> BoolArray | None:
+def holds(numbers: NumericColumns, name: str) -> BoolArray | None:
     """Return where a flag is set, shape (n,); None in messages that lack the flag."""
     return numbers[name] != 0.0 if name in numbers else None
 

@@ -16,7 +16,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.geodesy import SEMI_MAJOR_M, has_position
 from groundstation.readers.dialect import Dialect
 from groundstation.readers.layout import TableLayout
-from groundstation.readers.sections import Section
+from groundstation.readers.sections import TableSection
 from groundstation.readers.source import Source
 
 LOOKED_AT = "looked_at"  # topic of columns that are read for what they show
@@ -85,7 +85,7 @@ def samples_of(source: Source, dialect: Dialect, layout: TableLayout) -> NorthSa
 
     parts: list[dict[str, FloatArray]] = []
     for window in _windows(source, dialect):
-        for columns in TableReader(source, [Section(window, layout)]).columns():
+        for columns in TableReader(source, [TableSection(window, layout)]).columns():
             parts.append({name: np.where(one.mask, one.values, np.nan) for (_topic, name), one in columns.items()})
         if _is_enough(parts):
             break

@@ -30,7 +30,7 @@ from groundstation.readers.layout import LayoutRule, TableLayout, TimeRule
 from groundstation.readers.losses import Losses
 from groundstation.readers.places import placed
 from groundstation.readers.rtklib_header import Form, Governed, form_of, forms_of
-from groundstation.readers.sections import Section
+from groundstation.readers.sections import TableSection
 from groundstation.readers.source import Claim, Source
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def _rows(source: Source, governed: Sequence[Governed], losses: Losses) -> Itera
     dialect = Dialect("utf-8", "\t", len(form.names), 0, first.first_line)
     table = TableReader(
         _Tabbed(source.path, source, first.first_byte, governed[-1].end_byte),
-        [Section(dialect, TableLayout(time, tuple(rules)))],
+        [TableSection(dialect, TableLayout(time, tuple(rules)))],
     )
     items = table.items(LogHeader(NAME))
     next(items)

@@ -23,7 +23,7 @@ _WORD = re.compile(rb"[\n\r][ \"#]*[A-Za-z_]")
 
 
 @dataclass(frozen=True)
-class Section:
+class TableSection:
     """Rows below one header.
 
     Parameters
@@ -136,7 +136,7 @@ def _separator(source: Source) -> bytes:
     return b"\n" if b"\n" in source.head or b"\r" not in source.head else b"\r"
 
 
-def ended(section: Section, end_byte: int) -> Section:
+def ended(section: TableSection, end_byte: int) -> TableSection:
     """Return a section whose rows end at ``end_byte``, where the next header begins."""
     return replace(section, dialect=replace(section.dialect, end_byte=end_byte))
 
@@ -149,7 +149,7 @@ def left_out(source: Source, line: int, first_byte: int) -> Damage:
     return Damage("dropped_rows", f"rows {line} to {line + max(count, 1) - 1}", max(count, 1), what)
 
 
-def without_headers(section: Section) -> Section:
+def without_headers(section: TableSection) -> TableSection:
     """Return a section in which no repeated header line is looked for."""
     return replace(section, dialect=replace(section.dialect, header_lines=frozenset()))
 

@@ -26,7 +26,7 @@ from groundstation.base.records import (
 )
 from groundstation.base.signals import kind_of
 from groundstation.readers import cells
-from groundstation.readers.cells import Cells
+from groundstation.readers.cells import TableCells
 from groundstation.readers.dates import local_ns
 from groundstation.readers.dialect import Dialect
 from groundstation.readers.inside import new_logs, with_own_zeros
@@ -34,7 +34,7 @@ from groundstation.readers.layout import METHODS, Key, LayoutRule, TableLayout, 
 from groundstation.readers.losses import Losses
 from groundstation.readers.places import PLACED, without_place, zeroed
 from groundstation.readers.rows import RowBlock, RowScanner, restore_delimiters
-from groundstation.readers.sections import Section
+from groundstation.readers.sections import TableSection
 from groundstation.readers.source import Source
 
 MAX_BATCH_BYTES = 32 << 20  # a text field is as wide as its longest value: a batch of long texts has fewer rows
@@ -46,7 +46,7 @@ class TableReader:
     Parameters
     ----------
     source : Source
-    sections : sequence of Section
+    sections : sequence of TableSection
         In the order of the file. Rules of kind ``raw`` are settled here by a first pass over the file.
 
     Attributes
@@ -55,7 +55,7 @@ class TableReader:
         Times read so far that name no zone.
     """
 
-    def __init__(self, source: Source, sections: Sequence[Section]) -> None:
+    def __init__(self, source: Source, sections: Sequence[TableSection]) -> None:
         self._source = source
         self._losses = Losses()
         self._wrapped: dict[str, int] = {}
@@ -95,7 +95,7 @@ class TableReader:
             return self._time(self._arrays(block), block.line_numbers)
         return Column(np.zeros(0, dtype=np.int64))
 
-    def _settled(self, sections: Sequence[Section]) -> tuple[Section, ...]:
+    def _settled(self, sections: Sequence[TableSection]) -> tuple[TableSection, ...]:
         """Settle columns of kind ``raw``: float64 where every cell is a number, else text.
 
         A column's type must not change between batches, so it takes a pass of its own; only raw columns are parsed. A
@@ -115,7 +115,7 @@ class TableReader:
             settled.append(replace(section, layout=replace(section.layout, rules=rules)))
         return tuple(settled)
 
-    def _texts(self, section: Section, columns: set[int]) -> set[int]:
+    def _texts(self, section: TableSection, columns: set[int]) -> set[int]:
         """Return those of some columns of a section that have a cell which is no number."""
         self._dialect = section.dialect
         texts: set[int] = set()
@@ -237,7 +237,7 @@ class TableReader:
                 column = Column(column.values * rule.factor + rule.offset, column.present)
         return self._on_the_circle(rule, column) if rule.is_heading else column
 
-    def _read_cells(self, rule: LayoutRule, array: Any) -> tuple[Cells, str]:
+    def _read_cells(self, rule: LayoutRule, array: Any) -> tuple[TableCells, str]:
         if rule.kind == "bool":
             return cells.flags(array), "cells that are not 0, 1, true or false"
         if rule.kind == "text":
@@ -297,7 +297,7 @@ def _with_point(text: Any) -> Any:
     return pc.replace_substring(text, ",", ".", max_replacements=1)
 
 
-def _zero_of(header: LogHeader, section: Section) -> int | None:
+def _zero_of(header: LogHeader, section: TableSection) -> int | None:
     """UTC of time zero of the rows of a section."""
     if header.utc_of_zero_ns is None or section.shift_ns is None:
         return None
@@ -324,7 +324,7 @@ def first_times(source: Source, dialect: Dialect, layout: TableLayout) -> tuple[
 
     There are no times when there are no rows.
     """
-    reader = TableReader(source, [Section(dialect, replace(layout, rules=(), derivations=()))])
+    reader = TableReader(source, [TableSection(dialect, replace(layout, rules=(), derivations=()))])
     return reader.first_times(), reader.zoneless
 
 

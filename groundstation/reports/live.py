@@ -56,7 +56,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Curve:
+class LiveCurve:
     """Mark on axes: line, dots, band (``y`` to ``upper``) or lanes (``x`` to ``upper``).
 
     ``kind`` says which. ``name`` is empty for what the legend leaves out.
@@ -73,7 +73,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Panel(Frame):
+class LivePanel(Frame):
     """One pair of axes with its marks.
 
     ``grounds`` are start, end, colour and name of shaded spans, ``marks`` place and colour of upright lines.
@@ -81,7 +81,7 @@ class Panel(Frame):
 
     grounds: tuple[tuple[float, float, str, str], ...]
     marks: tuple[tuple[float, str], ...]
-    curves: tuple[Curve, ...]
+    curves: tuple[LiveCurve, ...]
 
 
 class Svg(str):
@@ -90,17 +90,17 @@ class Svg(str):
     Without panels it stays a picture. ``frames`` are those of its axes.
     """
 
-    panels: tuple[Panel, ...]
+    panels: tuple[LivePanel, ...]
     frames: tuple[Frame, ...]
 
-    def __new__(cls, text: str, panels: tuple[Panel, ...] = (), frames: tuple[Frame, ...] = ()) -> "Svg":
+    def __new__(cls, text: str, panels: tuple[LivePanel, ...] = (), frames: tuple[Frame, ...] = ()) -> "Svg":
         """Make the element from its text, with its panels and frames."""
         made = super().__new__(cls, text)
         made.panels, made.frames = panels, frames
         return made
 
 
-def page_data(figures: Iterable[tuple[Panel, ...]], pictures: Iterable[tuple[Frame, ...]] = ()) -> str:
+def page_data(figures: Iterable[tuple[LivePanel, ...]], pictures: Iterable[tuple[Frame, ...]] = ()) -> str:
     """Return the panels of every live figure of a page as JSON for a script element.
 
     The frames of every picture are in it too. Arrays are base64 of little-endian float32, NaN where a line breaks;
@@ -120,7 +120,7 @@ def page_data(figures: Iterable[tuple[Panel, ...]], pictures: Iterable[tuple[Fra
     return json.dumps(whole, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
 
 
-def _plain_panel(panel: Panel, kept: Any) -> dict[str, Any]:
+def _plain_panel(panel: LivePanel, kept: Any) -> dict[str, Any]:
     curves = [
         {
             "kind": one.kind,

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.chapters.wording import clean
-from groundstation.reports.live import Frame, Panel, page_data
+from groundstation.reports.live import Frame, LivePanel, page_data
 
 TEMPLATES = Path(__file__).parent / "templates"
 # Nothing may be loaded, nothing run but scripts that a template names by digest. SVG sets style attributes, hence
@@ -27,7 +27,7 @@ def render(template: str, **context: Any) -> str:
     return str(_environment().get_template(template).render(csp=CONTENT_SECURITY_POLICY, **context))
 
 
-def live_figures(figures: Sequence[tuple[Panel, ...]], pictures: Sequence[tuple[Frame, ...]]) -> dict[str, str]:
+def live_figures(figures: Sequence[tuple[LivePanel, ...]], pictures: Sequence[tuple[Frame, ...]]) -> dict[str, str]:
     """Return the values by which flight.html.j2 draws figures live and zooms into pictures.
 
     Empty texts without any. Those are data, script with its digest, style.

@@ -48,7 +48,7 @@ class Bound:
 
 
 @dataclass(frozen=True)
-class Limit:
+class AcceptanceLimit:
     """One limit: on at least ``share`` of the flights every bound holds.
 
     ``paragraph`` is its place in the standard; ``hours_over`` < hours <= ``hours_up_to`` are the flights it is for.
@@ -81,7 +81,7 @@ class Limit:
 
         Examples
         --------
-        >>> Limit("a", "", (Bound("heading_error_deg", 0.5),)).part({"heading_error_deg": -0.25})
+        >>> AcceptanceLimit("a", "", (Bound("heading_error_deg", 0.5),)).part({"heading_error_deg": -0.25})
         0.5
         """
         parts = [abs(values[one.quantity]) / one.at_most for one in self.bounds if one.quantity in values]
@@ -108,7 +108,7 @@ class Standard:
         A flight with less navigation is left out.
     accuracy_ratio_min : float or None
         Limit over the error of the reference (both 95 %) that a flight needs to count; None: it is told alone.
-    limits : tuple of Limit
+    limits : tuple of AcceptanceLimit
     """
 
     title: str
@@ -119,7 +119,7 @@ class Standard:
     claim: Claim = "type"
     minutes_min: float = number(10.0, 1.0, 6000.0)
     accuracy_ratio_min: float | None = number(None, 0.0, 1e6)
-    limits: tuple[Limit, ...] = ()
+    limits: tuple[AcceptanceLimit, ...] = ()
 
     def __post_init__(self) -> None:
         check_ranges(self)
@@ -268,7 +268,7 @@ class Acceptance:
         """Flights that enter the figures."""
         return tuple(flight for flight in self.flights if flight.is_included)
 
-    def limit(self, name: str) -> Limit:
+    def limit(self, name: str) -> AcceptanceLimit:
         """The limit of that name."""
         return next(limit for limit in self.standard.limits if limit.name == name)
 

@@ -29,7 +29,7 @@ class Side:
 
 
 @dataclass(frozen=True)
-class Alignment:
+class ClockAlignment:
     """Event that both clocks are aligned on, with its flight seconds in A and in B."""
 
     event: Event
@@ -42,7 +42,7 @@ class Alignment:
 
         Examples
         --------
-        >>> Alignment("lift-off", 120.0, 95.5).offset_s
+        >>> ClockAlignment("lift-off", 120.0, 95.5).offset_s
         24.5
         """
         return self.a_s - self.b_s
@@ -112,7 +112,7 @@ class Comparison:
     a, b : Side
     is_same_log : bool
         Both are of one log, or of parts of it: their noise is shared.
-    alignment : Alignment
+    alignment : ClockAlignment
     deltas : tuple of Delta
         Every answer both have.
     settings : tuple of SettingPair
@@ -127,7 +127,7 @@ class Comparison:
     a: Side
     b: Side
     is_same_log: bool
-    alignment: Alignment
+    alignment: ClockAlignment
     deltas: tuple[Delta, ...]
     settings: tuple[SettingPair, ...] = ()
     findings_a: tuple[Finding, ...] = ()

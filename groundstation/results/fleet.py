@@ -195,7 +195,7 @@ class FleetCalibration:
 
 
 @dataclass(frozen=True)
-class DeviationRow:
+class FleetDeviationRow:
     """Magnetic deviation found in one flight, beside the mean of its aircraft's ``others``.
 
     ``coefficients_deg`` A to E are of the error, by the method recommended; ``before_rms_deg`` and ``after_rms_deg`` of
@@ -311,7 +311,7 @@ class FleetResults:
         Logs and folders that failed or were skipped and why, failed first, by source.
     stated : mapping of str to number
         Rates and limits the statistics keep to, by name: chance of a false change point per aircraft, and so on.
-    deviations : tuple of DeviationRow
+    deviations : tuple of FleetDeviationRow
         By aircraft, then time.
     sessions : tuple of SessionRow
         By session id.
@@ -334,7 +334,7 @@ class FleetResults:
     outliers: tuple[OutlierRow, ...]
     not_in_fleet: tuple[NotInFleet, ...]
     stated: Mapping[str, float] = field(default_factory=dict)
-    deviations: tuple[DeviationRow, ...] = ()
+    deviations: tuple[FleetDeviationRow, ...] = ()
     sessions: tuple[SessionRow, ...] = ()
     installations: tuple[InstallationRow, ...] = ()
     installation_flights: FleetInstallationFlights = field(default_factory=FleetInstallationFlights.empty)

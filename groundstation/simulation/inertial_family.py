@@ -24,7 +24,7 @@ from groundstation.simulation.routes import Route, RouteKind, draw_route
 
 
 @dataclass(frozen=True)
-class GnssNoise:
+class GnssErrorModel:
     """GNSS errors per horizontal axis: white + first-order Gauss-Markov.
 
     Position and velocity are independent.
@@ -51,7 +51,7 @@ class FamilySettings:
         Name of a shipped class, or a class.
     route : {"straight", "norilsk_moscow", "manoeuvring", "out_and_back", "dogleg", "racetrack", "late_survey"}
     duration_s, step_s : float
-    gnss : GnssNoise
+    gnss : GnssErrorModel
     truth : {"full", "channel"}
         ``full``: the physics of :mod:`groundstation.simulation.ins_errors`. ``channel``: the design's six-state model
         is exactly true, with ``channel_gravity_mps2`` and ``channel_radius_m``; azimuth error is zero.
@@ -67,7 +67,7 @@ class FamilySettings:
     route: RouteKind = "straight"
     duration_s: float = number(16_000.0, 10.0, 200_000.0)
     step_s: float = number(1.0, 0.01, 10.0)
-    gnss: GnssNoise = field(default_factory=GnssNoise)
+    gnss: GnssErrorModel = field(default_factory=GnssErrorModel)
     truth: Literal["full", "channel"] = "full"
     earth_rate: bool = True
     body_fixed: bool | None = None
@@ -241,7 +241,9 @@ def _channel_errors(family: FamilySettings, ins: InsClass, time_s: FloatArray, s
     )
 
 
-def _gnss_errors(noise: GnssNoise, n: int, step_s: float, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+def _gnss_errors(
+    noise: GnssErrorModel, n: int, step_s: float, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
     """Position and velocity errors, shapes (n, 2)."""
     white = rng.standard_normal((4, n))
     position = noise.position_white_m * white[:2]

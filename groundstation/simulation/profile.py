@@ -16,7 +16,7 @@ from groundstation.simulation.scenario import Scenario
 
 
 @dataclass(frozen=True)
-class Profile:
+class MotionProfile:
     """Planned motion on the internal grid, arrays of shape (n,).
 
     On the ground ``speed_mps`` and ``direction_deg`` are those of the ground velocity, in the air those of the
@@ -70,7 +70,7 @@ def smoothstep_slope(share: FloatArray) -> FloatArray:
     return 6.0 * held * (1.0 - held)
 
 
-def plan(scenario: Scenario) -> Profile:
+def plan(scenario: Scenario) -> MotionProfile:
     """Chain the scenario's legs and sample them.
 
     Raises
@@ -136,7 +136,7 @@ def _change_frame(state: MotionState, scenario: Scenario) -> MotionState:
     )
 
 
-def _sample(planned: list[tuple[MotionState, MotionSegment, float]], end: MotionState, step_ns: int) -> Profile:
+def _sample(planned: list[tuple[MotionState, MotionSegment, float]], end: MotionState, step_ns: int) -> MotionProfile:
     step_s = step_ns / NS_PER_S
     blocks = [_sample_piece(state, piece, rate, round(piece.duration_s / step_s)) for state, piece, rate in planned]
     last = [end.speed_mps, 0.0, end.direction_deg, 0.0, 0.0, end.altitude_m, end.climb_rate_mps, 0.0]
@@ -145,7 +145,7 @@ def _sample(planned: list[tuple[MotionState, MotionSegment, float]], end: Motion
     )
     flags = [np.full(block.shape[1], state.airborne) for block, (state, _, _) in zip(blocks, planned, strict=True)]
     airborne = np.concatenate([*flags, np.array([end.airborne])])
-    return Profile(
+    return MotionProfile(
         step_ns=step_ns,
         speed_mps=speed,
         acceleration_mps2=acceleration,

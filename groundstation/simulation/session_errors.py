@@ -18,7 +18,7 @@ from groundstation.base.records import frozen
 from groundstation.simulation.ins_errors import InsErrors, SensorErrors, TrueMotion, propagate
 from groundstation.simulation.processes import gauss_markov
 from groundstation.simulation.session_motion import AircraftMotion
-from groundstation.simulation.session_scenario import SessionErrors, SessionScenario
+from groundstation.simulation.session_scenario import SessionErrorSigmas, SessionScenario
 
 RAD_PER_ARCSEC = float(np.deg2rad(1.0 / 3600.0))
 SMALL_STEP = (
@@ -126,7 +126,7 @@ def draw_errors(
 
 
 def _inertial_errors(
-    errors: SessionErrors, motion: AircraftMotion, height_above_m: float, rng: np.random.Generator
+    errors: SessionErrorSigmas, motion: AircraftMotion, height_above_m: float, rng: np.random.Generator
 ) -> tuple[InsErrors, FloatArray]:
     n = len(motion.time_s)
     step_s = float(motion.time_s[1] - motion.time_s[0])

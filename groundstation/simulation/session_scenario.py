@@ -14,7 +14,7 @@ MOST_AIRCRAFT = 20
 
 
 @dataclass(frozen=True)
-class Turn:
+class SessionTurn:
     """A turn at constant speed; to the right positive."""
 
     at_s: float = required_number(0.0)
@@ -41,7 +41,7 @@ class SessionAircraft:
     leaves_s: float = number(1e9, 0.0)
     satellites: tuple[str, ...] = ()
     hears: tuple[str, ...] = ()
-    turns: tuple[Turn, ...] = ()
+    turns: tuple[SessionTurn, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class SessionPoint:
 
 
 @dataclass(frozen=True)
-class SessionErrors:
+class SessionErrorSigmas:
     """Sigmas of the errors at the start and of the processes that drive them.
 
     Global frame: tilt, azimuth and gyro drifts of an INS (full error propagation); local frame: velocity errors are
@@ -133,7 +133,7 @@ class SessionScenario:
     longitude_deg: float = number(38.0, -180.0, 180.0)
     notes: str = ""
     points: tuple[SessionPoint, ...] = ()
-    errors: SessionErrors = field(default_factory=SessionErrors)
+    errors: SessionErrorSigmas = field(default_factory=SessionErrorSigmas)
     link: LinkSettings = field(default_factory=LinkSettings)
     satellite: SatelliteSettings = field(default_factory=SatelliteSettings)
 

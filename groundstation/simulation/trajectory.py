@@ -19,7 +19,7 @@ from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import BoolArray, Int64Array, frozen
 from groundstation.base.units import MPS2_PER_G
 from groundstation.simulation.processes import damped_oscillation
-from groundstation.simulation.profile import Profile, plan, smoothstep, smoothstep_slope
+from groundstation.simulation.profile import MotionProfile, plan, smoothstep, smoothstep_slope
 from groundstation.simulation.scenario import Scenario
 
 TRANSITION_S = 5.0
@@ -166,7 +166,7 @@ def track_deg(trajectory: Trajectory) -> FloatArray:
 
 
 def _integrate(
-    north_mps: FloatArray, east_mps: FloatArray, profile: Profile, scenario: Scenario
+    north_mps: FloatArray, east_mps: FloatArray, profile: MotionProfile, scenario: Scenario
 ) -> tuple[FloatArray, FloatArray]:
     """Integrate positions on the ellipsoid by the trapezoidal rule.
 
@@ -188,7 +188,7 @@ def _integrate(
 
 
 def _wander(
-    rng: np.random.Generator, profile: Profile, sigma: float, frequency_hz: float, damping: float
+    rng: np.random.Generator, profile: MotionProfile, sigma: float, frequency_hz: float, damping: float
 ) -> tuple[FloatArray, FloatArray]:
     """Draw a damped oscillation and its exact derivative.
 
@@ -205,14 +205,14 @@ def _wander(
     return spline(profile.time_s), spline(profile.time_s, 1)
 
 
-def _between(low_high: tuple[float, float], profile: Profile) -> tuple[FloatArray, FloatArray]:
+def _between(low_high: tuple[float, float], profile: MotionProfile) -> tuple[FloatArray, FloatArray]:
     """Return a weight that grows smoothly from 0 to 1 with the speed, and its time derivative."""
     low, high = low_high
     share = (profile.speed_mps - low) / (high - low)
     return smoothstep(share), smoothstep_slope(share) * profile.acceleration_mps2 / (high - low)
 
 
-def _steering(scenario: Scenario, profile: Profile, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+def _steering(scenario: Scenario, profile: MotionProfile, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     ground = scenario.ground
     wander, wander_rate = _wander(
         rng, profile, ground.steering_sigma_deg, ground.steering_frequency_hz, ground.steering_damping
@@ -222,7 +222,7 @@ def _steering(scenario: Scenario, profile: Profile, rng: np.random.Generator) ->
     return on_ground * weight * wander, on_ground * (weight_rate * wander + weight * wander_rate)
 
 
-def _taxiing(profile: Profile) -> tuple[FloatArray, FloatArray]:
+def _taxiing(profile: MotionProfile) -> tuple[FloatArray, FloatArray]:
     """Return a weight that is 1 at taxi speeds, and its derivative in time.
 
     It is 0 at rest and on the take-off run.
@@ -233,7 +233,7 @@ def _taxiing(profile: Profile) -> tuple[FloatArray, FloatArray]:
 
 
 def _crosswind_slip(
-    scenario: Scenario, profile: Profile, direction_deg: FloatArray, direction_rate_dps: FloatArray
+    scenario: Scenario, profile: MotionProfile, direction_deg: FloatArray, direction_rate_dps: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the angle of the nose into the wind while taxiing, and its rate."""
     wind, factor = scenario.wind, scenario.ground.crosswind_slip_deg_per_mps
@@ -247,7 +247,7 @@ def _crosswind_slip(
 
 def _nose_about_direction(
     scenario: Scenario,
-    profile: Profile,
+    profile: MotionProfile,
     crosswind_slip: tuple[FloatArray, FloatArray],
     rng: np.random.Generator,
 ) -> tuple[FloatArray, FloatArray]:
@@ -275,7 +275,7 @@ def _nose_about_direction(
     return on_ground * slip + swing, on_ground * slip_rate + on_ground_rate * slip + swing_rate
 
 
-def _roll_and_pitch(profile: Profile) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def _roll_and_pitch(profile: MotionProfile) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return roll and pitch with their rates (deg, deg/s).
 
     Roll is that of coordinated turns, pitch that of the flight path plus the angle of attack.

@@ -31,7 +31,7 @@ from groundstation.store.framing import (
     read_summary,
 )
 from groundstation.store.marks import MAGIC, RECORD_PREFIX, SEARCH_BYTES
-from groundstation.store.messages import HEAD, ByteArray, Messages
+from groundstation.store.messages import HEAD, ByteArray, ChunkMessages
 from groundstation.store.walk import find_messages
 
 PEEK_BYTES = 64
@@ -53,7 +53,7 @@ class ForeignMessages:
 
     channel: Channel
     schema: Schema | None
-    messages: Messages
+    messages: ChunkMessages
     places: "np.ndarray[tuple[int], np.dtype[np.int64]]"
 
 
@@ -233,7 +233,7 @@ class ForeignMcap:
         self._define(raw, starts, sizes)
         if not len(starts):
             return
-        everything = Messages(raw, 0, starts, sizes, 0)
+        everything = ChunkMessages(raw, 0, starts, sizes, 0)
         ids = everything.head("channel_id")
         places = np.arange(self._count, self._count + len(starts), dtype=np.int64)
         self._count += len(starts)
@@ -245,7 +245,7 @@ class ForeignMcap:
                 self._unknown += len(rows)
                 continue
             schema = self._known.schemas.get(channel.schema_id)
-            messages = Messages(raw, number, starts[rows], sizes[rows], 0)
+            messages = ChunkMessages(raw, number, starts[rows], sizes[rows], 0)
             yield ForeignMessages(channel, schema, messages, places[rows])
 
     def _define(self, raw: ByteArray, starts: "np.ndarray", sizes: "np.ndarray") -> None:

@@ -34,7 +34,7 @@ from mcap.records import (
 
 from groundstation.base.records import Int64Array
 from groundstation.store.marks import MAGIC, RECORD_PREFIX
-from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, Messages
+from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, ChunkMessages
 
 MAX_CHUNK_BYTES = 64 << 20  # largest chunk, decompressed; the writer's have about one megabyte
 MAX_RECORD_BYTES = 64 << 20  # largest record that is read whole
@@ -226,7 +226,7 @@ def _zstd(data: Buffer, size: int) -> bytes:
     return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
 
 
-def split_messages(buffer: ByteArray) -> list[Messages] | None:
+def split_messages(buffer: ByteArray) -> list[ChunkMessages] | None:
     """Split a chunk into messages by channel; None when it is not made of whole records."""
     if not len(buffer):
         return []
@@ -239,13 +239,13 @@ def split_messages(buffer: ByteArray) -> list[Messages] | None:
     if found is None:
         return None
     starts, sizes = found
-    ids = Messages(buffer, 0, starts, sizes, 0).head("channel_id")
+    ids = ChunkMessages(buffer, 0, starts, sizes, 0).head("channel_id")
     order = np.argsort(ids, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(ids[order])) + 1) if len(ids) else []
-    return [Messages(buffer, int(ids[rows[0]]), starts[rows], sizes[rows], 0) for rows in groups]
+    return [ChunkMessages(buffer, int(ids[rows[0]]), starts[rows], sizes[rows], 0) for rows in groups]
 
 
-def _evenly_spaced(buffer: ByteArray) -> Messages | None:
+def _evenly_spaced(buffer: ByteArray) -> ChunkMessages | None:
     """Return the messages of a chunk in which all have one length and one channel."""
     if len(buffer) < HEAD.itemsize or buffer[0] != MESSAGE_OPCODE:
         return None
@@ -259,7 +259,7 @@ def _evenly_spaced(buffer: ByteArray) -> Messages | None:
             return None
     count = len(matrix)
     starts = np.arange(count, dtype=np.int64) * stride
-    return Messages(buffer, int(head["channel_id"]), starts, np.full(count, stride, np.int64), stride)
+    return ChunkMessages(buffer, int(head["channel_id"]), starts, np.full(count, stride, np.int64), stride)
 
 
 @dataclass

@@ -25,7 +25,7 @@ MESSAGE_OPCODE = 5
 
 
 @dataclass(frozen=True)
-class Messages:
+class ChunkMessages:
     """Message records of one channel inside a chunk.
 
     Parameters
@@ -53,10 +53,10 @@ class Messages:
         first = int(self.starts[0])
         return self.buffer[first : first + len(self) * self.stride].reshape(len(self), self.stride)
 
-    def take(self, rows: Any) -> "Messages":
+    def take(self, rows: Any) -> "ChunkMessages":
         """Return the messages that ``rows`` (slice or positions) selects."""
         stride = self.stride if isinstance(rows, slice) and rows.step in (None, 1) else 0
-        return Messages(self.buffer, self.channel_id, self.starts[rows], self.sizes[rows], stride)
+        return ChunkMessages(self.buffer, self.channel_id, self.starts[rows], self.sizes[rows], stride)
 
     def head(self, name: str) -> Int64Array:
         """Return an entry of every record's head (``"log_time"``) as int64, shape (n,)."""

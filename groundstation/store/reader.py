@@ -19,7 +19,7 @@ from groundstation.base.units import NS_PER_S
 from groundstation.store.channel import COLUMNS_KEY, DERIVED_KEY
 from groundstation.store.framing import Summary, read_summary
 from groundstation.store.info import StoreInfo, definition_checksums, from_strings
-from groundstation.store.messages import Messages
+from groundstation.store.messages import ChunkMessages
 from groundstation.store.recognition import is_groundstation_mcap
 from groundstation.store.recovery import (
     Intact,
@@ -31,7 +31,7 @@ from groundstation.store.recovery import (
     search_definitions,
 )
 from groundstation.store.schema import WireField, message_type, own_columns
-from groundstation.store.wire import Decoded, decode
+from groundstation.store.wire import DecodedColumns, decode
 
 READER = "groundstation-mcap"
 PLACES_BYTES = 64 << 20  # bound of the working arrays for one piece of a chunk
@@ -255,7 +255,7 @@ class _Reading:
             if unreadable:
                 yield Damage("corrupt", place, unreadable, "messages that are not of their schema", definition.topic)
 
-    def _is_next(self, messages: Messages) -> bool:
+    def _is_next(self, messages: ChunkMessages) -> bool:
         """Tell whether a chunk is in order of time and follows those before.
 
         A damaged disk may repeat or move a chunk.
@@ -269,7 +269,7 @@ class _Reading:
         self._last_ns[messages.channel_id] = int(time_ns[-1])
         return True
 
-    def _is_repeated(self, messages: Messages) -> bool:
+    def _is_repeated(self, messages: ChunkMessages) -> bool:
         return (messages.channel_id, messages.first_sequence) in self._seen
 
     def damage(self, lost: Lost) -> Damage:
@@ -296,7 +296,7 @@ class _Reading:
             return f"{time_ns} ns"
 
 
-def _parts(messages: Messages, field_count: int) -> Iterator[Messages]:
+def _parts(messages: ChunkMessages, field_count: int) -> Iterator[ChunkMessages]:
     """Split messages into parts small enough for a batch and its working arrays."""
     most = max(1, min(MAX_BATCH_ROWS, PLACES_BYTES // (16 * field_count)))
     if len(messages) <= most:
@@ -306,7 +306,7 @@ def _parts(messages: Messages, field_count: int) -> Iterator[Messages]:
         yield messages.take(slice(start, start + most))
 
 
-def _batch(messages: Messages, decoded: Decoded, definition: _Definition) -> RecordBatch:
+def _batch(messages: ChunkMessages, decoded: DecodedColumns, definition: _Definition) -> RecordBatch:
     """Return the batch of decoded messages.
 
     Messages without a record index are not the store's, and are left out.

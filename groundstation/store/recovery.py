@@ -35,7 +35,7 @@ from groundstation.store.framing import (
 )
 from groundstation.store.info import COPY_NAME, is_intact
 from groundstation.store.marks import MAGIC, METADATA_NAME, PACKAGE, RECORD_PREFIX, SEARCH_BYTES
-from groundstation.store.messages import Messages
+from groundstation.store.messages import ChunkMessages
 from groundstation.store.schema import message_type, own_columns
 
 # A chunk record of the writer: this text stands 37 bytes from its start, zstd's magic number 8 bytes after it.
@@ -58,7 +58,7 @@ class Intact:
     """Chunk with the right checksum: its messages by channel."""
 
     start: int
-    messages: list[Messages]
+    messages: list[ChunkMessages]
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def _read(file: BinaryIO, at: int, length: int) -> bytes:
     return file.read(length)
 
 
-def _opened(data: memoryview, compression: str, size: int, crc: int) -> list[Messages]:
+def _opened(data: memoryview, compression: str, size: int, crc: int) -> list[ChunkMessages]:
     """Return the messages of a chunk's compressed data; ChunkError when it is not intact."""
     messages = split_messages(decompress(compression, data, size, crc))
     if messages is None:

@@ -13,7 +13,7 @@ import numpy as np
 from groundstation.base.compile import in_place
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.store.marks import RECORD_PREFIX
-from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, Messages
+from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, ChunkMessages
 from groundstation.store.schema import WireField
 
 INTERPRETED_BYTES = 200_000  # in all, about 0.2 s of the interpreter
@@ -158,7 +158,7 @@ def find_messages(buffer: ByteArray) -> tuple[Int64Array, Int64Array] | None:
     return None if count < 0 else (starts[:count].copy(), sizes[:count].copy())
 
 
-def locate_fields(messages: Messages, fields: Sequence[WireField]) -> tuple[Int64Array, Int64Array, BoolArray]:
+def locate_fields(messages: ChunkMessages, fields: Sequence[WireField]) -> tuple[Int64Array, Int64Array, BoolArray]:
     """Return places of values, bytes of texts, and which messages are protobuf.
 
     Places (-1: absent) and bytes are (n, fields), the last is (n,).

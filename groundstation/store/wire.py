@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.store.marks import RECORD_PREFIX
-from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, Messages, at_any_byte
+from groundstation.store.messages import HEAD, MESSAGE_OPCODE, ByteArray, ChunkMessages, at_any_byte
 from groundstation.store.schema import WireField, varint
 from groundstation.store.walk import locate_fields
 
@@ -261,7 +261,7 @@ def _scatter(channel_id: int, slots: Sequence[Slot]) -> tuple[ByteArray, Int64Ar
 
 
 @dataclass(frozen=True)
-class Decoded:
+class DecodedColumns:
     """Columns of some of a channel's messages.
 
     Parameters
@@ -279,7 +279,7 @@ class Decoded:
     rows: Int64Array | None = None
 
 
-def decode(messages: Messages, fields: Sequence[WireField]) -> Iterator[Decoded]:
+def decode(messages: ChunkMessages, fields: Sequence[WireField]) -> Iterator[DecodedColumns]:
     """Yield columns of messages, one per field, mostly in one piece.
 
     Absent stays absent; fields that are not asked for are skipped. Text is as wide as the longest of a piece: pieces
@@ -288,12 +288,12 @@ def decode(messages: Messages, fields: Sequence[WireField]) -> Iterator[Decoded]
     template = _template(messages, fields) if messages.stride else None
     if template is not None:
         columns = tuple(_column_of(messages, field, at) for field, at in zip(fields, template, strict=True))
-        yield Decoded(columns, len(messages))
+        yield DecodedColumns(columns, len(messages))
         return
     places, lengths, good = locate_fields(messages, fields)
     if not good.all():
         none = np.empty(0, np.int64)
-        yield Decoded(tuple(absent_column(field, 0) for field in fields), int((~good).sum()), none)
+        yield DecodedColumns(tuple(absent_column(field, 0) for field in fields), int((~good).sum()), none)
         if not good.any():
             return
     pending = [np.flatnonzero(good)]
@@ -306,10 +306,10 @@ def decode(messages: Messages, fields: Sequence[WireField]) -> Iterator[Decoded]
             continue
         placed = zip(fields, at.T, width.T, strict=True)
         columns = tuple(_gathered_column(messages.buffer, *one) for one in placed)
-        yield Decoded(columns, len(rows), None if len(rows) == len(messages) else rows)
+        yield DecodedColumns(columns, len(rows), None if len(rows) == len(messages) else rows)
 
 
-def _template(messages: Messages, fields: Sequence[WireField]) -> list[tuple[int, int] | None] | None:
+def _template(messages: ChunkMessages, fields: Sequence[WireField]) -> list[tuple[int, int] | None] | None:
     """Return place and width of each field's value in records laid out like the first.
 
     An absent field is None. The result is None when some record has another layout, or when the first has anything but
@@ -355,7 +355,7 @@ def _after_varint(data: bytes, at: int) -> int:
     return at + 1
 
 
-def _column_of(messages: Messages, field: WireField, place: tuple[int, int] | None) -> Column:
+def _column_of(messages: ChunkMessages, field: WireField, place: tuple[int, int] | None) -> Column:
     if place is None:
         return absent_column(field, len(messages))
     at, width = place

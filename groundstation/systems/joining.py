@@ -33,7 +33,7 @@ class Timed(Protocol):
     def gnss_time(self) -> Any: ...
 
 
-class ClockRelation(Protocol):
+class FlightClock(Protocol):
     """Relation of the clock of a log to that of the flight."""
 
     def first_time_ns(self, other_ns: Int64Array) -> Int64Array:
@@ -51,7 +51,7 @@ class PlacedLog:
     source : Source
     duration_s : float
         Length on its own clock.
-    relation : ClockRelation or None
+    relation : FlightClock or None
         As the system gave it; None for the log whose clock is that of the flight.
     rows : int
         Records that it has in the flight.
@@ -94,7 +94,7 @@ class JoinStep:
 
     settings: type[Any]
     timed: "Callable[[Flight, Clock, str, Any], Timed]"
-    relate: Callable[[Any, Any, Any], ClockRelation]
+    relate: Callable[[Any, Any, Any], FlightClock]
     told: Callable[[Sequence[PlacedLog], int], JoinRecord]
 
 

@@ -16,7 +16,7 @@ from groundstation.base.records import Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.tables.session import GroundPoint, SatelliteRanges, Session
-from groundstation.tables.session_clock import PlacedLog, place_logs
+from groundstation.tables.session_clock import LogOffset, place_logs
 from groundstation.tables.session_ranges import gather_ranges
 from groundstation.tables.session_settings import SessionSettings, Stations
 from groundstation.tables.session_tracks import (
@@ -158,7 +158,7 @@ def _named(flights: Iterable[Flight]) -> _Members:
     return members
 
 
-def _on_one_clock(members: _Members, settings: SessionSettings) -> tuple[dict[str, PlacedLog], int, int]:
+def _on_one_clock(members: _Members, settings: SessionSettings) -> tuple[dict[str, LogOffset], int, int]:
     placed, group_ns, agreeing = place_logs(members.flights, settings.clock_limit_s)
     for name in [name for name in members.flights if name not in placed]:
         text = f"{name} has neither UTC nor times of transmission: nothing relates its clock to that of the others"
@@ -166,7 +166,7 @@ def _on_one_clock(members: _Members, settings: SessionSettings) -> tuple[dict[st
     return placed, group_ns, agreeing
 
 
-def _with_tracks(members: _Members, placed: Mapping[str, PlacedLog], step_s: float) -> dict[str, InsRows]:
+def _with_tracks(members: _Members, placed: Mapping[str, LogOffset], step_s: float) -> dict[str, InsRows]:
     """Return the INS rows for dead reckoning of every log that has any."""
     rows = {}
     for name in list(members.flights):
@@ -209,7 +209,7 @@ def _away_s(span: tuple[int, int], others: Sequence[tuple[int, int]]) -> float:
     return max(first - span[1], span[0] - last) / NS_PER_S
 
 
-def _clock_row(name: str, flight: Flight, placed: PlacedLog, settings: SessionSettings) -> ClockRow:
+def _clock_row(name: str, flight: Flight, placed: LogOffset, settings: SessionSettings) -> ClockRow:
     clock = placed.clock
     is_corrected = bool(clock.rows and flight.has_utc and np.any(placed.shift_ns))
     offset_s = None
@@ -257,7 +257,7 @@ def _ranks(flights: Mapping[str, Flight], stations: Stations) -> dict[str, int]:
 
 
 def _satellites(
-    flights: Mapping[str, Flight], placed: Mapping[str, PlacedLog], start_ns: int, settings: SessionSettings
+    flights: Mapping[str, Flight], placed: Mapping[str, LogOffset], start_ns: int, settings: SessionSettings
 ) -> SatelliteRanges:
     """Return the pseudo-ranges to satellites, invalid ones included.
 

@@ -72,7 +72,7 @@ class LogClock:
 
 
 @dataclass(frozen=True)
-class PlacedLog:
+class LogOffset:
     """Time to take off the times of a log so that they are those of the session.
 
     Parameters
@@ -171,7 +171,7 @@ def group_offset_ns(clocks: Sequence[LogClock], limit_s: float) -> tuple[int, in
     return _median(offsets[near[best]]), int(near[best].sum())
 
 
-def place_logs(flights: Mapping[str, Flight], limit_s: float) -> tuple[dict[str, PlacedLog], int, int]:
+def place_logs(flights: Mapping[str, Flight], limit_s: float) -> tuple[dict[str, LogOffset], int, int]:
     """Place logs on one clock: that of UTC where any has it, else the link's.
 
     Parameters
@@ -196,11 +196,11 @@ def place_logs(flights: Mapping[str, Flight], limit_s: float) -> tuple[dict[str,
         residual = clock.offset_ns - group_ns
         if not clock.rows:
             if flight.has_utc or (not some_utc and len(flights) == 1):
-                placed[name] = PlacedLog(clock, residual, np.zeros(1, dtype=np.int64))
+                placed[name] = LogOffset(clock, residual, np.zeros(1, dtype=np.int64))
             continue
         if some_utc and not agreeing and not flight.has_utc:
             continue  # UTC without a time of transmission beside a log that has those alone
         is_near = np.abs(residual) <= int(limit_s * NS_PER_S)
         shift = np.where(is_near, 0, residual) if flight.has_utc else residual
-        placed[name] = PlacedLog(clock, residual, shift)
+        placed[name] = LogOffset(clock, residual, shift)
     return placed, group_ns, agreeing

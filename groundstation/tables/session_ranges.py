@@ -11,7 +11,7 @@ from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.tables.session import NO_SLOT, DeadReckoning, GroundPoint, Ranges
-from groundstation.tables.session_clock import PlacedLog, transmission_ns, travel_ns
+from groundstation.tables.session_clock import LogOffset, transmission_ns, travel_ns
 from groundstation.tables.session_settings import SessionSettings
 from groundstation.tables.table import Flight, Table
 
@@ -38,7 +38,7 @@ class _Link:
 
 def gather_ranges(
     flights: Mapping[str, Flight],
-    placed: Mapping[str, PlacedLog],
+    placed: Mapping[str, LogOffset],
     vehicles: Sequence[DeadReckoning],
     points: Sequence[GroundPoint],
     start_ns: int,
@@ -86,7 +86,7 @@ def _link(
     name: str,
     source: str,
     table: Table,
-    placed: PlacedLog,
+    placed: LogOffset,
     start_ns: int,
     group_ns: int,
     settings: SessionSettings,

@@ -12,7 +12,7 @@ from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S
 from groundstation.tables.session import DeadReckoning
-from groundstation.tables.session_clock import PlacedLog
+from groundstation.tables.session_clock import LogOffset
 from groundstation.tables.table import Flight, Table
 
 LEVEL = "latitude_deg", "longitude_deg"
@@ -45,13 +45,13 @@ class InsRows:
     remark: str
 
 
-def ins_rows(flight: Flight, placed: PlacedLog, step_s: float) -> InsRows:
+def ins_rows(flight: Flight, placed: LogOffset, step_s: float) -> InsRows:
     """Rows with position and velocity of the first INS that has both.
 
     Parameters
     ----------
     flight : Flight
-    placed : PlacedLog
+    placed : LogOffset
         Its place on the clock of the session.
     step_s : float
         One row is kept of each step.
@@ -133,7 +133,7 @@ def _height_m(flight: Flight, table: Table) -> tuple[FloatArray, str]:
 
 
 def truth_of(
-    flight: Flight, placed: PlacedLog, start_ns: int, origin: LocalFrame | None
+    flight: Flight, placed: LogOffset, start_ns: int, origin: LocalFrame | None
 ) -> tuple[FloatArray, FloatArray] | None:
     """Time and position of the truth in a log, None where there is none."""
     columns = (*LEVEL, "altitude_ellipsoid_m")

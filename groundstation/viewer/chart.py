@@ -14,7 +14,7 @@ import rerun.blueprint as rrb
 from groundstation.chapters.wording import clock
 from groundstation.plots.plot import Scale
 from groundstation.plots.ranges import thin
-from groundstation.plots.scales import Span
+from groundstation.plots.scales import ScaleSpan
 from groundstation.viewer import colours
 from groundstation.viewer.colours import Colour, faint
 from groundstation.viewer.names import clean_text
@@ -52,7 +52,7 @@ class ChartAxis:
     def share(self, values: FloatArray) -> FloatArray:
         """Return the place of values along the axis, 0 to 1; NaN outside of it."""
         with np.errstate(invalid="ignore"):
-            scaled = Span(self.scale, self.low, self.high, self.linear_to).shares(values)
+            scaled = ScaleSpan(self.scale, self.low, self.high, self.linear_to).shares(values)
             return np.where((scaled >= -1e-9) & (scaled <= 1.0 + 1e-9), scaled, np.nan)
 
     def within(self, values: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from groundstation.results.fleet import FleetResults
 from groundstation.systems.system import Systems
 from groundstation.viewer.fleet_charts import (
     MOST_AIRCRAFT,
-    Aircraft,
+    ChartedAircraft,
     aircraft_of,
     by_aircraft,
     log_aircraft,
@@ -27,7 +27,7 @@ from groundstation.viewer.fleet_text import aircraft_text, failed_text, flights_
 from groundstation.viewer.recording import save_stream, send_layout
 from groundstation.viewer.views import document
 
-Logged = tuple[Aircraft, dict[str, rrb.View]]  # an aircraft and the views of the quantities it has
+Logged = tuple[ChartedAircraft, dict[str, rrb.View]]  # an aircraft and the views of the quantities it has
 FLEET = "fleet"
 FLIGHTS_TEXT = "flights"  # entity of the table of flights
 
@@ -68,7 +68,7 @@ def send_fleet(stream: rr.RecordingStream, fleet: FleetResults, systems: Systems
     return send_layout(stream, shown, timeline=FLIGHT_NUMBER)  # on utc, the flights of a year are a few columns of dots
 
 
-def _logged(recorder: FleetRecorder, fleet: FleetResults, one: Aircraft) -> Logged:
+def _logged(recorder: FleetRecorder, fleet: FleetResults, one: ChartedAircraft) -> Logged:
     return one, log_aircraft(recorder, fleet, one)
 
 

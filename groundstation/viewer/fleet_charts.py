@@ -35,7 +35,7 @@ MOST_AIRCRAFT = 40  # with a tab of their own
 
 
 @dataclass(frozen=True)
-class Aircraft:
+class ChartedAircraft:
     """One aircraft: its name as logged, its label, its entity, and the role of its flights."""
 
     name: str
@@ -44,16 +44,16 @@ class Aircraft:
     role: Role
 
 
-def aircraft_of(fleet: FleetResults) -> tuple[Aircraft, ...]:
+def aircraft_of(fleet: FleetResults) -> tuple[ChartedAircraft, ...]:
     """The aircraft in order, each an entity of its own."""
     names = fleet.aircraft
     return tuple(
-        Aircraft(name, clean_text(name) or UNNAMED, f"aircraft/{part}", series(place))
+        ChartedAircraft(name, clean_text(name) or UNNAMED, f"aircraft/{part}", series(place))
         for place, (name, part) in enumerate(zip(names, path_parts(names), strict=True))
     )
 
 
-def log_aircraft(recorder: FleetRecorder, fleet: FleetResults, aircraft: Aircraft) -> dict[str, rrb.View]:
+def log_aircraft(recorder: FleetRecorder, fleet: FleetResults, aircraft: ChartedAircraft) -> dict[str, rrb.View]:
     """Log the figures of an aircraft and its verdicts; the views of the quantities it has."""
     flights = fleet.flights
     rows = recorder.order[(flights["aircraft"] == aircraft.name)[recorder.order]]
@@ -72,7 +72,7 @@ def _title(quantity: str) -> str:
     return f"{title[:1].upper()}{title[1:]}, {unit}"
 
 
-def by_aircraft(having: Sequence[Aircraft], quantity: str) -> list[rrb.View]:
+def by_aircraft(having: Sequence[ChartedAircraft], quantity: str) -> list[rrb.View]:
     """The view of one quantity of all aircraft that have it; none when no one has it."""
     if not having:
         return []
@@ -80,6 +80,6 @@ def by_aircraft(having: Sequence[Aircraft], quantity: str) -> list[rrb.View]:
     return [plot(_title(quantity), paths, legend=len(having) <= MOST_IN_LEGEND)]
 
 
-def verdicts(aircraft: Sequence[Aircraft]) -> rrb.View:
+def verdicts(aircraft: Sequence[ChartedAircraft]) -> rrb.View:
     """Lanes of the verdicts: each holds until the next flight of the aircraft."""
     return lanes("Verdict on the heading correction", [f"{one.entity}/verdict" for one in aircraft])

@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 from groundstation.plots import extents, marks
 from groundstation.plots.marks import AnyMark
 from groundstation.plots.plot import Axis, Panel
-from groundstation.plots.scales import Span
+from groundstation.plots.scales import ScaleSpan
 from groundstation.plots.viridis import viridis
 from groundstation.viewer import colours
 from groundstation.viewer.chart import FILLING, WIDTH, Chart, ChartAxis
@@ -55,7 +55,7 @@ def chart_view(
     return chart.view(name)
 
 
-def _axis(told: Axis, span: Span, names: tuple[tuple[float, str], ...]) -> ChartAxis:
+def _axis(told: Axis, span: ScaleSpan, names: tuple[tuple[float, str], ...]) -> ChartAxis:
     texts = tuple((place, clean_text(text)) for place, text in names)
     texts = texts or tuple((place, f"{place:g}") for place in told.ticks)
     return ChartAxis(told.title, span.low, span.high, span.scale, span.linear_to, texts)
@@ -206,7 +206,7 @@ def _outlines(chart: Chart, name: str, several: list[marks.Outlines], order: flo
 
 def _cells(chart: Chart, name: str, several: list[marks.Cells], _: float) -> None:
     for place, mark in enumerate(several):
-        scale = Span("log" if mark.is_log else "linear", mark.low, mark.high)
+        scale = ScaleSpan("log" if mark.is_log else "linear", mark.low, mark.high)
         share = np.clip(scale.shares(mark.values), 0.0, 1.0)
         row, column = np.nonzero(np.isfinite(share))
         x, y = extents.edges(mark.x), extents.edges(mark.y)

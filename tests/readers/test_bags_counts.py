@@ -365,7 +365,7 @@ def test_what_looks_like_a_record_is_looked_at_so_often(
     looked_at: list[int] = []
     known = ros1_records.head_at
 
-    def counted(data: bytes, at: int) -> ros1_records.Head | None:
+    def counted(data: bytes, at: int) -> ros1_records.RecordHeader | None:
         looked_at.append(at)
         return known(data, at)
 

@@ -10,7 +10,7 @@ import pytest
 from groundstation.base.records import LogHeader, RecordBatch
 from groundstation.readers.chapter10 import scan
 from groundstation.readers.chapter10.bus_words import words_of
-from groundstation.readers.chapter10.packets import Walk
+from groundstation.readers.chapter10.packets import PacketWalk
 from groundstation.readers.chapter10.reader import items
 from groundstation.readers.source import Source
 from tests.real_logs import real_log
@@ -38,7 +38,7 @@ def joined(path: Path, topic: str) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("name", NAMES)
 def test_every_packet(name: str) -> None:
     path = real_log(f"ch10/{name}")
-    ours = [row for block in Walk(Source(path)) for row in block.packets]
+    ours = [row for block in PacketWalk(Source(path)) for row in block.packets]
     peers = [(one.channel_id, one.data_type, one.rtc, one.sequence_number) for one in peer_packets(path)]
     found = [tuple(row[[scan.CHANNEL, scan.TYPE, scan.RTC, scan.SEQUENCE]].tolist()) for row in ours]
     # A packet that the end of the file cuts off is none for the peer.

@@ -14,7 +14,7 @@ from groundstation.base.records import Damage, RecordBatch
 from groundstation.readers.source import Source
 from groundstation.readers.ulog import read as read_ulog
 from groundstation.readers.ulog import scan
-from groundstation.readers.ulog.blocks import Walk
+from groundstation.readers.ulog.blocks import MessageWalk
 from tests.readers.test_ulog import BARO, T0_US, UlogWriter
 from tests.readers.test_ulog import read as read_log
 from tests.readers.ulog_writer import small_flight
@@ -293,7 +293,7 @@ def test_many_damaged_places_are_told_in_few_lines(tmp_path: Path) -> None:
     rows = [start for start in log.starts if log.data[start + 2] == ord("D")]
     for start in rows[10::4]:
         log.data[start + 2] ^= 0xFF
-    walk = Walk(Source(tmp_path / "x.ulg"))
+    walk = MessageWalk(Source(tmp_path / "x.ulg"))
     (tmp_path / "x.ulg").write_bytes(log.data)
     found = sum(int((block.topic >= 0).sum()) for block in walk)
     damages = list(walk.damages())

@@ -9,14 +9,14 @@ from groundstation.plots.axes import time_axis
 from groundstation.plots.marks import AnyMark, Curve, Lanes, Points, Spans, Told
 from groundstation.plots.plot import Axis
 from groundstation.plots.ranges import broken_at_gaps
-from groundstation.reports.live import TIME, Panel, page_data
+from groundstation.reports.live import TIME, LivePanel, page_data
 from groundstation.reports.svg.picture import picture_of
 from tests.every_mark import DRAWN, plot_of
 
 TIME_S = np.arange(0.0, 100.0)
 
 
-def panels(*marks: AnyMark, x: Axis | None = None, y: Axis | None = None) -> tuple[Panel, ...]:
+def panels(*marks: AnyMark, x: Axis | None = None, y: Axis | None = None) -> tuple[LivePanel, ...]:
     """What a page gets of a plot of one panel."""
     return picture_of(plot_of(*marks, x=x, y=y)).panels
 

@@ -14,7 +14,7 @@ from groundstation.simulation.channel_truth import channel_matrix, channel_noise
 from groundstation.simulation.inertial_family import (
     ErrorBatch,
     FamilySettings,
-    GnssNoise,
+    GnssErrorModel,
     iterate_family,
     simulate_family,
 )
@@ -90,7 +90,7 @@ def test_switches_change_what_they_name_and_nothing_else() -> None:
         other = simulate_family(replace(family, **changes), 2, SEED)  # type: ignore[arg-type]
         assert_same(plain, other, *ins)
         assert not np.array_equal(plain.position_error_m, other.position_error_m), changes
-    louder = simulate_family(replace(family, gnss=GnssNoise(position_white_m=20.0)), 2, SEED)
+    louder = simulate_family(replace(family, gnss=GnssErrorModel(position_white_m=20.0)), 2, SEED)
     assert_same(plain, louder, "gnss_position_error_m")
     assert np.allclose(louder.gnss_position_error_m, 2.0 * plain.gnss_position_error_m, rtol=1e-12)
 
@@ -155,7 +155,7 @@ def test_classes_are_in_order_and_read_strictly() -> None:
     with pytest.raises(SettingsError, match="one of i-21, mems"):
         load_ins_class("strategic")
     with pytest.raises(SettingsError, match="position_white_m"):
-        GnssNoise(position_white_m=-1.0)
+        GnssErrorModel(position_white_m=-1.0)
 
 
 def test_drift_and_tilt_belong_together() -> None:
@@ -227,7 +227,7 @@ def test_deflection_is_correlated_along_the_path_and_not_in_time() -> None:
 
 
 def test_gnss_errors_have_their_size_and_correlation() -> None:
-    noise = GnssNoise(position_white_m=3.0, position_correlated_m=10.0, velocity_correlated_mps=0.05)
+    noise = GnssErrorModel(position_white_m=3.0, position_correlated_m=10.0, velocity_correlated_mps=0.05)
     batch = simulate_family(FamilySettings(gnss=noise, truth="channel"), 20, SEED)
     error = batch.gnss_position_error_m
     # 20 flights x 2 axes x 53 correlation times: the slow variance is known to 3 %, four times that allowed

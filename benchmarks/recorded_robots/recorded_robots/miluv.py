@@ -24,7 +24,7 @@ from groundstation.base.records import BoolArray, Column, Item, LogHeader, Recor
 from groundstation.readers.dialect import Dialect, HeadLine, head_lines, split_cells
 from groundstation.readers.layout import LayoutRule, TableLayout, TimeRule
 from groundstation.readers.losses import Losses
-from groundstation.readers.sections import Section
+from groundstation.readers.sections import TableSection
 from groundstation.readers.source import Claim, Source
 
 NAME = "miluv"
@@ -72,7 +72,7 @@ def read(source: Source) -> Iterator[Item]:
     )
     time = TimeRule("seconds", (names.index(TIME),), (TIME,))
     dialect = Dialect("utf-8", ",", len(names), line.next_byte, 2)
-    items = TableReader(source, [Section(dialect, TableLayout(time, rules))]).items(header)
+    items = TableReader(source, [TableSection(dialect, TableLayout(time, rules))]).items(header)
     yield next(items)
     yield Remark("no_truth_range", "gt_range and bias are kept raw: the true range is that of the poses")
     losses = Losses()

@@ -20,7 +20,7 @@ from groundstation.base.records import Damage, Int64Array, Item, LogHeader, Reco
 from groundstation.readers.dialect import Dialect, head_lines
 from groundstation.readers.layout import LayoutRule, TableLayout, TimeRule
 from groundstation.readers.losses import Losses
-from groundstation.readers.sections import Section
+from groundstation.readers.sections import TableSection
 from groundstation.readers.source import Claim, Source
 
 NAME = "utias"
@@ -89,7 +89,7 @@ def read(source: Source) -> Iterator[Item]:
     metadata = {"dataset": "UTIAS MRCLAM"} | ({"aircraft": f"R{robot.group(1)}"} if robot else {})
     header = LogHeader(f"{NAME} {kind.lower()}", metadata, 0)
     layout = TableLayout(TimeRule("seconds", (0,), ("Time [s]",)), _RULES[kind])
-    items = TableReader(source, [Section(dialect, layout)]).items(header)
+    items = TableReader(source, [TableSection(dialect, layout)]).items(header)
     yield next(items)
     if robot is None:
         yield Remark("no_robot", "the name of the file tells no robot: Robot<number>_... is expected")

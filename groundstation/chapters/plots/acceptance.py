@@ -19,7 +19,7 @@ MOST_CURVES = 150
 RATE, FIXED = "radial_rate_fit_nmiph", ("radial_largest_nmi", "radial_final_nmi")
 
 
-def _single(found: Acceptance, *quantities: str) -> list[answers.Limit]:
+def _single(found: Acceptance, *quantities: str) -> list[answers.AcceptanceLimit]:
     """Return the limits that bound one of these quantities alone."""
     return [
         limit for limit in found.standard.limits if len(limit.bounds) == 1 and limit.bounds[0].quantity in quantities

@@ -17,15 +17,15 @@ from groundstation.methods.fleet.confidence import (
     share_high,
     share_low,
 )
-from groundstation.methods.fleet.ins_errors import FEWEST, Growth, InsErrors
+from groundstation.methods.fleet.ins_errors import FEWEST, Growth, PositionErrors
 from groundstation.results.acceptance import (
     ENSEMBLE,
     UNKNOWN_INS,
+    AcceptanceLimit,
     Decision,
     FlightError,
     InsRow,
     Judgement,
-    Limit,
     Standard,
 )
 from groundstation.results.arrays.acceptance import AcceptanceCurves, AcceptanceGrowth
@@ -37,7 +37,7 @@ CURVE_POINTS = 200
 WORST_FIRST: tuple[Decision, ...] = ("fail", "not enough flights", "pass", "not flown", "no limit")
 
 
-def accuracy_ratio(flight: FlightError, limit: Limit) -> float | None:
+def accuracy_ratio(flight: FlightError, limit: AcceptanceLimit) -> float | None:
     """Limit over what the reference may err by, both 95 %, the smallest of its bounds."""
     ratios = []
     for bound in limit.bounds:
@@ -47,7 +47,7 @@ def accuracy_ratio(flight: FlightError, limit: Limit) -> float | None:
     return min(ratios, default=None)
 
 
-def judge(flights: Sequence[FlightError], limit: Limit, standard: Standard, ins: str = ENSEMBLE) -> Judgement:
+def judge(flights: Sequence[FlightError], limit: AcceptanceLimit, standard: Standard, ins: str = ENSEMBLE) -> Judgement:
     """Judge one limit by the flights that it is for: of all INS, or of one.
 
     Flights of one INS are taken as independent given the INS; a claim on all of a type counts them by their
@@ -194,7 +194,7 @@ def growth_figure(growth: Growth, flights: Sequence[FlightError], standard: Stan
     )
 
 
-def curves_figure(errors: Sequence[InsErrors]) -> AcceptanceCurves:
+def curves_figure(errors: Sequence[PositionErrors]) -> AcceptanceCurves:
     """Radial error of each flight over its hours, thinned to what a page shows."""
     rows = [np.unique(np.linspace(0, len(one.hours) - 1, CURVE_POINTS).round().astype(int)) for one in errors]
     none = np.zeros(0)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.methods.fleet.aircraft import mean_over_flights
-from groundstation.methods.fleet.changes import ChangeSettings, Chart, control_chart
+from groundstation.methods.fleet.changes import ChangeSettings, ControlChart, control_chart
 from groundstation.methods.fleet.moments import Moments, merged, moments_of
 from groundstation.methods.fleet.outliers import FALSE_OUTLIERS, FEWEST, find_outliers
 from groundstation.methods.intervals import share_interval
@@ -165,7 +165,7 @@ def trends(flights: FigureData, settings: ChangeSettings) -> tuple[FleetTrend, t
     return joined(charted), tuple(changes)
 
 
-def _change_points(name: str, quantity: TrendQuantity, own: FleetTrend, chart: Chart) -> list[ChangePoint]:
+def _change_points(name: str, quantity: TrendQuantity, own: FleetTrend, chart: ControlChart) -> list[ChangePoint]:
     edges = [0, *(change.index for change in chart.changes), len(own)]
     return [
         ChangePoint(

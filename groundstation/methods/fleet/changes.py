@@ -54,7 +54,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Chart:
+class ControlChart:
     """Control chart of a series, shapes (n,).
 
     Level (median between changes) and limits, NaN where there are none.
@@ -117,7 +117,7 @@ def find_changes(value: FloatArray, *, settings: ChangeSettings | None = None) -
     return tuple(sorted(found, key=lambda change: change.index))
 
 
-def control_chart(value: FloatArray, *, settings: ChangeSettings | None = None) -> Chart | None:
+def control_chart(value: FloatArray, *, settings: ChangeSettings | None = None) -> ControlChart | None:
     """Draw the control chart of individual flights, with a level of its own between changes.
 
     limits = level +- L sigma; sigma from the median of successive differences within levels, L such that a flight of a
@@ -143,7 +143,7 @@ def control_chart(value: FloatArray, *, settings: ChangeSettings | None = None) 
     within = np.delete(np.diff(value), [start - 1 for start in starts])
     sigma = sigma_of_steps(within) or np.nan  # most flights agree to the last digit: no limits
     reach = limit_in_sigmas(len(value), settings.false_alarm, VALUES_PER_FREEDOM_STEP) * sigma
-    return Chart(changes, level, level - reach, level + reach)
+    return ControlChart(changes, level, level - reach, level + reach)
 
 
 def _ranks(value: FloatArray) -> FloatArray:

@@ -6,14 +6,14 @@ from numpy.typing import NDArray
 from groundstation.base.angles import wrap_180
 from groundstation.methods.harmonics import OVER_CIRCLE
 from groundstation.results.figures import FigureData
-from groundstation.results.fleet import DeviationRow
+from groundstation.results.fleet import FleetDeviationRow
 from groundstation.results.roles import LETTERS
 
 FloatArray = NDArray[np.float64]
 NOT_COMPARED = "reject"
 
 
-def deviations(flights: FigureData) -> tuple[DeviationRow, ...]:
+def deviations(flights: FigureData) -> tuple[FleetDeviationRow, ...]:
     """Compare each flight that found its deviation with the mean of its aircraft's others.
 
     The difference of two curves A + B sin c + C cos c + D sin 2c + E cos 2c is told as its RMS over the circle, with
@@ -45,7 +45,7 @@ def deviations(flights: FigureData) -> tuple[DeviationRow, ...]:
         others = others[others != row]
         difference, expected = _difference(values[row], sigmas[row], values[others], sigmas[others])
         found.append(
-            DeviationRow(
+            FleetDeviationRow(
                 aircraft=str(aircraft[row]),
                 flight_id=str(flights["flight_id"][row]),
                 start_utc_ns=_time(flights, row),

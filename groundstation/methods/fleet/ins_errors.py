@@ -20,7 +20,7 @@ S_PER_H = 3600.0
 
 
 @dataclass(frozen=True)
-class InsErrors:
+class PositionErrors:
     """Position errors of one flight, INS minus reference, at moments both are known, (n,).
 
     ``hours`` count from the start of navigation; ``along_nmi``, ``cross_nmi`` are NaN where the aircraft hardly moves.
@@ -61,7 +61,7 @@ def ins_errors(
     longitude_deg: FloatArray,
     *,
     start_s: float | None = None,
-) -> InsErrors | None:
+) -> PositionErrors | None:
     """Errors of a flight over its hours; None where fewer than two positions are compared.
 
     Parameters
@@ -85,7 +85,7 @@ def ins_errors(
     along = north_error_m * along_north + east_error_m * along_east
     cross = east_error_m * along_north - north_error_m * along_east
     nmi = [values[known] / M_PER_NAUTICAL_MILE for values in (np.hypot(north_error_m, east_error_m), along, cross)]
-    return InsErrors((time_s[known] - zero_s) / S_PER_H, *nmi)
+    return PositionErrors((time_s[known] - zero_s) / S_PER_H, *nmi)
 
 
 def _direction(
@@ -151,7 +151,7 @@ class Growth:
         return slope_through_origin(self.hours[known], error_nmi[known], self.flights[known])
 
 
-def growth_of(flights: Sequence[InsErrors]) -> Growth:
+def growth_of(flights: Sequence[PositionErrors]) -> Growth:
     """Return radial errors at every five minutes.
 
     They are between moments no more than ten minutes apart.

@@ -43,7 +43,7 @@ class Dynamics(NamedTuple):
     after: FloatArray
 
 
-class Lines(NamedTuple):
+class MeasurementRows(NamedTuple):
     """Rows of the measurement matrix, r of them, with the noise of each.
 
     ``variance`` as a measurement is weighted, ``believed`` as a single one is believed to err; measurements of one
@@ -68,7 +68,7 @@ class Schedule(NamedTuple):
     jump: Int64Array  # (n,) which row of ``jumps`` is added to the variances; NO_STEP: none
     jumps: FloatArray  # (j, n states)
     first: Int64Array  # (n + 1,) measurements of epoch k: first[k] to first[k + 1]
-    row: Int64Array  # (m,) what each measures: row of ``Lines``
+    row: Int64Array  # (m,) what each measures: row of ``MeasurementRows``
 
 
 class GateRules(NamedTuple):
@@ -131,7 +131,7 @@ class Back(NamedTuple):
     u: FloatArray  # (n,)
 
 
-class Record(NamedTuple):
+class FilterRecord(NamedTuple):
     """Arrays that a run fills; an array of no length is left out (but not y, S, mark).
 
     ``y``, ``S`` are those of the measurement when it is used, all before it used already; those called judged, when its

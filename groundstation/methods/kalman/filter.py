@@ -17,13 +17,13 @@ from groundstation.methods.kalman.arrays import (
     REJECTED,
     USED,
     Drive,
+    FilterRecord,
     FilterWorkspace,
     FloatArray,
     GateRules,
-    Lines,
     Marks,
+    MeasurementRows,
     Now,
-    Record,
     Schedule,
 )
 from groundstation.methods.kalman.transition import NONE, Transition
@@ -41,20 +41,20 @@ class Measurements:
         One column for each right-hand side; NaN in any of them: absent.
     row : ndarray of int, shape (m,)
         Row of ``lines`` that each measures.
-    lines : Lines
+    lines : MeasurementRows
     """
 
     epoch: Int64Array
     value: FloatArray
     row: Int64Array
-    lines: Lines
+    lines: MeasurementRows
 
     def __post_init__(self) -> None:
         value = np.asarray(self.value, dtype=np.float64)
         table = np.ascontiguousarray(value[:, None] if value.ndim == 1 else value)
         for name, array in (("epoch", self.epoch), ("row", self.row), ("value", table)):
             object.__setattr__(self, name, frozen(array))
-        object.__setattr__(self, "lines", Lines(*map(frozen, self.lines)))
+        object.__setattr__(self, "lines", MeasurementRows(*map(frozen, self.lines)))
         if len(self.epoch) != len(self.value) or (np.diff(self.epoch) < 0).any():
             raise ValueError(
                 "epochs of the measurements: one for each, never decreasing; sort the measurements by time"
@@ -100,7 +100,9 @@ class Measurements:
         weighted = np.broadcast_to(np.asarray(variance, dtype=np.float64), at.shape)
         given = weighted if believed is None else np.broadcast_to(np.asarray(believed, dtype=np.float64), at.shape)
         kinds = _place_within(at) if kind is None else np.broadcast_to(np.asarray(kind, dtype=np.int64), at.shape)
-        lines = Lines(starts, where[kept], weights[kept], np.array(weighted), np.array(given), np.array(kinds))
+        lines = MeasurementRows(
+            starts, where[kept], weights[kept], np.array(weighted), np.array(given), np.array(kinds)
+        )
         return cls(at, np.asarray(value), np.arange(len(at)), lines)
 
 
@@ -177,7 +179,7 @@ class FilterRun:
 
     Parameters
     ----------
-    record : Record
+    record : FilterRecord
         x (n, states, c), P (n, states, states), variance (n, states) after each epoch; gain K (m, states), innovation
         y (m, c), its variance S (m,), mark (m,): rejected -1, absent 0, used 1. y, S are given all before: white.
     end : Start
@@ -189,13 +191,13 @@ class FilterRun:
     transition: Transition
     schedule: Schedule
     measurements: Measurements
-    record: Record
+    record: FilterRecord
     end: Start
     reopened: int
     is_optimal: bool = field(default=True)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "record", Record(*(frozen(part) for part in self.record)))
+        object.__setattr__(self, "record", FilterRecord(*(frozen(part) for part in self.record)))
 
     @property
     def x(self) -> FloatArray:
@@ -234,7 +236,7 @@ class FilterRun:
         return np.asarray(self.record.y[used] ** 2 / self.record.S[used, None])
 
 
-def _kinds(lines: Lines) -> int:
+def _kinds(lines: MeasurementRows) -> int:
     return int(lines.kind.max()) + 1 if len(lines.kind) else 0
 
 
@@ -333,9 +335,9 @@ def _check_run(transition: Transition, step: Int64Array, measurements: Measureme
         raise ValueError(f"measurements of states outside 0 to {size - 1}")
 
 
-def _room(n: int, m: int, size: int, channels: int, kept: KeptArrays) -> Record:
+def _room(n: int, m: int, size: int, channels: int, kept: KeptArrays) -> FilterRecord:
     """Arrays of a record, those that are not kept without length."""
-    return Record(
+    return FilterRecord(
         x=np.empty((n if kept.states else 0, size, channels)),
         P=np.empty((n if kept.covariances else 0, size, size)),
         variance=np.empty((n if kept.variances else 0, size)),

@@ -13,13 +13,13 @@ from groundstation.methods.kalman.arrays import (
     USED,
     Drive,
     Dynamics,
+    FilterRecord,
     FilterWorkspace,
     FloatArray,
     GateRules,
-    Lines,
     Marks,
+    MeasurementRows,
     Now,
-    Record,
     Schedule,
     States,
 )
@@ -72,14 +72,14 @@ def run_filter(
     states: States,
     dynamics: Dynamics,
     schedule: Schedule,
-    lines: Lines,
+    lines: MeasurementRows,
     rules: GateRules,
     drive: Drive,
     z: FloatArray,
     held: Int64Array,
     now: Now,
     room: FilterWorkspace,
-    out: Record,
+    out: FilterRecord,
 ) -> int:
     """Run the filter over epochs, and return how often it was opened.
 

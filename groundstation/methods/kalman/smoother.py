@@ -8,7 +8,15 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from groundstation.base.records import Int64Array, frozen
-from groundstation.methods.kalman.arrays import Back, Dynamics, FloatArray, Lines, Record, Schedule, States
+from groundstation.methods.kalman.arrays import (
+    Back,
+    Dynamics,
+    FilterRecord,
+    FloatArray,
+    MeasurementRows,
+    Schedule,
+    States,
+)
 from groundstation.methods.kalman.filter import FilterRun
 
 
@@ -75,7 +83,7 @@ def lag_covariances(run: FilterRun, begin: Int64Array, end: Int64Array) -> tuple
     return smoothed, closed
 
 
-def _history(run: FilterRun) -> tuple[States, Dynamics, Schedule, Lines, Record, Back]:
+def _history(run: FilterRun) -> tuple[States, Dynamics, Schedule, MeasurementRows, FilterRecord, Back]:
     """Return what the smoothers go back over, and their working arrays.
 
     Raises

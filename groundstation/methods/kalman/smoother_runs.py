@@ -20,10 +20,10 @@ from groundstation.methods.kalman.arrays import (
     USED,
     Back,
     Dynamics,
+    FilterRecord,
     FloatArray,
-    Lines,
+    MeasurementRows,
     Pattern,
-    Record,
     Schedule,
     States,
 )
@@ -174,8 +174,8 @@ def run_smoother(
     states: States,
     dynamics: Dynamics,
     schedule: Schedule,
-    lines: Lines,
-    record: Record,
+    lines: MeasurementRows,
+    record: FilterRecord,
     room: Back,
     begin: int,
     end: int,
@@ -188,7 +188,7 @@ def run_smoother(
 
     Parameters
     ----------
-    record : Record
+    record : FilterRecord
         As the filter filled it, with x, P and K.
     xs, variance : ndarrays, shapes (n, states, c), (n, states)
         Filled from ``begin`` to ``end``: smoothed states and the variances of each.
@@ -229,8 +229,8 @@ def run_fixed_lag(
     states: States,
     dynamics: Dynamics,
     schedule: Schedule,
-    lines: Lines,
-    record: Record,
+    lines: MeasurementRows,
+    record: FilterRecord,
     room: Back,
     begin: Int64Array,
     end: Int64Array,
@@ -269,8 +269,8 @@ def run_lag_covariance(
     states: States,
     dynamics: Dynamics,
     schedule: Schedule,
-    lines: Lines,
-    record: Record,
+    lines: MeasurementRows,
+    record: FilterRecord,
     room: Back,
     begin: Int64Array,
     end: Int64Array,

@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 
 from groundstation.base.quantiles import student_quantile
 from groundstation.methods.lag.settings import LatencySettings
-from groundstation.methods.lag.windows import Noise, Series, Whitened, Windows, noise_of, reweighted, spread_of
+from groundstation.methods.lag.windows import (
+    Noise,
+    ReferenceSignals,
+    Whitened,
+    Windows,
+    noise_of,
+    reweighted,
+    spread_of,
+)
 
 FloatArray = NDArray[np.float64]
 MOST_STEPS, LONGEST_STEP_S, CONVERGED_S = 12, 0.3, 1e-4
@@ -76,7 +84,7 @@ class _Step:
 
 
 def fit_delay(
-    reference: Series,
+    reference: ReferenceSignals,
     windows: Windows,
     prior_sigma: FloatArray,
     settings: LatencySettings,
@@ -87,7 +95,7 @@ def fit_delay(
 
     Parameters
     ----------
-    reference : Series
+    reference : ReferenceSignals
     windows : Windows
         Two or more.
     prior_sigma : ndarray, shape (q,)
@@ -165,7 +173,7 @@ def _explained(left: FloatArray, seen: FloatArray, shown: FloatArray) -> float:
 
 
 def _search(
-    reference: Series, windows: Windows, prior: FloatArray, settings: LatencySettings
+    reference: ReferenceSignals, windows: Windows, prior: FloatArray, settings: LatencySettings
 ) -> tuple[FloatArray, FloatArray]:
     """Return the delays tried, and the RMS residual at each with the nuisances fitted.
 
@@ -187,7 +195,7 @@ def _search(
 
 
 def _iterated(
-    reference: Series,
+    reference: ReferenceSignals,
     windows: Windows,
     plain: Whitened,
     noise: Noise | None,
@@ -216,7 +224,7 @@ def _iterated(
     return (delay, theta), step, abs(change) < CONVERGED_S
 
 
-def _step(reference: Series, windows: Windows, whitened: Whitened, prior: FloatArray, at: At) -> _Step:
+def _step(reference: ReferenceSignals, windows: Windows, whitened: Whitened, prior: FloatArray, at: At) -> _Step:
     """Linearise at a delay and nuisances and solve.
 
     The solution is a change of delay, and the nuisances.

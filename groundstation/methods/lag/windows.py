@@ -20,7 +20,7 @@ WINDOWS_FOR_NOISE = 8
 
 
 @dataclass(frozen=True)
-class Series:
+class ReferenceSignals:
     """Signals of a reference: times (m,) increasing, values (m, b).
 
     A function makes c components of them. ``build`` turns values (..., b) into (..., c, 1 + q), linearly: of the last
@@ -48,7 +48,7 @@ class Series:
         whole = np.searchsorted(end, early, side="right") == np.searchsorted(start, late, side="left")
         return np.asarray(whole & (early >= self.time_s[0]) & (late <= self.time_s[-1]))
 
-    def smoothed(self, nodes: int) -> "Series":
+    def smoothed(self, nodes: int) -> "ReferenceSignals":
         """Return running means over an odd number of samples.
 
         Their ends and the samples near gaps are not to be used. Without smoothing the noise of single samples shows:
@@ -175,7 +175,9 @@ def too_few_windows(settings: LatencySettings) -> str:
     return f"fewer than two stretches of {settings.window_s:g} s in which both are logged without a gap"
 
 
-def cut_windows(reference: Series, time_s: FloatArray, values: FloatArray, settings: LatencySettings) -> Windows | None:
+def cut_windows(
+    reference: ReferenceSignals, time_s: FloatArray, values: FloatArray, settings: LatencySettings
+) -> Windows | None:
     """Cut windows of the other sensor where the reference moves most; None if there are none.
 
     Samples have times (n,) and values (n, c). A sample counts where the reference is known ``search_s`` before and

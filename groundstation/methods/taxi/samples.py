@@ -49,7 +49,7 @@ class GroundContact(Protocol):
     def method(self) -> str: ...
 
 
-class TrueHeading(Protocol):
+class HeadingOfRows(Protocol):
     """True heading of every row of an INS topic, degrees, NaN where unknown.
 
     The description says what it was made from. ``declination_sigma_deg`` is that of an error common to all rows; None
@@ -65,7 +65,7 @@ class TrueHeading(Protocol):
 
 
 OnGround = Callable[[Int64Array], GroundContact]
-HeadingOf = Callable[[str], TrueHeading]
+HeadingOf = Callable[[str], HeadingOfRows]
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ class Regressor:
 
 
 @dataclass(frozen=True)
-class Differences:
+class HeadingDifferences:
     """Heading differences to average, shapes (n,).
 
     Parameters
@@ -113,7 +113,7 @@ class _Target:
     """
 
     standstill: StandstillVelocities
-    differences: Differences
+    differences: HeadingDifferences
     apart: int = 0
 
     def __post_init__(self) -> None:
@@ -180,7 +180,7 @@ class _Target:
         return self.evaluate(self.whole(thetas), self.last).density
 
 
-def _start(differences: Differences, standstill: StandstillVelocities) -> FloatArray:
+def _start(differences: HeadingDifferences, standstill: StandstillVelocities) -> FloatArray:
     """Return a first guess of the parameters from plain standard deviations."""
     theta = PRIOR_MEAN.copy()
     if len(standstill.time_s) > 20:
@@ -192,7 +192,7 @@ def _start(differences: Differences, standstill: StandstillVelocities) -> FloatA
 
 
 def error_posterior(
-    differences: Differences,
+    differences: HeadingDifferences,
     standstill: StandstillVelocities = NO_STANDSTILL,
     *,
     draws: int = 4000,
@@ -203,7 +203,7 @@ def error_posterior(
 
     Parameters
     ----------
-    differences : Differences
+    differences : HeadingDifferences
     standstill : StandstillVelocities
         Empty where there is none: the priors then stand alone.
     draws : int
@@ -254,7 +254,7 @@ def error_posterior(
     )
 
 
-def _target_of(differences: Differences, standstill: StandstillVelocities) -> _Target:
+def _target_of(differences: HeadingDifferences, standstill: StandstillVelocities) -> _Target:
     """Return the target of the noise parameters.
 
     Where the terms told apart differ along the taxi, they are its last regressors. Directions then disagree by what a
@@ -281,7 +281,7 @@ def goes_there_and_back(direction_deg: FloatArray) -> bool:
     return bool(np.max(np.diff(ordered, append=ordered[0] + 360.0)) <= WIDEST_GAP_DEG)
 
 
-def _left_in_error(differences: Differences, parameters: FloatArray) -> float:
+def _left_in_error(differences: HeadingDifferences, parameters: FloatArray) -> float:
     """Return the standard deviation that the terms told apart leave in the error, degrees.
 
     Where a taxi does not go there and back they do not move the number, for they would extrapolate: so all of them that
@@ -297,13 +297,13 @@ def _left_in_error(differences: Differences, parameters: FloatArray) -> float:
     return float(np.sqrt(variance))
 
 
-def without_apart(differences: Differences) -> Differences:
+def without_apart(differences: HeadingDifferences) -> HeadingDifferences:
     """Return the differences without the regressors that are told apart."""
     return replace(differences, regressors=tuple(one for one in differences.regressors if not one.is_apart))
 
 
 def fixed_noise_estimate(
-    differences: Differences, parameters: FloatArray, standstill: StandstillVelocities = NO_STANDSTILL
+    differences: HeadingDifferences, parameters: FloatArray, standstill: StandstillVelocities = NO_STANDSTILL
 ) -> tuple[FloatArray, FloatArray]:
     """Return coefficients and their standard deviations, shapes (c,), for given noise.
 
@@ -319,7 +319,7 @@ def fixed_noise_estimate(
     return mean, np.sqrt(np.maximum(spread, 0.0))
 
 
-def misfit(differences: Differences, parameters: FloatArray) -> float:
+def misfit(differences: HeadingDifferences, parameters: FloatArray) -> float:
     """Return the mean square of the whitened residuals, shape ().
 
     It is 1 where the differences are as noisy as the parameters say.
@@ -332,7 +332,7 @@ def misfit(differences: Differences, parameters: FloatArray) -> float:
     return squares / max(len(differences.time_s) - target.width + 1, 1)
 
 
-def sample_weights(differences: Differences, parameters: FloatArray) -> FloatArray:
+def sample_weights(differences: HeadingDifferences, parameters: FloatArray) -> FloatArray:
     """Return the weight of every sample in the estimate of the error, shape (n,), sum 1.
 
     The noise parameters are given.

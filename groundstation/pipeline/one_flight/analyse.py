@@ -251,7 +251,7 @@ def _on_damage(
 
 
 def _intervals(flight: Flight, configuration: Configuration) -> tuple[Interval, ...]:
-    uses: tuple[tuple[Literal["exclude", "force"], tuple[configured.Interval, ...]], ...] = (
+    uses: tuple[tuple[Literal["exclude", "force"], tuple[configured.WrittenInterval, ...]], ...] = (
         ("exclude", configuration.exclude),
         ("force", configuration.force),
     )

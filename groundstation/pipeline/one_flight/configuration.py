@@ -53,7 +53,7 @@ def sections() -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Interval:
+class WrittenInterval:
     """Part of a flight that the user excludes or forces.
 
     Its ends are as written: flight seconds, +mm:ss or ISO UTC.
@@ -125,7 +125,7 @@ class Configuration:
     tables : mapping
         The TOML tables as written, by name: those of the analyses, ``aircraft``, ``site``, ``thresholds``,
         ``rules`` and ``isolation``.
-    exclude, force : tuple of Interval
+    exclude, force : tuple of WrittenInterval
     profile : str, optional
         Path of the layout of logs that no reader knows.
     icds : tuple of str
@@ -148,8 +148,8 @@ class Configuration:
     """
 
     tables: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    exclude: tuple[Interval, ...] = ()
-    force: tuple[Interval, ...] = ()
+    exclude: tuple[WrittenInterval, ...] = ()
+    force: tuple[WrittenInterval, ...] = ()
     profile: str | None = None
     icds: tuple[str, ...] = ()
     files: Mapping[str, str] = field(default_factory=dict)
@@ -353,7 +353,7 @@ def _refuse_unknown(document: Mapping[str, Any], known: Iterable[str], where: st
         raise SettingsError(where, f"unknown key {unknown[0]!r}", "one of " + ", ".join(sorted(known)))
 
 
-def _intervals(listed: Any, where: str) -> tuple[Interval, ...]:
+def _intervals(listed: Any, where: str) -> tuple[WrittenInterval, ...]:
     if not isinstance(listed, list) or not all(isinstance(part, dict) for part in listed):
         raise SettingsError(where, repr(listed), "tables such as [[exclude]] with from and to")
     for part in listed:
@@ -361,7 +361,8 @@ def _intervals(listed: Any, where: str) -> tuple[Interval, ...]:
         if not {"from", "to"} <= set(part):
             raise SettingsError(where, repr(part), "from and to: flight seconds, +mm:ss or ISO UTC")
     return tuple(
-        Interval(_time(part["from"], where), _time(part["to"], where), str(part.get("reason", ""))) for part in listed
+        WrittenInterval(_time(part["from"], where), _time(part["to"], where), str(part.get("reason", "")))
+        for part in listed
     )
 
 

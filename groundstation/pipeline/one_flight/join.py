@@ -30,7 +30,7 @@ from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.store.info import StoreInfo
 from groundstation.systems import systems
 from groundstation.systems.joining import (
-    ClockRelation,
+    FlightClock,
     JoinRecord,
     JoinStep,
     NotOneFlightError,
@@ -57,7 +57,7 @@ class _Part:
     mcap: Path
     converted: Converted
     timed: Timed
-    relation: ClockRelation | None = None
+    relation: FlightClock | None = None
 
     def name(self, topic: str) -> str:
         """Return the name of one of its topics in the flight."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from groundstation.base.records import Damage, Int64Array, Item, LogHeader, RecordBatch, Remark, UtcReadings
 from groundstation.pipeline.one_flight.segments import Segment, segments_in
-from groundstation.readers.chapter10.naming import NAMING_CODES, Seen, named
+from groundstation.readers.chapter10.naming import NAMING_CODES, SeenWords, named
 from groundstation.readers.icd import Icd
 from groundstation.store.info import StoreInfo
 from groundstation.store.reader import read, read_info
@@ -25,7 +25,7 @@ def items_named(path: Path, icds: Sequence[Icd]) -> Iterator[Item]:
     info = read_info(path)
     renamed = {one["topic"] for one in info.remarks if one.get("code") == "mapped" and one.get("topic")}
     segments = segments_in(info)
-    seen, utc_of_zero_ns = Seen(), None
+    seen, utc_of_zero_ns = SeenWords(), None
     places, zeros = list[int](), list[int]()
     for item in read(path):
         if not isinstance(item, RecordBatch):

@@ -26,7 +26,7 @@ from groundstation.methods.fleet.acceptance import (
     ins_rows,
     judgements,
 )
-from groundstation.methods.fleet.ins_errors import InsErrors, growth_of, ins_errors
+from groundstation.methods.fleet.ins_errors import PositionErrors, growth_of, ins_errors
 from groundstation.pipeline.many_flights.inputs import saved_flights
 from groundstation.pipeline.one_flight.identity import safe_part
 from groundstation.reports.acceptance import write_acceptance_report
@@ -132,7 +132,7 @@ def flights_figure(found: Acceptance) -> FigureData:
     return FigureData("flights", columns, {"hours": 4})
 
 
-def _flight_of(folder: Path, standard: Standard) -> tuple[FlightError, InsErrors | None, Mapping[str, Any]]:
+def _flight_of(folder: Path, standard: Standard) -> tuple[FlightError, PositionErrors | None, Mapping[str, Any]]:
     """Errors of one flight, or why it is left out.
 
     With them come the settings that its errors were found with.
@@ -145,7 +145,7 @@ def _flight_of(folder: Path, standard: Standard) -> tuple[FlightError, InsErrors
         return FlightError(folder.name, "", "", "", None, "", "", "", reason, is_read=False), None, {}
 
 
-def _errors_of(saved: SavedFlight, standard: Standard) -> tuple[FlightError, InsErrors | None, Mapping[str, Any]]:
+def _errors_of(saved: SavedFlight, standard: Standard) -> tuple[FlightError, PositionErrors | None, Mapping[str, Any]]:
     results, inertial = saved.results, saved.results.answer(InertialResult)
     flight = FlightError(
         saved.folder.name,
@@ -275,7 +275,7 @@ def _said(saved: SavedFlight, key: str) -> str:
     return str(set_by_user or saved.results.metadata.get(key, "")).strip()
 
 
-Found = tuple[FlightError, InsErrors | None, Mapping[str, Any]]
+Found = tuple[FlightError, PositionErrors | None, Mapping[str, Any]]
 
 
 def _without_twins(found: list[Found]) -> list[Found]:

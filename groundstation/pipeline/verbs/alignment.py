@@ -8,7 +8,7 @@ from groundstation.base.timescales import duration_text
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.verbs.clip import zero_s
 from groundstation.results.arrays.flight import GnssLanes, PhaseSpans
-from groundstation.results.comparison import Alignment, Event
+from groundstation.results.comparison import ClockAlignment, Event
 from groundstation.results.files import SavedFlight
 from groundstation.results.roles import ErrorsAlongTheFlight
 
@@ -17,7 +17,7 @@ AT_REST, UNKNOWN, AIRBORNE = "standstill", "unknown", "airborne"
 NO_GNSS = "no GNSS"
 
 
-def align(a: SavedFlight, b: SavedFlight, event: Event | None, *, is_same_log: bool) -> Alignment:
+def align(a: SavedFlight, b: SavedFlight, event: Event | None, *, is_same_log: bool) -> ClockAlignment:
     """Align two flights on an event that both have.
 
     Parameters
@@ -38,7 +38,7 @@ def align(a: SavedFlight, b: SavedFlight, event: Event | None, *, is_same_log: b
         start_a_ns, start_b_ns = (saved.results.start_utc_ns for saved in (a, b))
         if start_a_ns is None or start_b_ns is None:
             raise _missing(a if start_a_ns is None else b, event)
-        return Alignment(event, 0.0, (start_a_ns - start_b_ns) / NS_PER_S)
+        return ClockAlignment(event, 0.0, (start_a_ns - start_b_ns) / NS_PER_S)
     moments = []
     for saved in (a, b):
         found = events_of(saved)
@@ -47,7 +47,7 @@ def align(a: SavedFlight, b: SavedFlight, event: Event | None, *, is_same_log: b
         moments.append(found[event])
     if event == "start" and is_same_log:  # a part of a flight begins where it was cut
         moments = [-zero_s(saved.results.metadata) for saved in (a, b)]
-    return Alignment(event, moments[0], moments[1])
+    return ClockAlignment(event, moments[0], moments[1])
 
 
 def events_of(saved: SavedFlight) -> dict[Event, float]:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedLog:
     """Result of the check of one log.
 
     Parameters
@@ -78,7 +78,7 @@ class Checked:
             **({"usability": self.usability.to_dict()} if self.usability else {}),
         }
 
-    def judged(self, usability: "Usability", fail_on: str) -> "Checked":
+    def judged(self, usability: "Usability", fail_on: str) -> "CheckedLog":
         """Return the result with its usability, at the limit where that falls short.
 
         No use is at the limit; partial use is so under ``--fail-on warn``.
@@ -95,7 +95,7 @@ def check_many(
     purpose: str = "",
     fail_on: str = "none",
     listen: Listener = silent,
-) -> tuple[Checked, ...]:
+) -> tuple[CheckedLog, ...]:
     """Check logs one after the other, in the order given; a bad one never stops the others.
 
     Parameters
@@ -143,7 +143,7 @@ def check_here(
     is_session: bool,
     fail_on: str,
     listen: Listener,
-) -> tuple[Checked, ...]:
+) -> tuple[CheckedLog, ...]:
     """Return the checks of logs that exist; parameters as of :func:`check_many`."""
     found = []
     flights: dict[int, Flight] = {}
@@ -162,8 +162,8 @@ def check_here(
 
 
 def _for_purpose(
-    checked: Checked, purpose: str, flight: "Flight", configuration: Configuration, fail_on: str
-) -> Checked:
+    checked: CheckedLog, purpose: str, flight: "Flight", configuration: Configuration, fail_on: str
+) -> CheckedLog:
     from groundstation.pipeline.verbs.usable import usability_of_flight
 
     try:
@@ -174,8 +174,12 @@ def _for_purpose(
 
 
 def _for_session(
-    found: Sequence[Checked], purpose: str, flights: Mapping[int, "Flight"], configuration: Configuration, fail_on: str
-) -> list[Checked]:
+    found: Sequence[CheckedLog],
+    purpose: str,
+    flights: Mapping[int, "Flight"],
+    configuration: Configuration,
+    fail_on: str,
+) -> list[CheckedLog]:
     """Return the checks with the usability of their logs together.
 
     The stations are those beside the first log.
@@ -192,7 +196,7 @@ def _for_session(
 
 def _check_or_reason(
     path: Path, configuration: Configuration, fail_on: str, *, with_flight: bool
-) -> tuple[Checked, "Flight | None"]:
+) -> tuple[CheckedLog, "Flight | None"]:
     try:
         log = open_log(path, configuration.profile_path, configuration.icds)
         return checked_with_flight(log, configuration.thresholds, fail_on, with_flight=with_flight)
@@ -201,21 +205,21 @@ def _check_or_reason(
     return unread(path, reason, trace), None
 
 
-def unread(path: Path, reason: str, trace: str = "") -> Checked:
+def unread(path: Path, reason: str, trace: str = "") -> CheckedLog:
     """Return the check of a log that could not be read."""
-    return Checked(Outcome(str(path), "failed", reason, trace=trace), {}, Ledger(), Clock(), ())
+    return CheckedLog(Outcome(str(path), "failed", reason, trace=trace), {}, Ledger(), Clock(), ())
 
 
 def checked_with_flight(
     log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool
-) -> tuple[Checked, "Flight | None"]:
+) -> tuple[CheckedLog, "Flight | None"]:
     """Return the check of a log and, where wanted and readable, its tables."""
     read = _stored if log.is_store else _recorded
     checked, flight = read(log, limits, fail_on, with_flight=with_flight)
     return checked, None if checked.outcome.state == "failed" else flight
 
 
-def _recorded(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) -> tuple[Checked, "Flight | None"]:
+def _recorded(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) -> tuple[CheckedLog, "Flight | None"]:
     from groundstation.integrity.ledger_findings import ledger_findings
     from groundstation.integrity.survey import survey
 
@@ -239,7 +243,7 @@ def _recorded(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) 
     return replace(checked, power_ups=power_ups), flight
 
 
-def _stored(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) -> tuple[Checked, "Flight | None"]:
+def _stored(log: Log, limits: Thresholds, fail_on: str, *, with_flight: bool) -> tuple[CheckedLog, "Flight | None"]:
     from groundstation.store.reader import read_info
     from groundstation.tables.assemble import flight_from_batches
 
@@ -282,15 +286,15 @@ def _checked(
     findings: tuple[Finding, ...],
     has_lost_data: bool,
     fail_on: str,
-) -> Checked:
+) -> CheckedLog:
     if not ledger.topics:
         reason = f"{log.path.name}: {why_nothing_is_placed(findings)}: `info` shows what the file is"
         outcome = Outcome(str(log.path), "failed", reason, sha256=log.source.sha256)
-        return Checked(outcome, facts, ledger, clock, findings)
+        return CheckedLog(outcome, facts, ledger, clock, findings)
     gravest = worst(findings)
     state: State = "data_lost" if has_lost_data else "done"
     if fail_on in SEVERITIES and gravest and SEVERITIES.index(gravest) >= SEVERITIES.index(fail_on):
         state = "limit_reached"
     count = sum(finding.severity != "info" for finding in findings)
     text = f"{'data lost' if has_lost_data else 'no data lost'}, {count} warning{'' if count == 1 else 's'}"
-    return Checked(Outcome(str(log.path), state, text, sha256=log.source.sha256), facts, ledger, clock, findings)
+    return CheckedLog(Outcome(str(log.path), state, text, sha256=log.source.sha256), facts, ledger, clock, findings)

@@ -13,12 +13,12 @@ from groundstation.base.errors import GroundstationError, UsageError
 from groundstation.base.findings import Finding
 from groundstation.base.ledger import Ledger
 from groundstation.pipeline.many_flights.processes.apart import each_apart
-from groundstation.pipeline.many_flights.processes.confined import Bounds
+from groundstation.pipeline.many_flights.processes.confined import ProcessLimits
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome, reason_of
 from groundstation.pipeline.one_flight.progress import Event, Listener, silent
 from groundstation.pipeline.one_flight.segments import PowerUpTold
-from groundstation.pipeline.verbs.check import Checked, check_here, require_logs, unread
+from groundstation.pipeline.verbs.check import CheckedLog, check_here, require_logs, unread
 from groundstation.pipeline.verbs.describe import Description, describe, suggest_icd
 
 DRAFT = "draft of an ICD"
@@ -58,13 +58,13 @@ class _Told:
     power_ups: tuple[PowerUpTold, ...]
 
     @classmethod
-    def of(cls, checked: Checked) -> "_Told":
+    def of(cls, checked: CheckedLog) -> "_Told":
         usability = None if checked.usability is None else checked.usability.to_dict()
         return cls(**(vars(checked) | {"usability": usability}))
 
-    def checked(self) -> Checked:
+    def checked(self) -> CheckedLog:
         """Return the check as it was in the other process."""
-        found = Checked(**(vars(self) | {"usability": None}))
+        found = CheckedLog(**(vars(self) | {"usability": None}))
         if self.usability is None:
             return found
         from groundstation.pipeline.verbs.usable import usability_from
@@ -85,12 +85,12 @@ def _check(job: CheckJob, listen: Listener) -> _Several:
 def check_apart(
     paths: Sequence[Path],
     configuration: Configuration,
-    bounds: Bounds,
+    bounds: ProcessLimits,
     *,
     purpose: str = "",
     fail_on: str = "none",
     listen: Listener = silent,
-) -> tuple[Checked, ...]:
+) -> tuple[CheckedLog, ...]:
     """Check logs as :func:`~groundstation.pipeline.verbs.check.check_many`, in processes.
 
     The processes run one after the other. Logs of a session, which are judged together, are checked in one process.
@@ -134,7 +134,7 @@ def _describe(job: CheckJob, _listen: Listener) -> _Described:
         return _Described(failure=reason_of(job.name, error)[0])
 
 
-def describe_apart(path: Path, profile: Path | None, icds: tuple[str, ...], bounds: Bounds) -> Description:
+def describe_apart(path: Path, profile: Path | None, icds: tuple[str, ...], bounds: ProcessLimits) -> Description:
     """Describe a log in a process of its own.
 
     Raises
@@ -148,7 +148,7 @@ def describe_apart(path: Path, profile: Path | None, icds: tuple[str, ...], boun
     return found.description
 
 
-def suggest_icd_apart(path: Path, bounds: Bounds) -> str:
+def suggest_icd_apart(path: Path, bounds: ProcessLimits) -> str:
     """Return the draft of an ICD that a process of its own makes of a log.
 
     Raises
@@ -161,7 +161,7 @@ def suggest_icd_apart(path: Path, bounds: Bounds) -> str:
     return found.draft
 
 
-def _described_apart(job: CheckJob, bounds: Bounds) -> _Described:
+def _described_apart(job: CheckJob, bounds: ProcessLimits) -> _Described:
     ((_, found),) = each_apart(
         [(0, job)],
         _describe,

@@ -11,7 +11,7 @@ from groundstation.base.signals import is_canonical
 from groundstation.integrity.limits import Thresholds
 from groundstation.pipeline.many_flights.inputs import no_log
 from groundstation.pipeline.many_flights.processes.apart import outcomes_apart
-from groundstation.pipeline.many_flights.processes.confined import Bounds
+from groundstation.pipeline.many_flights.processes.confined import ProcessLimits
 from groundstation.pipeline.many_flights.processes.workers import Crew, in_turn
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import Converted, convert_log
@@ -27,7 +27,7 @@ def convert_many(
     *,
     configuration: Configuration | None = None,
     force: bool = False,
-    bounds: Bounds | None = None,
+    bounds: ProcessLimits | None = None,
     listen: Listener = silent,
 ) -> tuple[Outcome, ...]:
     """Convert logs to MCAP: one to the file ``output``, several into the folder ``output``.

@@ -29,7 +29,7 @@ END_S = 20.0  # for a batch that is interrupted to write its index
 
 
 @dataclass(frozen=True)
-class Batch:
+class WatchedLogs:
     """Logs to run; the fields are the parameters of ``run_many``.
 
     ``is_first``: the index then lists the logs without a flight of this batch alone, as that of ``run`` does; later
@@ -50,7 +50,7 @@ class Batch:
     is_isolated: bool = False
 
 
-def run_batch(batch: Batch, listen: Listener) -> tuple[Outcome, ...] | str:
+def run_batch(batch: WatchedLogs, listen: Listener) -> tuple[Outcome, ...] | str:
     """Run a batch in a process of its own.
 
     Returns what became of its logs, or why nothing was run.
@@ -84,7 +84,7 @@ def run_batch(batch: Batch, listen: Listener) -> tuple[Outcome, ...] | str:
     return (Outcome(str(path), "failed", f"{path.name}: its process died (killed, or out of memory)"),)
 
 
-def _one_by_one(batch: Batch, listen: Listener) -> tuple[Outcome, ...] | str:
+def _one_by_one(batch: WatchedLogs, listen: Listener) -> tuple[Outcome, ...] | str:
     outcomes: list[Outcome] = []
     for path in batch.paths:
         found = run_batch(replace(batch, paths=(path,), is_first=False), listen)
@@ -94,7 +94,7 @@ def _one_by_one(batch: Batch, listen: Listener) -> tuple[Outcome, ...] | str:
     return tuple(outcomes)
 
 
-def _run(sender: Connection, batch: Batch) -> None:
+def _run(sender: Connection, batch: WatchedLogs) -> None:
     """Run a batch in the process made for it.
 
     It ends with the watch, and cleanly when it is asked to.
@@ -127,7 +127,7 @@ def _end_with_the_watch() -> None:
         os._exit(1)
 
 
-def _outcomes(batch: Batch, listen: Listener) -> tuple[Outcome, ...]:
+def _outcomes(batch: WatchedLogs, listen: Listener) -> tuple[Outcome, ...]:
     from groundstation.pipeline.many_flights.fleet.index import rows_without_flight
     from groundstation.pipeline.many_flights.runs.batch import run_many
 
@@ -164,7 +164,7 @@ def _has_flights(out: Path) -> bool:
     return out.is_dir() and bool(flight_folders(out))
 
 
-def _unclaimed(path: Path, batch: Batch) -> Outcome | None:
+def _unclaimed(path: Path, batch: WatchedLogs) -> Outcome | None:
     """Outcome of a file that no reader claims, which in a folder is skipped.
 
     None for any other.
@@ -188,7 +188,7 @@ def _unclaimed(path: Path, batch: Batch) -> Outcome | None:
     return None
 
 
-def _list_too(batch: Batch, before: "list[IndexRow]", strangers: list[Outcome]) -> None:
+def _list_too(batch: WatchedLogs, before: "list[IndexRow]", strangers: list[Outcome]) -> None:
     """List the logs without a flight of earlier batches, and the files that no reader claims."""
     from groundstation.pipeline.many_flights.fleet.index import rows_without_flight, write_index_of
     from groundstation.pipeline.many_flights.runs.out_folder import alone_in

@@ -16,7 +16,7 @@ from groundstation.pipeline.many_flights.runs.out_folder import refuse_foreign
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.outcome import Outcome
 from groundstation.pipeline.one_flight.progress import Listener, silent
-from groundstation.pipeline.verbs.watched_batch import Batch, run_batch
+from groundstation.pipeline.verbs.watched_batch import WatchedLogs, run_batch
 from groundstation.readers.bags.bag import METADATA
 
 UNFINISHED = (".part", ".partial", ".tmp", ".filepart", ".crdownload")  # what programs call a file that still comes
@@ -112,7 +112,7 @@ def watch(
     if folder.resolve() == out.resolve():
         raise UsageError(str(out), "the folder that is watched", "another one for the results")
     refuse_foreign(out, force)
-    batch = Batch((), out, configuration, fail_on, with_pdf, jobs, stations, force, True, only_results, timeout_s)
+    batch = WatchedLogs((), out, configuration, fail_on, with_pdf, jobs, stations, force, True, only_results, timeout_s)
     batch = replace(batch, is_isolated=is_isolated)
     watched, trouble = Watched(), _Trouble((lambda _: None) if once else say)
     watched.ready(_look(folder, out, configuration, trouble))

@@ -16,7 +16,7 @@ from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.readers.bags.messages import Connection
 from groundstation.readers.bags.sources import WriteTimes
-from groundstation.readers.clock_offsets import Jump, Offsets, offsets_by
+from groundstation.readers.clock_offsets import ClockJump, Offsets, offsets_by
 from groundstation.readers.two_clocks import FEWEST_READINGS, ClockReadings, ClockStretch, ReadingSequence, stretches_of
 
 LARGEST_LAG_S = 2.0  # between header stamp and log time: a larger lag means another clock
@@ -31,14 +31,14 @@ _SLIP_NS = 60 * NS_PER_S  # longest slip, from the last message before it to the
 _LARGEST_LAG_NS = int(LARGEST_LAG_S * NS_PER_S)
 
 
-def was_set(jumps: Sequence[Jump], offsets: Offsets) -> bool:
+def was_set(jumps: Sequence[ClockJump], offsets: Offsets) -> bool:
     """Tell whether a corrected log time falls by a second or more, or leaps from before 1980.
 
     A slip of a few messages does not count.
 
     Parameters
     ----------
-    jumps : sequence of Jump
+    jumps : sequence of ClockJump
         Of one connection.
     offsets : Offsets
     """
@@ -53,13 +53,13 @@ def was_set(jumps: Sequence[Jump], offsets: Offsets) -> bool:
     return False
 
 
-def _is_back(jump: Jump, later: Jump) -> bool:
+def _is_back(jump: ClockJump, later: ClockJump) -> bool:
     """Tell whether the log time returns to its old course a few messages after a jump."""
     return later.number - jump.number < FEWEST_READINGS and 0 <= later.time_ns - jump.before_ns < _SLIP_NS
 
 
 @dataclass
-class Sample:
+class ThinnedColumns:
     """Columns of integers, thinned evenly as they grow.
 
     Each row that is kept stands for ``stride`` rows.
@@ -92,19 +92,19 @@ class Stamped:
 
     Attributes
     ----------
-    log : Sample
+    log : ThinnedColumns
         Log times.
-    stamps : Sample
+    stamps : ThinnedColumns
         Record, log time and stamp of messages that have one.
     readings : ClockReadings
         Of the stamps, against log time.
-    jumps : list of Jump
+    jumps : list of ClockJump
     """
 
-    log: Sample = field(default_factory=lambda: Sample(1))
-    stamps: Sample = field(default_factory=lambda: Sample(3))
+    log: ThinnedColumns = field(default_factory=lambda: ThinnedColumns(1))
+    stamps: ThinnedColumns = field(default_factory=lambda: ThinnedColumns(3))
     readings: ClockReadings = field(default_factory=ClockReadings)
-    jumps: list[Jump] = field(default_factory=list)
+    jumps: list[ClockJump] = field(default_factory=list)
     _last: Int64Array = field(default_factory=lambda: np.zeros((2, 0), dtype=np.int64))
 
     def take(self, record_index: Int64Array, log_ns: Int64Array, rows: Int64Array, stamp_ns: Int64Array) -> None:
@@ -118,7 +118,7 @@ class Stamped:
         for at in np.flatnonzero((change < 0) | (change > _LEAP_S))[: MOST_JUMPS - len(self.jumps)].tolist():
             before, behind = times[:, at].tolist(), times[:, at + 1].tolist()
             number = self.log.count - times.shape[1] + at + 1
-            self.jumps.append(Jump(number, before[0], behind[0], before[1], behind[1]))
+            self.jumps.append(ClockJump(number, before[0], behind[0], before[1], behind[1]))
         self._last = new[:, -1:]
 
     @cached_property

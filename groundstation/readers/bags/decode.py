@@ -9,7 +9,7 @@ import numpy as np
 
 from groundstation.base.records import MAX_TEXT_CHARACTERS, Column, Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.bags.definitions import Definition, DefinitionError, known, parse
+from groundstation.readers.bags.definitions import DefinitionError, MessageDefinition, known, parse
 from groundstation.readers.bags.messages import Connection, ConnectionBlock
 from groundstation.readers.bags.shapes import (
     CDR,
@@ -24,7 +24,7 @@ from groundstation.readers.bags.shapes import (
     values_of,
     walk,
 )
-from groundstation.readers.bags.work import BYTES_PER_STEP, STEPS_PER_VALUE, Work
+from groundstation.readers.bags.work import BYTES_PER_STEP, STEPS_PER_VALUE, StepBudget
 
 DEEPEST = 32  # objects within objects
 BYTES = "bytes"  # column of messages that cannot be read: how long they are
@@ -32,7 +32,7 @@ MOST_SHAPES = 64  # shapes kept for a connection: messages of ever new lengths a
 
 
 @dataclass(frozen=True, eq=False)
-class Decoded:
+class DecodedMessages:
     """Columns of the messages ``rows`` of a block; those of one block do not overlap."""
 
     rows: Int64Array
@@ -58,10 +58,10 @@ class Decoder:
     unreadable: int = 0
     shortened: dict[str, None] = field(default_factory=dict)
     _shapes: dict[tuple[int, tuple[tuple[int, int], ...]], Shape] = field(default_factory=dict)
-    _definition: Definition | None = None
+    _definition: MessageDefinition | None = None
     _object: Callable[[bytes], Any] | None = None
     kinds: dict[str, str] = field(default_factory=dict)
-    work: Work = field(default_factory=lambda: Work.of(0))
+    work: StepBudget = field(default_factory=lambda: StepBudget.of(0))
     given_up: int = 0
     left_out: int = 0
 
@@ -114,7 +114,7 @@ class Decoder:
         rows = np.flatnonzero(fits)
         return rows, Column(values_of(leaf, block.buffer, block.starts[rows]))
 
-    def decode(self, block: ConnectionBlock) -> Iterator[Decoded]:
+    def decode(self, block: ConnectionBlock) -> Iterator[DecodedMessages]:
         """Yield columns of the messages; unreadable ones have their length alone."""
         bad: list[Int64Array] = []
         if self.reason:
@@ -128,7 +128,7 @@ class Decoder:
             self.unreadable += len(rows)
             yield _sizes(block, rows)
 
-    def _shaped(self, block: ConnectionBlock, bad: list[Int64Array]) -> Iterator[Decoded]:
+    def _shaped(self, block: ConnectionBlock, bad: list[Int64Array]) -> Iterator[DecodedMessages]:
         order = np.argsort(block.sizes, kind="stable")
         sizes = block.sizes[order]
         for group in np.split(order, np.flatnonzero(np.diff(sizes)) + 1):
@@ -170,7 +170,7 @@ class Decoder:
 
     def _objects(
         self, block: ConnectionBlock, read: Callable[[bytes], Any], bad: list[Int64Array]
-    ) -> Iterator[Decoded]:
+    ) -> Iterator[DecodedMessages]:
         """Messages that a library reads one by one."""
         found: list[dict[str, Any]] = []
         rows: list[int] = []
@@ -192,7 +192,9 @@ class Decoder:
             return
         yield from self._laid_out(block, np.array(rows, dtype=np.int64), found)
 
-    def _laid_out(self, block: ConnectionBlock, rows: Int64Array, found: list[dict[str, Any]]) -> Iterator[Decoded]:
+    def _laid_out(
+        self, block: ConnectionBlock, rows: Int64Array, found: list[dict[str, Any]]
+    ) -> Iterator[DecodedMessages]:
         """Yield columns of flat objects; those without any value have their length."""
         columns: dict[str, Column] = {}
         for name in dict.fromkeys(name for one in found for name in one):
@@ -208,21 +210,21 @@ class Decoder:
         for column in columns.values():
             has_any |= column.mask
         if has_any.any():
-            yield Decoded(rows[has_any], {name: column.take(has_any) for name, column in columns.items()})
+            yield DecodedMessages(rows[has_any], {name: column.take(has_any) for name, column in columns.items()})
         if not has_any.all():
             yield _sizes(block, rows[~has_any])
 
 
-def _read(block: ConnectionBlock, shape: Shape, rows: Int64Array) -> Decoded:
+def _read(block: ConnectionBlock, shape: Shape, rows: Int64Array) -> DecodedMessages:
     columns = shape.columns(block.buffer, block.starts[rows])
-    return Decoded(rows, columns) if columns else _sizes(block, rows)
+    return DecodedMessages(rows, columns) if columns else _sizes(block, rows)
 
 
-def _sizes(block: ConnectionBlock, rows: Int64Array) -> Decoded:
-    return Decoded(rows, {BYTES: Column(block.sizes[rows].astype(np.uint32))})
+def _sizes(block: ConnectionBlock, rows: Int64Array) -> DecodedMessages:
+    return DecodedMessages(rows, {BYTES: Column(block.sizes[rows].astype(np.uint32))})
 
 
-def _definition(connection: Connection) -> tuple[Definition | None, str]:
+def _definition(connection: Connection) -> tuple[MessageDefinition | None, str]:
     """Return the definition of a connection, or the reason why there is none."""
     usual = {"ros1": "ros1msg", "cdr": "ros2msg"}[connection.encoding]
     try:

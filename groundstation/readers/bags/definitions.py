@@ -100,7 +100,7 @@ class MessageField:
 
 
 @dataclass(frozen=True)
-class Definition:
+class MessageDefinition:
     """A message type with all its parts.
 
     Parameters
@@ -124,7 +124,7 @@ def plain_name(name: str) -> str:
     return name.replace("/msg/", "/")
 
 
-def parse(root: str, text: str) -> Definition:
+def parse(root: str, text: str) -> MessageDefinition:
     """Parse the text of a definition.
 
     Raises
@@ -160,11 +160,11 @@ def parse(root: str, text: str) -> Definition:
         if sum(len(fields) for fields in types.values()) > MOST_FIELDS:
             raise DefinitionError(f"more than {MOST_FIELDS} fields")
     _refuse_circles(types)
-    return Definition(plain_name(root), types)
+    return MessageDefinition(plain_name(root), types)
 
 
 @cache
-def known(type_name: str) -> Definition | None:
+def known(type_name: str) -> MessageDefinition | None:
     """Return the definition of a common ROS 2 type, for bags that carry none."""
     text = KNOWN_TYPES.get(type_name)
     return None if text is None else parse(type_name, text)

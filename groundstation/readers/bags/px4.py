@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from groundstation.base.records import Remark
-from groundstation.readers.mapping import Offer, assigned
+from groundstation.readers.mapping import OfferedMessages, assigned
 from groundstation.readers.ulog.canonical import ROLES
 
 _PACKAGE = "px4_msgs/"
@@ -39,7 +39,7 @@ def feed(seen: Mapping[int, Any], feeds: dict[int, list[Any]], remarks: list[Rem
     """
     taken = {one.topic.partition(".")[0] for several in feeds.values() for one in several}
     offers = [
-        Offer(log_topic(one.connection.type), number, frozenset(one.columns))
+        OfferedMessages(log_topic(one.connection.type), number, frozenset(one.columns))
         for number, one in seen.items()
         if is_px4(one.connection.type)
     ]

@@ -20,13 +20,13 @@ from groundstation.base.records import (
 from groundstation.base.signals import RAW_PREFIX
 from groundstation.readers.bags.bag import Bag, kind_of
 from groundstation.readers.bags.clocks import LARGEST_LAG_S
-from groundstation.readers.bags.decode import Decoded, Decoder
+from groundstation.readers.bags.decode import DecodedMessages, Decoder
 from groundstation.readers.bags.messages import Connection, ConnectionBlock, joined
 from groundstation.readers.bags.profile import MessageProfile
 from groundstation.readers.bags.shapes import MOST_COLUMNS
 from groundstation.readers.bags.sources import Key, key_of
-from groundstation.readers.bags.survey import Survey, survey
-from groundstation.readers.bags.work import Work
+from groundstation.readers.bags.survey import BagSurvey, survey
+from groundstation.readers.bags.work import StepBudget
 from groundstation.readers.parts import TopicPart, bounded, merged, occupied, one_row_each
 from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
@@ -51,7 +51,7 @@ def items(source: Source, reader_name: str, profile: MessageProfile | None = Non
         has_counting_clock=not found.is_set,
         clock_offsets=found.offsets.stated,
     )
-    topics = _Topics(found, names, Work.of(bag.size))
+    topics = _Topics(found, names, StepBudget.of(bag.size))
     gathered: dict[int, list[ConnectionBlock]] = {}
     size, newest = 0, -1
     for part in bag:
@@ -74,7 +74,7 @@ def _type_text(connection: Connection) -> str:
     return f"{connection.type or 'unknown type'} ({connection.encoding or 'unknown encoding'})"
 
 
-def _raw_names(found: Survey) -> dict[int, str]:
+def _raw_names(found: BagSurvey) -> dict[int, str]:
     """Return the raw topic of each connection, the same for all that write one topic.
 
     A name that clashes gets a number.
@@ -95,7 +95,7 @@ def _raw_names(found: Survey) -> dict[int, str]:
     return names
 
 
-def _publishers(found: Survey, names: dict[int, str]) -> dict[int, str]:
+def _publishers(found: BagSurvey, names: dict[int, str]) -> dict[int, str]:
     """Return the publisher of each connection, where several sources write its raw topic."""
     writers = Counter(names[seen.connection.number] for seen in found.sources)
     return {
@@ -125,7 +125,7 @@ def _fits_in(time_ns: Int64Array, record_index: Int64Array, is_far: BoolArray) -
 class _Topics:
     """Decoder of blocks into batches of topics."""
 
-    def __init__(self, found: Survey, names: dict[int, str], work: Work) -> None:
+    def __init__(self, found: BagSurvey, names: dict[int, str], work: StepBudget) -> None:
         self._work = work
         self._found, self._names, self._publishers = found, names, _publishers(found, names)
         self._decoders: dict[int, Decoder] = {}
@@ -154,7 +154,7 @@ class _Topics:
         for topic, parts in sorted(canonical.items()):
             yield from bounded(one_row_each(merged(topic, parts)) if len(parts) > 1 else merged(topic, parts))
 
-    def _part(self, block: ConnectionBlock, decoded: Decoded) -> TopicPart:
+    def _part(self, block: ConnectionBlock, decoded: DecodedMessages) -> TopicPart:
         """Return raw columns of decoded messages, with their three times."""
         log_ns, publish_ns = block.log_time_ns[decoded.rows], block.publish_time_ns[decoded.rows]
         is_time = (log_ns >= 0) & (log_ns < LATEST_NS)
@@ -173,7 +173,7 @@ class _Topics:
         return self._decoders.setdefault(connection.number, Decoder(connection, kinds=kinds, work=self._work))
 
     def _validity(
-        self, number: int, decoded: Decoded, record_index: Int64Array, log_ns: Int64Array
+        self, number: int, decoded: DecodedMessages, record_index: Int64Array, log_ns: Int64Array
     ) -> Int64Array | None:
         """Return times of validity: header stamps where they are believed, else log time.
 

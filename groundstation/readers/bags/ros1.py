@@ -24,9 +24,9 @@ from groundstation.readers.bags.ros1_records import (
     MAGIC,
     MESSAGE,
     OP,
-    Head,
     Index,
     Record,
+    RecordHeader,
     Records,
     Tries,
     head_at,
@@ -125,7 +125,7 @@ class Ros1Bag:
         elif lost > 0 and not is_told:
             yield Damage("dropped_rows", "the whole log", lost, f"chunks of the {chunks} that the bag counts are gone")
 
-    def _chunk(self, head: Head, data: bytes, at: int, is_cut: bool) -> Iterator[Part]:
+    def _chunk(self, head: RecordHeader, data: bytes, at: int, is_cut: bool) -> Iterator[Part]:
         compression = head.fields.get(b"compression", b"")
         size = number_of(head.fields, b"size") or 0
         left = max(FREE_BYTES, MAX_RATIO * self._source.size) - self._expanded
@@ -188,7 +188,7 @@ class Ros1Bag:
         heads = heads_in(content, OP, self._tries, at + 1)
         return next((begin for begin, head in heads if head.end <= len(content)), len(content))
 
-    def _message(self, content: bytes, at: int, head: Head, found: dict[int, _Gathered]) -> None:
+    def _message(self, content: bytes, at: int, head: RecordHeader, found: dict[int, _Gathered]) -> None:
         number, time = number_of(head.fields, b"conn"), head.fields.get(b"time", b"")
         if number not in self._connections or number is None or len(time) != 8:
             self._unknown += 1
@@ -220,7 +220,7 @@ class Ros1Bag:
         self._count += 1
         return end
 
-    def _connect(self, head: Head, data: bytes) -> None:
+    def _connect(self, head: RecordHeader, data: bytes) -> None:
         number, more = number_of(head.fields, b"conn"), parse_header(data)
         if number is None or more is None or number in self._connections:
             return

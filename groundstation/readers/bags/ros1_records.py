@@ -27,7 +27,7 @@ OP_OUTSIDE = re.compile(rb"\x04\0\0\0op=[\x04-\x06]")  # operations of records o
 _BEGINNING = re.compile(rb"(?=[\0-\xff]{2}[\0-\x0f]\0[\0-\xff]{2}[\0-\x0f]\0[a-z_])")
 
 
-class Head(NamedTuple):
+class RecordHeader(NamedTuple):
     """Header of a record, and where its data begins and ends."""
 
     op: int
@@ -64,7 +64,7 @@ def number_of(fields: dict[bytes, bytes], name: bytes) -> int | None:
     return int.from_bytes(value, "little") if value is not None and len(value) <= 8 else None
 
 
-def head_at(data: bytes, at: int) -> Head | None:
+def head_at(data: bytes, at: int) -> RecordHeader | None:
     """Return the record at a place of ``data``, which may end behind its header."""
     length = int.from_bytes(data[at : at + 4], "little")
     if not 8 <= length <= MAX_HEADER_BYTES or at + 8 + length > len(data):
@@ -74,7 +74,7 @@ def head_at(data: bytes, at: int) -> Head | None:
     if fields is None or op is None or not MESSAGE <= op <= CONNECTION:
         return None
     data_at = at + 8 + length
-    return Head(op, fields, data_at, data_at + int.from_bytes(data[data_at - 4 : data_at], "little"))
+    return RecordHeader(op, fields, data_at, data_at + int.from_bytes(data[data_at - 4 : data_at], "little"))
 
 
 @dataclass
@@ -87,7 +87,7 @@ class Tries:
     left: int = MOST_TRIES
 
 
-def heads_in(block: bytes, ops: re.Pattern[bytes], tries: Tries, start: int = 0) -> Iterator[tuple[int, Head]]:
+def heads_in(block: bytes, ops: re.Pattern[bytes], tries: Tries, start: int = 0) -> Iterator[tuple[int, RecordHeader]]:
     """Yield the headers of records in some bytes and their places, by their operation."""
     for match in ops.finditer(block, start):
         tries.left -= 1
@@ -122,7 +122,7 @@ class Record:
 
     start: int
     end: int
-    head: Head | None = None
+    head: RecordHeader | None = None
     is_cut: bool = False
 
 
@@ -161,7 +161,7 @@ class Records:
         inside = self._inside(head)
         return Record(at, inside) if inside else Record(at, head.end, head)
 
-    def _inside(self, head: Head) -> int:
+    def _inside(self, head: RecordHeader) -> int:
         """Return the place of the next record inside one that states too large a length.
 
         Bytes are missing in such a record, and no other begins where it says that it ends. 0 for a record that ends
@@ -172,7 +172,7 @@ class Records:
         place = self._next(head.data_at, min(self.size, head.end + BEYOND_BYTES), OP_OUTSIDE)
         return place if place < head.end else 0
 
-    def head(self, at: int) -> Head | None:
+    def head(self, at: int) -> RecordHeader | None:
         """Return the header of the record at a place of the file."""
         head = head_at(self.read(at, MAX_HEADER_BYTES + 8), 0)
         return None if head is None else head._replace(data_at=at + head.data_at, end=at + head.end)
@@ -220,7 +220,7 @@ class Index:
 
     index_at: int | None = None
     chunks: int | None = None
-    connections: dict[int, tuple[Head, bytes]] = field(default_factory=dict)
+    connections: dict[int, tuple[RecordHeader, bytes]] = field(default_factory=dict)
     messages: dict[int, int] = field(default_factory=dict)
     listed: int = 0
 
@@ -250,7 +250,7 @@ class Index:
                 found.take(record.head, records.read(record.head.data_at, length))
         return found
 
-    def take(self, head: Head, data: bytes) -> None:
+    def take(self, head: RecordHeader, data: bytes) -> None:
         """Take in a record of the index."""
         if head.op == CONNECTION:
             number = number_of(head.fields, b"conn")

@@ -22,7 +22,7 @@ STAMPS = ("header.stamp_ns", "timestamp_ns")
 
 
 @dataclass
-class Seen:
+class SeenMessages:
     """Facts seen of one connection, or of all connections of one source.
 
     Attributes
@@ -51,7 +51,7 @@ class Seen:
     _stamps_kept: int = 0
 
     @classmethod
-    def of(cls, several: Sequence["Seen"]) -> "Seen":
+    def of(cls, several: Sequence["SeenMessages"]) -> "SeenMessages":
         """Join the facts of all connections of a source, in their order."""
         return replace(
             several[0],

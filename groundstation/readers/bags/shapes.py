@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import MAX_TEXT_CHARACTERS, BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.bags.definitions import PRIMITIVES, TEXT, TIMES, WIDE_TEXT, Definition
+from groundstation.readers.bags.definitions import PRIMITIVES, TEXT, TIMES, WIDE_TEXT, MessageDefinition
 from groundstation.readers.bags.messages import ByteArray
 
 MOST_NUMBERS, MOST_PARTS = 64, 16  # elements of an array that become columns: of a longer one only the length is kept
@@ -174,7 +174,7 @@ def decoded_text(values: NDArray[Any]) -> NDArray[np.str_]:
     return np.asarray(texts[place])
 
 
-def walk(definition: Definition, message: bytes, serialisation: Serialisation) -> Shape:
+def walk(definition: MessageDefinition, message: bytes, serialisation: Serialisation) -> Shape:
     """Return the shape of a message.
 
     Raises
@@ -190,7 +190,7 @@ def walk(definition: Definition, message: bytes, serialisation: Serialisation) -
         raise
 
 
-def _walked(walker: "_Walker", definition: Definition, message: bytes, serialisation: Serialisation) -> Shape:
+def _walked(walker: "_Walker", definition: MessageDefinition, message: bytes, serialisation: Serialisation) -> Shape:
     walker.part(definition.root, "")
     left = len(message) - walker.at
     if not 0 <= left < (serialisation.alignment if serialisation.alignment > 1 else 1):
@@ -205,7 +205,7 @@ def _walked(walker: "_Walker", definition: Definition, message: bytes, serialisa
 class _Walker:
     """Walk through one message that notes the place of each value."""
 
-    def __init__(self, definition: Definition, message: bytes, serialisation: Serialisation) -> None:
+    def __init__(self, definition: MessageDefinition, message: bytes, serialisation: Serialisation) -> None:
         self._types, self._message, self._how = definition.types, message, serialisation
         self._is_noted = True
         self.steps = 0

@@ -18,10 +18,10 @@ from groundstation.readers.bags.clocks import LARGEST_LAG_S, Lags, offsets_of, t
 from groundstation.readers.bags.decode import Decoder
 from groundstation.readers.bags.messages import ConnectionBlock
 from groundstation.readers.bags.profile import MessageProfile
-from groundstation.readers.bags.seen import Seen
+from groundstation.readers.bags.seen import SeenMessages
 from groundstation.readers.bags.sources import in_order, sources_of
 from groundstation.readers.bags.values import Values
-from groundstation.readers.bags.work import Work
+from groundstation.readers.bags.work import StepBudget
 from groundstation.readers.clock_offsets import Offsets
 from groundstation.readers.mapping import Columns, mapped
 
@@ -32,7 +32,7 @@ _TURNED = "east-north-up turned to north-east-down, forward-left-up to forward-r
 
 
 @dataclass(frozen=True)
-class Feed:
+class TopicFeed:
     """Feed of a canonical topic by the messages of a connection.
 
     The messages must have the columns ``needs``. ``without`` are fields that another connection gives.
@@ -60,15 +60,15 @@ class Feed:
 
 
 @dataclass
-class Survey:
+class BagSurvey:
     """Findings of the first pass.
 
     Attributes
     ----------
-    seen : dict of connection number to Seen
-    sources : list of Seen
+    seen : dict of connection number to SeenMessages
+    sources : list of SeenMessages
         The same of each source, in the order in which they were first met.
-    feeds : dict of connection number to list of Feed
+    feeds : dict of connection number to list of TopicFeed
     offsets : Offsets
         How log times are moved, where the recorder's clock was set.
     lags : dict of connection number to Lags
@@ -76,9 +76,9 @@ class Survey:
     remarks : list of Remark
     """
 
-    seen: dict[int, Seen] = field(default_factory=dict)
-    sources: list[Seen] = field(default_factory=list)
-    feeds: dict[int, list[Feed]] = field(default_factory=dict)
+    seen: dict[int, SeenMessages] = field(default_factory=dict)
+    sources: list[SeenMessages] = field(default_factory=list)
+    feeds: dict[int, list[TopicFeed]] = field(default_factory=dict)
     offsets: Offsets = field(default_factory=Offsets)
     lags: dict[int, Lags] = field(default_factory=dict)
     remarks: list[Remark] = field(default_factory=list)
@@ -92,35 +92,35 @@ class Survey:
         return any(was_set(one.jumps, self.offsets) for seen in self.seen.values() for one in seen.stamped)
 
 
-def survey(bag: Bag, profile: MessageProfile | None = None) -> Survey:
+def survey(bag: Bag, profile: MessageProfile | None = None) -> BagSurvey:
     """Read the times of all messages of a bag, and the content of the first of each topic.
 
     ``profile`` says what some of them mean.
     """
-    found = Survey()
+    found = BagSurvey()
     decoders: dict[int, Decoder] = {}
-    work = Work.of(bag.size).of_a_first_look()
+    work = StepBudget.of(bag.size).of_a_first_look()
     for part in bag:
         if isinstance(part, ConnectionBlock) and len(part):
             number = part.connection.number
             decoder = decoders.setdefault(number, Decoder(part.connection, work=work))
             if number not in found.seen:
                 rule = profile.rule_for(part.connection) if profile is not None else None
-                found.seen[number] = Seen(part.connection, (number,), rule)
+                found.seen[number] = SeenMessages(part.connection, (number,), rule)
             found.seen[number].take(part, decoder)
     lines = [seen.stamped[0].line(seen.connection) for seen in found.seen.values()]
-    found.sources = [Seen.of([found.seen[number] for number in source]) for source in sources_of(lines)]
+    found.sources = [SeenMessages.of([found.seen[number] for number in source]) for source in sources_of(lines)]
     _map(found)
     _choose_clock(found)
     return found
 
 
-def _map(found: Survey) -> None:
+def _map(found: BagSurvey) -> None:
     """Map the messages to canonical topics, those of the profile first."""
     named = _map_by_rules(found)
     served = [seen for seen in found.sources if seen.rule is None and _serves(seen)]
     units = _units([seen for seen in served if MESSAGES[seen.connection.type].role in _ORDER])
-    kinds: dict[str, list[list[Seen]]] = {}
+    kinds: dict[str, list[list[SeenMessages]]] = {}
     for unit in units:
         kinds.setdefault(_kind_of(unit), []).append(unit)
     alone = [seen for seen in served if MESSAGES[seen.connection.type].role not in _ORDER]
@@ -135,7 +135,7 @@ def _map(found: Survey) -> None:
         for place, unit in enumerate(several, start=1):
             topic = kind if len(several) == 1 else f"{kind}.{place}"
             _feed(found, topic, unit)
-    px4.feed({seen.connection.number: seen for seen in found.sources}, found.feeds, found.remarks, Feed)
+    px4.feed({seen.connection.number: seen for seen in found.sources}, found.feeds, found.remarks, TopicFeed)
     for seen in found.sources:
         for number in seen.numbers[1:]:
             if seen.connection.number in found.feeds:
@@ -143,7 +143,7 @@ def _map(found: Survey) -> None:
     found.remarks += mapped(_named_sources(found))
 
 
-def _named_sources(found: Survey) -> dict[str, list[str]]:
+def _named_sources(found: BagSurvey) -> dict[str, list[str]]:
     """Return the topics of the log that feed each canonical topic.
 
     With their publishers where several write one topic.
@@ -158,17 +158,17 @@ def _named_sources(found: Survey) -> dict[str, list[str]]:
     return sources
 
 
-def _serves(seen: Seen) -> bool:
+def _serves(seen: SeenMessages) -> bool:
     message = MESSAGES.get(seen.connection.type)
     return message is not None and all(name in seen.columns for name in message.needs)
 
 
-def _units(seen: list[Seen]) -> list[list[Seen]]:
+def _units(seen: list[SeenMessages]) -> list[list[SeenMessages]]:
     """Group messages of one namespace that share their header stamps into units.
 
     They are what one unit says of the same instants.
     """
-    units: list[list[Seen]] = []
+    units: list[list[SeenMessages]] = []
     for one in sorted(seen, key=lambda seen: _ORDER.index(MESSAGES[seen.connection.type].role)):
         fitting = [unit for unit in units if _belongs(one, unit)]
         fitting.sort(key=lambda unit: unit[0].connection.publisher != one.connection.publisher)
@@ -179,7 +179,7 @@ def _units(seen: list[Seen]) -> list[list[Seen]]:
     return units
 
 
-def _belongs(one: Seen, unit: list[Seen]) -> bool:
+def _belongs(one: SeenMessages, unit: list[SeenMessages]) -> bool:
     roles = {MESSAGES[other.connection.type].role for other in unit}
     namespaces = {other.connection.topic.rpartition("/")[0] for other in unit}
     if MESSAGES[one.connection.type].role in roles or one.connection.topic.rpartition("/")[0] not in namespaces:
@@ -188,7 +188,7 @@ def _belongs(one: Seen, unit: list[Seen]) -> bool:
     return len(few) > 0 and bool(np.isin(few, many).mean() >= SHARED_SHARE)
 
 
-def _kind_of(unit: list[Seen]) -> str:
+def _kind_of(unit: list[SeenMessages]) -> str:
     """Return ``ins``, ``gnss`` or ``odometry``, the kind of topic that a unit feeds.
 
     Empty where a message alone does not tell what it is of.
@@ -202,10 +202,10 @@ def _kind_of(unit: list[Seen]) -> str:
     return "odometry" if "odometry" in roles else ""
 
 
-def _map_by_rules(found: Survey) -> set[str]:
+def _map_by_rules(found: BagSurvey) -> set[str]:
     """Map messages to topics as the profile says; return the kinds of topics it names."""
     kinds: set[str] = set()
-    served: dict[int, list[Seen]] = {}
+    served: dict[int, list[SeenMessages]] = {}
     for seen in sorted(found.sources, key=lambda seen: in_order(seen.connection)):
         if seen.rule is not None:
             served.setdefault(id(seen.rule), []).append(seen)
@@ -215,7 +215,7 @@ def _map_by_rules(found: Survey) -> set[str]:
         several = served[id(seen.rule)]
         for topic in seen.rule.topics:
             name = f"{topic}.{several.index(seen) + 1}" if len(several) > 1 and topic == kind_of(topic) else topic
-            found.feeds.setdefault(number, []).append(Feed(name, (), seen.rule.feeding(topic)))
+            found.feeds.setdefault(number, []).append(TopicFeed(name, (), seen.rule.feeding(topic)))
             kinds.add(kind_of(topic))
         text, missing = seen.rule.told(seen.columns)
         found.remarks.append(Remark("profile", f"{seen.connection.topic} by the profile: {text}"))
@@ -225,12 +225,12 @@ def _map_by_rules(found: Survey) -> set[str]:
     return kinds
 
 
-def _leave_raw(found: Survey, seen: Seen, why: str) -> None:
+def _leave_raw(found: BagSurvey, seen: SeenMessages, why: str) -> None:
     text = f"{seen.connection.topic} ({seen.connection.type}) is kept as raw: {why}"
     found.remarks.append(Remark("not_mapped", text))
 
 
-def _feed(found: Survey, topic: str, unit: list[Seen]) -> None:
+def _feed(found: BagSurvey, topic: str, unit: list[SeenMessages]) -> None:
     """Map the messages of one unit to a topic.
 
     A field that two messages have is given by the first in :data:`_ORDER`.
@@ -239,7 +239,7 @@ def _feed(found: Survey, topic: str, unit: list[Seen]) -> None:
     for seen in unit:
         message = MESSAGES[seen.connection.type]
         columns = wheel_odometry if topic.startswith("odometry") else message.columns
-        feed = Feed(topic, message.needs, columns, frozenset(given))
+        feed = TopicFeed(topic, message.needs, columns, frozenset(given))
         fields = feed.of(seen.columns)
         found.feeds.setdefault(seen.connection.number, []).append(feed)
         given |= fields.keys()
@@ -253,7 +253,7 @@ def _feed(found: Survey, topic: str, unit: list[Seen]) -> None:
             found.remarks.append(Remark("converted", f"{topic}: {seen.connection.topic}, {_TURNED}", topic))
 
 
-def _choose_clock(found: Survey) -> None:
+def _choose_clock(found: BagSurvey) -> None:
     """Choose header stamps as times of validity, if they are of the clock of log time."""
     found.offsets = offsets_of({number: seen.stamped[0] for number, seen in found.seen.items()})
     if found.offsets.stated:

@@ -13,7 +13,7 @@ STEPS_PER_VALUE, BYTES_PER_STEP = 3, 16
 
 
 @dataclass
-class Work:
+class StepBudget:
     """Work in steps that are left.
 
     Parameters
@@ -22,7 +22,7 @@ class Work:
 
     Examples
     --------
-    >>> work = Work.of(0)
+    >>> work = StepBudget.of(0)
     >>> work.spend(FREE_STEPS), work.spend(1)
     (True, False)
     """
@@ -30,13 +30,13 @@ class Work:
     steps: int
 
     @classmethod
-    def of(cls, size: int) -> "Work":
+    def of(cls, size: int) -> "StepBudget":
         """Return the work that a file of so many bytes is given."""
         return cls(FREE_STEPS + STEPS_PER_BYTE * size)
 
-    def of_a_first_look(self) -> "Work":
+    def of_a_first_look(self) -> "StepBudget":
         """Return the work that a first look may take."""
-        return Work(self.steps // FIRST_LOOK)
+        return StepBudget(self.steps // FIRST_LOOK)
 
     def spend(self, steps: int) -> bool:
         """Take some steps; False when there are none left."""

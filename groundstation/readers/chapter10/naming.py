@@ -37,7 +37,7 @@ WRONG_WORD = 6  # flags of a 429 word: format or parity error seen by the record
 TIME_TAG = "time_tag"  # element that counts the samples of a message sent more often than it is computed
 
 
-class Seen:
+class SeenWords:
     """Command words and labels that are on the buses of each channel."""
 
     def __init__(self) -> None:
@@ -85,7 +85,7 @@ class NamedWords:
     remarks: tuple[Remark, ...]
 
 
-def found_on(seen: Seen, icds: Sequence[Icd], names: BusNames) -> NamedWords:
+def found_on(seen: SeenWords, icds: Sequence[Icd], names: BusNames) -> NamedWords:
     """Find the words and messages of the ICDs that are on the buses.
 
     A word that may be on any bus is one of another unit on each.
@@ -359,7 +359,7 @@ def _title(holder: Any) -> str:
     return f"{holder.name} (RT {command >> 11} {'T' if holder.transmit else 'R'} SA {command >> 5 & 31}) of {place}"
 
 
-def named(items: Iterable[Item], icds: Sequence[Icd], seen: Seen) -> Iterator[Item]:
+def named(items: Iterable[Item], icds: Sequence[Icd], seen: SeenWords) -> Iterator[Item]:
     """Yield the items of a log, and after bus words the signals that ICDs find in them."""
     namer: Namer | None = None
     for item in items:

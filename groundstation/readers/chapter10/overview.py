@@ -12,8 +12,8 @@ import numpy as np
 from groundstation.readers.chapter10 import scan
 from groundstation.readers.chapter10.bus_words import TOPIC_429, TOPIC_1553
 from groundstation.readers.chapter10.kinds import ARINC_429, MIL_STD_1553, TIME, TMATS
-from groundstation.readers.chapter10.naming import Seen
-from groundstation.readers.chapter10.packets import NS_PER_COUNT, PacketBlock, Walk
+from groundstation.readers.chapter10.naming import SeenWords
+from groundstation.readers.chapter10.packets import NS_PER_COUNT, PacketBlock, PacketWalk
 from groundstation.readers.chapter10.timing import Reading, dates_in, reading
 from groundstation.readers.chapter10.tmats import Tmats, parse
 from groundstation.readers.source import Source
@@ -29,7 +29,7 @@ class RecordingOverview:
     tmats: Tmats = field(default_factory=Tmats)
     readings: list[Reading] = field(default_factory=list)
     dates: Counter[date] = field(default_factory=Counter)
-    seen: Seen = field(default_factory=Seen)
+    seen: SeenWords = field(default_factory=SeenWords)
 
 
 def overview(source: Source, *, with_buses: bool) -> RecordingOverview:
@@ -38,7 +38,7 @@ def overview(source: Source, *, with_buses: bool) -> RecordingOverview:
     Several TMATS packets in a row are one text. Reading what is on the buses (``with_buses``) takes longer.
     """
     found, texts, is_setup = RecordingOverview(), [], True
-    for block in Walk(source):
+    for block in PacketWalk(source):
         for packet in block.of(TMATS) if is_setup else ():
             texts.append(block.body(packet))
         is_setup = is_setup and bool(np.isin(block.packets[:, scan.TYPE], (TMATS, 0)).all() or not texts)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from groundstation.base.errors import UnreadableLogError
 from groundstation.base.records import Damage, Int64Array
 from groundstation.readers.chapter10 import kinds, scan
-from groundstation.readers.chapter10.tally import Tally
+from groundstation.readers.chapter10.tally import RecordingTally
 from groundstation.readers.dataflash.scan import magic_places
 from groundstation.readers.skipped import SkippedBytes
 from groundstation.readers.source import Source
@@ -62,7 +62,7 @@ class PacketBlock:
         return int.from_bytes(self.data[at - 4 : at].tobytes(), "little") if packet[scan.BODY_END] >= at else 0
 
 
-class Walk:
+class PacketWalk:
     """Iterator over the blocks of a recording; the damage is known at the end.
 
     Parameters
@@ -72,7 +72,7 @@ class Walk:
 
     def __init__(self, source: Source) -> None:
         self._source = source
-        self.tally = Tally()
+        self.tally = RecordingTally()
         self._skipped = SkippedBytes("packet")
         self._state = np.zeros(scan.STATE_SIZE, dtype=np.int64)
         self._state[scan.SKIP_START] = scan.NOWHERE

@@ -10,7 +10,7 @@ from groundstation.readers.chapter10.bus_words import bounded, messages_1553, wo
 from groundstation.readers.chapter10.kinds import ARINC_429, EVENT, MIL_STD_1553
 from groundstation.readers.chapter10.naming import named
 from groundstation.readers.chapter10.overview import RecordingOverview, overview
-from groundstation.readers.chapter10.packets import PacketBlock, Walk
+from groundstation.readers.chapter10.packets import PacketBlock, PacketWalk
 from groundstation.readers.chapter10.payloads import batch_of
 from groundstation.readers.chapter10.timing import start_of
 from groundstation.readers.chapter10.tmats import Tmats
@@ -40,7 +40,7 @@ def _recorded(source: Source, found: RecordingOverview) -> Iterator[Item]:
     start = start_of(found.readings, found.dates, found.tmats)
     facts = metadata(found.tmats)
     yield LogHeader(READER, facts, start.utc_of_zero_ns, has_counting_clock=True, utc_readings=start.readings)
-    walk, lost = Walk(source), dict[str, int]()
+    walk, lost = PacketWalk(source), dict[str, int]()
     for block in walk:
         for batch in _batches(block, found.tmats, lost):
             yield from bounded(batch)

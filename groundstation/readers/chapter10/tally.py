@@ -41,7 +41,7 @@ class _Sequence:
 
 
 @dataclass
-class Tally:
+class RecordingTally:
     """Counts of a whole recording."""
 
     packets: int = 0

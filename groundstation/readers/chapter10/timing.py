@@ -111,7 +111,7 @@ def dates_in(words: NDArray[np.uint32]) -> Counter[date]:
 
 
 @dataclass(frozen=True)
-class Start:
+class CounterZero:
     """UTC of the counter's zero, None when nothing tells it, and what was assumed.
 
     ``readings`` are there where the counter starts again (recordings joined end to end) or wraps: its zero is another
@@ -123,7 +123,7 @@ class Start:
     readings: UtcReadings | None = None
 
 
-def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) -> Start:
+def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) -> CounterZero:
     """Return the UTC of the counter's zero: the median over the readings of one channel.
 
     It is the channel that has most readings. If the time source was set in the recording, its last readings count. A
@@ -136,13 +136,13 @@ def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) ->
     '2011-12-09T00:00:55.000Z'
     """
     if not readings:
-        return Start(None, (Remark("no_time_packets", "no time packet: times are those of the counter, no UTC"),))
+        return CounterZero(None, (Remark("no_time_packets", "no time packet: times are those of the counter, no UTC"),))
     channels = Counter(one.channel for one in readings)
     chosen = min(channels, key=lambda channel: (-channels[channel], channel))
     used = [one for one in readings if one.channel == chosen]
     year, remarks = _year_of(used[0], dates, tmats)
     if year is None:
-        return Start(None, remarks)
+        return CounterZero(None, remarks)
     every = _every_zero(used, year)
     zeros = every[_last_start(used) :]
     zero = zero_of_readings(zeros)
@@ -161,7 +161,7 @@ def start_of(readings: Sequence[Reading], dates: Counter[date], tmats: Tmats) ->
     remarks = (Remark("utc_from_time_packets", text), *remarks, *parted, *behind.remarks, *others)
     places = np.array([one.place for one in used], dtype=np.int64)
     is_one = len(zeros) == len(every)
-    return Start(utc_ns, remarks, None if is_one else UtcReadings(places, every + shift_ns))
+    return CounterZero(utc_ns, remarks, None if is_one else UtcReadings(places, every + shift_ns))
 
 
 def _of_tmats(tmats: Tmats) -> tuple[OtherDate, ...]:

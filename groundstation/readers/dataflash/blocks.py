@@ -17,7 +17,7 @@ from groundstation.readers.dataflash.definitions import (
     FMT_BYTES,
     FMT_ID,
     HEADER_BYTES,
-    Definition,
+    RecordDefinition,
     fmt_definition,
     parse_fmt,
 )
@@ -45,16 +45,16 @@ class RecordBlock:
     types : ndarray of uint8, shape (n,)
     first_index : int
         Place of the first record among those of the file.
-    definitions : mapping of type id to Definition
+    definitions : mapping of type id to RecordDefinition
     """
 
     data: NDArray[np.uint8]
     offsets: Int64Array
     types: NDArray[np.uint8]
     first_index: int
-    definitions: dict[int, Definition]
+    definitions: dict[int, RecordDefinition]
 
-    def groups(self) -> Iterator[tuple[Definition, Int64Array]]:
+    def groups(self) -> Iterator[tuple[RecordDefinition, Int64Array]]:
         """Yield each record type that occurs, and the numbers of its records in the block.
 
         Records are numbered from 0; the numbers increase.
@@ -65,7 +65,7 @@ class RecordBlock:
         for type_id in np.flatnonzero(counts).tolist():
             yield self.definitions[type_id], order[ends[type_id] - counts[type_id] : ends[type_id]]
 
-    def records(self, definition: Definition, which: Int64Array) -> NDArray[Any]:
+    def records(self, definition: RecordDefinition, which: Int64Array) -> NDArray[Any]:
         """Records of one type as a structured array, shape (n,), copied from the block."""
         length = definition.length
         at_any_byte = np.ndarray((len(self.data) - length + 1,), f"V{length}", self.data.data, strides=(1,))
@@ -78,7 +78,7 @@ class _Places(NamedTuple):
     offsets: NDArray[np.uint32]
     types: NDArray[np.uint8]
     first_index: int
-    definitions: dict[int, Definition]
+    definitions: dict[int, RecordDefinition]
 
     @classmethod
     def of(cls, block: RecordBlock) -> "_Places":
@@ -97,7 +97,7 @@ class _Chunk(NamedTuple):
 
 
 @dataclass
-class Spans:
+class UnusedSpans:
     """Bytes of a log that belong to no record."""
 
     skipped: SkippedBytes
@@ -133,8 +133,8 @@ class Scanner:
 
     def __init__(self, source: Source) -> None:
         self._source = source
-        self.spans = Spans(SkippedBytes("record"))
-        self.refused: list[tuple[int, Definition]] = []
+        self.spans = UnusedSpans(SkippedBytes("record"))
+        self.refused: list[tuple[int, RecordDefinition]] = []
         self.refused_more = 0
         self._met = 0
         self.log_starts: list[int] = []  # places of the records with which further logs begin
@@ -249,7 +249,7 @@ class Scanner:
             self._state[scan.COUNT] = 0
             yield block
 
-    def _accepted(self, payload: bytes, types: NDArray[np.uint8], place: int) -> Definition | None:
+    def _accepted(self, payload: bytes, types: NDArray[np.uint8], place: int) -> RecordDefinition | None:
         """Return the definition of a FMT record if it is new and believed."""
         type_id = payload[0]
         if type_id == FMT_ID or self.payloads.get(type_id) == payload:
@@ -270,7 +270,7 @@ class Scanner:
         pending = types[: int(self._state[scan.COUNT])]
         return type_id in self.definitions and (bool(self._seen[type_id]) or bool((pending == type_id).any()))
 
-    def _define(self, new: Definition) -> None:
+    def _define(self, new: RecordDefinition) -> None:
         self.definitions[new.type_id] = new
         self._lengths[new.type_id] = new.length
         self._time_kind[new.type_id] = _time_kind(new)
@@ -290,7 +290,7 @@ class Scanner:
                 self.spans.skipped.add(self._base + skip_start, size, self._count)
 
 
-def _time_kind(definition: Definition) -> int:
+def _time_kind(definition: RecordDefinition) -> int:
     """Return the code by which the scan finds the time of a record of this type."""
     time = definition.time_field
     if time is None or definition.fields[0].name != time[0]:

@@ -88,7 +88,7 @@ class FieldSpec:
 
 
 @dataclass(frozen=True)
-class Definition:
+class RecordDefinition:
     """One record type as its FMT record defines it.
 
     Parameters
@@ -149,13 +149,13 @@ class Definition:
         return ("T", 1_000_000) if clock is not None and clock.is_integer else None
 
 
-def fmt_definition() -> Definition:
+def fmt_definition() -> RecordDefinition:
     """Return the definition of FMT records, which a log need not hold."""
     return parse(FMT_ID, FMT_BYTES, "FMT", "BBnNZ", ["Type", "Length", "Name", "Format", "Columns"])
 
 
 @lru_cache(maxsize=256)  # both passes over a log meet the same ones
-def parse_fmt(payload: bytes) -> Definition | None:
+def parse_fmt(payload: bytes) -> RecordDefinition | None:
     """Parse the payload of a FMT record into a definition.
 
     None when no record could have the length that it states.
@@ -166,7 +166,7 @@ def parse_fmt(payload: bytes) -> Definition | None:
     return parse(type_id, length, _text(name), _text(characters), _text(labels).split(","))
 
 
-def parse(type_id: int, length: int, name: str, characters: str, labels: Sequence[str]) -> Definition:
+def parse(type_id: int, length: int, name: str, characters: str, labels: Sequence[str]) -> RecordDefinition:
     """Return a definition from the parts of a FMT record; a contradiction is a ``fault``.
 
     Examples
@@ -183,7 +183,7 @@ def parse(type_id: int, length: int, name: str, characters: str, labels: Sequenc
     opaque = np.dtype((np.void, length))
     unknown = [character for character in characters if character not in _TYPES]
     if unknown:
-        return Definition(
+        return RecordDefinition(
             type_id, length, safe_name, (), opaque, f"the format has the unknown character {unknown[0]!r}"
         )
     formats = [np.dtype(_TYPES[character]) for character in characters]
@@ -193,11 +193,11 @@ def parse(type_id: int, length: int, name: str, characters: str, labels: Sequenc
     ]
     if offsets[-1] > length:
         fault = f"the format {characters} takes {offsets[-1]} bytes, the record has {length}"
-        return Definition(type_id, length, safe_name, (), opaque, fault)
+        return RecordDefinition(type_id, length, safe_name, (), opaque, fault)
     names = _distinct([*(label.strip() for label in labels), *([""] * len(formats))][: len(formats)])
     dtype = np.dtype({"names": names, "formats": formats, "offsets": offsets[:-1], "itemsize": length})
     fields = tuple(FieldSpec(label, character) for label, character in zip(names, characters, strict=True))
-    return Definition(type_id, length, safe_name, fields, dtype)
+    return RecordDefinition(type_id, length, safe_name, fields, dtype)
 
 
 def _distinct(labels: Sequence[str]) -> list[str]:
@@ -227,9 +227,9 @@ class Units:
 
     texts: dict[str, str] = field(default_factory=dict)
     multipliers: dict[str, float] = field(default_factory=dict)
-    of_definition: dict[Definition, tuple[str, str]] = field(default_factory=dict)
+    of_definition: dict[RecordDefinition, tuple[str, str]] = field(default_factory=dict)
 
-    def of(self, definition: Definition, name: str) -> Unit:
+    def of(self, definition: RecordDefinition, name: str) -> Unit:
         """Unit of a field; an empty one when the log gives none."""
         unit_ids, multiplier_ids = self.of_definition.get(definition, ("", ""))
         at = next((at for at, spec in enumerate(definition.fields) if spec.name == name), len(definition.fields))
@@ -246,7 +246,7 @@ class Units:
         value = self.multipliers.get(code)
         return value if value is not None and code != "?" and 0.0 < value < math.inf else None
 
-    def instance_field(self, definition: Definition) -> str | None:
+    def instance_field(self, definition: RecordDefinition) -> str | None:
         """Return the field that tells instances of a type apart (unit ``#``).
 
         None when there is none or it is a text.
@@ -256,7 +256,7 @@ class Units:
             return None
         return definition.fields[at].name
 
-    def describe(self, definition: Definition) -> str:
+    def describe(self, definition: RecordDefinition) -> str:
         """List the fields that have a unit, for people: ``"TimeUS s x 1e-06, GyrX rad/s"``.
 
         Implied scales are already in the values.

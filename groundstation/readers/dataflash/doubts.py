@@ -13,7 +13,7 @@ import numpy as np
 
 from groundstation.base.records import Damage
 from groundstation.readers.dataflash import rules
-from groundstation.readers.dataflash.definitions import FMT_DTYPE, Definition
+from groundstation.readers.dataflash.definitions import FMT_DTYPE, RecordDefinition
 from groundstation.readers.dataflash.rules import MOST_SENSORS, FieldRule
 
 _NAME = re.compile(rb"[A-Za-z][A-Za-z0-9_]{0,3}")
@@ -58,7 +58,7 @@ WANTED: Mapping[str, tuple[str, ...]] = MappingProxyType(
 
 
 def doubts(
-    payloads: Mapping[int, bytes], definitions: Mapping[int, Definition], counts: Mapping[int, int]
+    payloads: Mapping[int, bytes], definitions: Mapping[int, RecordDefinition], counts: Mapping[int, int]
 ) -> Iterator[Damage]:
     """Yield damage for types with a doubtful definition; it counts the records read by it.
 
@@ -66,7 +66,7 @@ def doubts(
     ----------
     payloads : mapping of type id to bytes
         The FMT records in force, without their headers.
-    definitions : mapping of type id to Definition
+    definitions : mapping of type id to RecordDefinition
     counts : mapping of type id to int
         Records by type.
     """
@@ -87,7 +87,7 @@ def odd_instances(counts: Mapping[str, int]) -> Iterator[Damage]:
             yield Damage("corrupt", topic, count, f"records of an instance {instance}, which no autopilot has", topic)
 
 
-def _fault(payload: bytes, definition: Definition) -> str:
+def _fault(payload: bytes, definition: RecordDefinition) -> str:
     """Return the part of a FMT record that no autopilot writes; empty where there is none."""
     record = np.frombuffer(payload, FMT_DTYPE, 1)[0]
     starts = {name: FMT_DTYPE.fields[name][1] for name in ("Name", "Format", "Columns")}  # type: ignore[index]
@@ -108,7 +108,7 @@ def _fault(payload: bytes, definition: Definition) -> str:
     return ""
 
 
-def _slip(definition: Definition, names: set[str]) -> str:
+def _slip(definition: RecordDefinition, names: set[str]) -> str:
     """Return a field, or the type, whose name is almost one that is expected and missing."""
     labels = [spec.name for spec in definition.fields]
     if labels and labels[0] not in _TIMES and any(_is_slip(labels[0], time) for time in _TIMES):

@@ -13,7 +13,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Damage, Int64Array
 from groundstation.readers.dataflash.blocks import RecordBlock, Scanner
-from groundstation.readers.dataflash.definitions import Definition, Units
+from groundstation.readers.dataflash.definitions import RecordDefinition, Units
 from groundstation.readers.dataflash.rules import FIX_3D, SPEED_SIGMA, UnknownUnits
 from groundstation.readers.dataflash.values import RecordRows, as_double, by_instance, rows_of
 
@@ -65,7 +65,7 @@ class DataflashOverview:
     Parameters
     ----------
     units : Units
-    types : mapping of str to Definition
+    types : mapping of str to RecordDefinition
         Types that have records which can be read, by name.
     sensors : tuple of (type, instance)
         Each type that has records; several entries where it has an instance field.
@@ -87,7 +87,7 @@ class DataflashOverview:
     """
 
     units: Units
-    types: Mapping[str, Definition]
+    types: Mapping[str, RecordDefinition]
     sensors: tuple[Unit, ...]
     split: frozenset[tuple[int, str]]
     parameters: Mapping[str, float]
@@ -116,8 +116,8 @@ class _Survey:
 
     def __init__(self) -> None:
         self._units = Units()
-        self._definitions: Mapping[int, Definition] = {}  # in force in the block at hand
-        self._types: dict[str, Definition] = {}
+        self._definitions: Mapping[int, RecordDefinition] = {}  # in force in the block at hand
+        self._types: dict[str, RecordDefinition] = {}
         self._instances: dict[tuple[int, str], set[int]] = {}
         self._parameters: dict[str, float] = {}
         self._messages: list[str] = []

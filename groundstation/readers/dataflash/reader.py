@@ -8,7 +8,7 @@ from groundstation.base.records import MAX_BATCH_ROWS, Damage, Item, LogHeader, 
 from groundstation.readers.dataflash.blocks import RecordBlock, Scanner
 from groundstation.readers.dataflash.canonical import Mapper
 from groundstation.readers.dataflash.choices import choose
-from groundstation.readers.dataflash.definitions import Definition
+from groundstation.readers.dataflash.definitions import RecordDefinition
 from groundstation.readers.dataflash.doubts import doubts, odd_instances
 from groundstation.readers.dataflash.facts import metadata, utc_of_power_up, utc_readings
 from groundstation.readers.dataflash.overview import DataflashOverview, overview
@@ -88,7 +88,7 @@ class _Topics:
         name = self._name(rows.definition)
         return f"raw.{name}" if rows.instance is None else f"raw.{name}.{rows.instance}"
 
-    def _name(self, definition: Definition) -> str:
+    def _name(self, definition: RecordDefinition) -> str:
         layout = (definition.type_id, definition.fields)
         name, copy = definition.name, 1
         while self._layouts.setdefault(name, layout) != layout:

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from groundstation.base.records import Damage
 from groundstation.base.units import CONVERSIONS
-from groundstation.readers.dataflash.definitions import Definition, Units
+from groundstation.readers.dataflash.definitions import RecordDefinition, Units
 
 # Unit of FMTU -> what it measures, and factor to the canonical unit.
 _UNITS: Mapping[str, tuple[str, float]] = MappingProxyType(
@@ -59,7 +59,7 @@ class FieldRule:
     multiplier: float = 1.0
     integer_multiplier: float | None = None
 
-    def scale(self, definition: Definition, units: Units) -> float | None:
+    def scale(self, definition: RecordDefinition, units: Units) -> float | None:
         """Return the factor from the values of the raw column to the canonical unit.
 
         None when the log's unit is unknown.
@@ -88,7 +88,7 @@ class FieldRule:
             multiplier = stated.multiplier
         return factor * multiplier
 
-    def passed_over(self, definition: Definition, units: Units) -> float | None:
+    def passed_over(self, definition: RecordDefinition, units: Units) -> float | None:
         """Return the log's multiplier of a float that is not applied; None without one."""
         spec, stated = definition.find(self.source), units.of(definition, self.source).multiplier
         assert spec is not None
@@ -103,7 +103,7 @@ class UnknownUnits:
     def __init__(self) -> None:
         self._counts: dict[tuple[str, str, str], int] = {}
 
-    def add(self, rule: FieldRule, definition: Definition, units: Units, count: int, topic: str) -> None:
+    def add(self, rule: FieldRule, definition: RecordDefinition, units: Units, count: int, topic: str) -> None:
         """Take in the values of a field in some records."""
         key = (f"{definition.name}.{rule.source}", units.of(definition, rule.source).text, topic)
         self._counts[key] = self._counts.get(key, 0) + count

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.angles import FloatArray
 from groundstation.base.records import Column, Int64Array
-from groundstation.readers.dataflash.definitions import Definition, FieldSpec
+from groundstation.readers.dataflash.definitions import FieldSpec, RecordDefinition
 
 LATEST_NS = 1 << 61  # 73 years after power-up: a time past it was not written by a clock
 
@@ -23,7 +23,7 @@ class RecordRows:
 
     Parameters
     ----------
-    definition : Definition
+    definition : RecordDefinition
     instance : int or None
         Which of several sensors; None where the type has no instance field.
     record_index : ndarray of int64, shape (n,)
@@ -32,7 +32,7 @@ class RecordRows:
     records : structured ndarray, shape (n,)
     """
 
-    definition: Definition
+    definition: RecordDefinition
     instance: int | None
     record_index: Int64Array
     time_ns: Column
@@ -66,7 +66,7 @@ class RecordRows:
         )
 
 
-def rows_of(definition: Definition, records: NDArray[Any], record_index: Int64Array) -> RecordRows:
+def rows_of(definition: RecordDefinition, records: NDArray[Any], record_index: Int64Array) -> RecordRows:
     """Rows of a type, all instances together."""
     return RecordRows(definition, None, record_index, device_time(definition, records), records)
 
@@ -79,7 +79,7 @@ def by_instance(rows: RecordRows, name: str) -> Iterator[RecordRows]:
         yield RecordRows(part.definition, value, part.record_index, part.time_ns, part.records)
 
 
-def device_time(definition: Definition, records: NDArray[Any]) -> Column:
+def device_time(definition: RecordDefinition, records: NDArray[Any]) -> Column:
     """Return times of records; absent without a clock, and where a number is no time."""
     if definition.time_field is None:
         return Column(np.zeros(len(records), dtype=np.int64), np.zeros(len(records), dtype=bool))

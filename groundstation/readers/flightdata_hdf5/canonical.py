@@ -78,7 +78,7 @@ _SAID: Mapping[str, str] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Feed:
+class ParameterFeed:
     """Parameter that feeds a field: value times factor."""
 
     parameter: Parameter
@@ -87,13 +87,13 @@ class Feed:
     way: Way
 
 
-def feeds_of(container: Container) -> tuple[dict[str, tuple[Feed, ...]], tuple[tuple[str, str], ...]]:
+def feeds_of(container: Container) -> tuple[dict[str, tuple[ParameterFeed, ...]], tuple[tuple[str, str], ...]]:
     """Return feeds by topic, the leading one first, and remarks by topic."""
     by_name = {parameter.name: parameter for parameter in container.parameters}
-    feeds: dict[str, tuple[Feed, ...]] = {}
+    feeds: dict[str, tuple[ParameterFeed, ...]] = {}
     remarks: list[tuple[str, str]] = []
     for topic, rules in RULES.items():
-        found: dict[str, Feed] = {}
+        found: dict[str, ParameterFeed] = {}
         for rule in rules:
             parameter = by_name.get(rule.parameter)
             if parameter is None or rule.field in found:
@@ -103,7 +103,7 @@ def feeds_of(container: Container) -> tuple[dict[str, tuple[Feed, ...]], tuple[t
             if factor is None or known is None:
                 remarks.append((topic, f"{parameter.name} is in {parameter.unit}, which is no unit of {rule.field}"))
                 continue
-            found[rule.field] = Feed(parameter, known, rule.sign * factor, rule.way)
+            found[rule.field] = ParameterFeed(parameter, known, rule.sign * factor, rule.way)
             if rule.parameter in _SAID:
                 remarks.append((topic, f"{rule.parameter} {_SAID[rule.parameter]}"))
         if found:
@@ -111,12 +111,12 @@ def feeds_of(container: Container) -> tuple[dict[str, tuple[Feed, ...]], tuple[t
     return feeds, tuple(remarks)
 
 
-def track_feed(container: Container) -> Feed | None:
+def track_feed(container: Container) -> ParameterFeed | None:
     """The parameter that gives the direction of the velocities, None where there is none."""
     known = field_of("gnss", "track_deg")
     assert known is not None
     found = next((one for one in container.parameters if one.name == TRACK), None)
-    return None if found is None or _factor(found.unit, "deg") != 1.0 else Feed(found, known, 1.0, "circle")
+    return None if found is None or _factor(found.unit, "deg") != 1.0 else ParameterFeed(found, known, 1.0, "circle")
 
 
 def _factor(unit: str, usual: str) -> float | None:
@@ -133,7 +133,7 @@ def _factor(unit: str, usual: str) -> float | None:
     return CONVERSIONS[found][1]
 
 
-def values_at(feed: Feed, times_ns: Int64Array) -> tuple[FloatArray, BoolArray]:
+def values_at(feed: ParameterFeed, times_ns: Int64Array) -> tuple[FloatArray, BoolArray]:
     """Return the values of a feed at given times, and where it has one.
 
     A value between samples needs both neighbours to be valid.

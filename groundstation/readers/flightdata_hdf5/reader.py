@@ -15,7 +15,7 @@ from groundstation.base.records import MAX_BATCH_ROWS, Column, Damage, Int64Arra
 from groundstation.base.signals import RAW_PREFIX
 from groundstation.base.source_units import PREFIX, units_entry
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.flightdata_hdf5.canonical import TRACK, Feed, feeds_of, track_feed, values_at
+from groundstation.readers.flightdata_hdf5.canonical import TRACK, ParameterFeed, feeds_of, track_feed, values_at
 from groundstation.readers.flightdata_hdf5.container import FAILURES, HIGHEST_RATE_HZ, Container, Parameter, opened
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.parts import bounded
@@ -141,7 +141,7 @@ def _raw_batches(topics: dict[str, Parameter], span: Span, losses: _Losses) -> I
 
 
 def _canonical_batches(
-    feeds: dict[str, tuple[Feed, ...]], track: Feed | None, span: Span, losses: _Losses
+    feeds: dict[str, tuple[ParameterFeed, ...]], track: ParameterFeed | None, span: Span, losses: _Losses
 ) -> Iterator[RecordBatch]:
     for topic, several in feeds.items():
         leader = several[0].parameter
@@ -225,7 +225,9 @@ class _Steps:
             yield Remark("quantised", text, "ins", ("latitude_deg", "longitude_deg"))
 
 
-def _remarks(feeds: dict[str, tuple[Feed, ...]], track: Feed | None, container: Container) -> Iterator[Remark]:
+def _remarks(
+    feeds: dict[str, tuple[ParameterFeed, ...]], track: ParameterFeed | None, container: Container
+) -> Iterator[Remark]:
     mapped = "; ".join(
         f"{topic} from {', '.join(one.parameter.name for one in several)}" for topic, several in feeds.items()
     )

@@ -12,7 +12,7 @@ from groundstation.readers.receiver.tally import (
     MOST_PITCH_DEG,
     MOST_ROLL_DEG,
     ZERO_POSITION,
-    Tally,
+    StreamTally,
 )
 
 DILUTIONS, MOST_DILUTION = ("gdop", "pdop", "hdop"), 99.985
@@ -20,7 +20,7 @@ HEADINGS = ("true_heading_deg", "magnetic_heading_deg")
 _MOST_DEG = {"roll_deg": MOST_ROLL_DEG, "pitch_deg": MOST_PITCH_DEG} | dict.fromkeys(HEADINGS, MOST_HEADING_DEG)
 
 
-def credible_position(columns: Columns, topic: str, places: Int64Array, tally: Tally) -> Columns:
+def credible_position(columns: Columns, topic: str, places: Int64Array, tally: StreamTally) -> Columns:
     """Drop positions that are no numbers, and the values of fixes at 0, 0.
 
     ``tally`` counts the fixes at 0, 0.
@@ -47,7 +47,7 @@ def credible_dilution(columns: Columns) -> Columns:
     return columns | {name: _without(one, one.values > MOST_DILUTION) for name, one in told.items()}
 
 
-def credible_attitude(columns: Columns, places: Int64Array, tally: Tally) -> Columns:
+def credible_attitude(columns: Columns, places: Int64Array, tally: StreamTally) -> Columns:
     """Drop impossible attitudes and bring headings into [0, 360).
 
     A row with one impossible angle keeps none of its angles.
@@ -58,7 +58,7 @@ def credible_attitude(columns: Columns, places: Int64Array, tally: Tally) -> Col
         Angles, degrees, as the device wrote them, and their sigmas; others are left as they are.
     places : ndarray of int64, shape (n,)
         Where the rows begin in the file.
-    tally : Tally
+    tally : StreamTally
         Counts the rows that were refused.
     """
     angles = [name for name in _MOST_DEG if name in columns]

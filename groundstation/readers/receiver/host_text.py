@@ -56,7 +56,7 @@ _GAP = r"[ T_,;\t-]{1,3}"
 
 
 @dataclass(frozen=True)
-class Clock:
+class HostClock:
     """Form in which a computer writes a time: its kind and a pattern.
 
     Kinds are :data:`DATE`, :data:`DAY` and :data:`ELAPSED`.
@@ -132,10 +132,10 @@ _PATTERNS = (
     (DAY, rf"(?<!\d){_TIME}"),
     (ELAPSED, r"(?<![\d.:-])(?P<seconds>\d{1,9})\.(?P<fraction>\d{1,9})(?![\d.:])"),
 )
-CLOCKS = tuple(Clock(kind, re.compile(text.encode())) for kind, text in _PATTERNS)
+CLOCKS = tuple(HostClock(kind, re.compile(text.encode())) for kind, text in _PATTERNS)
 
 
-def _clock_of(texts: list[bytes]) -> Clock | None:
+def _clock_of(texts: list[bytes]) -> HostClock | None:
     """Return the first clock that reads a time in nearly all texts."""
     least = _SHARE_WITH_TIME * len(texts)
     return next((one for one in CLOCKS if sum(one.read(text) is not None for text in texts) >= least), None)
@@ -151,7 +151,7 @@ class HostText:
         Shapes of the text in front of sentences and behind them.
     example : str
         The first such text, in front of sentences or behind them as ``clock_is_before`` says.
-    clock : Clock or None
+    clock : HostClock or None
         How the time in the text is written; None where it has none.
     clock_is_before : bool
         Whether that text stands in front of the sentences.
@@ -160,7 +160,7 @@ class HostText:
     before: frozenset[bytes]
     behind: frozenset[bytes]
     example: str
-    clock: Clock | None
+    clock: HostClock | None
     clock_is_before: bool
 
     @property

@@ -15,7 +15,7 @@ from groundstation.readers.receiver.nmea import SentenceEpochs
 from groundstation.readers.receiver.nmea_makers import makers_solution
 from groundstation.readers.receiver.sentence_layouts import STANDARD_POSITIONS
 from groundstation.readers.receiver.sentences import Sentences
-from groundstation.readers.receiver.tally import ASTRAY, MOST_SEPARATION_M, NOT_MEASURED, Tally
+from groundstation.readers.receiver.tally import ASTRAY, MOST_SEPARATION_M, NOT_MEASURED, StreamTally
 
 HEADING_FORMATTERS = ("PASHR", "HDT", "THS", "HDM")  # the first of which a log tells a heading is ``ins``
 _TWO_DIMENSIONS = 2
@@ -38,7 +38,7 @@ _RANKS = np.full(128, 2)
 _RANKS[[0, *map(ord, "NSMEAPDFR")]] = 0, 1, 3, 4, 5, 6, 7, 8, 9, 10
 
 
-def gnss_batch(epochs: SentenceEpochs, time: Column, tally: Tally) -> RecordBatch | None:
+def gnss_batch(epochs: SentenceEpochs, time: Column, tally: StreamTally) -> RecordBatch | None:
     """Return one row for each epoch that has a fix, or says that it has none."""
     columns = makers_solution(epochs)
     for formatter in STANDARD_POSITIONS:  # the last that has a position gives it
@@ -95,7 +95,7 @@ def _has_fix(formatter: str, found: Columns) -> BoolArray:
     return np.asarray(status.mask & (status.values == "A") & ~(mode.mask & (mode.values == "N")))
 
 
-def _add_heights(epochs: SentenceEpochs, columns: Columns, tally: Tally) -> None:
+def _add_heights(epochs: SentenceEpochs, columns: Columns, tally: StreamTally) -> None:
     """Add the heights of GGA or GNS, metres above the sea and above the ellipsoid.
 
     The latter needs the separation. Where the separation cannot be one the sum is the height above the ellipsoid all
@@ -202,7 +202,7 @@ def _has_satellites(sentences: Sentences) -> BoolArray:
     return sentences.columns["svid_01"].mask
 
 
-def _add_solution(epochs: SentenceEpochs, columns: Columns, tally: Tally) -> None:
+def _add_solution(epochs: SentenceEpochs, columns: Columns, tally: StreamTally) -> None:
     """Add the kind of the fix, and whether GNSS gives it.
 
     The latter is absent for a fix in two dimensions, which has no height either.
@@ -294,7 +294,7 @@ def _attitude(columns: Columns) -> Columns:
     return found
 
 
-def ins_batch(epochs: SentenceEpochs, address: str, time: Column, mode: str, tally: Tally) -> RecordBatch | None:
+def ins_batch(epochs: SentenceEpochs, address: str, time: Column, mode: str, tally: StreamTally) -> RecordBatch | None:
     """Attitude of the vehicle from the sentences with an address, one row each."""
     sentences = epochs.sentences.get(address)
     if sentences is None:

@@ -21,7 +21,7 @@ from groundstation.readers.receiver.layouts import layout
 from groundstation.readers.receiver.messages import Columns, Messages, MessagesByName, occupied
 from groundstation.readers.receiver.novatel_messages import LAYOUTS, VELOCITY_OF, name_of
 from groundstation.readers.receiver.stream import Frames
-from groundstation.readers.receiver.tally import Tally
+from groundstation.readers.receiver.tally import StreamTally
 from groundstation.readers.receiver.ubx import FIRST_WEEK, LAST_WEEK
 
 LONG = np.dtype(
@@ -63,7 +63,7 @@ def _fixes() -> NDArray[np.str_]:
 _FIXES = _fixes()
 
 
-class Timed(Messages):
+class TimedMessages(Messages):
     """Messages with the week and millisecond of their headers."""
 
     def time(self) -> Column:
@@ -89,7 +89,7 @@ class Timed(Messages):
         return self.places - self.frames.first_byte
 
 
-def messages_of(frames: Frames) -> Iterator[Timed]:
+def messages_of(frames: Frames) -> Iterator[TimedMessages]:
     """NovAtel messages of a block by name."""
     which = frames.of(scan.NOVATEL, scan.NOVATEL_SHORT)
     at, is_long = frames.offsets[which], frames.kinds[which] == scan.NOVATEL
@@ -105,7 +105,7 @@ def messages_of(frames: Frames) -> Iterator[Timed]:
     yield from _of_text(novatel_text.as_binary(frames))
 
 
-def _of_text(logs: novatel_text.TextLogs | None) -> Iterator[Timed]:
+def _of_text(logs: novatel_text.TextLogs | None) -> Iterator[TimedMessages]:
     """Logs that are text, by name."""
     if logs is None:
         return
@@ -115,7 +115,9 @@ def _of_text(logs: novatel_text.TextLogs | None) -> Iterator[Timed]:
         yield from _by_size(name, logs.frames, logs.offsets[rows], logs.payload_at[rows], logs.sizes[rows])
 
 
-def _by_size(name: str, frames: Frames, at: Int64Array, payload_at: Int64Array, sizes: Int64Array) -> Iterator[Timed]:
+def _by_size(
+    name: str, frames: Frames, at: Int64Array, payload_at: Int64Array, sizes: Int64Array
+) -> Iterator[TimedMessages]:
     """Yield messages by size of payload: those shorter than the layout apart."""
     known = layout(LAYOUTS[name]) if name in LAYOUTS else None
     is_short = sizes < (known.size if known is not None else 0)
@@ -124,7 +126,9 @@ def _by_size(name: str, frames: Frames, at: Int64Array, payload_at: Int64Array, 
         rows = np.flatnonzero(~is_short if size is None else is_short & (sizes == size))
         if len(rows):
             is_sound = not is_odd if size is None else known is not None and size >= known.needed
-            yield Timed(name, frames, frames.first_byte + at[rows], payload_at[rows], sizes[rows], known, is_sound)
+            yield TimedMessages(
+                name, frames, frames.first_byte + at[rows], payload_at[rows], sizes[rows], known, is_sound
+            )
 
 
 def epoch_start(frames: Frames) -> int:
@@ -147,10 +151,10 @@ def epoch_start(frames: Frames) -> int:
 
 
 @np.errstate(all="ignore")  # doubles of a device may be anything
-def gnss_batch(block: MessagesByName, leader: str, tally: Tally) -> RecordBatch | None:
+def gnss_batch(block: MessagesByName, leader: str, tally: StreamTally) -> RecordBatch | None:
     """Return one row for each position, with velocity and dilution of the same moment."""
     messages, fields = block.get(leader), block.fields(leader)
-    if not isinstance(messages, Timed) or fields is None:
+    if not isinstance(messages, TimedMessages) or fields is None:
         return None
     computed = fields["solution_status"] == _COMPUTED
     height, undulation = fields["orthometric_height"], fields["undulation"].astype(np.float64)
@@ -175,13 +179,13 @@ def gnss_batch(block: MessagesByName, leader: str, tally: Tally) -> RecordBatch 
 
 
 @np.errstate(all="ignore")
-def ins_batch(block: MessagesByName, source: str, tally: Tally) -> RecordBatch | None:
+def ins_batch(block: MessagesByName, source: str, tally: StreamTally) -> RecordBatch | None:
     """Return position, velocity and attitude of the receiver's inertial filter.
 
     For a HEADING message it is the heading of the receiver's two antennas.
     """
     messages, fields = block.get(source), block.fields(source)
-    if not isinstance(messages, Timed) or fields is None:
+    if not isinstance(messages, TimedMessages) or fields is None:
         return None
     if "HEADING" in source:
         columns = _two_antennas(fields)
@@ -194,7 +198,7 @@ def ins_batch(block: MessagesByName, source: str, tally: Tally) -> RecordBatch |
     return occupied("ins", messages.places, _solution_time(messages, fields), columns)
 
 
-def _solution_time(messages: Timed, fields: Mapping[str, NDArray[Any]]) -> Column:
+def _solution_time(messages: TimedMessages, fields: Mapping[str, NDArray[Any]]) -> Column:
     """Return the time of validity: the week and second inside the message, or of its header.
 
     Those of the header count where the message has none.
@@ -294,10 +298,10 @@ def _covariance(fields: Mapping[str, NDArray[Any]]) -> Columns:
     }
 
 
-def _joined(block: MessagesByName, leader: Timed, name: str, columns_of: Any) -> Columns:
+def _joined(block: MessagesByName, leader: TimedMessages, name: str, columns_of: Any) -> Columns:
     """Return columns of another message, on the rows of the leading one with its time."""
     other, fields = block.get(name), block.fields(name)
-    if not isinstance(other, Timed) or fields is None:
+    if not isinstance(other, TimedMessages) or fields is None:
         return {}
     (week, week_ms, known), (other_week, other_ms, other_known) = leader.header_time(), other.header_time()
     wanted, had = week * _MS_PER_WEEK + week_ms, np.where(other_known, other_week * _MS_PER_WEEK + other_ms, -1)

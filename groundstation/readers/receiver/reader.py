@@ -24,7 +24,7 @@ from groundstation.readers.receiver.novatel_messages import INS_SOURCES
 from groundstation.readers.receiver.overview import NAME, StreamOverview, overview, remarks
 from groundstation.readers.receiver.sentences import Sentences, by_address
 from groundstation.readers.receiver.stream import Frames, Stream
-from groundstation.readers.receiver.tally import Tally
+from groundstation.readers.receiver.tally import StreamTally
 from groundstation.readers.source import Source
 
 _WITH_CHECKSUM = re.compile(rb"[$!][A-Z][A-Z0-9]{2,29},[^\r\n$*]{0,500}\*[0-9A-Fa-f]{2}")
@@ -44,7 +44,7 @@ def items(source: Source) -> Iterator[Item]:
         raise UnreadableLogError(source.name, "no message or sentence of a receiver", "", "was it cut or damaged?")
     # Messages of one epoch come late and in any order, with times some microseconds apart: no step of the clock.
     yield LogHeader(NAME, found.metadata, 0 if found.is_absolute else None, has_counting_clock=True)
-    stream, tally = Stream(source, is_bare, _epoch_start_of(found), host.accepts if host else None), Tally()
+    stream, tally = Stream(source, is_bare, _epoch_start_of(found), host.accepts if host else None), StreamTally()
     days = nmea.DayTimes(found.anchors)
     for frames, sentences in found.blocks or ((frames, by_address(frames)) for frames in stream):
         yield from _of_block(frames, sentences, found, days, tally)
@@ -62,7 +62,7 @@ def _epoch_start_of(found: StreamOverview) -> Callable[[Frames], int]:
 
 
 def _of_block(
-    frames: Frames, sentences: dict[str, Sentences], found: StreamOverview, days: nmea.DayTimes, tally: Tally
+    frames: Frames, sentences: dict[str, Sentences], found: StreamOverview, days: nmea.DayTimes, tally: StreamTally
 ) -> Iterator[RecordBatch]:
     block = MessagesByName()
     for messages, time in ubx.timed(frames, found.anchors):
@@ -99,7 +99,7 @@ def _of_block(
 
 
 def _ins(
-    block: MessagesByName, epochs: nmea.SentenceEpochs, time: Column, found: StreamOverview, tally: Tally
+    block: MessagesByName, epochs: nmea.SentenceEpochs, time: Column, found: StreamOverview, tally: StreamTally
 ) -> RecordBatch | None:
     if not found.attitude:
         return None

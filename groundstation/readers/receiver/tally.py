@@ -37,7 +37,7 @@ _LENGTHS = {
 
 
 @dataclass
-class Tally:
+class StreamTally:
     """Counts of odd rows, messages and cells by kind, each with the byte of the first.
 
     Parameters

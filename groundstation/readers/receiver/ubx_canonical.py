@@ -14,7 +14,7 @@ from groundstation.base.records import BoolArray, Column, Int64Array, RecordBatc
 from groundstation.readers.layout import velocity_from_track
 from groundstation.readers.receiver.credible import credible_attitude, credible_dilution, credible_position
 from groundstation.readers.receiver.messages import Columns, MessagesByName, occupied
-from groundstation.readers.receiver.tally import MOVING_MPS, Tally
+from groundstation.readers.receiver.tally import MOVING_MPS, StreamTally
 from groundstation.readers.receiver.times import Anchors
 from groundstation.readers.receiver.ubx import time_of
 
@@ -35,7 +35,7 @@ SAME_DEG = 2e-5
 INS_MODE = "gnss_aided"
 
 
-def gnss_batch(block: MessagesByName, leader: str, anchors: Anchors, tally: Tally) -> RecordBatch | None:
+def gnss_batch(block: MessagesByName, leader: str, anchors: Anchors, tally: StreamTally) -> RecordBatch | None:
     """Return one row for each epoch, from the leading message and others.
 
     The others are of the same solution and time of the week.
@@ -57,7 +57,7 @@ def gnss_batch(block: MessagesByName, leader: str, anchors: Anchors, tally: Tall
     return occupied("gnss", messages.places, time_of(messages, anchors), columns)
 
 
-def ins_batch(block: MessagesByName, source: str, anchors: Anchors, tally: Tally) -> RecordBatch | None:
+def ins_batch(block: MessagesByName, source: str, anchors: Anchors, tally: StreamTally) -> RecordBatch | None:
     """Return the attitude of the vehicle from the message that states it.
 
     Position and velocity stay those of ``gnss``.

@@ -14,14 +14,14 @@ from groundstation.base.geodesy import has_position
 from groundstation.base.records import BoolArray, Column
 from groundstation.base.units import DEG_PER_RAD, MPS2_PER_G, NT_PER_GAUSS
 from groundstation.readers.layout import velocity_from_track, wind_from_direction
-from groundstation.readers.mapping import Columns, Numbers, Role, SourceRule, direction, pressure_altitude
+from groundstation.readers.mapping import Columns, NumericColumns, Role, SourceRule, direction, pressure_altitude
 
 UNKNOWN_16 = 65_535.0
 ARMED, ON_GROUND = 128, 1
 _2D_FIX, _3D_FIX = 2.0, 3.0
 
 
-def attitude(rows: Numbers) -> Columns:
+def attitude(rows: NumericColumns) -> Columns:
     """Roll, pitch, heading and rates."""
     angles = {
         name: Column(rows[source] * DEG_PER_RAD) for name, source in (("roll_deg", "roll"), ("pitch_deg", "pitch"))
@@ -35,7 +35,7 @@ def attitude(rows: Numbers) -> Columns:
     }
 
 
-def global_position(rows: Numbers) -> Columns:
+def global_position(rows: NumericColumns) -> Columns:
     """Position and velocity of the autopilot's filter; zeros before it has a position."""
     known = has_position(rows["lat"] * 1e-7, rows["lon"] * 1e-7)
     return {
@@ -48,7 +48,7 @@ def global_position(rows: Numbers) -> Columns:
     }
 
 
-def gnss(rows: Numbers) -> Columns:
+def gnss(rows: NumericColumns) -> Columns:
     """Return the fix of a receiver; unknown values are the largest number, or zero."""
     has_fix = rows["fix_type"] >= _2D_FIX
     has_track = has_fix & (rows["cog"] != UNKNOWN_16) & (rows["vel"] != UNKNOWN_16)
@@ -72,25 +72,25 @@ def gnss(rows: Numbers) -> Columns:
     return columns
 
 
-def imu(rows: Numbers) -> Columns:
+def imu(rows: NumericColumns) -> Columns:
     """Specific force in milli-g, rates in milliradians per second."""
     columns = {f"accel_{axis}_mps2": Column(rows[f"{axis}acc"] * 1e-3 * MPS2_PER_G) for axis in "xyz"}
     return columns | {f"rate_{axis}_dps": Column(rows[f"{axis}gyro"] * 1e-3 * DEG_PER_RAD) for axis in "xyz"}
 
 
-def field(rows: Numbers) -> Columns:
+def field(rows: NumericColumns) -> Columns:
     """Return the magnetic field from milligauss; zeros without a compass are absent."""
     known: BoolArray = (rows["xmag"] != 0.0) | (rows["ymag"] != 0.0) | (rows["zmag"] != 0.0)
     axes = zip("xyz", ("forward", "right", "down"), strict=True)
     return {f"field_{name}_nt": Column(rows[f"{axis}mag"] * 1e-3 * NT_PER_GAUSS, known) for axis, name in axes}
 
 
-def pressure(rows: Numbers) -> Columns:
+def pressure(rows: NumericColumns) -> Columns:
     """Pressure in hectopascal, as altitude in the standard atmosphere."""
     return pressure_altitude(rows["press_abs"] * 100.0)
 
 
-def battery(rows: Numbers) -> Columns:
+def battery(rows: NumericColumns) -> Columns:
     """Return the current of the first battery; -1 is absent."""
     known = rows["current_battery"] >= 0.0
     if "id" in rows:
@@ -98,13 +98,13 @@ def battery(rows: Numbers) -> Columns:
     return {"current_a": Column(rows["current_battery"] * 0.01, known)}
 
 
-def wind(rows: Numbers) -> Columns:
+def wind(rows: NumericColumns) -> Columns:
     """Return the wind velocity from the direction the wind blows from."""
     north, east = wind_from_direction(rows["direction"], rows["speed"])
     return {"wind_north_mps": Column(north), "wind_east_mps": Column(east)}
 
 
-def landed(rows: Numbers) -> Columns:
+def landed(rows: NumericColumns) -> Columns:
     """Return weight on wheels by the autopilot; 0 is unknown."""
     return {"weight_on_wheels": Column(rows["landed_state"] == ON_GROUND, rows["landed_state"] != 0.0)}
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from groundstation.base.records import BoolArray, Column, Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.clock_offsets import Jump, Offsets, offsets_by
-from groundstation.readers.tlog.dialect import Message, messages
+from groundstation.readers.clock_offsets import ClockJump, Offsets, offsets_by
+from groundstation.readers.tlog.dialect import DialectMessage, messages
 from groundstation.readers.tlog.frames import FrameBlock
 from groundstation.readers.two_clocks import (
     FEWEST_READINGS,
@@ -57,7 +57,7 @@ class TimeField:
     is_short: bool
 
     @classmethod
-    def of(cls, message: Message) -> "TimeField | None":
+    def of(cls, message: DialectMessage) -> "TimeField | None":
         """Return the time field of a message, None without one."""
         units = {"time_boot_ms": NS_PER_MS, "time_boot_us": NS_PER_US, "time_usec": NS_PER_US}
         for name, unit_ns in units.items():
@@ -207,7 +207,7 @@ class SenderClock:
 
 
 @dataclass(frozen=True, eq=False)
-class Clocks:
+class TlogClocks:
     """Clocks of all senders of a log.
 
     Parameters
@@ -254,7 +254,7 @@ class ClockSurvey:
         self._readers: dict[tuple[int, int], TimeReader] = {}
         self._readings: dict[Key, ClockReadings] = {}
         self._utc: dict[int, ClockReadings] = {}
-        self._jumps: list[Jump] = []
+        self._jumps: list[ClockJump] = []
         self._last: tuple[int, int] | None = None
 
     def take(self, block: FrameBlock) -> None:
@@ -301,10 +301,10 @@ class ClockSurvey:
         odd = np.flatnonzero((changes < -NS_PER_S) | (changes > RECEIPT_STEP_S * NS_PER_S))
         for at in odd[: MOST_JUMPS - len(self._jumps)].tolist():
             records, times = index[at : at + 2].tolist(), time_ns[at : at + 2].tolist()
-            self._jumps.append(Jump(records[1], *records, *times))
+            self._jumps.append(ClockJump(records[1], *records, *times))
         self._last = int(index[-1]), int(time_ns[-1])
 
-    def clocks(self, vehicle: int) -> Clocks:
+    def clocks(self, vehicle: int) -> TlogClocks:
         """Return the clocks that were found."""
         tracks = {key: readings.all() for key, readings in self._readings.items()}
         parted: dict[int, list[ClockStretch]] = {}
@@ -323,7 +323,7 @@ class ClockSurvey:
         senders = {sender: self._clock_of(key, parted[sender], tracks, offsets) for sender, key in found.items()}
         by = {sender: tracks[key] for sender, key in found.items()}
         ground_ns = _ground_ns(senders, by, vehicle)
-        return Clocks(senders, offsets.plus(ground_ns), ground_ns)
+        return TlogClocks(senders, offsets.plus(ground_ns), ground_ns)
 
     def _ranked(self, sender: int, tracks: Mapping[Key, ReadingSequence]) -> list[Key]:
         """Rank the messages that may serve as the clock of a sender, the best first."""

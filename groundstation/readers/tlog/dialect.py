@@ -33,7 +33,7 @@ _DTYPES = {
 
 
 @dataclass(frozen=True)
-class Message:
+class DialectMessage:
     """Layout of one message: its dtype, its text fields, and its arrays with their length."""
 
     name: str
@@ -43,7 +43,7 @@ class Message:
 
 
 @cache
-def messages() -> dict[int, Message]:
+def messages() -> dict[int, DialectMessage]:
     """Layouts by number of message: common and ArduPilot's own.
 
     Raises
@@ -74,7 +74,7 @@ def _map() -> dict[int, Any]:
     return found
 
 
-def _message(kind: Any) -> Message:
+def _message(kind: Any) -> DialectMessage:
     by_name = dict(zip(kind.fieldnames, zip(kind.fieldtypes, range(len(kind.fieldnames)), strict=True), strict=True))
     fields: list[Any] = []
     texts, arrays = set(), {}
@@ -89,4 +89,4 @@ def _message(kind: Any) -> Message:
             fields.append((name, _DTYPES[type_name], (length,)))
         else:
             fields.append((name, _DTYPES[type_name]))
-    return Message(kind.msgname, np.dtype(fields), frozenset(texts), arrays)
+    return DialectMessage(kind.msgname, np.dtype(fields), frozenset(texts), arrays)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.base.records import Column, Int64Array
-from groundstation.readers.tlog.dialect import Message
+from groundstation.readers.tlog.dialect import DialectMessage
 
 _NS_PER_US = 1_000
 _MOST_US = (1 << 62) // _NS_PER_US
@@ -62,7 +62,7 @@ class FrameBlock:
         for sender, groups in groupby(self.groups, key=itemgetter(0)):
             yield sender, [(number, which) for _sender, number, which in groups]
 
-    def rows(self, which: Int64Array, message: Message) -> NDArray[Any]:
+    def rows(self, which: Int64Array, message: DialectMessage) -> NDArray[Any]:
         """Return the frames of one message as records.
 
         A payload of version 2 leaves out the zeros at its end.
@@ -72,7 +72,7 @@ class FrameBlock:
             self._rows[key] = self._read(which, message)
         return self._rows[key]
 
-    def _read(self, which: Int64Array, message: Message) -> NDArray[Any]:
+    def _read(self, which: Int64Array, message: DialectMessage) -> NDArray[Any]:
         size = message.dtype.itemsize
         places, lengths = self.frames[which, 3], np.minimum(self.frames[which, 4], size)
         if lengths.min(initial=size) == size:

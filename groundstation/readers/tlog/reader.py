@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from groundstation.base.geodesy import NO_POSITION
 from groundstation.base.records import Column, Damage, Int64Array, Item, LogHeader, Remark
 from groundstation.base.signals import EVENT_SEPARATOR, RAW_PREFIX
-from groundstation.readers.mapping import Assignment, Offer, assigned, mapped
+from groundstation.readers.mapping import Assignment, OfferedMessages, assigned, mapped
 from groundstation.readers.parts import TopicPart, bounded, merged, occupied, one_row_each
 from groundstation.readers.places import placed
 from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 from groundstation.readers.tlog.canonical import ARMED, INSTANCES, ROLES
-from groundstation.readers.tlog.clock import Clocks, ClockSurvey
-from groundstation.readers.tlog.dialect import Message, crc_extras, messages
+from groundstation.readers.tlog.clock import ClockSurvey, TlogClocks
+from groundstation.readers.tlog.dialect import DialectMessage, crc_extras, messages
 from groundstation.readers.tlog.frames import FrameBlock
 from groundstation.readers.tlog.timer import Timer
 
@@ -149,7 +149,7 @@ def _with_next(blocks: Iterable[FrameBlock]) -> Iterator[tuple[FrameBlock, Frame
         yield before, None
 
 
-def _survey(frames: Iterable[FrameBlock]) -> tuple[int, dict[str, frozenset[str]], Clocks]:
+def _survey(frames: Iterable[FrameBlock]) -> tuple[int, dict[str, frozenset[str]], TlogClocks]:
     """Find the vehicle, the columns of its messages, and the clocks of all senders.
 
     The vehicle (system x 256 + component) is the one that tells its attitude most often.
@@ -170,7 +170,7 @@ def _survey(frames: Iterable[FrameBlock]) -> tuple[int, dict[str, frozenset[str]
     return vehicle, columns, clocks.clocks(vehicle)
 
 
-def _part(block: FrameBlock, which: Int64Array, message: Message, validity_ns: Int64Array | None) -> TopicPart:
+def _part(block: FrameBlock, which: Int64Array, message: DialectMessage, validity_ns: Int64Array | None) -> TopicPart:
     """Columns of one message's frames."""
     rows_of = block.rows(which, message)
     columns: dict[str, Column] = {}
@@ -191,7 +191,7 @@ def _part(block: FrameBlock, which: Int64Array, message: Message, validity_ns: I
 def _served(met: Mapping[str, frozenset[str]]) -> dict[str, list[Assignment]]:
     """Return, by message name, the canonical topics that messages with these columns feed."""
     names = {INSTANCES.get(name, (name, 0)): name for name in met}
-    offers = [Offer(*source, met[name]) for source, name in names.items()]
+    offers = [OfferedMessages(*source, met[name]) for source, name in names.items()]
     served: dict[str, list[Assignment]] = {}
     for one in assigned(ROLES, offers):
         served.setdefault(names[one.offer.source, one.offer.instance], []).append(one)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
-from groundstation.readers.tlog.clock import NS_PER_US, Clocks, TimeReader, time_fields
+from groundstation.readers.tlog.clock import NS_PER_US, TimeReader, TlogClocks, time_fields
 from groundstation.readers.tlog.frames import FrameBlock
 
 MOST_LATE_S = 600.0
@@ -26,7 +26,7 @@ class Timer:
         How late a frame arrived at most, so far.
     """
 
-    def __init__(self, clocks: Clocks) -> None:
+    def __init__(self, clocks: TlogClocks) -> None:
         self.most_late_ns = 0
         self._clocks = clocks
         self._readers: dict[tuple[int, int], TimeReader] = {}

@@ -15,7 +15,7 @@ from groundstation.base.records import Damage, Int64Array
 from groundstation.readers.skipped import SkippedBytes, bytes_place
 from groundstation.readers.source import Source
 from groundstation.readers.ulog import scan
-from groundstation.readers.ulog.formats import Flattener, Format, TopicLayout, parse_format
+from groundstation.readers.ulog.formats import Flattener, MessageFormat, TopicLayout, parse_format
 from groundstation.readers.ulog.messages import FILE_HEADER_BYTES, FLAGS_BYTES, MAGIC, FlagBits, flag_bits, text_of
 
 BLOCK_BYTES = 8 << 20
@@ -112,7 +112,7 @@ class Definitions:
         self.least = np.zeros(IDS, dtype=np.int64)
         self.most = np.full(IDS, scan.NOT_SUBSCRIBED, dtype=np.int64)
         self.number = np.full(IDS, NOT_SUBSCRIBED, dtype=np.int64)
-        self._formats: dict[str, Format] = {}
+        self._formats: dict[str, MessageFormat] = {}
         self._flattener = Flattener(self._formats)
         self._layouts: dict[str, TopicLayout] = {}
         self._known: dict[tuple[str, int], Topic] = {}
@@ -167,7 +167,7 @@ def flags_of(source: Source) -> FlagBits | None:
     return flags if scan.leads_on(head, flags.end, len(head), none.least, none.most) else None
 
 
-class Walk:
+class MessageWalk:
     """One pass over the messages of a log.
 
     Parameters

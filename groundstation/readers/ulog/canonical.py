@@ -16,7 +16,7 @@ from groundstation.base.records import Column
 from groundstation.base.units import DEG_PER_RAD, NT_PER_GAUSS
 from groundstation.readers.mapping import (
     Columns,
-    Numbers,
+    NumericColumns,
     Role,
     SourceRule,
     direction,
@@ -50,7 +50,7 @@ class TopicRows:
             return np.asarray(self._rows[name].astype(np.float64))
 
 
-def _vector(fields: tuple[str, str, str], name: str, factor: float) -> Callable[[Numbers], Columns]:
+def _vector(fields: tuple[str, str, str], name: str, factor: float) -> Callable[[NumericColumns], Columns]:
     return scaled({field: (f"{name}[{axis}]", factor) for axis, field in enumerate(fields)})
 
 
@@ -58,7 +58,7 @@ def _rule(source: str, fields: Mapping[str, tuple[str, float]], **derived: str) 
     return SourceRule(source, tuple(name for name, _factor in fields.values()), scaled(fields), derived)
 
 
-def attitude_from_quaternion(rows: Numbers) -> Columns:
+def attitude_from_quaternion(rows: NumericColumns) -> Columns:
     """Return roll, pitch and heading of the quaternion ``q`` (w, x, y, z).
 
     ``q`` turns body forward-right-down into north-east-down. A quaternion whose length is not one counts as missing:
@@ -78,7 +78,7 @@ def attitude_from_quaternion(rows: Numbers) -> Columns:
         }
 
 
-def attitude_from_angles(rows: Numbers) -> Columns:
+def attitude_from_angles(rows: NumericColumns) -> Columns:
     """Roll, pitch and heading that PX4 logged as angles (before 1.5)."""
     with np.errstate(invalid="ignore", over="ignore"):
         heading = direction(rows["yaw"] * DEG_PER_RAD)
@@ -86,7 +86,7 @@ def attitude_from_angles(rows: Numbers) -> Columns:
     return {"roll_deg": Column(roll), "pitch_deg": Column(pitch), "true_heading_deg": heading}
 
 
-def local_velocity(rows: Numbers) -> Columns:
+def local_velocity(rows: NumericColumns) -> Columns:
     """Velocity of ``vehicle_local_position``, absent where the filter calls it invalid."""
     level, vertical = holds(rows, "v_xy_valid"), holds(rows, "v_z_valid")
     return {
@@ -96,7 +96,7 @@ def local_velocity(rows: Numbers) -> Columns:
     }
 
 
-def global_position(rows: Numbers) -> Columns:
+def global_position(rows: NumericColumns) -> Columns:
     """Position of ``vehicle_global_position``; its flags of validity came with PX4 1.16."""
     level, vertical = holds(rows, "lat_lon_valid"), holds(rows, "alt_valid")
     columns = {"latitude_deg": Column(rows["lat"], level), "longitude_deg": Column(rows["lon"], level)}
@@ -104,7 +104,7 @@ def global_position(rows: Numbers) -> Columns:
     return columns | {field: Column(rows[name], vertical) for field, name in names.items() if name in rows}
 
 
-def gnss(rows: Numbers) -> Columns:
+def gnss(rows: NumericColumns) -> Columns:
     """Fix of a satellite receiver; position and velocity are absent where there is no fix."""
     fix = rows["fix_type"] >= _2D_FIX
     velocity = holds(rows, "vel_ned_valid")
@@ -151,18 +151,18 @@ _GNSS_FIELDS: Mapping[str, tuple[tuple[str, float], ...]] = {
 _NEVER_ZERO = ("hdop", "velocity_sigma_mps")  # a driver that does not know them leaves 0
 
 
-def _air_data(rows: Numbers) -> Columns:
+def _air_data(rows: NumericColumns) -> Columns:
     return pressure_altitude(rows["baro_pressure_pa"])
 
 
-def _barometer(rows: Numbers) -> Columns:
+def _barometer(rows: NumericColumns) -> Columns:
     pressure = rows["pressure"]
     with np.errstate(invalid="ignore"):
         pascals = np.where(pressure < _HPA_BELOW, pressure * 100.0, pressure)
     return pressure_altitude(pascals)
 
 
-def _wind(rows: Numbers) -> Columns:
+def _wind(rows: NumericColumns) -> Columns:
     """Wind of the filter; a variance of 0 is that of a filter that has not started."""
     known = None
     for north, east in (("variance_north", "variance_east"), ("covariance_north", "covariance_east")):
@@ -172,19 +172,19 @@ def _wind(rows: Numbers) -> Columns:
     return {field: Column(rows[name], known) for field, name in names.items()}
 
 
-def _current(rows: Numbers) -> Columns:
+def _current(rows: NumericColumns) -> Columns:
     current = rows["current_a"]
     return {"current_a": Column(current, current != _UNKNOWN_CURRENT)}
 
 
-def _height(rows: Numbers) -> Columns:
+def _height(rows: NumericColumns) -> Columns:
     present = rows["orientation"] == _DOWNWARD
     if "signal_quality" in rows:
         present &= rows["signal_quality"] != 0.0
     return {"height_m": Column(rows["current_distance"], present)}
 
 
-def _landed(rows: Numbers) -> Columns:
+def _landed(rows: NumericColumns) -> Columns:
     landed = holds(rows, "landed")
     return {"weight_on_wheels": Column(landed)} if landed is not None else {}
 
@@ -212,7 +212,7 @@ def _while_there(sensor: str, rule: SourceRule) -> SourceRule:
     """
     mark = f"{sensor}_timestamp_relative"
 
-    def columns(rows: Numbers) -> Columns:
+    def columns(rows: NumericColumns) -> Columns:
         found = rule.columns(rows)
         if mark not in rows:
             return found

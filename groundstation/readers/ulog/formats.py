@@ -32,7 +32,7 @@ class FormatField:
 
 
 @dataclass(frozen=True)
-class Format:
+class MessageFormat:
     """A message format: name and fields."""
 
     name: str
@@ -101,7 +101,7 @@ class TopicLayout:
         return next((c.offset for c in self.columns if c.name == TIMESTAMP and c.type == "uint64_t"), None)
 
 
-def parse_format(text: str) -> Format:
+def parse_format(text: str) -> MessageFormat:
     """Read a format definition.
 
     Raises
@@ -126,7 +126,7 @@ def parse_format(text: str) -> Format:
         fields.append(FormatField(kind, None if count is None else int(count), field_name))
     if not (colon and name and fields):
         raise GroundstationError(f"format {text[:80]!r}", "no name or no fields")
-    return Format(name, tuple(fields))
+    return MessageFormat(name, tuple(fields))
 
 
 class Flattener:
@@ -141,7 +141,7 @@ class Flattener:
     ([('timestamp', 0), ('of[0].a', 8), ('of[1].a', 16), ('ok', 24)], 25)
     """
 
-    def __init__(self, formats: Mapping[str, Format]) -> None:
+    def __init__(self, formats: Mapping[str, MessageFormat]) -> None:
         self._formats = formats
         self._steps = 0
         self._offset = 0

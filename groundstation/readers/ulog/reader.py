@@ -28,7 +28,7 @@ from groundstation.readers.mapping import mapped
 from groundstation.readers.parts import TopicPart, bounded, merged, occupied
 from groundstation.readers.places import nowhere, placed
 from groundstation.readers.source import Source
-from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, Topic, UlogBlock, Walk
+from groundstation.readers.ulog.blocks import NOT_SUBSCRIBED, MessageWalk, Topic, UlogBlock
 from groundstation.readers.ulog.canonical import MODE_NAMES, MODES, TopicRows
 from groundstation.readers.ulog.formats import TIMESTAMP
 from groundstation.readers.ulog.survey import UlogOverview, overview
@@ -68,12 +68,12 @@ class _Losses:
 
 def items(source: Source, reader_name: str, start_us: int) -> Iterator[Item]:
     """Yield the items of a log; ``start_us`` is when its header says that logging began."""
-    walk = Walk(source)
+    walk = MessageWalk(source)
     kept = deque(walk) if walk.may_be_kept else None
     found = overview(walk if kept is None else kept, walk.definitions)
     yield LogHeader(reader_name, found.metadata, found.utc_of_zero_ns, has_counting_clock=True)
     if kept is None:
-        walk = Walk(source)
+        walk = MessageWalk(source)
     losses = _Losses()
     texts = TextTopics(start_us if start_us <= MAX_TIME_US else 0)
     raw, canonical = _RawTopics(losses, found.odd_flags), _CanonicalTopics(losses, found)

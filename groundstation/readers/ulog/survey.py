@@ -10,11 +10,11 @@ import numpy as np
 
 from groundstation.base.errors import GroundstationError
 from groundstation.base.records import Remark
-from groundstation.readers.mapping import Assignment, Offer, assigned
+from groundstation.readers.mapping import Assignment, OfferedMessages, assigned
 from groundstation.readers.ulog.blocks import Definitions, Topic, UlogBlock
 from groundstation.readers.ulog.canonical import ARMING, ROLES
 from groundstation.readers.ulog.messages import Keyed, keyed, release_text
-from groundstation.readers.ulog.utc import FIX_3D, Clocks
+from groundstation.readers.ulog.utc import FIX_3D, UtcCollector
 
 MAX_METADATA = 200
 MAX_METADATA_CHARACTERS = 256
@@ -51,7 +51,7 @@ class UlogOverview:
 def overview(blocks: Iterable[UlogBlock], definitions: Definitions) -> UlogOverview:
     """Go through the blocks of a log once; ``definitions`` are those of their walk."""
     with_data: set[int] = set()
-    found, clocks = UlogOverview(), Clocks()
+    found, clocks = UlogOverview(), UtcCollector()
     for block in blocks:
         occurring = np.flatnonzero(np.bincount(block.topic[block.topic >= 0])).tolist()
         with_data.update(occurring)
@@ -92,7 +92,7 @@ def _assign(found: UlogOverview, topics: list[Topic]) -> None:
     """Choose the rule of each role among topics with data; of receivers those with a fix."""
     silent = _RECEIVERS - found.fixed if found.fixed else frozenset()
     offers = [
-        Offer(topic.name, topic.instance, topic.layout.names)
+        OfferedMessages(topic.name, topic.instance, topic.layout.names)
         for topic in topics
         if topic.layout is not None and topic.name not in silent
     ]
@@ -105,7 +105,7 @@ def _assign(found: UlogOverview, topics: list[Topic]) -> None:
             break
 
 
-def _note_facts(block: UlogBlock, metadata: dict[str, str], clocks: Clocks) -> None:
+def _note_facts(block: UlogBlock, metadata: dict[str, str], clocks: UtcCollector) -> None:
     for _number, kind, body in block.controls():
         if kind in "LC":
             clocks.heed_line(kind, body)

@@ -44,7 +44,7 @@ class _OwnClock:
 
 
 @dataclass(frozen=True)
-class PowerUp:
+class PowerUpTime:
     """UTC of power-up in nanoseconds, None where nothing states it, and remarks."""
 
     utc_ns: int | None = None
@@ -52,7 +52,7 @@ class PowerUp:
 
 
 @dataclass
-class Clocks:
+class UtcCollector:
     """Collector of what states UTC, block by block."""
 
     _told: dict[str, list[Int64Array]] = field(default_factory=dict)  # UTC and device time of fixes, microseconds
@@ -94,13 +94,13 @@ class Clocks:
             line = logged_text(body, kind == "C")
             self._line = (line.text, line.timestamp_us) if _LOG_NAME.search(line.text) else None
 
-    def power_up(self, release: str) -> PowerUp:
+    def power_up(self, release: str) -> PowerUpTime:
         """Return UTC of power-up by the surest clock; ``release`` is the firmware's version."""
         own = self._own()
         told = {name: np.concatenate(self._told[name], axis=1) for name in sorted(self._told, key=_rank)}
         told = {name: one for name, one in told.items() if _is_dated(one[0])}
         if not told:
-            return PowerUp() if own is None else _dated(own.zero_ns, own.moment_ns, (own.remark,), release, ())
+            return PowerUpTime() if own is None else _dated(own.zero_ns, own.moment_ns, (own.remark,), release, ())
         receivers = {name: told_at_zero(*one) for name, one in told.items()}
         name, found = _chosen(receivers)
         moment_ns = int(told[name][0, -1])
@@ -113,7 +113,7 @@ class Clocks:
         )
         remarks = (Remark("utc_from_gnss", text), *found.remarks(name))
         start = _dated(found.ns, moment_ns, remarks, release, others)
-        return PowerUp(start.utc_ns, (*start.remarks, *_apart(own, name, start.utc_ns)))
+        return PowerUpTime(start.utc_ns, (*start.remarks, *_apart(own, name, start.utc_ns)))
 
     def _own(self) -> _OwnClock | None:
         """Return the autopilot's own clock: its start, or else the name of its log."""
@@ -178,10 +178,10 @@ def _chosen(receivers: dict[str, ToldZero]) -> tuple[str, ToldZero]:
 
 def _dated(
     zero_ns: int, moment_ns: int, remarks: tuple[Remark, ...], release: str, others: tuple[OtherDate, ...]
-) -> PowerUp:
+) -> PowerUpTime:
     """Return UTC of power-up on a date that it can have, as far as the log shows it."""
     found = rollovers(moment_ns, earliest=_earliest(release), others=others)
-    return PowerUp(zero_ns + found.shift_ns(moment_ns, is_gps_time=False), (*remarks, *found.remarks))
+    return PowerUpTime(zero_ns + found.shift_ns(moment_ns, is_gps_time=False), (*remarks, *found.remarks))
 
 
 def _earliest(release: str) -> Earliest:

@@ -22,10 +22,10 @@ from matplotlib.transforms import ScaledTranslation
 from groundstation.plots.extents import has_rows, names_of
 from groundstation.plots.marks import Cells
 from groundstation.plots.plot import Plot
-from groundstation.plots.scales import Span
+from groundstation.plots.scales import ScaleSpan
 from groundstation.reports.notebook.shapes import draw, handle_of
 from groundstation.reports.svg import boxes as b
-from groundstation.reports.svg.boxes import Box, Placed
+from groundstation.reports.svg.boxes import Box, PlacedPanel
 from groundstation.reports.svg.cells import span_of_colours
 from groundstation.reports.svg.colours import EDGE, FAINT, GRID, INK, PAPER
 from groundstation.reports.svg.font import SIZE_PT, TITLE_PT, label, lines_of, middle
@@ -118,7 +118,7 @@ def _style() -> Iterator[None]:
 class _Places(Locator):
     """Places of ticks as the page has them, wherever the axis is moved."""
 
-    def __init__(self, span: Span, *, is_upright: bool) -> None:
+    def __init__(self, span: ScaleSpan, *, is_upright: bool) -> None:
         self.span, self.is_upright = span, is_upright
         self.texts: dict[float, str] = {}
 
@@ -130,7 +130,7 @@ class _Places(Locator):
         size = self.axis.axes.bbox  # type: ignore[union-attr]
         pixels = size.height if self.is_upright else size.width
         length_pt = POINTS_PER_INCH * pixels / self.axis.get_figure(root=True).dpi  # type: ignore[union-attr]
-        span = Span(self.span.scale, float(vmin), float(vmax), self.span.linear_to)
+        span = ScaleSpan(self.span.scale, float(vmin), float(vmax), self.span.linear_to)
         self.texts = dict(ticks_of(span, max(length_pt, 1.0), is_upright=self.is_upright))
         return list(self.texts)
 
@@ -145,7 +145,7 @@ class _Texts(Formatter):
         return self.places.texts.get(float(x), f"{x:g}")
 
 
-def _panel(figure: Figure, one: Placed, height: float) -> list[Axes]:
+def _panel(figure: Figure, one: PlacedPanel, height: float) -> list[Axes]:
     found = [_frame(figure, box, height) for box in one.boxes]
     if one.title:
         lines = len(one.lines) if one.has_own_line else 0
@@ -198,7 +198,7 @@ def _place(left: float, bottom: float, wide: float, high: float, height: float) 
     return (MARGIN_PT + left) / WHOLE_WIDTH_PT, 1.0 - bottom / height, wide / WHOLE_WIDTH_PT, high / height
 
 
-def _ticks(axis: Axis, span: Span, ticks: Sequence[tuple[float, str]] | None, *, is_upright: bool) -> None:
+def _ticks(axis: Axis, span: ScaleSpan, ticks: Sequence[tuple[float, str]] | None, *, is_upright: bool) -> None:
     """Set ticks at given places, else where the page has them."""
     axis.set_minor_locator(NullLocator())
     if ticks is None:

@@ -24,11 +24,11 @@ from groundstation.plots.marks import (
     Told,
 )
 from groundstation.plots.ranges import thin
-from groundstation.plots.scales import NO_PLACES, Span
+from groundstation.plots.scales import NO_PLACES, ScaleSpan
 from groundstation.reports import live
 from groundstation.reports.live import TIME, CursorValues, Frame
 from groundstation.reports.svg import colours
-from groundstation.reports.svg.boxes import PT_PER_MM, Box, Placed
+from groundstation.reports.svg.boxes import PT_PER_MM, Box, PlacedPanel
 from groundstation.reports.svg.font import label
 from groundstation.reports.svg.legend import MOST_OF_A_NAME, ground
 from groundstation.reports.svg.shapes import stepped
@@ -40,13 +40,13 @@ _UNTOLD = {"symlog", "date"}  # scales whose values the page does not tell
 JUST_BELOW = np.nextafter(np.float32(1.0), np.float32(0.0))
 
 
-def frames_of(panels: Sequence[Placed], height_pt: float) -> tuple[Frame, ...]:
+def frames_of(panels: Sequence[PlacedPanel], height_pt: float) -> tuple[Frame, ...]:
     """Return the frames of a picture, except for axes whose values the page does not show."""
     boxes = [box for one in panels for box in one.boxes]
     return tuple(_frame(box, height_pt) for box in boxes if not _UNTOLD & {box.x.scale, box.y.scale})
 
 
-def panels_of(panels: Sequence[Placed], height_pt: float) -> tuple[live.Panel, ...]:
+def panels_of(panels: Sequence[PlacedPanel], height_pt: float) -> tuple[live.LivePanel, ...]:
     """Return the panels of a plot from left to right and from top to bottom.
 
     Empty where one of them cannot be drawn live.
@@ -58,7 +58,7 @@ def panels_of(panels: Sequence[Placed], height_pt: float) -> tuple[live.Panel, .
         for box in one.boxes:
             curves = [_held(curve) for mark in one.panel.marks for curve in _curves(mark, box)]
             found.append(
-                live.Panel(
+                live.LivePanel(
                     **vars(_frame(box, height_pt)),
                     grounds=_grounds(box),
                     marks=_uprights(box),
@@ -68,13 +68,13 @@ def panels_of(panels: Sequence[Placed], height_pt: float) -> tuple[live.Panel, .
     return tuple(found)
 
 
-def _held(curve: live.Curve) -> live.Curve:
+def _held(curve: live.LiveCurve) -> live.LiveCurve:
     """Return the curve with numbers that the page holds."""
     x, y, upper = (np.clip(values, -LARGEST, LARGEST) for values in (curve.x, curve.y, curve.upper))
     return replace(curve, x=x, y=y, upper=upper)
 
 
-def can_live(one: Placed) -> bool:
+def can_live(one: PlacedPanel) -> bool:
     """Tell whether the page's script can draw all marks of a panel.
 
     It draws lines, dots, bands, lanes.
@@ -116,7 +116,7 @@ def _frame(box: Box, height_pt: float) -> Frame:
     )
 
 
-def _single(span: Span) -> tuple[float, float]:
+def _single(span: ScaleSpan) -> tuple[float, float]:
     """Return the ends of a scale as float32 holds them."""
     low, high = (float(np.float32(min(max(end, -LARGEST), LARGEST))) for end in (span.low, span.high))
     return low, high
@@ -157,28 +157,28 @@ def _uprights(box: Box) -> tuple[tuple[float, str], ...]:
     return tuple((float(mark.value), colours.COLOURS[mark.role]) for mark in limits if np.isfinite(mark.value))
 
 
-def _curves(mark: AnyMark, box: Box) -> list[live.Curve]:
+def _curves(mark: AnyMark, box: Box) -> list[live.LiveCurve]:
     colour, name = colours.COLOURS[mark.role], label(mark.name, MOST_OF_A_NAME)
     width = colours.LINE_PT[mark.emphasis]
     if isinstance(mark, Curve):
         share = colours.LINE[mark.emphasis]
         stroke = colour if share == 1.0 else colours.with_alpha(colour, share)
-        return [live.Curve("line", name, stroke, width, bool(mark.dash), *_line(mark, box), NO_PLACES)]
+        return [live.LiveCurve("line", name, stroke, width, bool(mark.dash), *_line(mark, box), NO_PLACES)]
     if isinstance(mark, Dots | Points):
         size = colours.DOT_PT[mark.emphasis] if isinstance(mark, Dots) else 3.0
         known = np.flatnonzero(_has_place(mark.x, box.x.scale) & _has_place(mark.y, box.y.scale))
         rows = known[thin(len(known), MOST_SAMPLES)]
         rows = rows[np.argsort(mark.x[rows], kind="stable")]
-        return [live.Curve("dots", name, colour, size, False, mark.x[rows], mark.y[rows], NO_PLACES)]
+        return [live.LiveCurve("dots", name, colour, size, False, mark.x[rows], mark.y[rows], NO_PLACES)]
     if isinstance(mark, Band):
         shade = colours.with_alpha(colour, colours.SHADE[mark.emphasis])
-        return [live.Curve("band", name, shade, 0.0, False, *_band(mark, box))]
+        return [live.LiveCurve("band", name, shade, 0.0, False, *_band(mark, box))]
     if isinstance(mark, Histogram):
-        return [live.Curve("band", name, colours.with_alpha(colour, 0.19), 0.0, False, *_bars(mark))]
+        return [live.LiveCurve("band", name, colours.with_alpha(colour, 0.19), 0.0, False, *_bars(mark))]
     if isinstance(mark, Limit) and not mark.is_upright and np.isfinite(mark.value):
         ends = np.sort(np.array([box.x.low, box.x.high]))
         return [
-            live.Curve(
+            live.LiveCurve(
                 "line",
                 name or label(mark.label, MOST_OF_A_NAME),
                 colour,
@@ -254,7 +254,7 @@ def _bars(mark: Histogram) -> tuple[Floats, Floats, Floats]:
     return x, np.zeros(len(x)), np.repeat(np.nan_to_num(mark.heights), 2)
 
 
-def _lanes(mark: Lanes) -> list[live.Curve]:
+def _lanes(mark: Lanes) -> list[live.LiveCurve]:
     found = []
     for place, name in enumerate(mark.order):
         rows = np.flatnonzero((mark.state == name) & np.isfinite(mark.start) & np.isfinite(mark.end))
@@ -262,5 +262,5 @@ def _lanes(mark: Lanes) -> list[live.Curve]:
         if len(rows):
             colour = colours.COLOURS[mark.roles.get(name, mark.role)]
             heights = np.full(len(rows), float(place))
-            found.append(live.Curve("lanes", "", colour, 7.0, False, mark.start[rows], heights, mark.end[rows]))
+            found.append(live.LiveCurve("lanes", "", colour, 7.0, False, mark.start[rows], heights, mark.end[rows]))
     return found

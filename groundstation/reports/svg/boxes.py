@@ -12,7 +12,7 @@ import numpy as np
 from groundstation.plots import extents
 from groundstation.plots.marks import Cells, Floats
 from groundstation.plots.plot import WIDTH_MM, Panel, Plot, Row
-from groundstation.plots.scales import Span
+from groundstation.plots.scales import ScaleSpan
 from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, TITLE_PT, label, lines_of, width_pt
 from groundstation.reports.svg.legend import LINE_PT, Entry, above, beside_pt, entries_of
 from groundstation.reports.svg.ticks import Tick, own_ticks, ticks_of
@@ -40,8 +40,8 @@ class Box:
     top: float
     width: float
     height: float
-    x: Span
-    y: Span
+    x: ScaleSpan
+    y: ScaleSpan
     x_ticks: tuple[Tick, ...]
     y_ticks: tuple[Tick, ...]
     has_x_texts: bool
@@ -69,7 +69,7 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedPanel:
     """One panel: its frames from the left, and the texts above and beside them."""
 
     panel: Panel
@@ -91,8 +91,8 @@ class _Told:
     """A panel before it has a place."""
 
     panel: Panel
-    x: Span
-    y: tuple[Span, ...]  # in each window of the other axis
+    x: ScaleSpan
+    y: tuple[ScaleSpan, ...]  # in each window of the other axis
     y_ticks: tuple[tuple[Tick, ...], ...]
     entries: tuple[Entry, ...]
     has_x_texts: bool
@@ -101,15 +101,15 @@ class _Told:
     right_pt: float
 
 
-def placed(plot: Plot) -> tuple[tuple[Placed, ...], float]:
+def placed(plot: Plot) -> tuple[tuple[PlacedPanel, ...], float]:
     """Return all panels with their places, row by row, and the height of the picture, points."""
     rows, lefts, rights, widths = _with_room(plot)
-    found: list[Placed] = []
+    found: list[PlacedPanel] = []
     y = 4.0
     for number, (row, told) in enumerate(zip(plot.rows, rows, strict=True)):
         height = max(row.height_mm * PT_PER_MM, 4.0)
         x = 0.0
-        line: list[Placed] = []
+        line: list[PlacedPanel] = []
         for column, one in enumerate(told):
             x += lefts[number][column] + (BETWEEN_PT if column else 0.0)
             gap = max(_gap_pt(rows[place][column]) for place in _chain(plot, number, column))
@@ -172,7 +172,7 @@ def _chain(plot: Plot, row: int, column: int) -> range:
     return range(first, last + 1)
 
 
-def _y_ticks(panel: Panel, span: Span, length_pt: float) -> tuple[Tick, ...]:
+def _y_ticks(panel: Panel, span: ScaleSpan, length_pt: float) -> tuple[Tick, ...]:
     names = extents.names_of(panel)
     if names:
         return tuple((place, label(name, MOST_OF_A_NAME)) for place, name in names if np.isfinite(place))
@@ -290,7 +290,7 @@ def _gap_pt(told: _Told) -> float:
     return max(WINDOWS_PT, max(map(widest, told.y_ticks[1:])) + 10.0) if has_own else WINDOWS_PT
 
 
-def _placed(told: _Told, left: float, width: float, height: float, gap: float) -> Placed:
+def _placed(told: _Told, left: float, width: float, height: float, gap: float) -> PlacedPanel:
     panel = told.panel
     windows = extents.windows_of(panel, told.x)
     lengths = np.array([window.high - window.low for window in windows])
@@ -318,21 +318,21 @@ def _placed(told: _Told, left: float, width: float, height: float, gap: float) -
     lines = above(told.entries, width) if panel.legend == "above" else ()
     taken = sum(entry.width_pt for entry in lines[0]) if lines else 0.0
     has_own_line = bool(title and lines) and (len(lines) > 1 or width_pt(title, TITLE_PT, True) + taken + 10.0 > width)
-    return Placed(panel, tuple(boxes), title, told.entries, lines, has_own_line, told.has_scale)
+    return PlacedPanel(panel, tuple(boxes), title, told.entries, lines, has_own_line, told.has_scale)
 
 
-def _x_ticks(panel: Panel, span: Span, width: float) -> tuple[Tick, ...]:
+def _x_ticks(panel: Panel, span: ScaleSpan, width: float) -> tuple[Tick, ...]:
     if panel.x.names:
         return tuple((place, label(name, 24)) for place, name in panel.x.names if np.isfinite(place))
     return own_ticks(panel.x.ticks) if panel.x.ticks else ticks_of(span, width, is_upright=False)
 
 
-def _above_pt(one: Placed) -> float:
+def _above_pt(one: PlacedPanel) -> float:
     lines = len(one.lines) + (1 if one.has_own_line or (one.title and not one.lines) else 0)
     return lines * LINE_PT + (3.0 if lines else 0.0)
 
 
-def _below_pt(one: Placed) -> float:
+def _below_pt(one: PlacedPanel) -> float:
     if not one.boxes[0].has_x_texts:
         return 0.0
     text = TICK_PT + TO_TEXT_PT + SIZE_PT

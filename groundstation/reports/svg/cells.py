@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from groundstation.plots.extents import edges
 from groundstation.plots.marks import Cells, Floats
 from groundstation.plots.ranges import thin
-from groundstation.plots.scales import NO_PLACES, Span, span_of
+from groundstation.plots.scales import NO_PLACES, ScaleSpan, span_of
 from groundstation.plots.viridis import viridis
 from groundstation.reports.svg import path
 from groundstation.reports.svg.boxes import BAR_PT, MOST_OF_A_TITLE, TICK_PT, TO_BAR_PT, TO_TEXT_PT, Box
@@ -53,7 +53,7 @@ def _levels(mark: Cells, values: Floats) -> NDArray[np.int64]:
     return np.where(known, found, -1)
 
 
-def span_of_colours(mark: Cells) -> Span:
+def span_of_colours(mark: Cells) -> ScaleSpan:
     """Return the scale of the colours of cells with its ends."""
     return span_of("log" if mark.is_log else "linear", mark.low, mark.high, NO_PLACES, is_tight=True)
 

@@ -17,7 +17,7 @@ from groundstation.reports.live import Svg
 from groundstation.reports.svg import boxes as b
 from groundstation.reports.svg import legend
 from groundstation.reports.svg.alive import frames_of, panels_of
-from groundstation.reports.svg.boxes import Box, Placed, placed
+from groundstation.reports.svg.boxes import Box, PlacedPanel, placed
 from groundstation.reports.svg.cells import scale_beside
 from groundstation.reports.svg.colours import EDGE, FAINT, GRID, INK, PAPER
 from groundstation.reports.svg.font import LINE_SHARE, SIZE_PT, TITLE_PT, label, lines_of, middle, written
@@ -147,7 +147,7 @@ def _labels(box: Box) -> str:
     return "".join(told)
 
 
-def _around(one: Placed) -> str:
+def _around(one: PlacedPanel) -> str:
     """Return the title and legend of a panel, and the scale of its cells."""
     first = one.boxes[0]
     parts = []

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from groundstation.chapters.wording import MINUS, NARROW_SPACE, clock
-from groundstation.plots.scales import Span
+from groundstation.plots.scales import ScaleSpan
 from groundstation.reports.svg.font import width_pt
 
 TIME_STEPS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 28800, 86400)
@@ -33,14 +33,14 @@ _STEPS = (
 Tick = tuple[float, str]
 
 
-def ticks_of(span: Span, length_pt: float, *, is_upright: bool) -> tuple[Tick, ...]:
+def ticks_of(span: ScaleSpan, length_pt: float, *, is_upright: bool) -> tuple[Tick, ...]:
     """Return places along an axis of some length, each with its text.
 
     Examples
     --------
-    >>> [text for _, text in ticks_of(Span("linear", -0.1, 1.1), 100.0, is_upright=True)]
+    >>> [text for _, text in ticks_of(ScaleSpan("linear", -0.1, 1.1), 100.0, is_upright=True)]
     ['0.0', '0.2', '0.4', '0.6', '0.8', '1.0']
-    >>> [text for _, text in ticks_of(Span("time", 0.0, 4000.0), 440.0, is_upright=False)]
+    >>> [text for _, text in ticks_of(ScaleSpan("time", 0.0, 4000.0), 440.0, is_upright=False)]
     ['0:00', '10:00', '20:00', '30:00', '40:00', '50:00', '1:00:00']
     """
     low, high = min(span.low, span.high), max(span.low, span.high)
@@ -203,7 +203,7 @@ def of_decade(value: float, *, as_power: bool = False) -> str:
     return sign + (power if part == "1" else f"{part}·{power}")
 
 
-def _symlog(span: Span, length_pt: float, is_upright: bool) -> tuple[Tick, ...]:
+def _symlog(span: ScaleSpan, length_pt: float, is_upright: bool) -> tuple[Tick, ...]:
     """Return ticks at zero, at the end of the linear part, and at round numbers beyond.
 
     Where room is short, decades and numbers nearest to zero go first.

@@ -28,7 +28,7 @@ from groundstation.systems.cooperative.loop_types import (
     TIME,
     VELOCITY,
     Fleet,
-    Numbers,
+    ModelNumbers,
 )
 from groundstation.systems.cooperative.motion import place, step
 from groundstation.systems.cooperative.settings import CooperativeSettings
@@ -61,7 +61,7 @@ class Aircraft:
     density : ndarray, shape (n,)
         Of the white noise on each state.
     epochs : ndarray, shape (t, EPOCH_COLUMNS)
-    numbers : Numbers
+    numbers : ModelNumbers
     """
 
     name: str
@@ -70,7 +70,7 @@ class Aircraft:
     start_sigma: FloatArray
     density: FloatArray
     epochs: FloatArray
-    numbers: Numbers
+    numbers: ModelNumbers
 
     @property
     def size(self) -> int:
@@ -221,7 +221,7 @@ def aircraft_of(track: DeadReckoning, frame: Frame, settings: CooperativeSetting
         np.array(list(sigma.values())),
         np.array([density.get(name, 0.0) for name in sigma]),
         _epochs_of(track, frame),
-        Numbers(b.velocity_s, b.gyro_s, b.baro_s, b.clock_s, settings.range_bias_s),
+        ModelNumbers(b.velocity_s, b.gyro_s, b.baro_s, b.clock_s, settings.range_bias_s),
     )
 
 

@@ -14,11 +14,11 @@ from groundstation.systems.cooperative.alone_types import (
     RANKED,
     SPLIT,
     AloneWorkspace,
-    Batch,
-    Heard,
+    HeardBroadcasts,
     NeighbourRules,
-    Own,
+    OwnFilters,
     Past,
+    UpdateRows,
 )
 from groundstation.systems.cooperative.alone_update import split_update, update
 from groundstation.systems.cooperative.joint import SAME_TIME_S
@@ -35,8 +35,8 @@ from groundstation.systems.cooperative.loop_types import (
     FloatArray,
     Items,
     LinearisedEvent,
-    Log,
-    Points,
+    PointNumbers,
+    RunRecords,
 )
 from groundstation.systems.cooperative.motion import place, position, step, turn_covariance, turn_rows
 from groundstation.systems.cooperative.observation import observe
@@ -46,20 +46,20 @@ from groundstation.tables.session import NO_SLOT
 @in_place
 def run_alone(
     fleet: Fleet,
-    points: Points,
+    points: PointNumbers,
     events: Events,
     items: Items,
     begin: int,
     end: int,
     method: NeighbourRules,
-    own: Own,
+    own: OwnFilters,
     past: Past,
-    heard: Heard,
+    heard: HeardBroadcasts,
     rejected: Int64Array,
-    batch: Batch,
+    batch: UpdateRows,
     room: AloneWorkspace,
     rows: LinearisedEvent,
-    log: Log,
+    log: RunRecords,
 ) -> None:
     """Work through the items ``begin`` to ``end``: one window of the error map."""
     entry = room.entry
@@ -99,7 +99,7 @@ def run_alone(
 
 
 @in_place
-def _keep(fleet: Fleet, own: Own, who: int, log: Log) -> None:
+def _keep(fleet: Fleet, own: OwnFilters, who: int, log: RunRecords) -> None:
     at = log.counts[OUTPUTS]
     for i in range(fleet.size[who]):
         log.x[at, i] = own.x[who, i]
@@ -109,7 +109,7 @@ def _keep(fleet: Fleet, own: Own, who: int, log: Log) -> None:
 
 
 @in_place
-def _move(fleet: Fleet, own: Own, who: int, to_s: float, room: AloneWorkspace) -> None:
+def _move(fleet: Fleet, own: OwnFilters, who: int, to_s: float, room: AloneWorkspace) -> None:
     """Move a vehicle's filter to another time."""
     if abs(to_s - own.time_s[who]) < SAME_TIME_S:
         return
@@ -151,7 +151,7 @@ def _copy(
 
 
 @in_place
-def _remember(fleet: Fleet, own: Own, past: Past, slot: int) -> None:
+def _remember(fleet: Fleet, own: OwnFilters, past: Past, slot: int) -> None:
     """Keep the state of all filters at the begin of a slot, over the oldest of those kept."""
     at = past.begun[0] % len(past.slot)
     past.slot[at] = slot
@@ -177,11 +177,11 @@ def _listen(
     events: Events,
     event: int,
     method: NeighbourRules,
-    own: Own,
+    own: OwnFilters,
     past: Past,
-    heard: Heard,
+    heard: HeardBroadcasts,
     room: AloneWorkspace,
-    log: Log,
+    log: RunRecords,
 ) -> int:
     """Return the entry of the broadcast of a range's source in its slot.
 
@@ -245,7 +245,7 @@ def _tell(
     x: FloatArray,
     P: FloatArray,
     held: FloatArray,
-    heard: Heard,
+    heard: HeardBroadcasts,
     entry: int,
     room: AloneWorkspace,
 ) -> None:
@@ -277,7 +277,7 @@ def _tell(
 
 
 @in_place
-def _is_used(events: Events, event: int, method: NeighbourRules, log: Log) -> bool:
+def _is_used(events: Events, event: int, method: NeighbourRules, log: RunRecords) -> bool:
     """Tell whether a measurement is used: ranked filters hear only vehicles of higher rank."""
     if events.kind[event] != PEER or (method.algorithm != RANKED and method.algorithm != MODIFIED):
         return True
@@ -290,21 +290,21 @@ def _is_used(events: Events, event: int, method: NeighbourRules, log: Log) -> bo
 @in_place
 def _use(
     fleet: Fleet,
-    points: Points,
+    points: PointNumbers,
     events: Events,
     start: int,
     last: int,
     first: int,
     at_s: float,
     method: NeighbourRules,
-    own: Own,
-    heard: Heard,
+    own: OwnFilters,
+    heard: HeardBroadcasts,
     entry: Int64Array,
     rejected: Int64Array,
-    batch: Batch,
+    batch: UpdateRows,
     room: AloneWorkspace,
     rows: LinearisedEvent,
-    log: Log,
+    log: RunRecords,
 ) -> None:
     """Use one receiver's measurements of a group, from ``start`` on, in one update."""
     who, count, is_moved = events.receiver[start], 0, False
@@ -334,7 +334,7 @@ def _use(
 
 
 @in_place
-def _copy_row(batch: Batch, one: int, other: int) -> None:
+def _copy_row(batch: UpdateRows, one: int, other: int) -> None:
     batch.event[other], batch.heard[other] = batch.event[one], batch.heard[one]
     for i in range(batch.h.shape[1]):
         batch.h[other, i] = batch.h[one, i]
@@ -349,18 +349,18 @@ def _copy_row(batch: Batch, one: int, other: int) -> None:
 @in_place
 def _linearise(
     fleet: Fleet,
-    points: Points,
+    points: PointNumbers,
     events: Events,
     event: int,
     by: int,
     method: NeighbourRules,
-    own: Own,
-    heard: Heard,
-    batch: Batch,
+    own: OwnFilters,
+    heard: HeardBroadcasts,
+    batch: UpdateRows,
     at: int,
     room: AloneWorkspace,
     rows: LinearisedEvent,
-    log: Log,
+    log: RunRecords,
 ) -> int:
     """Put the rows of an event into the batch; return how many there are.
 
@@ -400,7 +400,14 @@ def _linearise(
 
 @in_place
 def _bring(
-    points: Points, events: Events, event: int, by: int, method: NeighbourRules, heard: Heard, batch: Batch, to: int
+    points: PointNumbers,
+    events: Events,
+    event: int,
+    by: int,
+    method: NeighbourRules,
+    heard: HeardBroadcasts,
+    batch: UpdateRows,
+    to: int,
 ) -> None:
     """Set the variance that the source adds, and the derivative by errors of uncertain points."""
     for c in range(batch.by_shared.shape[1]):
@@ -427,10 +434,10 @@ def _passes(
     events: Events,
     row: int,
     method: NeighbourRules,
-    own: Own,
+    own: OwnFilters,
     rejected: Int64Array,
-    batch: Batch,
-    log: Log,
+    batch: UpdateRows,
+    log: RunRecords,
 ) -> bool:
     """Tell whether an innovation is inside the gate.
 

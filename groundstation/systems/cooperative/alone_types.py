@@ -9,7 +9,7 @@ EXACT, RANKED, MODIFIED, SPLIT = 0, 1, 2, 3
 NOBODY = -1
 
 
-class Own(NamedTuple):
+class OwnFilters(NamedTuple):
     """Filters of k vehicles: at most n states each, q errors of uncertain points; N states."""
 
     time_s: FloatArray  # (k,)
@@ -32,7 +32,7 @@ class Past(NamedTuple):
     map_rows: FloatArray
 
 
-class Heard(NamedTuple):
+class HeardBroadcasts(NamedTuple):
     """Broadcasts heard by the measurements of a group.
 
     The last of each sender is kept for those who hear it next.
@@ -60,11 +60,11 @@ class NeighbourRules(NamedTuple):
     weights: FloatArray  # of covariance intersection
 
 
-class Batch(NamedTuple):
+class UpdateRows(NamedTuple):
     """Rows of one update of one vehicle, at most r."""
 
     event: Int64Array
-    heard: Int64Array  # entry of Heard, NOBODY for a point or satellite
+    heard: Int64Array  # entry of HeardBroadcasts, NOBODY for a point or satellite
     h: FloatArray  # (r, n) by its state now
     by_shared: FloatArray  # (r, q)
     told: FloatArray  # (r, 4) by place and clock of the source
@@ -93,5 +93,5 @@ class AloneWorkspace(NamedTuple):
     mixed: FloatArray  # (r, N)
     by_error: FloatArray  # (r, q)
     cross: FloatArray  # (5, 4, 4)
-    entry: Int64Array  # (r,) of Heard, for each measurement of a group
+    entry: Int64Array  # (r,) of HeardBroadcasts, for each measurement of a group
     lines: FloatArray  # (2, n or r)

@@ -11,10 +11,10 @@ from groundstation.systems.cooperative.alone_types import (
     MODIFIED,
     NOBODY,
     AloneWorkspace,
-    Batch,
-    Heard,
+    HeardBroadcasts,
     NeighbourRules,
-    Own,
+    OwnFilters,
+    UpdateRows,
 )
 from groundstation.systems.cooperative.loop_types import (
     PEER,
@@ -60,7 +60,14 @@ def solve(count: int, width: int, A: FloatArray, B: FloatArray) -> None:
 
 @in_place
 def _mix(
-    fleet: Fleet, who: int, count: int, own: Own, heard: Heard, batch: Batch, first: int, mixed: FloatArray
+    fleet: Fleet,
+    who: int,
+    count: int,
+    own: OwnFilters,
+    heard: HeardBroadcasts,
+    batch: UpdateRows,
+    first: int,
+    mixed: FloatArray,
 ) -> None:
     """Fill the errors that each row of an update brings in.
 
@@ -102,9 +109,9 @@ def update(
     who: int,
     count: int,
     method: NeighbourRules,
-    own: Own,
-    heard: Heard,
-    batch: Batch,
+    own: OwnFilters,
+    heard: HeardBroadcasts,
+    batch: UpdateRows,
     room: AloneWorkspace,
 ) -> None:
     """Run the Kalman update with the noise of the algorithm.
@@ -160,7 +167,7 @@ def update(
 
 
 @in_place
-def _told_shared(row: int, c: int, heard: Heard, batch: Batch) -> float:
+def _told_shared(row: int, c: int, heard: HeardBroadcasts, batch: UpdateRows) -> float:
     """Return the covariance of what a row's source told with the error c of the points."""
     total = 0.0
     if batch.heard[row] != NOBODY:
@@ -171,7 +178,7 @@ def _told_shared(row: int, c: int, heard: Heard, batch: Batch) -> float:
 
 @in_place
 def _common(
-    events: Events, r: int, s: int, method: NeighbourRules, heard: Heard, batch: Batch, cross: FloatArray
+    events: Events, r: int, s: int, method: NeighbourRules, heard: HeardBroadcasts, batch: UpdateRows, cross: FloatArray
 ) -> float:
     """Return the covariance of the noise of two rows.
 
@@ -194,7 +201,7 @@ def _common(
 
 
 @in_place
-def _between(heard: Heard, one: int, two: int, cross: FloatArray) -> None:
+def _between(heard: HeardBroadcasts, one: int, two: int, cross: FloatArray) -> None:
     """Fill ``cross[0]`` with the covariance of the errors in two messages of one sender.
 
     It is the product of their square roots. Errors of one sender are common to its messages. The symmetric roots make
@@ -253,8 +260,8 @@ def _correct_shared(
     gain: FloatArray,
     method: NeighbourRules,
     shared: FloatArray,
-    heard: Heard,
-    batch: Batch,
+    heard: HeardBroadcasts,
+    batch: UpdateRows,
     brought: FloatArray,
 ) -> None:
     """Correct the covariance with the errors of the points after an update."""
@@ -270,7 +277,14 @@ def _correct_shared(
 
 @in_place
 def split_update(
-    fleet: Fleet, who: int, row: int, method: NeighbourRules, own: Own, heard: Heard, batch: Batch, room: AloneWorkspace
+    fleet: Fleet,
+    who: int,
+    row: int,
+    method: NeighbourRules,
+    own: OwnFilters,
+    heard: HeardBroadcasts,
+    batch: UpdateRows,
+    room: AloneWorkspace,
 ) -> None:
     """Split covariance intersection with one row, see ``plain.split_covariance``.
 

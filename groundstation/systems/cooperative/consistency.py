@@ -15,7 +15,7 @@ LONGEST_GAP_S = 1.0  # of the truth, unless it comes more seldom
 
 
 @dataclass(frozen=True)
-class Judgement:
+class TrackJudgement:
     """One track against truth, horizontal.
 
     Parameters
@@ -49,7 +49,7 @@ class Judgement:
 
 def judge(
     track: VehicleTrack, vehicle: DeadReckoning | Odometry, time_s: FloatArray, position_m: FloatArray
-) -> Judgement:
+) -> TrackJudgement:
     """Compare a track with the true positions of its vehicle (m, 3).
 
     The truth is interpolated to the epochs of the track, not over long gaps.
@@ -63,7 +63,7 @@ def judge(
         horizontal = np.einsum("nij,ni->nj", vehicle.axes[nearest], error)[:, :2]
     else:
         horizontal = error[:, :2]
-    return Judgement(horizontal, normalised(horizontal, track.horizontal_m2))
+    return TrackJudgement(horizontal, normalised(horizontal, track.horizontal_m2))
 
 
 def _in_gap(at_s: FloatArray, time_s: FloatArray) -> BoolArray:

@@ -29,15 +29,15 @@ from groundstation.systems.cooperative.alone_types import (
     RANKED,
     SPLIT,
     AloneWorkspace,
-    Batch,
-    Heard,
+    HeardBroadcasts,
     NeighbourRules,
-    Own,
+    OwnFilters,
     Past,
+    UpdateRows,
 )
 from groundstation.systems.cooperative.error_map import blocks, spectral_radius, unit_rows, windows
 from groundstation.systems.cooperative.events import Prepared
-from groundstation.systems.cooperative.loop_types import Items, Log, rows_for
+from groundstation.systems.cooperative.loop_types import Items, RunRecords, rows_for
 from groundstation.systems.cooperative.messages import Broadcast
 from groundstation.systems.cooperative.plain.split_covariance import WEIGHTS
 from groundstation.systems.cooperative.settings import CooperativeSettings
@@ -59,7 +59,7 @@ def run_decentralised(prepared: Prepared, settings: CooperativeSettings, algorit
 
 
 def _work(
-    prepared: Prepared, settings: CooperativeSettings, algorithm: str, items: Items, log: Log
+    prepared: Prepared, settings: CooperativeSettings, algorithm: str, items: Items, log: RunRecords
 ) -> tuple[list[float], list[float]]:
     """Run the loop window by window; in between the error map is judged and begun anew.
 
@@ -105,9 +105,9 @@ def _work(
     return times, radii
 
 
-def _start(prepared: Prepared, unit: FloatArray, errors: int) -> Own:
+def _start(prepared: Prepared, unit: FloatArray, errors: int) -> OwnFilters:
     k, n, _ = unit.shape
-    own = Own(
+    own = OwnFilters(
         np.array([vehicle.first_s for vehicle in prepared.vehicles]),
         np.zeros((k, n)),
         np.zeros((k, n, n)),
@@ -122,7 +122,7 @@ def _start(prepared: Prepared, unit: FloatArray, errors: int) -> Own:
     return own
 
 
-def _past(own: Own, slots: int) -> Past:
+def _past(own: OwnFilters, slots: int) -> Past:
     def room(like: FloatArray) -> FloatArray:
         return np.zeros((slots, *like.shape))
 
@@ -137,9 +137,9 @@ def _past(own: Own, slots: int) -> Past:
     )
 
 
-def _heard(own: Own, entries: int) -> Heard:
+def _heard(own: OwnFilters, entries: int) -> HeardBroadcasts:
     k, n, width = own.map_rows.shape
-    return Heard(
+    return HeardBroadcasts(
         np.zeros((entries, 3)),
         np.zeros(entries),
         np.zeros((entries, 4, 4)),
@@ -153,8 +153,8 @@ def _heard(own: Own, entries: int) -> Heard:
     )
 
 
-def _batch(most: int, n: int, errors: int) -> Batch:
-    return Batch(
+def _batch(most: int, n: int, errors: int) -> UpdateRows:
+    return UpdateRows(
         np.zeros(most, dtype=np.int64),
         np.zeros(most, dtype=np.int64),
         np.zeros((most, n)),

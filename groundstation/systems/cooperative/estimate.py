@@ -11,7 +11,7 @@ from groundstation.methods.intervals import nees_limits
 from groundstation.systems.cooperative import figures
 from groundstation.systems.cooperative.algorithms import run_algorithm
 from groundstation.systems.cooperative.answer import AlgorithmRow, CooperativeResult, GeometryRow, LinkRow, VehicleRow
-from groundstation.systems.cooperative.consistency import Judgement, judge
+from groundstation.systems.cooperative.consistency import TrackJudgement, judge
 from groundstation.systems.cooperative.events import Prepared, prepare, require_vehicles
 from groundstation.systems.cooperative.geometry import Geometry, Truth, bound_of, geometry_of
 from groundstation.systems.cooperative.loop_types import KINDS, PEER, POINT, USED
@@ -28,10 +28,10 @@ class JudgedRun:
     """One algorithm with its judgement; an empty tuple where no truth is known."""
 
     run: AlgorithmRun
-    judgements: tuple[Judgement | None, ...]
+    judgements: tuple[TrackJudgement | None, ...]
 
     @property
-    def known(self) -> list[tuple[int, Judgement]]:
+    def known(self) -> list[tuple[int, TrackJudgement]]:
         """Vehicles with truth."""
         return [(index, one) for index, one in enumerate(self.judgements) if one is not None]
 

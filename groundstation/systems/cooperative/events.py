@@ -18,7 +18,7 @@ from groundstation.systems.cooperative.loop_types import (
     SATELLITE,
     Events,
     Fleet,
-    Points,
+    PointNumbers,
 )
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.vehicles import Vehicle
@@ -40,7 +40,7 @@ class Prepared:
     vehicles : tuple of Vehicle
     events : Events
         In order of time; peers among vehicles that are there.
-    points : Points
+    points : PointNumbers
     ranks : tuple of int
         Of the vehicles.
     findings : tuple of Finding
@@ -49,7 +49,7 @@ class Prepared:
     session: Session
     vehicles: tuple[Vehicle, ...]
     events: Events
-    points: Points
+    points: PointNumbers
     ranks: tuple[int, ...]
     findings: tuple[Finding, ...]
 
@@ -102,7 +102,7 @@ def prepare(session: Session, settings: CooperativeSettings) -> Prepared:
     )
 
 
-def _points_of(session: Session) -> Points:
+def _points_of(session: Session) -> PointNumbers:
     axes = np.zeros((len(session.points), 3, 2))
     for index, point in enumerate(session.points):
         axes[index] = np.eye(3)[:, :2]
@@ -111,7 +111,7 @@ def _points_of(session: Session) -> Points:
             axes[index] = ecef_from_n(latitude, longitude)[:, :2]
     sigma = np.array([point.position_sigma_m for point in session.points], dtype=np.float64)
     number = np.cumsum(sigma > 0.0, dtype=np.int64) - 1
-    return Points(axes, sigma, np.where(sigma > 0.0, number, -1))
+    return PointNumbers(axes, sigma, np.where(sigma > 0.0, number, -1))
 
 
 def _clean(track: DeadReckoning | Odometry, findings: list[Finding]) -> DeadReckoning | Odometry | None:

@@ -12,7 +12,7 @@ from groundstation.systems.cooperative.arrays import (
     CooperativeTracks,
     CooperativeTraffic,
 )
-from groundstation.systems.cooperative.consistency import Judgement
+from groundstation.systems.cooperative.consistency import TrackJudgement
 from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.geometry import Geometry
 from groundstation.systems.cooperative.loop_types import KINDS, PEER, POINT
@@ -26,7 +26,7 @@ def source_name(prepared: Prepared, kind: int, source: int) -> str:
     return prepared.session.points[source].name if kind == POINT else KINDS[kind]
 
 
-def tracks_figure(runs: Sequence[tuple[AlgorithmRun, Sequence[Judgement | None]]]) -> CooperativeTracks:
+def tracks_figure(runs: Sequence[tuple[AlgorithmRun, Sequence[TrackJudgement | None]]]) -> CooperativeTracks:
     """Positions, sigmas and errors of every vehicle under every algorithm."""
     parts = []
     for run, judgements in runs:

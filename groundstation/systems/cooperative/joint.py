@@ -21,9 +21,9 @@ from groundstation.systems.cooperative.loop_types import (
     FloatArray,
     Items,
     LinearisedEvent,
-    Log,
     LoopRules,
-    Points,
+    PointNumbers,
+    RunRecords,
     rows_for,
 )
 from groundstation.systems.cooperative.motion import place, position, step
@@ -69,7 +69,7 @@ class JointWorkspace(NamedTuple):
     values: FloatArray  # (1, n n), at least 2 n
 
 
-class Lines(NamedTuple):
+class JointRows(NamedTuple):
     """Rows of one update: sparse derivatives by the joint state, one below the other."""
 
     starts: Int64Array
@@ -79,11 +79,13 @@ class Lines(NamedTuple):
     variance: FloatArray
 
 
-def work(fleet: Fleet, points: Points, events: Events, items: Items, rules: LoopRules, joint: Joint, log: Log) -> None:
+def work(
+    fleet: Fleet, points: PointNumbers, events: Events, items: Items, rules: LoopRules, joint: Joint, log: RunRecords
+) -> None:
     """Work through a session."""
     size, n = len(joint.x), fleet.density.shape[1]
     most = int(np.max(items.last - items.first, initial=1))
-    lines = Lines(
+    lines = JointRows(
         np.zeros(most + 1, dtype=np.int64),
         np.zeros(most * (2 * n + 2), dtype=np.int64),
         np.zeros(most * (2 * n + 2)),
@@ -118,15 +120,15 @@ def _room(size: int, n: int) -> JointWorkspace:
 @in_place
 def run_joint(
     fleet: Fleet,
-    points: Points,
+    points: PointNumbers,
     events: Events,
     items: Items,
     rules: LoopRules,
     joint: Joint,
     room: JointWorkspace,
     rows: LinearisedEvent,
-    lines: Lines,
-    log: Log,
+    lines: JointRows,
+    log: RunRecords,
 ) -> None:
     """Work through a session."""
     size, before = len(joint.x), room.before[0]
@@ -151,7 +153,7 @@ def run_joint(
 
 
 @in_place
-def _keep(fleet: Fleet, joint: Joint, who: int, log: Log) -> None:
+def _keep(fleet: Fleet, joint: Joint, who: int, log: RunRecords) -> None:
     """Write down a vehicle's states."""
     at, first = log.counts[OUTPUTS], joint.first[who]
     for i in range(fleet.size[who]):
@@ -218,14 +220,14 @@ def _look_at(fleet: Fleet, joint: Joint, who: int, at_s: float, end: int, room: 
 @inlined
 def _linearise(
     fleet: Fleet,
-    points: Points,
+    points: PointNumbers,
     events: Events,
     event: int,
     rules: LoopRules,
     joint: Joint,
     room: JointWorkspace,
     rows: LinearisedEvent,
-    lines: Lines,
+    lines: JointRows,
     at: int,
 ) -> int:
     """Put the rows of an event into ``lines`` from row ``at`` on; return how many there are."""
@@ -286,7 +288,7 @@ def _linearise(
 
 
 @inlined
-def _put(n: int, h: FloatArray, is_back: bool, phi: FloatArray, first: int, lines: Lines, entry: int) -> int:
+def _put(n: int, h: FloatArray, is_back: bool, phi: FloatArray, first: int, lines: JointRows, entry: int) -> int:
     """Write the derivative by a vehicle's states now, h phi, where it is not zero.
 
     Returns the next free entry.
@@ -341,7 +343,7 @@ def _refer(fleet: Fleet, joint: Joint, who: int, source: int, arm_m: FloatArray,
 
 @inlined
 def _judge(
-    fleet: Fleet, events: Events, event: int, rules: LoopRules, joint: Joint, lines: Lines, at: int, log: Log
+    fleet: Fleet, events: Events, event: int, rules: LoopRules, joint: Joint, lines: JointRows, at: int, log: RunRecords
 ) -> bool:
     """Tell whether a row is inside the gate.
 
@@ -360,7 +362,7 @@ def _judge(
 
 
 @inlined
-def _correct(joint: Joint, room: JointWorkspace, lines: Lines, at: int, innovation: float) -> None:
+def _correct(joint: Joint, room: JointWorkspace, lines: JointRows, at: int, innovation: float) -> None:
     """Use one scalar measurement with the optimal gain, in the core's symmetric form."""
     size = len(joint.x)
     update_covariance(
@@ -382,7 +384,7 @@ def _correct(joint: Joint, room: JointWorkspace, lines: Lines, at: int, innovati
 @inlined
 def _use(
     fleet: Fleet,
-    points: Points,
+    points: PointNumbers,
     events: Events,
     first: int,
     last: int,
@@ -390,8 +392,8 @@ def _use(
     joint: Joint,
     room: JointWorkspace,
     rows: LinearisedEvent,
-    lines: Lines,
-    log: Log,
+    lines: JointRows,
+    log: RunRecords,
 ) -> None:
     """Use all measurements in one update, linearised once.
 

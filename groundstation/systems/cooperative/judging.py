@@ -2,14 +2,14 @@
 
 from groundstation.base.compile import in_place
 from groundstation.base.records import Int64Array
-from groundstation.systems.cooperative.loop_types import CLOCK_LEAPS, GATED, JUDGED, USED, Fleet, FloatArray, Log
+from groundstation.systems.cooperative.loop_types import CLOCK_LEAPS, GATED, JUDGED, USED, Fleet, FloatArray, RunRecords
 
 PATIENCE = 30  # rejections of a vehicle in a row: then its clock has leapt, or it is not where it thinks
 LEAP_M = 1e5
 
 
 @in_place
-def write_down(event: int, innovation: float, variance: float, passes: bool, log: Log) -> None:
+def write_down(event: int, innovation: float, variance: float, passes: bool, log: RunRecords) -> None:
     """Log a measurement as it was judged."""
     at = log.counts[JUDGED]
     log.event[at], log.innovation[at], log.variance[at] = event, innovation, variance
@@ -19,7 +19,14 @@ def write_down(event: int, innovation: float, variance: float, passes: bool, log
 
 @in_place
 def count_rejection(
-    fleet: Fleet, who: int, passes: bool, may_open: bool, rejected: Int64Array, first: int, P: FloatArray, log: Log
+    fleet: Fleet,
+    who: int,
+    passes: bool,
+    may_open: bool,
+    rejected: Int64Array,
+    first: int,
+    P: FloatArray,
+    log: RunRecords,
 ) -> None:
     """Count rejections in a row; open the clock of a vehicle that no range fits any more.
 

@@ -20,7 +20,7 @@ TIME, PLACE, RATE, AXES, HEADING, LATITUDE, MERIDIAN, NORMAL, VELOCITY, FORCE, E
 )
 
 
-class Numbers(NamedTuple):
+class ModelNumbers(NamedTuple):
     """Constants of an aircraft's model: correlation times."""
 
     velocity_s: float = 1.0
@@ -48,7 +48,7 @@ class Fleet(NamedTuple):
     time_s: FloatArray  # (t,) of the epochs
     epochs: FloatArray  # (t, EPOCH_COLUMNS)
     density: FloatArray  # (k, n) of the white noise on each state
-    numbers: FloatArray  # (k, 5) Numbers
+    numbers: FloatArray  # (k, 5) ModelNumbers
 
 
 class Events(NamedTuple):
@@ -74,7 +74,7 @@ class Events(NamedTuple):
     spread: FloatArray
 
 
-class Points(NamedTuple):
+class PointNumbers(NamedTuple):
     """Ground points: axes north and east, sigma, index among the uncertain ones (-1: exact)."""
 
     axes: FloatArray  # (p, 3, 2)
@@ -123,7 +123,7 @@ def rows_for(n: int) -> LinearisedEvent:
     return LinearisedEvent(np.zeros(1), np.zeros((1, n)), np.zeros((1, 3)), np.zeros(1), np.zeros(1), np.zeros((3, 3)))
 
 
-class Log(NamedTuple):
+class RunRecords(NamedTuple):
     """Records of a run: states at every output, every measurement as judged, and counts."""
 
     x: FloatArray  # (outputs, n)
@@ -136,6 +136,6 @@ class Log(NamedTuple):
     sent: Int64Array  # (k,) messages
 
 
-OUTPUTS, JUDGED, LOST, UNUSED, CLOCK_LEAPS = 0, 1, 2, 3, 4  # of Log.counts
+OUTPUTS, JUDGED, LOST, UNUSED, CLOCK_LEAPS = 0, 1, 2, 3, 4  # of RunRecords.counts
 COUNTS = 5
 USED, GATED = 1, -1

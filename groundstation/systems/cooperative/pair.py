@@ -20,8 +20,8 @@ from groundstation.systems.cooperative.loop_types import (
     FloatArray,
     Items,
     LinearisedEvent,
-    Log,
-    Points,
+    PointNumbers,
+    RunRecords,
 )
 from groundstation.systems.cooperative.motion import place, position, step, turn_covariance, turn_rows
 from groundstation.systems.cooperative.observation import observe
@@ -80,7 +80,7 @@ def room_for(n: int, width: int) -> PairWorkspace:
 @in_place
 def run_pairs(
     fleet: Fleet,
-    points: Points,
+    points: PointNumbers,
     events: Events,
     items: Items,
     begin: int,
@@ -89,7 +89,7 @@ def run_pairs(
     members: Members,
     room: PairWorkspace,
     rows: LinearisedEvent,
-    log: Log,
+    log: RunRecords,
 ) -> None:
     """Work through the items ``begin`` to ``end``: one window of the error map."""
     for item in range(begin, end):
@@ -132,14 +132,14 @@ def _scale_factors(n: int, who: int, but: int, by: FloatArray, members: Members,
 @in_place
 def _use(
     fleet: Fleet,
-    points: Points,
+    points: PointNumbers,
     events: Events,
     event: int,
     gate_sigma: float,
     members: Members,
     room: PairWorkspace,
     rows: LinearisedEvent,
-    log: Log,
+    log: RunRecords,
 ) -> None:
     """Use one measurement."""
     who, source, at_s = events.receiver[event], events.source[event], events.time_s[event]
@@ -182,7 +182,7 @@ def _passes(
     total: float,
     gate_sigma: float,
     members: Members,
-    log: Log,
+    log: RunRecords,
 ) -> bool:
     """Tell whether an innovation is inside the gate.
 
@@ -199,14 +199,14 @@ def _passes(
 @in_place
 def _private(
     fleet: Fleet,
-    points: Points,
+    points: PointNumbers,
     events: Events,
     event: int,
     gate_sigma: float,
     members: Members,
     room: PairWorkspace,
     rows: LinearisedEvent,
-    log: Log,
+    log: RunRecords,
 ) -> None:
     """Use a range to a point or satellite; no other vehicle is told."""
     who, source, variance = events.receiver[event], events.source[event], rows.variance[0]
@@ -247,7 +247,7 @@ def _relative(
     members: Members,
     room: PairWorkspace,
     rows: LinearisedEvent,
-    log: Log,
+    log: RunRecords,
 ) -> None:
     """Use a range between two vehicles: both are updated as one filter."""
     one, two = events.receiver[event], events.source[event]

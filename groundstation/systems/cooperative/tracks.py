@@ -16,7 +16,7 @@ from groundstation.systems.cooperative.loop_types import (
     UNUSED,
     USED,
     Items,
-    Log,
+    RunRecords,
 )
 from groundstation.systems.cooperative.motion import positions
 
@@ -126,11 +126,11 @@ class AlgorithmRun:
     map_radius: FloatArray
 
 
-def log_for(prepared: Prepared, items: Items) -> Log:
+def log_for(prepared: Prepared, items: Items) -> RunRecords:
     """Make an empty log for a run."""
     k, n = prepared.fleet.density.shape
     outputs, rows = int((items.vehicle >= 0).sum()), len(prepared.events.time_s)
-    return Log(
+    return RunRecords(
         np.zeros((outputs, n)),
         np.zeros((outputs, n, n)),
         np.zeros(rows, dtype=np.int64),
@@ -145,7 +145,7 @@ def log_for(prepared: Prepared, items: Items) -> Log:
 def finished(
     prepared: Prepared,
     items: Items,
-    log: Log,
+    log: RunRecords,
     algorithm: str,
     update: str,
     messages: dict[str, tuple[int, int]],
@@ -176,7 +176,7 @@ def finished(
     )
 
 
-def _track(prepared: Prepared, items: Items, log: Log, who: int) -> VehicleTrack:
+def _track(prepared: Prepared, items: Items, log: RunRecords, who: int) -> VehicleTrack:
     vehicle, n = prepared.vehicles[who], prepared.vehicles[who].size
     mine = items.vehicle[items.vehicle >= 0] == who
     time_s = items.time_s[items.vehicle == who]

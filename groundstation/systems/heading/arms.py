@@ -18,7 +18,7 @@ from groundstation.base.angles import wrap_180, wrap_360
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.methods.taxi.gating import NOT_TAXI
 from groundstation.methods.taxi.samples import TaxiSamples
-from groundstation.methods.taxi_error.interval import Differences, Regressor, fixed_noise_estimate, misfit
+from groundstation.methods.taxi_error.interval import HeadingDifferences, Regressor, fixed_noise_estimate, misfit
 from groundstation.methods.taxi_error.priors import PRIOR_MEAN
 from groundstation.systems.heading.settings import HeadingSettings
 from groundstation.systems.known import AircraftData
@@ -114,7 +114,7 @@ def _from_turns(
     keep = np.abs(sine) < LARGEST_SINE
     if keep.sum() < LEAST_TURNING:
         return (arm[0], 0.0), (arm[1], settings.offset_prior_sigma_s)
-    differences = Differences(
+    differences = HeadingDifferences(
         time_s=samples.time_s[index][keep],
         difference_deg=sine[keep] * DEG_PER_RAD,
         direction_deg=wrap_360(samples.heading_deg[index][keep] - error),

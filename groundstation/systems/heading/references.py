@@ -34,7 +34,7 @@ ABSURD_RESIDUAL_DEG = 5.0
 
 
 @dataclass(frozen=True)
-class Reference:
+class ParkedHeading:
     """True heading of the aircraft as parked, [0, 360), its sigma, and who says so."""
 
     heading_deg: float
@@ -102,15 +102,15 @@ def shrunk_drift(prior_sigma_deg_per_h: float, *measured: tuple[float, float] | 
     return sum(drift * part for drift, part in known) / weight, float(weight**-0.5)
 
 
-def site_reference(site: SiteData) -> Reference | None:
+def site_reference(site: SiteData) -> ParkedHeading | None:
     """Reference of the stand that the user's site file names."""
     stand = site.parked_on()
     if stand is None:
         return None
-    return Reference(float(wrap_360(stand.heading_deg)), stand.sigma_deg, f"site file, stand {stand.name}")
+    return ParkedHeading(float(wrap_360(stand.heading_deg)), stand.sigma_deg, f"site file, stand {stand.name}")
 
 
-def logged_reference(flight_metadata: Mapping[str, str]) -> Reference | None:
+def logged_reference(flight_metadata: Mapping[str, str]) -> ParkedHeading | None:
     """Reference that the log itself brings; None without one, or where it is no finite number.
 
     Examples
@@ -124,7 +124,7 @@ def logged_reference(flight_metadata: Mapping[str, str]) -> Reference | None:
     if heading is None:
         return None
     sigma = _finite(flight_metadata.get(REFERENCE_SIGMA_KEY))
-    return Reference(float(wrap_360(heading)), sigma if sigma and sigma > 0.0 else REFERENCE_SIGMA_DEG, "log")
+    return ParkedHeading(float(wrap_360(heading)), sigma if sigma and sigma > 0.0 else REFERENCE_SIGMA_DEG, "log")
 
 
 def _finite(text: str | None) -> float | None:
@@ -135,7 +135,7 @@ def _finite(text: str | None) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def parking_reference(flight_metadata: Mapping[str, str], site: SiteData) -> Reference | None:
+def parking_reference(flight_metadata: Mapping[str, str], site: SiteData) -> ParkedHeading | None:
     """The reference compared with: the user's site file stands above the log."""
     return site_reference(site) or logged_reference(flight_metadata)
 

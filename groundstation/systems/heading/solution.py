@@ -12,7 +12,7 @@ from groundstation.base.angles import mean_heading, wrap_180, wrap_360
 from groundstation.base.records import BoolArray
 from groundstation.methods.taxi.samples import TaxiSamples, take_samples, without_arm
 from groundstation.methods.taxi_error.interval import (
-    Differences,
+    HeadingDifferences,
     Regressor,
     StandstillVelocities,
     error_posterior,
@@ -47,7 +47,7 @@ class Solution:
     ----------
     samples, used : TaxiSamples
         All and the used ones, the applied arm taken out.
-    differences : Differences
+    differences : HeadingDifferences
         Of the used samples, without a jump at +-180 deg, the mean sideslip of a known wind taken off.
     posterior : ErrorPosterior
     without_wind_deg : ndarray, shape (n,)
@@ -78,7 +78,7 @@ class Solution:
 
     samples: TaxiSamples
     used: TaxiSamples
-    differences: Differences
+    differences: HeadingDifferences
     posterior: ErrorPosterior
     without_wind_deg: FloatArray
     growth_samples: NDArray[np.int64]
@@ -106,11 +106,11 @@ def _centred(difference_deg: FloatArray) -> FloatArray:
 
 def _differences(
     used: TaxiSamples, knowledge: ArmKnowledge, steady: SteadyPrior, steps: tuple[HeadingStep, ...]
-) -> Differences:
+) -> HeadingDifferences:
     difference = _centred(used.difference_deg)
     direction = wrap_360(used.heading_deg - np.median(difference))
     difference = difference - steady.sideslip_deg(direction)
-    return Differences(
+    return HeadingDifferences(
         time_s=used.time_s,
         difference_deg=difference,
         direction_deg=direction,
@@ -194,7 +194,7 @@ def solve(
     )
 
 
-def _part(differences: Differences, index: slice | BoolArray) -> Differences:
+def _part(differences: HeadingDifferences, index: slice | BoolArray) -> HeadingDifferences:
     return replace(
         differences,
         time_s=differences.time_s[index],
@@ -229,7 +229,9 @@ def _velocities(
     )
 
 
-def _drift(differences: Differences, reference_time_s: float, draws: FloatArray) -> tuple[float | None, float | None]:
+def _drift(
+    differences: HeadingDifferences, reference_time_s: float, draws: FloatArray
+) -> tuple[float | None, float | None]:
     """Slope of the error and its standard deviation, deg/h, by generalised least squares."""
     if float(np.ptp(differences.time_s)) < LEAST_DRIFT_S:
         return None, None
@@ -238,7 +240,7 @@ def _drift(differences: Differences, reference_time_s: float, draws: FloatArray)
     return float(mean[-1]) * 3600.0, float(sigma[-1]) * 3600.0
 
 
-def _segment(differences: Differences, used: TaxiSamples, mask: BoolArray, draws: FloatArray) -> TaxiSegment:
+def _segment(differences: HeadingDifferences, used: TaxiSamples, mask: BoolArray, draws: FloatArray) -> TaxiSegment:
     mean, sigma = fixed_noise_estimate(without_apart(_part(differences, mask)), draws)
     return TaxiSegment(
         start_s=float(used.time_s[mask][0]),
@@ -252,7 +254,7 @@ def _segment(differences: Differences, used: TaxiSamples, mask: BoolArray, draws
 
 
 def _parts(
-    differences: Differences,
+    differences: HeadingDifferences,
     used: TaxiSamples,
     segments: tuple[TaxiSegment, ...],
     draws: FloatArray,
@@ -273,7 +275,7 @@ def _parts(
     return tuple(parts)
 
 
-def _wind_found(differences: Differences, posterior: ErrorPosterior) -> FloatArray:
+def _wind_found(differences: HeadingDifferences, posterior: ErrorPosterior) -> FloatArray:
     """Return the part of each difference by the terms told apart, degrees.
 
     Zero where one direction hides them.
@@ -286,7 +288,7 @@ def _wind_found(differences: Differences, posterior: ErrorPosterior) -> FloatArr
     )
 
 
-def _wind_of(parts: tuple[TaxiSegment, ...], differences: Differences) -> FloatArray:
+def _wind_of(parts: tuple[TaxiSegment, ...], differences: HeadingDifferences) -> FloatArray:
     """Return one sigma of each term told apart, averaged over each part, (parts, terms).
 
     Degrees.
@@ -298,7 +300,7 @@ def _wind_of(parts: tuple[TaxiSegment, ...], differences: Differences) -> FloatA
 
 
 def _directions(
-    differences: Differences, used: TaxiSamples, segments: tuple[TaxiSegment, ...], draws: FloatArray
+    differences: HeadingDifferences, used: TaxiSamples, segments: tuple[TaxiSegment, ...], draws: FloatArray
 ) -> tuple[TaxiSegment, ...]:
     """Estimate the error out and back; empty if the taxi went one way.
 

@@ -13,7 +13,7 @@ from groundstation.base.findings import Finding
 from groundstation.base.quantiles import NORMAL_95
 from groundstation.base.signals import topics_of_kind
 from groundstation.systems.inertial.answer import CHANNELS, Difference, InertialResult, OwnInnovation
-from groundstation.systems.inertial.differences import Differences, differences
+from groundstation.systems.inertial.differences import InsDifferences, differences
 from groundstation.systems.inertial.figures import differences_figure, own_innovations_figure, plain_track_figure
 from groundstation.systems.inertial.kind import WHY_NOT
 from groundstation.systems.inertial.model import FloatArray
@@ -77,7 +77,7 @@ def compare_aided(
     return result, (*compared.findings, Finding("info", code, text, compared.ins_topic))
 
 
-def _differences(compared: Differences) -> tuple[Difference, ...]:
+def _differences(compared: InsDifferences) -> tuple[Difference, ...]:
     rows = []
     for (quantity, unit), values in zip(UNITS, (compared.epochs.position_m, compared.epochs.velocity_mps), strict=True):
         for axis, along in (*zip(CHANNELS, values.T, strict=True), ("horizontal", np.hypot(*values.T))):

@@ -14,8 +14,8 @@ from groundstation.base.records import BoolArray
 from groundstation.methods.ins_noise import RADPS_PER_DPH
 from groundstation.methods.intervals import BOUND95
 from groundstation.results.roles import AzimuthEstimate, EarlyAzimuth
-from groundstation.systems.inertial.differences import Differences
-from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, run_filter
+from groundstation.systems.inertial.differences import InsDifferences
+from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs, run_filter
 from groundstation.systems.inertial.model import VELOCITY, FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.velocity_changes import (
@@ -69,8 +69,8 @@ class AzimuthFit:
 
 
 def estimate_azimuth(
-    differences: Differences,
-    run: FilterRun,
+    differences: InsDifferences,
+    run: ChannelsRun,
     settings: InertialSettings,
     *,
     limits: AzimuthLimits | None = None,
@@ -79,9 +79,9 @@ def estimate_azimuth(
 
     Parameters
     ----------
-    differences : Differences
+    differences : InsDifferences
         With velocities of GNSS.
-    run : FilterRun
+    run : ChannelsRun
         Of the separate channels: its model and its noise are used.
     settings : InertialSettings
         ``azimuth_sigma_max_deg``, ``gate_sigmas``.
@@ -132,8 +132,8 @@ def estimate_azimuth(
 
 
 def _early(
-    differences: Differences,
-    run: FilterRun,
+    differences: InsDifferences,
+    run: ChannelsRun,
     settings: InertialSettings,
     changes: Changes,
     known: BoolArray,
@@ -163,8 +163,8 @@ def _early(
 
 
 def fit_azimuth(
-    differences: Differences,
-    run: FilterRun,
+    differences: InsDifferences,
+    run: ChannelsRun,
     settings: InertialSettings,
     changes: Changes,
     known: BoolArray,
@@ -204,7 +204,7 @@ def _refused(changes: int, largest: float, reason: str) -> AzimuthEstimate:
 
 
 def _without_azimuth(
-    differences: Differences, parameters: FloatArray, reference_s: float, known: BoolArray
+    differences: InsDifferences, parameters: FloatArray, reference_s: float, known: BoolArray
 ) -> DifferenceEpochs:
     """Return the velocity differences less the effect of an azimuth error on the velocity.
 
@@ -217,7 +217,7 @@ def _without_azimuth(
     return DifferenceEpochs(epochs.time_s, np.full_like(velocity, np.nan), velocity, epochs.drag_per_s, epochs.is_reset)
 
 
-def _unpredicted(run: FilterRun, changes: Changes) -> tuple[FloatArray, FloatArray]:
+def _unpredicted(run: ChannelsRun, changes: Changes) -> tuple[FloatArray, FloatArray]:
     """Return the change of velocity error that the filter did not predict, and its variance.
 
     Shapes (m, 2) and (m,).
@@ -247,7 +247,7 @@ def _ends(changes: Changes, index: int) -> tuple[float, float]:
     return float(changes.before_s[index]), float(changes.after_s[index])
 
 
-def _quiet_scale(run: FilterRun, quiet: Changes) -> float:
+def _quiet_scale(run: ChannelsRun, quiet: Changes) -> float:
     """Return how much larger the variance across quiet stretches is than modelled.
 
     1 with few of them.

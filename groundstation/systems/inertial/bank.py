@@ -16,7 +16,7 @@ import numpy as np
 
 from groundstation.base.records import frozen
 from groundstation.systems.inertial.coarse import Coarse
-from groundstation.systems.inertial.filter import FilterRun, Initial, initial_of, run_filter
+from groundstation.systems.inertial.filter import ChannelsRun, Initial, initial_of, run_filter
 from groundstation.systems.inertial.leads import PAST_FROM_S, Path, built_up, past_mean, start_epochs
 from groundstation.systems.inertial.model import POSITION, FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
@@ -33,17 +33,17 @@ class NoiseBank:
 
     Parameters
     ----------
-    flown : FilterRun
+    flown : ChannelsRun
         The flight's own filter, over its own epochs.
-    runs : tuple of FilterRun
+    runs : tuple of ChannelsRun
         One for each set, over coarse epochs.
     end_s : ndarray, shape (n,)
         Time of the last sample that is in each coarse epoch.
     settings : InertialSettings
     """
 
-    flown: FilterRun
-    runs: tuple[FilterRun, ...]
+    flown: ChannelsRun
+    runs: tuple[ChannelsRun, ...]
     end_s: FloatArray
     settings: InertialSettings
 
@@ -122,7 +122,7 @@ class NoiseBank:
         return found
 
 
-def run_bank(run: FilterRun, settings: InertialSettings) -> NoiseBank:
+def run_bank(run: ChannelsRun, settings: InertialSettings) -> NoiseBank:
     """Filter a flight with every set of its class's bank.
 
     None of them uses what the flight's own filter rejected.

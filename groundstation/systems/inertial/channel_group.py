@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.methods.kalman import filter as kalman
-from groundstation.methods.kalman.arrays import NO_STEP, REJECTED, USED, Drive, Lines
+from groundstation.methods.kalman.arrays import NO_STEP, REJECTED, USED, Drive, MeasurementRows
 from groundstation.methods.kalman.transition import Transition
 from groundstation.systems.inertial.model import POSITION, SIZE, VELOCITY, FloatArray
 from groundstation.systems.inertial.seams import Fixes, Seam, fixes_since, returns_of
@@ -107,7 +107,7 @@ class ChannelGroup:
         n, _, channels = z.shape
         both, opened = np.arange(2), np.zeros((1, SIZE))
         opened[0, KINDS] = np.square([RESET_POSITION_M, RESET_VELOCITY_MPS])
-        lines = Lines(np.arange(3), KINDS, np.ones(2), self.weighted, self.believed, both)
+        lines = MeasurementRows(np.arange(3), KINDS, np.ones(2), self.weighted, self.believed, both)
         step = steps.index.copy()
         step[:1] = NO_STEP  # the start belongs to the first epoch
         return kalman.run_filter(

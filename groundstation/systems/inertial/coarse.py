@@ -8,7 +8,7 @@ from groundstation.base.records import frozen
 from groundstation.methods.ins_noise import InsNoise
 from groundstation.methods.kalman.arrays import USED
 from groundstation.systems.inertial.differences import mean_in
-from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun
+from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs
 from groundstation.systems.inertial.model import FloatArray
 
 COARSE_S = 10.0  # a Schuler period has 500 of them
@@ -20,7 +20,7 @@ class Coarse:
 
     Parameters
     ----------
-    flown : FilterRun
+    flown : ChannelsRun
         The flight's own filter over its own epochs; what it rejected is in no mean.
     epochs : DifferenceEpochs
         Each at the mean time of the samples that measured; a reset of the INS begins one.
@@ -30,7 +30,7 @@ class Coarse:
         How many measurements are usually in one.
     """
 
-    flown: FilterRun
+    flown: ChannelsRun
     epochs: DifferenceEpochs
     begin_s: FloatArray
     end_s: FloatArray
@@ -41,7 +41,7 @@ class Coarse:
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     @classmethod
-    def of(cls, run: FilterRun) -> "Coarse":
+    def of(cls, run: ChannelsRun) -> "Coarse":
         """Means over :data:`COARSE_S` of what a run used."""
         epochs = run.epochs
         begins = np.diff(np.floor((epochs.time_s - epochs.time_s[0]) / COARSE_S), prepend=-1.0) > 0.0

@@ -19,12 +19,12 @@ from groundstation.base.records import Int64Array, frozen
 from groundstation.base.units import MPS2_PER_G
 from groundstation.methods.ins_noise import InsNoise
 from groundstation.methods.kalman import filter as kalman
-from groundstation.methods.kalman.arrays import NO_STEP, REJECTED, Lines
+from groundstation.methods.kalman.arrays import NO_STEP, REJECTED, MeasurementRows
 from groundstation.methods.kalman.rates import Rates
 from groundstation.methods.kalman.transition import Transition
 from groundstation.systems.inertial.channel_group import RESET_POSITION_M, RESET_VELOCITY_MPS
 from groundstation.systems.inertial.craft_motion import CraftMotion, latitude_rad, radii_m, rates_radps
-from groundstation.systems.inertial.differences import Differences, only_used
+from groundstation.systems.inertial.differences import InsDifferences, only_used
 from groundstation.systems.inertial.filter import DifferenceEpochs, measurement_variances, patience_of
 from groundstation.systems.inertial.model import POSITION, VELOCITY, FloatArray
 from groundstation.systems.inertial.seams import Fixes, fixes_since, returns_of
@@ -79,7 +79,7 @@ class CoupledRun:
         How often GNSS was rejected for so long that the filter took it to be right after all.
     """
 
-    differences: Differences
+    differences: InsDifferences
     noise: InsNoise
     x: FloatArray
     sigma: FloatArray
@@ -151,7 +151,7 @@ def coupled_matrix(motion: CraftMotion, beta_per_s: float) -> FloatArray:
 
 
 def run_coupled(
-    differences: Differences, noise: InsNoise, settings: InertialSettings, *, every: int = EVERY
+    differences: InsDifferences, noise: InsNoise, settings: InertialSettings, *, every: int = EVERY
 ) -> CoupledRun:
     """Estimate the errors of both channels and the azimuth together.
 
@@ -237,7 +237,7 @@ def _seam_at(
     values: FloatArray,
     interval_s: FloatArray,
     densities: FloatArray,
-    lines: Lines,
+    lines: MeasurementRows,
     gate: float,
 ) -> tuple[int, float]:
     """Return the first agreeing fix after a return of GNSS, and the factor on the sigma.
@@ -266,17 +266,17 @@ def _at_epochs(run: kalman.FilterRun, last: Int64Array) -> tuple[FloatArray, Flo
     return run.x[last, :, 0], run.record.variance[last]
 
 
-def lines_of(epochs: DifferenceEpochs, noise: InsNoise) -> Lines:
+def lines_of(epochs: DifferenceEpochs, noise: InsNoise) -> MeasurementRows:
     """Position north and east, velocity north and east; the two of a kind are judged together."""
     weighted, believed = measurement_variances(epochs, noise)
     states = CHANNELS[:, [POSITION, VELOCITY]].T.ravel()
-    return Lines(
+    return MeasurementRows(
         np.arange(5), states, np.ones(4), np.repeat(weighted, 2), np.repeat(believed, 2), np.array([0, 0, 1, 1])
     )
 
 
 def noise_of(
-    noise: InsNoise, differences: Differences, epochs: DifferenceEpochs, heading_rad: float
+    noise: InsNoise, differences: InsDifferences, epochs: DifferenceEpochs, heading_rad: float
 ) -> tuple[FloatArray, FloatArray]:
     """Covariance at the start, shape (16, 16), and densities (16,).
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.base.geodesy import EARTH_RATE_RADPS, curvature_radii_m
 from groundstation.base.records import frozen
-from groundstation.systems.inertial.differences import Differences
+from groundstation.systems.inertial.differences import InsDifferences
 from groundstation.systems.inertial.model import FloatArray, normal_gravity_mps2
 
 LATITUDE_MAX_DEG = 88.0  # beyond, north is no axis for an error model
@@ -37,7 +37,7 @@ class CraftMotion:
             object.__setattr__(self, item.name, frozen(np.asarray(getattr(self, item.name), dtype=np.float64)))
 
     @classmethod
-    def between(cls, differences: Differences, time_s: FloatArray, *, is_strapdown: bool = True) -> "CraftMotion":
+    def between(cls, differences: InsDifferences, time_s: FloatArray, *, is_strapdown: bool = True) -> "CraftMotion":
         """The motion between neighbouring times, m of them, from the INS alone; m - 1 intervals.
 
         It is held where the INS has no samples; without any it is at rest on the equator.

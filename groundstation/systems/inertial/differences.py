@@ -33,7 +33,7 @@ LONGEST_FLIGHT_S = 4.0e6  # 46 days: a clock that jumps by years must not fill t
 
 
 @dataclass(frozen=True)
-class Differences:
+class InsDifferences:
     """INS minus GNSS on the epochs of the filter, and the motion of the INS there.
 
     Parameters
@@ -100,7 +100,7 @@ class Differences:
 
 def differences(
     flight: Flight, *, settings: InertialSettings, excluded_s: tuple[tuple[float, float], ...] = ()
-) -> Differences:
+) -> InsDifferences:
     """Compare INS and GNSS of a flight.
 
     GNSS samples are averaged over ``epoch_interval_s`` after the INS has been interpolated to each of them; epochs with
@@ -153,7 +153,7 @@ def differences(
         drag_per_s(latitude, _altitude(at), ins_velocity),
         _reset_marks(flight, time_s, reset_ns),
     )
-    return Differences(
+    return InsDifferences(
         *(ins_topic, gnss_topic, epochs, latitude, longitude, _altitude(at), ins_velocity),
         aided_share=aided_share(ins),
         findings=tuple(findings),

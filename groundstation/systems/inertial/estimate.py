@@ -16,11 +16,11 @@ from groundstation.systems.inertial import figures
 from groundstation.systems.inertial.answer import ChannelResult, InertialResult, NavigationStart, StateEstimate
 from groundstation.systems.inertial.azimuth import estimate_azimuth
 from groundstation.systems.inertial.coupled import CoupledRun
-from groundstation.systems.inertial.differences import Differences, differences, only_used
+from groundstation.systems.inertial.differences import InsDifferences, differences, only_used
 from groundstation.systems.inertial.filter import (
+    ChannelsRun,
     DifferenceEpochs,
-    FilterRun,
-    Smoothed,
+    SmoothedErrors,
     initial_of,
     run_filter,
     smooth,
@@ -58,10 +58,10 @@ class Estimation:
     default method where it was not. ``coupled`` is the coupled run, where that forecast needed one.
     """
 
-    compared: Differences
+    compared: InsDifferences
     noise: InsNoise
-    run: FilterRun
-    smoothed: Smoothed
+    run: ChannelsRun
+    smoothed: SmoothedErrors
     corrected_error_m: FloatArray
     result: InertialResult
     findings: tuple[Finding, ...]
@@ -120,7 +120,7 @@ def estimate_ins_errors(
 
 def estimate_compared(
     flight: Flight,
-    compared: Differences,
+    compared: InsDifferences,
     kind: tuple[str, str],
     *,
     settings: InertialSettings,
@@ -144,7 +144,7 @@ def estimate_compared(
     return Estimation(compared, noise, run, smoothed, bridged.error_m, result, findings, bridged.coupled)
 
 
-def _mean_place(compared: Differences) -> tuple[float, float]:
+def _mean_place(compared: InsDifferences) -> tuple[float, float]:
     """Return mean latitude, degrees, and altitude, metres, where the INS knew them.
 
     Else the equator at sea level.
@@ -156,7 +156,7 @@ def _mean_place(compared: Differences) -> tuple[float, float]:
     return latitude, altitude
 
 
-def observability(run: FilterRun) -> FloatArray:
+def observability(run: ChannelsRun) -> FloatArray:
     """Return 1 - sigma / sigma without GNSS of every state at every epoch, in [0, 1].
 
     Shape (n, 6, c).
@@ -168,9 +168,9 @@ def observability(run: FilterRun) -> FloatArray:
 
 def _result(
     flight: Flight,
-    compared: Differences,
-    run: FilterRun,
-    smoothed: Smoothed,
+    compared: InsDifferences,
+    run: ChannelsRun,
+    smoothed: SmoothedErrors,
     bridged: Bridged,
     settings: InertialSettings,
     origin: str,
@@ -217,7 +217,7 @@ def _result(
     )
 
 
-def _channel(run: FilterRun, visible: FloatArray, channel: int) -> ChannelResult:
+def _channel(run: ChannelsRun, visible: FloatArray, channel: int) -> ChannelResult:
     seen = np.flatnonzero(run.epochs.has_gnss)
     last = int(seen[-1])
     used = run.used[:, :, channel]
@@ -278,7 +278,7 @@ def _radial_rates(epochs: DifferenceEpochs, radial_m: FloatArray, start_s: float
     return float(np.median(rates)), float(np.quantile(rates, 0.95)), fit
 
 
-def _findings(compared: Differences, run: FilterRun, result: InertialResult) -> list[Finding]:
+def _findings(compared: InsDifferences, run: ChannelsRun, result: InertialResult) -> list[Finding]:
     found = []
     rejected = int((run.used == -1).any(axis=2).sum())
     if rejected:
@@ -299,7 +299,7 @@ def _findings(compared: Differences, run: FilterRun, result: InertialResult) -> 
     return [*found, *_outage_findings(compared, result)]
 
 
-def _seam_findings(compared: Differences, run: FilterRun) -> list[Finding]:
+def _seam_findings(compared: InsDifferences, run: ChannelsRun) -> list[Finding]:
     """Return a finding for each outage at whose end GNSS was beyond the gate and used.
 
     One stands for all where many are.
@@ -318,7 +318,7 @@ def _seam_findings(compared: Differences, run: FilterRun) -> list[Finding]:
     return found
 
 
-def _outage_findings(compared: Differences, result: InertialResult) -> list[Finding]:
+def _outage_findings(compared: InsDifferences, result: InertialResult) -> list[Finding]:
     """One finding for each outage, or one for all where there are many."""
     lost = {"gnss": "no GNSS", "ins": "no INS", "both": "neither INS nor GNSS"}
     if len(result.outages) > OUTAGES_LISTED:

@@ -5,7 +5,7 @@ import numpy as np
 from groundstation.base.errors import NotAssessableError
 from groundstation.methods.roles import InsKinds
 from groundstation.systems.analysis import Shortfall
-from groundstation.systems.inertial.differences import Differences, differences
+from groundstation.systems.inertial.differences import InsDifferences, differences
 from groundstation.systems.inertial.kind import WHY_NOT, kind_of, stated_kind
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.known import Known
@@ -17,7 +17,9 @@ LEAST_COVERED = 0.95  # of the time of the INS: more without GNSS is worth a wor
 LISTED = 5  # outages
 
 
-def compared_with_kind(flight: Flight, known: Known, settings: InertialSettings) -> tuple[Differences, tuple[str, str]]:
+def compared_with_kind(
+    flight: Flight, known: Known, settings: InertialSettings
+) -> tuple[InsDifferences, tuple[str, str]]:
     """Return INS minus GNSS of a flight, and whether GNSS corrects the INS, with the reason.
 
     Raises

@@ -19,8 +19,8 @@ from groundstation.systems.inertial.arrays import (
     OwnInnovationsOfChannel,
     StatesOfChannel,
 )
-from groundstation.systems.inertial.differences import Differences
-from groundstation.systems.inertial.filter import FilterRun, Smoothed
+from groundstation.systems.inertial.differences import InsDifferences
+from groundstation.systems.inertial.filter import ChannelsRun, SmoothedErrors
 from groundstation.systems.inertial.forecast_arrays import (
     FanOfChannel,
     ForecastClassic,
@@ -55,7 +55,7 @@ def thinned(count: int) -> Int64Array:
     return np.unique(np.linspace(0, count - 1, min(count, ROWS)).round().astype(np.int64))
 
 
-def states_figure(run: FilterRun, smoothed: Smoothed) -> InertialStates:
+def states_figure(run: ChannelsRun, smoothed: SmoothedErrors) -> InertialStates:
     """States with sigma, what was measured, and the smoothed errors, over time."""
     rows = thinned(len(run.epochs))
     epochs = run.epochs
@@ -69,7 +69,7 @@ def states_figure(run: FilterRun, smoothed: Smoothed) -> InertialStates:
     )
 
 
-def _states(run: FilterRun, smoothed: Smoothed, channel: int, rows: Int64Array) -> StatesOfChannel:
+def _states(run: ChannelsRun, smoothed: SmoothedErrors, channel: int, rows: Int64Array) -> StatesOfChannel:
     """Columns of one channel."""
     position, velocity, tilt, drift, drift_rate, random_drift = (PER_SI * run.x[rows, :, channel]).T
     sigmas = (PER_SI * run.sigma(channel)[rows]).T
@@ -94,13 +94,13 @@ def _states(run: FilterRun, smoothed: Smoothed, channel: int, rows: Int64Array) 
     )
 
 
-def _normalised(run: FilterRun, channel: int) -> FloatArray:
+def _normalised(run: ChannelsRun, channel: int) -> FloatArray:
     """Return the position innovation over its sigma; the velocity's where none was measured."""
     ratio = run.innovation[:, :, channel] / np.sqrt(run.innovation_variance[:, :, channel])
     return np.where(np.isfinite(ratio[:, 0]), ratio[:, 0], ratio[:, 1])
 
 
-def observability_figure(run: FilterRun, observability: FloatArray) -> InertialObservability:
+def observability_figure(run: ChannelsRun, observability: FloatArray) -> InertialObservability:
     """Return how far each state's sigma is below what it would be without GNSS.
 
     ``observability`` has shape (n, 6, c).
@@ -123,7 +123,7 @@ def _observability(values: FloatArray) -> ObservabilityOfChannel:
     )
 
 
-def track_figure(compared: Differences, corrected_m: FloatArray, smoothed_m: FloatArray) -> InertialTrack:
+def track_figure(compared: InsDifferences, corrected_m: FloatArray, smoothed_m: FloatArray) -> InertialTrack:
     """Return the tracks of the INS, of GNSS, and of the INS as corrected and as smoothed.
 
     The last two are the INS minus its estimated error, and minus its smoothed error.
@@ -142,7 +142,7 @@ def track_figure(compared: Differences, corrected_m: FloatArray, smoothed_m: Flo
     )
 
 
-def plain_track_figure(compared: Differences) -> InertialTrack:
+def plain_track_figure(compared: InsDifferences) -> InertialTrack:
     """Track of the INS and of GNSS."""
     measured = compared.epochs.position_m
     rows = thinned(len(measured))
@@ -156,13 +156,13 @@ def plain_track_figure(compared: Differences) -> InertialTrack:
     )
 
 
-def _places(compared: Differences, error_m: FloatArray, rows: Int64Array) -> tuple[FloatArray, FloatArray]:
+def _places(compared: InsDifferences, error_m: FloatArray, rows: Int64Array) -> tuple[FloatArray, FloatArray]:
     """Latitude and longitude of the INS minus an error, of some rows."""
     latitude, longitude = moved(compared, error_m)
     return latitude[rows], longitude[rows]
 
 
-def differences_figure(compared: Differences) -> InertialDifferences:
+def differences_figure(compared: InsDifferences) -> InertialDifferences:
     """INS minus GNSS over time."""
     epochs = compared.epochs
     rows = thinned(len(epochs))
@@ -191,7 +191,7 @@ def own_innovations_figure(flight: Flight, own: OwnInnovations) -> InertialOwnIn
     return InertialOwnInnovations(time_s=flight.seconds(own.time_ns[rows]), north=north, east=east)
 
 
-def moved(compared: Differences, error_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+def moved(compared: InsDifferences, error_m: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Position of the INS minus an error in metres."""
     meridian, prime_vertical = curvature_radii_m(np.nan_to_num(compared.latitude_deg))
     height = np.nan_to_num(compared.altitude_m)

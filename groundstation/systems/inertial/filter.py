@@ -98,12 +98,12 @@ class Initial:
 
 
 @dataclass(frozen=True)
-class FilterRun:
+class ChannelsRun:
     """The filter's history. n epochs, c channels; measurement axis: position, velocity.
 
     Parameters
     ----------
-    parts : tuple of kalman.FilterRun
+    parts : tuple of kalman.ChannelsRun
         What the core ran: one for both channels, which share a covariance then (g = 1), or one each (g = 2).
     x : ndarray, shape (n, 6, c)
         Estimates after each epoch (forecast where GNSS was absent).
@@ -204,7 +204,7 @@ def run_filter(
     gate: float = STANDARD_GATE,
     initial: Initial | None = None,
     steps: Steps | None = None,
-) -> FilterRun:
+) -> ChannelsRun:
     """Estimate the errors of both channels; where GNSS is absent the states are forecast.
 
     Parameters
@@ -245,7 +245,7 @@ def run_filter(
     records, n = [part.run.record for part in parts], len(epochs)
     shared = [(len(group), record) for group, record in zip(groups, records, strict=True)]
     seams = tuple(part.seams for part in parts)
-    return FilterRun(
+    return ChannelsRun(
         epochs=epochs,
         model=model,
         noise=noise,
@@ -307,14 +307,14 @@ def _pushed(drag: FloatArray, group: list[int], earlier: list[FloatArray]) -> Fl
 
 
 @dataclass(frozen=True)
-class Smoothed:
+class SmoothedErrors:
     """Smoothed states and variances, both (n, 6, c), NaN outside the interval asked for."""
 
     x: FloatArray
     variance: FloatArray
 
 
-def smooth(run: FilterRun, first: int = 0, last: int | None = None) -> Smoothed:
+def smooth(run: ChannelsRun, first: int = 0, last: int | None = None) -> SmoothedErrors:
     """Smooth epochs ``first`` to ``last`` (both included) with the data up to ``last``.
 
     Source: Rauch, Tung, Striebel, 1965, in the form of Bryson and Frazier (Bierman, 1973).
@@ -322,4 +322,4 @@ def smooth(run: FilterRun, first: int = 0, last: int | None = None) -> Smoothed:
     parts = [smoother.smooth(part, first, last) for part in run.parts]
     shapes = [(*part.variance.shape, len(group)) for part, group in zip(parts, run.groups, strict=True)]
     variances = [np.broadcast_to(part.variance[:, :, None], shape) for part, shape in zip(parts, shapes, strict=True)]
-    return Smoothed(_joined([part.x for part in parts]), _joined(variances))
+    return SmoothedErrors(_joined([part.x for part in parts]), _joined(variances))

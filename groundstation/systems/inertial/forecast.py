@@ -14,7 +14,7 @@ from groundstation.systems.inertial.bank import NoiseBank, run_bank
 from groundstation.systems.inertial.coupled import CoupledRun, run_coupled
 from groundstation.systems.inertial.coupled_forecast import coupled_rows, coupled_variance, hindcast_coupled
 from groundstation.systems.inertial.estimate import Estimation
-from groundstation.systems.inertial.filter import FilterRun
+from groundstation.systems.inertial.filter import ChannelsRun
 from groundstation.systems.inertial.forecast_answer import ClassicStart, ForecastResult, PhaseRow
 from groundstation.systems.inertial.gaps import gap_rows
 from groundstation.systems.inertial.hindcast import Hindcast, hindcast
@@ -127,7 +127,7 @@ def _lengths_that_fit(plan: ReplayPlan) -> tuple[float, ...]:
 
 
 def _phases(
-    run: FilterRun, coupled: CoupledRun, bank: NoiseBank, settings: InertialSettings, phase_of: PhaseOf | None
+    run: ChannelsRun, coupled: CoupledRun, bank: NoiseBank, settings: InertialSettings, phase_of: PhaseOf | None
 ) -> tuple[PhaseRow, ...]:
     """Outages of 10 s to 1 h that begin in each phase, default method beside raw INS."""
     if phase_of is None:
@@ -151,7 +151,7 @@ def _phases(
 
 
 def _classic(
-    run: FilterRun, coupled: CoupledRun, bank: NoiseBank, settings: InertialSettings, take_off_s: float
+    run: ChannelsRun, coupled: CoupledRun, bank: NoiseBank, settings: InertialSettings, take_off_s: float
 ) -> tuple[tuple[ClassicStart, ...], tuple[FigureData, ...]]:
     """Replay the paper's four starts: rows at equal horizons, figure 2 to the flight's end."""
     time_s = run.epochs.time_s
@@ -175,6 +175,6 @@ def _classic(
     return tuple(rows), (figures.classic_figure(replay, _known(run, replay), settings.default_method),)
 
 
-def _known(run: FilterRun, replay: Hindcast) -> FloatArray:
+def _known(run: ChannelsRun, replay: Hindcast) -> FloatArray:
     measured = run.epochs.position_m[replay.at]
     return np.where(np.isfinite(measured), measured, run.x[replay.at, POSITION])

@@ -10,7 +10,7 @@ import numpy as np
 
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.systems.inertial.coarse import Coarse
-from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, Initial, run_filter, smooth
+from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs, Initial, run_filter, smooth
 from groundstation.systems.inertial.forecast_answer import GapRow
 from groundstation.systems.inertial.model import POSITION, FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
@@ -31,13 +31,13 @@ class _Replayed:
 
 
 def gap_rows(
-    run: FilterRun, at: Int64Array, lengths_min: Sequence[float] = LENGTHS_MIN, *, settings: InertialSettings
+    run: ChannelsRun, at: Int64Array, lengths_min: Sequence[float] = LENGTHS_MIN, *, settings: InertialSettings
 ) -> tuple[GapRow, ...]:
     """Take GNSS away from every start for each length, and compare the result with GNSS.
 
     Parameters
     ----------
-    run : FilterRun
+    run : ChannelsRun
         Over the whole flight; what it knew at each start is used, nothing later but the data behind the gap.
     at : ndarray of int, shape (s,)
         Epochs at which the gaps begin.
@@ -71,7 +71,7 @@ def gap_rows(
 
 
 def _replay(
-    run: FilterRun, coarse: Coarse, epoch: int, length_s: float, settings: InertialSettings
+    run: ChannelsRun, coarse: Coarse, epoch: int, length_s: float, settings: InertialSettings
 ) -> _Replayed | None:
     """Replay one gap; None where it does not fit the flight or GNSS cannot judge it."""
     time_s = run.epochs.time_s

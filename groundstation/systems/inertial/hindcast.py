@@ -7,7 +7,7 @@ import numpy as np
 
 from groundstation.base.records import Int64Array
 from groundstation.systems.inertial.bank import NoiseBank, run_bank
-from groundstation.systems.inertial.filter import FilterRun
+from groundstation.systems.inertial.filter import ChannelsRun
 from groundstation.systems.inertial.leads import Path, built_up
 from groundstation.systems.inertial.model import FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
@@ -56,7 +56,7 @@ class Hindcast:
 
 
 def hindcast(
-    run: FilterRun,
+    run: ChannelsRun,
     at: Int64Array,
     lead_s: FloatArray,
     methods: Sequence[str],
@@ -67,7 +67,7 @@ def hindcast(
 
     Parameters
     ----------
-    run : FilterRun
+    run : ChannelsRun
     at : ndarray of int, shape (s,)
     lead_s : ndarray, shape (l,)
         Equal steps from the first: k times ``lead_s[0]``.

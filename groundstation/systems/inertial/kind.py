@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from groundstation.systems.inertial.differences import Differences
+from groundstation.systems.inertial.differences import InsDifferences
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.tables.sources import AIDED, HALF, STATED, UNAIDED, UNKNOWN
 
@@ -30,7 +30,9 @@ def stated_kind(aircraft_kind: str, metadata: Mapping[str, str]) -> tuple[str, s
     return (logged, "the log header says so") if logged in STATED else ("", "")
 
 
-def kind_of(compared: Differences, settings: InertialSettings, stated: tuple[str, str] = ("", "")) -> tuple[str, str]:
+def kind_of(
+    compared: InsDifferences, settings: InertialSettings, stated: tuple[str, str] = ("", "")
+) -> tuple[str, str]:
     """Say whether GNSS corrects the INS, and why it is thought so.
 
     It is stated, its own mode says so, or it never drifts: 95 % of the minute means of the position difference lie

@@ -11,7 +11,7 @@ from groundstation.base.records import Int64Array
 from groundstation.methods.kalman.arrays import Drive
 from groundstation.methods.kalman.filter import forecast
 from groundstation.methods.kalman.transition import Transition
-from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun
+from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs
 from groundstation.systems.inertial.model import POSITION, SIZE, VELOCITY, ChannelModel, FloatArray
 
 NEAREST_S = 1.0
@@ -92,7 +92,7 @@ class Path:
     every: int
 
     @classmethod
-    def of(cls, run: FilterRun, at: Int64Array, lead_s: FloatArray, longest_step_s: float) -> "Path":
+    def of(cls, run: ChannelsRun, at: Int64Array, lead_s: FloatArray, longest_step_s: float) -> "Path":
         """Make a path from epochs ``at`` over leads in equal steps from the first."""
         epochs = run.epochs
         start_s, lead_step = epochs.time_s[at], float(lead_s[0]) if len(lead_s) else longest_step_s

@@ -14,7 +14,7 @@ from groundstation.base.timescales import iso_to_utc_ns
 from groundstation.base.units import NS_PER_S
 from groundstation.methods.ins_noise import GnssNoise
 from groundstation.systems.inertial.answer import NavigationStart
-from groundstation.systems.inertial.differences import UNUSED_MODES, Differences
+from groundstation.systems.inertial.differences import UNUSED_MODES, InsDifferences
 from groundstation.tables.sources import said_of
 from groundstation.tables.table import Flight
 
@@ -57,7 +57,7 @@ def stated_start(aircraft_utc: str, flight: Flight, ins_topic: str) -> Stated:
 
 
 def navigation_start(
-    flight: Flight, compared: Differences, gnss: GnssNoise, stated: Stated = NOBODY
+    flight: Flight, compared: InsDifferences, gnss: GnssNoise, stated: Stated = NOBODY
 ) -> tuple[NavigationStart, tuple[Finding, ...]]:
     """Prove when the INS began to navigate.
 
@@ -68,7 +68,7 @@ def navigation_start(
     Parameters
     ----------
     flight : Flight
-    compared : Differences
+    compared : InsDifferences
     gnss : GnssNoise
         The position sigma, by which INS and GNSS may differ.
     stated : Stated
@@ -95,7 +95,7 @@ def navigation_start(
 
 
 def _by_statement(
-    flight: Flight, compared: Differences, stated: Stated
+    flight: Flight, compared: InsDifferences, stated: Stated
 ) -> tuple[NavigationStart | None, tuple[Finding, ...]]:
     if not stated.utc:
         return None, ()
@@ -126,7 +126,7 @@ def _alignments_ended_s(flight: Flight, topic: str) -> FloatArray:
     return np.asarray(flight.seconds(time_ns[ended]), dtype=np.float64)
 
 
-def _by_standstill(compared: Differences, gnss: GnssNoise) -> NavigationStart:
+def _by_standstill(compared: InsDifferences, gnss: GnssNoise) -> NavigationStart:
     """Return the first standstill at which INS and GNSS agree, or what speaks against it.
 
     It is at the beginning of the INS record.
@@ -158,7 +158,7 @@ def _by_standstill(compared: Differences, gnss: GnssNoise) -> NavigationStart:
     return NavigationStart(float(epochs.time_s[0]), "standstill", text)
 
 
-def _moves_from_s(compared: Differences, end_s: float) -> float:
+def _moves_from_s(compared: InsDifferences, end_s: float) -> float:
     """Return the time at which the aircraft first moves, by means over some seconds.
 
     ``end_s`` where it stands until then.

@@ -12,8 +12,8 @@ from groundstation.base.units import NS_PER_S
 from groundstation.systems.inertial.answer import RealOutage
 from groundstation.systems.inertial.coupled import CoupledRun, run_coupled
 from groundstation.systems.inertial.coupled_forecast import coupled_variance, hindcast_coupled
-from groundstation.systems.inertial.differences import Differences
-from groundstation.systems.inertial.filter import FilterRun
+from groundstation.systems.inertial.differences import InsDifferences
+from groundstation.systems.inertial.filter import ChannelsRun
 from groundstation.systems.inertial.hindcast import hindcast
 from groundstation.systems.inertial.leads import leads_of
 from groundstation.systems.inertial.model import POSITION, FloatArray
@@ -38,7 +38,7 @@ class Bridged:
     coupled: CoupledRun | None = None
 
 
-def bridge_outages(flight: Flight, compared: Differences, run: FilterRun, settings: InertialSettings) -> Bridged:
+def bridge_outages(flight: Flight, compared: InsDifferences, run: ChannelsRun, settings: InertialSettings) -> Bridged:
     """Find the outages and forecast through each with the method and model of the settings.
 
     ``jump_m`` compares that very forecast with the first GNSS position after it.
@@ -70,7 +70,7 @@ def bridge_outages(flight: Flight, compared: Differences, run: FilterRun, settin
 
 
 def _grown(
-    run: FilterRun, last: int, back: int, coupled: CoupledRun | None, settings: InertialSettings
+    run: ChannelsRun, last: int, back: int, coupled: CoupledRun | None, settings: InertialSettings
 ) -> tuple[FloatArray, FloatArray | None]:
     """Return the forecast growth of position error since epoch ``last``, shape (k, c).
 
@@ -101,7 +101,7 @@ def _at(elapsed_s: FloatArray, lead_s: FloatArray, values: FloatArray) -> FloatA
 
 
 def _sigma(
-    run: FilterRun, last: int, length_s: float, own_m2: FloatArray | None, settings: InertialSettings
+    run: ChannelsRun, last: int, length_s: float, own_m2: FloatArray | None, settings: InertialSettings
 ) -> float | None:
     """Return the radial sigma of the forecast at the end of an outage.
 
@@ -126,7 +126,7 @@ def _sigma(
     return float(np.sqrt(total))
 
 
-def _empty(flight: Flight, compared: Differences, start_s: float, end_s: float) -> RealOutage:
+def _empty(flight: Flight, compared: InsDifferences, start_s: float, end_s: float) -> RealOutage:
     """Return an outage whose forecast could not be judged; the tables tell what was missing."""
     present = {}
     for kind, topic in (("ins", compared.ins_topic), ("gnss", compared.gnss_topic)):

@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.base.records import Int64Array
 from groundstation.results.forecast_methods import FORECAST_HORIZONS_MIN
-from groundstation.systems.inertial.filter import FilterRun
+from groundstation.systems.inertial.filter import ChannelsRun
 from groundstation.systems.inertial.leads import PAST_FROM_S, built_up, leads_of, start_epochs
 from groundstation.systems.inertial.model import FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
@@ -48,7 +48,7 @@ class ReplayPlan:
     reason: str
 
 
-def plan_replay(run: FilterRun, settings: InertialSettings) -> ReplayPlan:
+def plan_replay(run: ChannelsRun, settings: InertialSettings) -> ReplayPlan:
     """Choose the starts of the replay.
 
     They are the settings' where they show half an hour of forecast, else from 40 % of the flight on. A start counts
@@ -76,13 +76,13 @@ def plan_replay(run: FilterRun, settings: InertialSettings) -> ReplayPlan:
     return ReplayPlan(first, step, at, horizons, lead_s, not reason, reason)
 
 
-def _judged(run: FilterRun, first_s: float, step_s: float, horizon_min: float) -> int:
+def _judged(run: ChannelsRun, first_s: float, step_s: float, horizon_min: float) -> int:
     """Count the starts that GNSS could judge at a horizon."""
     shown = built_up(run.epochs, start_epochs(run.epochs, first_s, step_s), np.array([60.0 * horizon_min]))
     return int(np.isfinite(shown).all(axis=2).sum())
 
 
-def map_grid(run: FilterRun, settings: InertialSettings) -> tuple[Int64Array, FloatArray]:
+def map_grid(run: ChannelsRun, settings: InertialSettings) -> tuple[Int64Array, FloatArray]:
     """Return starts (epochs) and leads of the map of errors over the whole flight.
 
     They are thinned to a picture's size.

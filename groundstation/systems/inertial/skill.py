@@ -11,7 +11,7 @@ import numpy as np
 from groundstation.base.quantiles import chi_square_quantile
 from groundstation.base.records import BoolArray
 from groundstation.methods.ins_noise import ScaleName
-from groundstation.systems.inertial.filter import FilterRun
+from groundstation.systems.inertial.filter import ChannelsRun
 from groundstation.systems.inertial.forecast_answer import CalibrationRow, SkillRow
 from groundstation.systems.inertial.hindcast import Hindcast
 from groundstation.systems.inertial.leads import MEMORY_S, past_mean
@@ -48,7 +48,7 @@ class Claimed:
         return Claimed(self.model_m[rows], self.scaled_m[rows], self.scale[rows])
 
 
-def claimed_sigma(method: str, run: FilterRun, replay: Hindcast, settings: InertialSettings) -> Claimed | None:
+def claimed_sigma(method: str, run: ChannelsRun, replay: Hindcast, settings: InertialSettings) -> Claimed | None:
     """Sigma of a method's forecast, None for a method that has none.
 
     Where ``replay`` itself holds one, that is taken: for the bank, and for the last estimate of the coupled model.
@@ -85,7 +85,7 @@ def scale_of(method: str, *, is_own: bool) -> ScaleName:
     return "coupled" if is_own else "separate"
 
 
-def _own_scale(ratio: FloatArray, replay: Hindcast, run: FilterRun) -> FloatArray:
+def _own_scale(ratio: FloatArray, replay: Hindcast, run: ChannelsRun) -> FloatArray:
     """Return what the past of the flight adds to the class's scale, (s, l).
 
     It is the root of the mean squared ratio of error to sigma. Found at the class's horizons, from the shortest on:

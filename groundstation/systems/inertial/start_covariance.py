@@ -13,7 +13,7 @@ import numpy as np
 
 from groundstation.base.records import Int64Array
 from groundstation.methods.kalman.smoother import lag_covariances
-from groundstation.systems.inertial.filter import FilterRun
+from groundstation.systems.inertial.filter import ChannelsRun
 from groundstation.systems.inertial.model import POSITION, SIZE, FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
 from groundstation.systems.inertial.starts import windows_of
@@ -24,7 +24,7 @@ LAG_STEP_S = 50.0  # of the double sum over a window; the covariance of the esti
 
 
 def start_covariance(
-    method: str, run: FilterRun, at: Int64Array, channel: int, settings: InertialSettings
+    method: str, run: ChannelsRun, at: Int64Array, channel: int, settings: InertialSettings
 ) -> FloatArray:
     """Covariance of a method's start error, position known, shape (s, 6, 6).
 
@@ -32,7 +32,7 @@ def start_covariance(
     ----------
     method : str
         One of :data:`WITH_COVARIANCE`.
-    run : FilterRun
+    run : ChannelsRun
     at : ndarray of int, shape (s,)
     channel : int
     settings : InertialSettings
@@ -55,7 +55,7 @@ def start_covariance(
     return out
 
 
-def _smoothed(run: FilterRun, at: Int64Array, channel: int, lag_s: float) -> FloatArray:
+def _smoothed(run: ChannelsRun, at: Int64Array, channel: int, lag_s: float) -> FloatArray:
     """Q(L) - Phi P(s|t) Phi' + Phi P(s) Psi' + its transpose; P(t) itself for L = 0."""
     time_s, group = run.epochs.time_s, min(channel, len(run.P) - 1)
     first = np.maximum(np.searchsorted(time_s, time_s[at] - lag_s, side="left"), 0)
@@ -70,7 +70,7 @@ def _smoothed(run: FilterRun, at: Int64Array, channel: int, lag_s: float) -> Flo
     return out
 
 
-def _windowed(method: str, run: FilterRun, at: Int64Array, channel: int, settings: InertialSettings) -> FloatArray:
+def _windowed(method: str, run: ChannelsRun, at: Int64Array, channel: int, settings: InertialSettings) -> FloatArray:
     time_s, P = run.epochs.time_s, run.covariance(channel)
     known = run.covariance_without_data - P  # of the estimates themselves
     lengths_s = windows_of(method, settings).lengths_s
@@ -128,7 +128,7 @@ class LeadGrowth:
         return np.asarray(np.maximum(carried, 0.0) + self.added_m2)
 
 
-def lead_growth(run: FilterRun, lead_s: FloatArray) -> LeadGrowth:
+def lead_growth(run: ChannelsRun, lead_s: FloatArray) -> LeadGrowth:
     """Growth of a forecast's error over leads in equal steps from the first.
 
     Source: the model; errors of GNSS at the two ends are correlated as the noise of the class says.

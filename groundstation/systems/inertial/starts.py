@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.base.records import Int64Array
 from groundstation.methods.kalman.smoother import smooth_lags
-from groundstation.systems.inertial.filter import FilterRun
+from groundstation.systems.inertial.filter import ChannelsRun
 from groundstation.systems.inertial.model import (
     DRIFT,
     DRIFT_RATE,
@@ -44,14 +44,14 @@ def windows_of(method: str, settings: InertialSettings) -> AveragingWindow:
     return AveragingWindow.of(settings, *states)
 
 
-def start_states(method: str, run: FilterRun, at: Int64Array, settings: InertialSettings) -> FloatArray:
+def start_states(method: str, run: ChannelsRun, at: Int64Array, settings: InertialSettings) -> FloatArray:
     """States from which a method forecasts.
 
     Parameters
     ----------
     method : str
         A name of results.forecast_methods.
-    run : FilterRun
+    run : ChannelsRun
     at : ndarray of int, shape (s,)
         Epochs at which GNSS is lost; nothing later is looked at.
 
@@ -80,7 +80,7 @@ def start_states(method: str, run: FilterRun, at: Int64Array, settings: Inertial
     return out
 
 
-def _held_velocity(run: FilterRun, at: Int64Array, length_s: float) -> FloatArray:
+def _held_velocity(run: ChannelsRun, at: Int64Array, length_s: float) -> FloatArray:
     """Return the mean measured velocity error over the last seconds.
 
     It is that of the estimate where none was measured.
@@ -97,7 +97,7 @@ def _held_velocity(run: FilterRun, at: Int64Array, length_s: float) -> FloatArra
     return states
 
 
-def _schuler_fit(run: FilterRun, at: Int64Array, length_s: float) -> FloatArray:
+def _schuler_fit(run: ChannelsRun, at: Int64Array, length_s: float) -> FloatArray:
     """Fit velocity error = bias + a cos + b sin at the Schuler rate over the last seconds.
 
     By least squares. As a state: the bias is a constant drift of -bias / R, the slope a tilt of -slope / g.
@@ -125,7 +125,7 @@ def _schuler_fit(run: FilterRun, at: Int64Array, length_s: float) -> FloatArray:
     return states
 
 
-def _averaged(run: FilterRun, at: Int64Array, window: AveragingWindow) -> FloatArray:
+def _averaged(run: ChannelsRun, at: Int64Array, window: AveragingWindow) -> FloatArray:
     """Average past estimates over the paper's windows: plain means, one length per state.
 
     Only epochs that had GNSS count.
@@ -143,7 +143,7 @@ def _averaged(run: FilterRun, at: Int64Array, window: AveragingWindow) -> FloatA
     return states
 
 
-def _carried_average(run: FilterRun, at: Int64Array, window: AveragingWindow) -> FloatArray:
+def _carried_average(run: ChannelsRun, at: Int64Array, window: AveragingWindow) -> FloatArray:
     """Average past estimates, each carried to the start by the model first.
 
     Nothing true is smoothed away.
@@ -164,7 +164,7 @@ def _carried_average(run: FilterRun, at: Int64Array, window: AveragingWindow) ->
     return states
 
 
-def _smoothed(run: FilterRun, at: Int64Array, lag_s: float) -> FloatArray:
+def _smoothed(run: ChannelsRun, at: Int64Array, lag_s: float) -> FloatArray:
     """Smooth the state ``lag_s`` before the start and carry it forward by the model.
 
     All data up to the start are used.

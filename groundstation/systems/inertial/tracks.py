@@ -5,16 +5,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from groundstation.base.units import NS_PER_S
-from groundstation.systems.inertial.differences import Differences
+from groundstation.systems.inertial.differences import InsDifferences
 from groundstation.systems.inertial.figures import moved
-from groundstation.systems.inertial.filter import FilterRun, Smoothed
+from groundstation.systems.inertial.filter import ChannelsRun, SmoothedErrors
 from groundstation.systems.inertial.model import POSITION, VELOCITY, FloatArray
 from groundstation.tables.table import Table
 from groundstation.tables.tracks import ins_table
 
 
 def corrected_tracks(
-    compared: Differences, run: FilterRun, smoothed: Smoothed, corrected_error_m: FloatArray, start_ns: int
+    compared: InsDifferences, run: ChannelsRun, smoothed: SmoothedErrors, corrected_error_m: FloatArray, start_ns: int
 ) -> Iterator[tuple[str, Table]]:
     """Yield the tracks of the INS less its errors, as filtered and as smoothed, with sigmas.
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.toml_settings import check_ranges, number
-from groundstation.systems.inertial.differences import Differences
+from groundstation.systems.inertial.differences import InsDifferences
 from groundstation.systems.inertial.model import FloatArray
 from groundstation.tables.motion import runs
 
@@ -100,7 +100,7 @@ class Changes:
         return float(0.5 * (self.before_s[-1] + self.after_s[-1]))
 
 
-def changes_of(differences: Differences, known: BoolArray, limits: AzimuthLimits) -> Changes:
+def changes_of(differences: InsDifferences, known: BoolArray, limits: AzimuthLimits) -> Changes:
     """Find the changes of velocity of a flight.
 
     ``known`` (n,) says where INS and GNSS velocities are compared.
@@ -113,7 +113,7 @@ def changes_of(differences: Differences, known: BoolArray, limits: AzimuthLimits
     return _changes_between(differences, known, np.array(pieces, dtype=np.int64).reshape(-1, 2), limits)
 
 
-def quiet_intervals(differences: Differences, known: BoolArray, limits: AzimuthLimits) -> Changes:
+def quiet_intervals(differences: InsDifferences, known: BoolArray, limits: AzimuthLimits) -> Changes:
     """Find stretches without a manoeuvre, as long as the manoeuvres may be.
 
     Nothing but noise changes across them.
@@ -134,7 +134,7 @@ def turned(vectors: FloatArray) -> FloatArray:
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
 
 
-def _is_manoeuvring(differences: Differences, limits: AzimuthLimits) -> BoolArray:
+def _is_manoeuvring(differences: InsDifferences, limits: AzimuthLimits) -> BoolArray:
     """Tell where the INS velocity changes, shape (n,)."""
     time_s, velocity = differences.epochs.time_s, differences.velocity_mps
     half = 0.5 * limits.smooth_s
@@ -145,7 +145,7 @@ def _is_manoeuvring(differences: Differences, limits: AzimuthLimits) -> BoolArra
     return np.asarray(change > limits.acceleration_mps2 * seconds)
 
 
-def _manoeuvres(differences: Differences, limits: AzimuthLimits) -> list[tuple[int, int]]:
+def _manoeuvres(differences: InsDifferences, limits: AzimuthLimits) -> list[tuple[int, int]]:
     """Return first and last epoch of each manoeuvre.
 
     Those with no room for averages in between are one.
@@ -166,7 +166,9 @@ def _manoeuvres(differences: Differences, limits: AzimuthLimits) -> list[tuple[i
     return out
 
 
-def _changes_between(differences: Differences, known: BoolArray, pieces: Int64Array, limits: AzimuthLimits) -> Changes:
+def _changes_between(
+    differences: InsDifferences, known: BoolArray, pieces: Int64Array, limits: AzimuthLimits
+) -> Changes:
     """Return the changes across pieces (m, 2) of epochs.
 
     Those without GNSS for half of either average, or with a reset, are left out.

@@ -35,7 +35,7 @@ ASSUMED = LandingSettings()
 
 
 @dataclass(frozen=True)
-class Family:
+class ApproachFamily:
     """Family of approaches: its change to those of the plain family, and its settings."""
 
     name: str
@@ -52,39 +52,39 @@ def _flown(scenario: ApproachScenario, **changes: object) -> ApproachScenario:
     return replace(scenario, flown=replace(scenario.flown, **changes))  # type: ignore[arg-type]
 
 
-FAMILIES: tuple[Family, ...] = (
-    Family("plain", "as assumed; positions rounded or cut off, nobody says which", lambda one, rng: one),
-    Family(
+FAMILIES: tuple[ApproachFamily, ...] = (
+    ApproachFamily("plain", "as assumed; positions rounded or cut off, nobody says which", lambda one, rng: one),
+    ApproachFamily(
         "rounded",
         "as assumed; positions rounded, and the settings say so",
         lambda one, rng: _recorded(one, rounding="nearest"),
         replace(ASSUMED, positions_rounded="nearest"),
     ),
-    Family(
+    ApproachFamily(
         "bends",
         "rounded; bends of the course line three times category I, each 3 km long",
         lambda one, rng: _recorded(one, rounding="nearest", bend_ddm=0.045, bend_length_m=3_000.0),
         replace(ASSUMED, positions_rounded="nearest"),
     ),
-    Family(
+    ApproachFamily(
         "line",
         "rounded; course line 30 m off at the threshold",
         lambda one, rng: _recorded(one, rounding="nearest", course_line_m=30.0),
         replace(ASSUMED, positions_rounded="nearest"),
     ),
-    Family(
+    ApproachFamily(
         "width",
         "rounded; course sector two thirds as wide as the site file says",
         lambda one, rng: _recorded(one, rounding="nearest", width_error=0.5),
         replace(ASSUMED, positions_rounded="nearest"),
     ),
-    Family(
+    ApproachFamily(
         "crab",
         "rounded; nose 10 deg off the track",
         lambda one, rng: _flown(_recorded(one, rounding="nearest"), crab_deg=10.0),
         replace(ASSUMED, positions_rounded="nearest"),
     ),
-    Family(
+    ApproachFamily(
         "beside",
         "rounded; touchdown and roll-out 15 m beside the centre line",
         lambda one, rng: _flown(_recorded(one, rounding="nearest"), rollout_across_m=15.0),
@@ -94,7 +94,7 @@ FAMILIES: tuple[Family, ...] = (
 
 
 def study_approach(
-    runs: int = 100, seed: int = 0, progress: Progress | None = None, *, families: tuple[Family, ...] = FAMILIES
+    runs: int = 100, seed: int = 0, progress: Progress | None = None, *, families: tuple[ApproachFamily, ...] = FAMILIES
 ) -> StudyResult:
     """Fly every family and judge intervals against the truth.
 
@@ -106,7 +106,7 @@ def study_approach(
         Run k of every family has the seed (seed, k): families differ by what they change alone.
     progress : callable, optional
         Called with one line for each family.
-    families : tuple of Family
+    families : tuple of ApproachFamily
     """
     rows = []
     for family in families:
@@ -184,7 +184,7 @@ def measured(scenario: ApproachScenario, site: SiteData, settings: LandingSettin
     return found[-1] if found else None
 
 
-def _judged(family: Family, runs: int, seed: int) -> dict[str, object]:
+def _judged(family: ApproachFamily, runs: int, seed: int) -> dict[str, object]:
     errors, halves, scaled, rates, rolled, changes = (list[float]() for _ in range(6))
     for run in range(runs):
         rng = np.random.default_rng((seed, run))
@@ -226,7 +226,7 @@ def _share(scaled: list[float]) -> float:
     return float(np.mean(np.abs(scaled) <= LINEAR_95)) if scaled else float("nan")
 
 
-def _page(data: FigureData, families: tuple[Family, ...], runs: int, seed: int) -> tuple[Section, ...]:
+def _page(data: FigureData, families: tuple[ApproachFamily, ...], runs: int, seed: int) -> tuple[Section, ...]:
     head = section(
         "Study: the localizer as a reference for recorded positions",
         f"{runs} approaches of each family of docs/approaches.md (seed {seed}), each through phases and analysis, with "

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from groundstation.base.angles import direction_of, unwrap
 from groundstation.base.attitude import rotation_n_from_b
 from groundstation.methods.lag.settings import SLOW_MPS, LatencySettings
-from groundstation.methods.lag.windows import Series
+from groundstation.methods.lag.windows import ReferenceSignals
 from groundstation.systems.latency.answer import Quantity
 from groundstation.tables.epochs import distinct_epochs
 from groundstation.tables.sources import sources_of_kind
@@ -25,7 +25,7 @@ LEAST_SAMPLES, LEAST_NODES = 10, 3
 
 
 @dataclass(frozen=True)
-class Comparison:
+class SignalComparison:
     """Reference signal and the samples of another sensor, on flight seconds.
 
     Times have shape (n,), values (n, c) in ``unit``.
@@ -33,7 +33,7 @@ class Comparison:
     ``prior_sigma`` (q,): of the nuisances in the reference.
     """
 
-    reference: Series
+    reference: ReferenceSignals
     time_s: FloatArray
     values: FloatArray
     prior_sigma: FloatArray
@@ -75,7 +75,7 @@ def pairs_of(flight: Flight) -> list[tuple[str, str, Quantity]]:
     return pairs
 
 
-def compare(flight: Flight, pair: tuple[str, str, Quantity], settings: LatencySettings) -> Comparison:
+def compare(flight: Flight, pair: tuple[str, str, Quantity], settings: LatencySettings) -> SignalComparison:
     """Make the signals of a pair comparable.
 
     Raises
@@ -115,7 +115,7 @@ def _columns(unit: Table, sensor: Table, quantity: Quantity) -> tuple[tuple[str,
     return (*ATTITUDE, heading), (*ATTITUDE, heading)
 
 
-def _nodes(made: Comparison, samples: int, settings: LatencySettings) -> int:
+def _nodes(made: SignalComparison, samples: int, settings: LatencySettings) -> int:
     """Return how many reference samples to average.
 
     They span as much time as the means of the other sensor, and are enough that their noise does not show.
@@ -125,7 +125,7 @@ def _nodes(made: Comparison, samples: int, settings: LatencySettings) -> int:
     return max(LEAST_NODES, 2 * round(0.5 * width_s / step_s) + 1)
 
 
-def _velocity(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> Comparison:
+def _velocity(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> SignalComparison:
     """Compare GNSS velocity with INS velocity.
 
     Azimuth error, scale and the lever arm of the antenna are nuisances.
@@ -145,10 +145,12 @@ def _velocity(flight: Flight, unit: Table, sensor: Table, settings: LatencySetti
     at_s, measured = _averaged(flight, sensor, VELOCITY, settings.other_step_s)
     sigma = [settings.scale_sigma, np.deg2rad(settings.azimuth_sigma_deg), *[settings.arm_sigma_m] * 3]
     values = np.stack([measured[name] for name in VELOCITY], axis=-1)
-    return Comparison(Series(time_s, base, build, settings.gap_max_s), at_s, values, np.array(sigma), "m/s")
+    return SignalComparison(
+        ReferenceSignals(time_s, base, build, settings.gap_max_s), at_s, values, np.array(sigma), "m/s"
+    )
 
 
-def _altitude(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> Comparison:
+def _altitude(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> SignalComparison:
     """Compare pressure altitude with the height of the INS; a scale is the nuisance.
 
     The height is integrated from the vertical speed of the INS, or is its altitude.
@@ -162,11 +164,13 @@ def _altitude(flight: Flight, unit: Table, sensor: Table, settings: LatencySetti
     at_s, measured = _averaged(flight, sensor, ["pressure_altitude_m"], settings.other_step_s)
     values = measured["pressure_altitude_m"][:, None]
     sigma = np.array([3.0 * settings.scale_sigma])  # air that is not standard
-    reference = Series(time_s, height[:, None], lambda base: np.stack([base, base], axis=-1), settings.gap_max_s)
-    return Comparison(reference, at_s, values, sigma, "m")
+    reference = ReferenceSignals(
+        time_s, height[:, None], lambda base: np.stack([base, base], axis=-1), settings.gap_max_s
+    )
+    return SignalComparison(reference, at_s, values, sigma, "m")
 
 
-def _field(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> Comparison:
+def _field(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> SignalComparison:
     """Magnetic field along body axes against a constant field turned by the attitude.
 
     Soft iron with mounting, and the field itself, are nuisances.
@@ -177,7 +181,7 @@ def _field(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings
     at_s, measured = _averaged(flight, sensor, FIELD, settings.other_step_s)
     values = np.stack([measured[name] for name in FIELD], axis=-1)
     base = body_from_n.reshape(-1, 9)
-    bare = Series(time_s, base, lambda base: base, settings.gap_max_s)
+    bare = ReferenceSignals(time_s, base, lambda base: base, settings.gap_max_s)
     known = bare.covers(at_s, 0.0)
     if np.count_nonzero(known) < LEAST_SAMPLES:
         raise NotComparableError("too few samples while the attitude is known")
@@ -195,10 +199,10 @@ def _field(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings
         return np.concatenate([turned[..., None], iron, size * turn], axis=-1)
 
     sigma = np.full(12, settings.iron_sigma)
-    return Comparison(Series(time_s, base, build, settings.gap_max_s), at_s, values, sigma, "nT")
+    return SignalComparison(ReferenceSignals(time_s, base, build, settings.gap_max_s), at_s, values, sigma, "nT")
 
 
-def _attitude(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> Comparison:
+def _attitude(flight: Flight, unit: Table, sensor: Table, settings: LatencySettings) -> SignalComparison:
     """Roll, pitch and heading of two INS."""
     sides = []
     names, _seen = _columns(unit, sensor, "attitude")
@@ -206,8 +210,8 @@ def _attitude(flight: Flight, unit: Table, sensor: Table, settings: LatencySetti
         time_s, columns = _averaged(flight, table, names, step_s)
         sides.append((time_s, np.stack([columns[name] for name in names], axis=-1)))
     (time_s, shown), (at_s, values) = sides
-    reference = Series(time_s, shown, lambda base: base[..., None], settings.gap_max_s)
-    return Comparison(reference, at_s, values, np.zeros(0), "deg")
+    reference = ReferenceSignals(time_s, shown, lambda base: base[..., None], settings.gap_max_s)
+    return SignalComparison(reference, at_s, values, np.zeros(0), "deg")
 
 
 def _compared_part(unit: Table) -> Table:

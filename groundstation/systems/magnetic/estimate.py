@@ -30,7 +30,7 @@ from groundstation.systems.magnetic.figures import draw, parts_of
 from groundstation.systems.magnetic.flown import find_flown
 from groundstation.systems.magnetic.held_out import Unseen, advantage, find_unseen, hold_out, is_level
 from groundstation.systems.magnetic.iron import bank_bias, heading_errors, parameters_of
-from groundstation.systems.magnetic.manoeuvre import Figure, FoundTurn, widest_gap_deg
+from groundstation.systems.magnetic.manoeuvre import FoundTurn, OppositeTurns, widest_gap_deg
 from groundstation.systems.magnetic.methods import (
     FORECAST_BANKS_DEG,
     Fits,
@@ -123,7 +123,7 @@ def _answer(
     topics: tuple[str, str],
     readings: Readings,
     is_airborne: BoolArray,
-    found: tuple[list[Figure], list[FoundTurn]],
+    found: tuple[list[OppositeTurns], list[FoundTurn]],
     alignment: Alignment,
     settings: MagneticSettings,
 ) -> MagneticResult:
@@ -229,7 +229,7 @@ def _aligned(readings: Readings, alignment: Alignment, mounting_deg: float) -> R
     return replace(readings, true_heading_deg=wrap_360(readings.true_heading_deg - mounting_deg - error))
 
 
-def _coverage(figures: list[Figure], table: CompassTable) -> Coverage:
+def _coverage(figures: list[OppositeTurns], table: CompassTable) -> Coverage:
     measured = int(np.count_nonzero(table.is_measured))
     share = max(figure.covered_share for figure in figures)
     return Coverage(share, measured, len(table.is_measured) - measured, widest_gap_deg(table.is_measured))

@@ -21,7 +21,7 @@ from groundstation.systems.magnetic.arrays import (
     MagneticTable,
 )
 from groundstation.systems.magnetic.compass_table import CENTRES_DEG
-from groundstation.systems.magnetic.manoeuvre import Figure
+from groundstation.systems.magnetic.manoeuvre import OppositeTurns
 from groundstation.systems.magnetic.methods import Fits
 from groundstation.systems.magnetic.poisson import corrected_heading_deg
 from groundstation.systems.magnetic.readings import Readings
@@ -34,7 +34,7 @@ def draw(
     readings: Readings,
     declination_deg: FloatArray,
     part: NDArray[np.str_],
-    figures: list[Figure],
+    figures: list[OppositeTurns],
     fits: Fits,
     deviation_deg: FloatArray,
     methods: Sequence[Method],
@@ -54,7 +54,7 @@ def draw(
     )
 
 
-def parts_of(is_airborne: BoolArray, is_held_out: BoolArray, figures: list[Figure]) -> NDArray[np.str_]:
+def parts_of(is_airborne: BoolArray, is_held_out: BoolArray, figures: list[OppositeTurns]) -> NDArray[np.str_]:
     """Part of the flight each reading belongs to, shape (n,)."""
     part = np.where(is_airborne, "other flight", "ground").astype("U12")
     part[is_held_out] = "held out"
@@ -127,7 +127,7 @@ def _curves(methods: Sequence[Method], recommended: MethodName, recommended_deg:
     )
 
 
-def _modulus(readings: Readings, figures: list[Figure], fits: Fits) -> MagneticModulus:
+def _modulus(readings: Readings, figures: list[OppositeTurns], fits: Fits) -> MagneticModulus:
     rows = np.unique(np.concatenate([figure.rows(right) for figure in figures for right in (True, False)]))
     rows = rows[:: max(1, -(-len(rows) // LARGEST))]
     shown = readings.take(rows)

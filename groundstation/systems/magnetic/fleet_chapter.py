@@ -3,7 +3,7 @@
 from groundstation.chapters.fleet.common import aircraft_name, bounded
 from groundstation.chapters.parts import Cell, Figure, Grid, Head, Mark, Part, Section
 from groundstation.chapters.wording import ABSENT, number
-from groundstation.results.fleet import DeviationRow, FleetResults
+from groundstation.results.fleet import FleetDeviationRow, FleetResults
 from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import ADVISORY, METHOD_TITLES
 from groundstation.systems.magnetic.chapter import TONES
@@ -22,12 +22,12 @@ def build(fleet: FleetResults) -> Section | None:
     return Section("deviation", TITLE, LEAD, (*parts, _table(fleet.deviations)))
 
 
-def usable(fleet: FleetResults) -> list[DeviationRow]:
+def usable(fleet: FleetResults) -> list[FleetDeviationRow]:
     """Return the deviations of the flights that are not rejected."""
     return [row for row in fleet.deviations if row.verdict != "reject"]
 
 
-def _table(rows: tuple[DeviationRow, ...]) -> Grid:
+def _table(rows: tuple[FleetDeviationRow, ...]) -> Grid:
     heads = (
         *(Head("Aircraft"), Head("Flight"), Head("Verdict"), Head("Method")),
         *(Head(f"{letter}, °", True) for letter in LETTERS),
@@ -42,7 +42,7 @@ def _table(rows: tuple[DeviationRow, ...]) -> Grid:
     return Grid("Deviation of every flight", heads, [_cells(row) for row in rows], caption)
 
 
-def _cells(row: DeviationRow) -> tuple[Cell, ...]:
+def _cells(row: FleetDeviationRow) -> tuple[Cell, ...]:
     difference, expected = row.difference_rms_deg, row.expected_rms_deg
     is_changed = difference is not None and expected is not None and difference > CHANGED * expected
     text = bounded(difference, 2)

@@ -11,7 +11,7 @@ import numpy as np
 from groundstation.base.errors import NotAssessableError
 from groundstation.base.records import BoolArray
 from groundstation.results.roles import Delays
-from groundstation.systems.magnetic.manoeuvre import Figure, FoundTurn, find_figures, find_turns
+from groundstation.systems.magnetic.manoeuvre import FoundTurn, OppositeTurns, find_figures, find_turns
 from groundstation.systems.magnetic.readings import ANALYSIS, Readings, gather, why_not_independent
 from groundstation.systems.magnetic.settings import MagneticSettings
 from groundstation.tables.phases import Phases
@@ -26,7 +26,7 @@ class FlownTurns:
 
     readings: Readings
     is_airborne: BoolArray
-    figures: list[Figure]
+    figures: list[OppositeTurns]
     turns: list[FoundTurn]
     latency_s: float
 

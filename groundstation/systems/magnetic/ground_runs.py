@@ -15,7 +15,7 @@ from groundstation.base.errors import NotAssessableError
 from groundstation.base.units import DEG_PER_RAD
 from groundstation.methods.moving_lines import fitted_lines, window_bounds
 from groundstation.methods.taxi.samples import OnGround, TaxiSamples, take_samples
-from groundstation.methods.taxi_error.interval import Differences, Regressor, error_posterior
+from groundstation.methods.taxi_error.interval import HeadingDifferences, Regressor, error_posterior
 from groundstation.results.figures import FigureData
 from groundstation.results.roles import Delays
 from groundstation.systems.known import AircraftData
@@ -231,7 +231,7 @@ def _with_errors(
         direction[rows] = wrap_360(runs[place].track_deg + wrap_180(turned))  # along the run, free of GNSS noise
     regressors = tuple(Regressor((numbers == place).astype(np.float64), 0.0, FREE_DEG) for place in used)
     posterior = error_posterior(
-        Differences(part.time_s, own, direction, np.full(len(part), MODEL_MPS), regressors, (0.0, PINNED_DEG)),
+        HeadingDifferences(part.time_s, own, direction, np.full(len(part), MODEL_MPS), regressors, (0.0, PINNED_DEG)),
         draws=settings.posterior_draws,
         growth=2,
     )

@@ -13,7 +13,7 @@ from groundstation.systems.magnetic.answer import Alignment, HeldOut
 from groundstation.systems.magnetic.apply import corrected_by_table
 from groundstation.systems.magnetic.compass_table import CompassTable, bin_of
 from groundstation.systems.magnetic.iron import Iron, derivatives
-from groundstation.systems.magnetic.manoeuvre import Figure
+from groundstation.systems.magnetic.manoeuvre import OppositeTurns
 from groundstation.systems.magnetic.poisson import IronFit, corrected_heading_deg
 from groundstation.systems.magnetic.readings import Readings
 from groundstation.systems.magnetic.settings import MagneticSettings
@@ -50,7 +50,7 @@ class Left:
 
 
 def find_unseen(
-    readings: Readings, is_airborne: BoolArray, figures: list[Figure], settings: MagneticSettings
+    readings: Readings, is_airborne: BoolArray, figures: list[OppositeTurns], settings: MagneticSettings
 ) -> BoolArray:
     """Readings in flight that are in none of the figures, nor near their ends."""
     is_unseen = is_airborne.copy()
@@ -70,7 +70,7 @@ def hold_out(
     readings: Readings,
     declination_deg: FloatArray,
     is_airborne: BoolArray,
-    figures: list[Figure],
+    figures: list[OppositeTurns],
     alignment: Alignment,
     settings: MagneticSettings,
 ) -> tuple[Unseen, HeldOut] | None:

@@ -33,7 +33,7 @@ class FoundTurn:
 
 
 @dataclass(frozen=True)
-class Figure:
+class OppositeTurns:
     """Opposite turns of equal bank.
 
     ``covered_share`` is that of the circle which both branches cover.
@@ -81,7 +81,7 @@ def find_turns(readings: Readings, is_airborne: BoolArray, settings: MagneticSet
 
 def find_figures(
     readings: Readings, turns: list[FoundTurn], settings: MagneticSettings
-) -> tuple[list[Figure], list[FoundTurn]]:
+) -> tuple[list[OppositeTurns], list[FoundTurn]]:
     """Figures of opposite turns, and every turn with what became of it.
 
     Usable turns of about equal bank and near in time are gathered, in order of time, until right and left ones cover
@@ -89,11 +89,11 @@ def find_figures(
     ``coverage_usable``.
     """
     heading = readings.magnetic_heading_deg
-    whole: list[Figure] = []
-    partial: list[Figure] = []
+    whole: list[OppositeTurns] = []
+    partial: list[OppositeTurns] = []
     for candidate in (one for one in turns if one.turn.state == "used"):
-        group = next((group for group in partial if _belongs(candidate, group, settings)), Figure((), 0.0))
-        grown = _covered(Figure((*group.turns, candidate), 0.0), heading, settings)
+        group = next((group for group in partial if _belongs(candidate, group, settings)), OppositeTurns((), 0.0))
+        grown = _covered(OppositeTurns((*group.turns, candidate), 0.0), heading, settings)
         partial = [other for other in partial if other is not group]
         (whole if grown.covered_share >= settings.coverage_min else partial).append(grown)
     if not whole:
@@ -185,20 +185,22 @@ def _objection(turn: Turn, is_airborne: bool, settings: MagneticSettings) -> str
     return ""
 
 
-def _belongs(candidate: FoundTurn, group: Figure, settings: MagneticSettings) -> bool:
+def _belongs(candidate: FoundTurn, group: OppositeTurns, settings: MagneticSettings) -> bool:
     first = group.turns[0].turn
     is_equal = abs(abs(candidate.turn.bank_deg) - abs(first.bank_deg)) <= settings.bank_difference_max_deg
     return is_equal and candidate.turn.start_s - group.end_s <= settings.pair_gap_max_s
 
 
-def _covered(figure: Figure, heading_deg: FloatArray, settings: MagneticSettings) -> Figure:
+def _covered(figure: OppositeTurns, heading_deg: FloatArray, settings: MagneticSettings) -> OppositeTurns:
     if len({one.is_right for one in figure.turns}) < 2:
         return figure
     both = [covered_bins(heading_deg[figure.rows(right)], settings.bin_gap_max_deg) for right in (True, False)]
     return replace(figure, covered_share=float(np.mean(both[0] & both[1])))
 
 
-def _left_over(one: FoundTurn, turns: list[FoundTurn], partial: list[Figure], settings: MagneticSettings) -> FoundTurn:
+def _left_over(
+    one: FoundTurn, turns: list[FoundTurn], partial: list[OppositeTurns], settings: MagneticSettings
+) -> FoundTurn:
     """A usable turn that no figure holds, with the reason."""
     if one.turn.state == "rejected":
         return one

@@ -9,11 +9,11 @@ from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.answer import CardRow, Swing
 from groundstation.systems.magnetic.apply import corrected_by_table
 from groundstation.systems.magnetic.compass_table import CENTRES_DEG, bin_of, build_table
-from groundstation.systems.magnetic.manoeuvre import Figure
+from groundstation.systems.magnetic.manoeuvre import OppositeTurns
 from groundstation.systems.magnetic.readings import Readings
 
 
-def compare_swings(readings: Readings, declination_deg: float, figures: list[Figure]) -> list[Swing]:
+def compare_swings(readings: Readings, declination_deg: float, figures: list[OppositeTurns]) -> list[Swing]:
     """Every figure's own A to E, and how far its curve is from the mean of the other figures."""
     heading, error = readings.magnetic_heading_deg, readings.compass_error_deg
     tables = [build_table(heading, error, figure.rows(True), figure.rows(False)) for figure in figures]

@@ -12,7 +12,7 @@ from groundstation.base.records import Int64Array
 from groundstation.results.arrays.typed import joined
 from groundstation.systems.reference.arrays import ReferenceChecks, ReferenceErrors, ReferenceTrack
 from groundstation.systems.reference.errors import SIGMAS, Errors
-from groundstation.systems.reference.judging import Checked
+from groundstation.systems.reference.judging import CheckedClaim
 
 ROWS = 2_000  # of each subject
 
@@ -80,7 +80,7 @@ def track_figure(listed: Sequence[Errors]) -> ReferenceTrack | None:
     return joined(parts)
 
 
-def checks_figure(listed: Sequence[Checked]) -> ReferenceChecks | None:
+def checks_figure(listed: Sequence[CheckedClaim]) -> ReferenceChecks | None:
     """Return as many evenly spaced samples of every claim as are independent.
 
     These are what a fleet may count.

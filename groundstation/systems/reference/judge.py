@@ -19,7 +19,7 @@ from groundstation.systems.reference.answer import ErrorRow, ForecastCheck, Plac
 from groundstation.systems.reference.answers import forecast_checks, heading_check
 from groundstation.systems.reference.errors import FIELDS, Errors, errors_of
 from groundstation.systems.reference.figures import checks_figure, errors_figure, track_figure
-from groundstation.systems.reference.judging import Checked, axes_of, checked, error_row
+from groundstation.systems.reference.judging import CheckedClaim, axes_of, checked, error_row
 from groundstation.systems.reference.paths import path_rows, relative_rows
 from groundstation.systems.reference.placing import gross_offset_s, place
 from groundstation.systems.reference.settings import ReferenceSettings
@@ -128,7 +128,7 @@ def _answer(
     errors: Sequence[ErrorRow],
     standing: Standing,
     settings: ReferenceSettings,
-) -> tuple[ReferenceResult, list[Checked]]:
+) -> tuple[ReferenceResult, list[CheckedClaim]]:
     claims = [
         found for one in listed for axis in axes_of(one, settings) if axis.sigma and (found := checked(one, axis))
     ]

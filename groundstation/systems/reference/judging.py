@@ -43,7 +43,7 @@ class JudgedAxis:
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedClaim:
     """A claim checked sample by sample.
 
     ``z`` is each error as a standard normal variable if the claim is true; ``is_inside`` tells whether the error is
@@ -114,7 +114,7 @@ def _rms_of(sigmas: Mapping[str, FloatArray], name: str, rows: BoolArray) -> flo
     return float(np.sqrt(np.mean(np.square(known)))) if known.size else None
 
 
-def checked(errors: Errors, axis: JudgedAxis) -> Checked | None:
+def checked(errors: Errors, axis: JudgedAxis) -> CheckedClaim | None:
     """Check an error against the 95 % region that subject and reference claim together.
 
     None without a claim.
@@ -149,4 +149,4 @@ def checked(errors: Errors, axis: JudgedAxis) -> Checked | None:
         confidence95=share.confidence95,
         state="reference_too_coarse" if is_coarse else share.state,
     )
-    return Checked(row, errors.time_s[known], np.asarray(z), is_inside)
+    return CheckedClaim(row, errors.time_s[known], np.asarray(z), is_inside)

@@ -54,7 +54,7 @@ class TopicSignals:
 
 
 @dataclass(frozen=True)
-class Pair:
+class SignalPair:
     """The same signals (``names``, c of them) of two logs."""
 
     names: tuple[str, ...]
@@ -64,7 +64,7 @@ class Pair:
 
 def pair_of(
     first: Flight, other: Flight, longest_s: float, *, is_late: tuple[bool, bool] = (False, False)
-) -> Pair | None:
+) -> SignalPair | None:
     """Return the pair of topics that shows most of the motion; None where there is none.
 
     The pair comes with the signals that both have. Velocities say more than speed, an INS more than GNSS (it is stamped
@@ -78,7 +78,7 @@ def pair_of(
             names = _common(a, b)
             if not names:
                 continue
-            pair = Pair(names, a.side(names), b.side(names))
+            pair = SignalPair(names, a.side(names), b.side(names))
             if min(len(pair.first.time_s), len(pair.other.time_s)) < LEAST_ROWS:
                 continue
             slower = max(pair.first.interval_s, pair.other.interval_s)

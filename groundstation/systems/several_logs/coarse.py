@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.base.angles import FloatArray
-from groundstation.systems.several_logs.channels import Pair, TopicSignals
+from groundstation.systems.several_logs.channels import SignalPair, TopicSignals
 from groundstation.systems.several_logs.settings import TwoClocksSettings
 
 GAP_S = 2.5  # nothing is interpolated over a longer one
@@ -43,7 +43,7 @@ class Grids:
     step_s: float
 
 
-def grids_of(pair: Pair, settings: TwoClocksSettings) -> Grids:
+def grids_of(pair: SignalPair, settings: TwoClocksSettings) -> Grids:
     """Put both motions of a pair on grids, each signal in its own standard deviations."""
     step_s = max(settings.grid_s, 0.5 * min(pair.first.interval_s, pair.other.interval_s))
     first, first_start_s = _grid(pair.first, step_s, settings.high_pass_s)

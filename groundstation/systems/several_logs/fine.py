@@ -12,8 +12,8 @@ from groundstation.base.attitude import rotation_n_from_b
 from groundstation.base.quantiles import NORMAL_95, student_quantile
 from groundstation.methods.lag.fit import DelayFit, fit_delay
 from groundstation.methods.lag.settings import SLOW_MPS, LatencySettings
-from groundstation.methods.lag.windows import Series, Windows, cut_windows, too_few_windows
-from groundstation.systems.several_logs.channels import Pair, TopicSignals, averaged, running_mean
+from groundstation.methods.lag.windows import ReferenceSignals, Windows, cut_windows, too_few_windows
+from groundstation.systems.several_logs.channels import SignalPair, TopicSignals, averaged, running_mean
 from groundstation.systems.several_logs.settings import TwoClocksSettings
 
 REFERENCE_STEP_S, OTHER_STEP_S, SLOW_S = 0.1, 0.4, 0.35
@@ -43,13 +43,13 @@ class MotionFit:
 
 
 def fit_motion(
-    pair: Pair, lag_s: float, span_s: tuple[float, float], hidden_s: float, settings: TwoClocksSettings
+    pair: SignalPair, lag_s: float, span_s: tuple[float, float], hidden_s: float, settings: TwoClocksSettings
 ) -> MotionFit | str:
     """Fit lag and drift over a stretch of the other log, from a lag that is nearly right.
 
     Parameters
     ----------
-    pair : Pair
+    pair : SignalPair
     lag_s : float
         From :func:`place_of`: good to ``search_s``.
     span_s : (float, float)
@@ -109,7 +109,7 @@ def _why_not(fit: DelayFit, settings: TwoClocksSettings) -> str:
     return "" if fit.is_converged else "no minimum near the place of the first search"
 
 
-def _hidden_by_arm_s(pair: Pair, other: TopicSignals, settings: TwoClocksSettings) -> float:
+def _hidden_by_arm_s(pair: SignalPair, other: TopicSignals, settings: TwoClocksSettings) -> float:
     """Return the lag, one sigma, that a lever arm between two antennas can hide.
 
     It is the length of the arm over the speed, where no attitude tells the two apart. In a turn of one radius an
@@ -208,7 +208,7 @@ def _series(
     width_s: float,
     settings: TwoClocksSettings,
     fine: LatencySettings,
-) -> tuple[Series, FloatArray, int]:
+) -> tuple[ReferenceSignals, FloatArray, int]:
     """Return the reference with its nuisances, their priors, and the index of the drift.
 
     It is averaged over ``width_s`` as the sensor was, and so that the noise of its single samples does not show.
@@ -233,7 +233,7 @@ def _series(
 
     sigma = [LOOSE_PPM, *(SCALE_SIGMA.get(name, USUAL_SCALE_SIGMA) for name in names)]
     sigma += [AZIMUTH_SIGMA_RAD, *[settings.arm_sigma_m] * 3] if turns else []
-    series = Series(side.time_s, base, build, fine.gap_max_s)
+    series = ReferenceSignals(side.time_s, base, build, fine.gap_max_s)
     return series.smoothed(_nodes(width_s, side.interval_s)), np.array(sigma), 0
 
 
@@ -267,7 +267,7 @@ def _track(north_mps: FloatArray, east_mps: FloatArray) -> FloatArray:
     return np.interp(np.arange(len(north_mps)), known, unwrap(direction_of(north_mps[known], east_mps[known])))
 
 
-def _middle(series: Series, windows: Windows) -> float:
+def _middle(series: ReferenceSignals, windows: Windows) -> float:
     """Return the mean time of the motion, about which the offset is known best."""
     rate = series.at(windows.time_s)[1][..., 0]
     weight = np.sum(rate**2, axis=-1) * windows.weight

@@ -11,7 +11,7 @@ from groundstation.base.signals import topics_of_kind
 from groundstation.base.timescales import duration_text, utc_ns_to_iso
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.joining import NotOneFlightError
-from groundstation.systems.several_logs.channels import Pair, TopicSignals, pair_of
+from groundstation.systems.several_logs.channels import SignalPair, TopicSignals, pair_of
 from groundstation.systems.several_logs.coarse import CoarseLag, grids_of, place_of, steps_of
 from groundstation.systems.several_logs.fine import MotionFit, fit_motion
 from groundstation.systems.several_logs.relation import LogRelation, RelationStretch, TimedLog
@@ -130,7 +130,10 @@ def _by_gnss_time(first: TimedLog, other: TimedLog, settings: TwoClocksSettings)
 
 
 def _placed(
-    pair: Pair | None, by_gnss: tuple[RelationStretch, ...], files_lag_s: float | None, settings: TwoClocksSettings
+    pair: SignalPair | None,
+    by_gnss: tuple[RelationStretch, ...],
+    files_lag_s: float | None,
+    settings: TwoClocksSettings,
 ) -> tuple[CoarseLag | None, str]:
     """Return the lag at which the motions fit; or None, and why the motion does not tell it.
 
@@ -173,7 +176,7 @@ def _moves(names: tuple[str, ...], side: TopicSignals, settings: TwoClocksSettin
 
 def _by_motion(
     found: LogRelation,
-    pair: Pair,
+    pair: SignalPair,
     place: CoarseLag,
     by_gnss: tuple[RelationStretch, ...],
     logs: tuple[TimedLog, TimedLog],
@@ -320,7 +323,7 @@ def _span(log: TimedLog) -> str:
 
 
 def _require_no_contradiction(
-    first: TimedLog, other: TimedLog, pair: Pair, found: LogRelation, settings: TwoClocksSettings
+    first: TimedLog, other: TimedLog, pair: SignalPair, found: LogRelation, settings: TwoClocksSettings
 ) -> None:
     """Refuse logs whose clocks agree and whose motions do not."""
     moves = [_moves(pair.names, side, settings) for side in (pair.first, pair.other)]
@@ -349,7 +352,7 @@ def _require_near(first: TimedLog, other: TimedLog, found: LogRelation, settings
 
 
 @dataclass(frozen=True)
-class Apart:
+class Separation:
     """Median distance over the ground; ``is_inertial``: one position is that of an INS.
 
     An INS may drift.
@@ -359,7 +362,7 @@ class Apart:
     is_inertial: bool
 
 
-def apart_m(first: Flight, other: Flight, first_time_ns: Callable[[Int64Array], Int64Array]) -> Apart | None:
+def apart_m(first: Flight, other: Flight, first_time_ns: Callable[[Int64Array], Int64Array]) -> Separation | None:
     """Return the distance between the positions of two logs at one time.
 
     None where one has no position or they never overlap.
@@ -378,7 +381,7 @@ def apart_m(first: Flight, other: Flight, first_time_ns: Callable[[Int64Array], 
             b.values("latitude_deg")[row], b.values("longitude_deg")[row], float(latitude[row]), float(longitude[row])
         )
         distance.append(float(np.hypot(north, east)))
-    return Apart(float(np.median(distance)), any(one.topic.startswith("ins") for one in (a, b)))
+    return Separation(float(np.median(distance)), any(one.topic.startswith("ins") for one in (a, b)))
 
 
 def _positions(flight: Flight) -> Table | None:

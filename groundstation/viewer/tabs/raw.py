@@ -51,7 +51,7 @@ _AXES = re.compile(r"(_(north|east|down|x|y|z|w|forward|right|roll|pitch|xx|xy|x
 
 
 @dataclass(frozen=True)
-class Family:
+class FieldFamily:
     """Fields of one topic that belong on one axis and share their rows.
 
     ``breaks`` tells after which rows the lines end, shape (n - 1,). ``name`` is the field's own, without unit, where
@@ -87,7 +87,7 @@ def raw(recorder: Recorder, flight: Flight, results: FlightResults) -> rrb.Conta
     filled = sorted((topic for topic in flight.topics() if len(flight[topic])), key=_reading_order)
     topics, without_page = filled[:MAX_TOPICS], filled[MAX_TOPICS:]
     most_views = min(MAX_VIEWS, max(MAX_ALL_VIEWS // max(len(topics), 1), 1))
-    families: dict[str, list[Family]] = {}
+    families: dict[str, list[FieldFamily]] = {}
     listed = {topic for topic in topics if is_list(flight[topic])}
     for topic in topics:
         if topic in listed:
@@ -212,7 +212,7 @@ def family_of(topic: str, field: str) -> str:
     return _AXES.sub("", name) or name
 
 
-def _families(table_of_topic: Table, gap_starts_ns: Int64Array, units: Mapping[str, str]) -> list[Family]:
+def _families(table_of_topic: Table, gap_starts_ns: Int64Array, units: Mapping[str, str]) -> list[FieldFamily]:
     """Return numeric fields by family and by the rows where they are present.
 
     An absent value is not a gap, NaN from the device is. ``units`` are those that the source tells. Counts and codes,
@@ -244,7 +244,7 @@ def _families(table_of_topic: Table, gap_starts_ns: Int64Array, units: Mapping[s
         breaks = breaks_of[presence]
         unit = units.get(fields[0], "")
         of_topic = table_of_topic.topic, title, tuple(fields), time_ns, values
-        found.append(Family(*of_topic, breaks, name in CIRCULAR, is_stepped, unit))
+        found.append(FieldFamily(*of_topic, breaks, name in CIRCULAR, is_stepped, unit))
     return found
 
 
@@ -269,7 +269,7 @@ def columns_of(views: int) -> int:
 
 
 def _log_families(
-    recorder: Recorder, base: str, families: list[Family], limit: int, most_views: int
+    recorder: Recorder, base: str, families: list[FieldFamily], limit: int, most_views: int
 ) -> tuple[int, list[rrb.View]]:
     """Log the families of one topic; most rows kept of any, and their views."""
     paths = [f"{base}/{part}" for part in path_parts([STATES, *(family.name for family in families)])[1:]]
@@ -328,7 +328,7 @@ def _held(time_ns: Int64Array, column: Column) -> tuple[Int64Array, np.ndarray]:
 
 def _about(
     flight: Flight,
-    families: dict[str, list[Family]],
+    families: dict[str, list[FieldFamily]],
     kept: dict[str, int],
     left_out: list[str],
     without_page: list[str],

@@ -7,20 +7,20 @@ import numpy as np
 from groundstation.simulation.session import SimulatedSession, VehicleTruth
 from groundstation.simulation.session_scenario import (
     SessionAircraft,
-    SessionErrors,
+    SessionErrorSigmas,
     SessionPoint,
     SessionScenario,
-    Turn,
+    SessionTurn,
 )
 from groundstation.systems.cooperative.settings import CooperativeSettings, InsBelief
 
 TRIANGLE = (
     SessionAircraft("A", 0.0, 0.0, rank=1),
-    SessionAircraft("B", 0.0, 30_000.0, rank=1, turns=(Turn(30.0, 3.0, 30.0),)),
+    SessionAircraft("B", 0.0, 30_000.0, rank=1, turns=(SessionTurn(30.0, 3.0, 30.0),)),
     SessionAircraft("C", -25_981.0, 15_000.0, rank=2),
 )
 POINTS = (SessionPoint("N1", 50_000.0, -30_000.0), SessionPoint("N2", 100_000.0, 60_000.0))
-GLOBAL_ERRORS = SessionErrors(position_m=106.0, velocity_mps=0.15, baro_m=10.0)
+GLOBAL_ERRORS = SessionErrorSigmas(position_m=106.0, velocity_mps=0.15, baro_m=10.0)
 LOCAL = SessionScenario("local", "local", TRIANGLE, duration_s=60.0, points=POINTS)
 GLOBAL = SessionScenario(
     "global",

@@ -23,7 +23,7 @@ from groundstation.systems.cooperative.motion import place
 from groundstation.systems.cooperative.observation import observe
 from groundstation.systems.cooperative.plain.decentralised import Decentralised
 from groundstation.systems.cooperative.plain.observation import rows_of
-from groundstation.systems.cooperative.plain.steps import Event
+from groundstation.systems.cooperative.plain.steps import MeasurementEvent
 from groundstation.systems.cooperative.settings import (
     ALGORITHMS,
     CameraBelief,
@@ -109,7 +109,7 @@ def lines_of(
     """Innovations of one range of 10 km about a state at 2.5 s, and derivatives by state, place and clock."""
     values = (2.5, kind, 0, 1, 1e4, 100.0, 0, source, np.nan, np.nan, False, ARM_M, 1.0)
     if isinstance(vehicle, WheeledVehicle):  # sees a bearing too
-        event = Event(*values[:8], 0.3, 1e-4, False, 1e-3 * ARM_M, 1.0, 0)
+        event = MeasurementEvent(*values[:8], 0.3, 1e-4, False, 1e-3 * ARM_M, 1.0, 0)
         rows = rows_of(event, vehicle, x, source, clock)
         names = ("innovation", "receiver", "place", "clock")
         return tuple(np.array([getattr(row, name) for row in rows]) for name in names)

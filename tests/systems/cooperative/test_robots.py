@@ -11,7 +11,7 @@ from groundstation.systems.cooperative.events import prepare
 from groundstation.systems.cooperative.loop_types import PEER
 from groundstation.systems.cooperative.plain.sighting import sighting_of
 from groundstation.systems.cooperative.plain.split_covariance import fuse
-from groundstation.systems.cooperative.plain.steps import Event
+from groundstation.systems.cooperative.plain.steps import MeasurementEvent
 from groundstation.systems.cooperative.settings import CameraBelief, CooperativeSettings, OdometryBelief
 from groundstation.systems.cooperative.tracks import VehicleTrack
 from groundstation.systems.cooperative.wheeled_vehicle import WheeledVehicle
@@ -173,7 +173,7 @@ def test_a_sighting_against_central_differences() -> None:
     team = Team(np.random.default_rng(3))
     observer = WheeledVehicle(team.vehicles[0], BELIEF)
     x = observer.start()[0] + 0.05 * np.random.default_rng(4).standard_normal(observer.size)
-    event = Event(3.1, PEER, 0, 1, 2.0, 1e-4, NO_SLOT, np.zeros(3), 0.4, 1e-4, True, np.zeros(3), 1.0, 0)
+    event = MeasurementEvent(3.1, PEER, 0, 1, 2.0, 1e-4, NO_SLOT, np.zeros(3), 0.4, 1e-4, True, np.zeros(3), 1.0, 0)
     found = sighting_of(event, observer, x)
     assert found is not None
     for at in range(observer.size):

@@ -9,7 +9,7 @@ from groundstation.methods.intervals import mixture_quantile
 from groundstation.methods.taxi_error import noise
 from groundstation.methods.taxi_error.interval import (
     NO_STANDSTILL,
-    Differences,
+    HeadingDifferences,
     Regressor,
     StandstillVelocities,
     _Target,
@@ -23,9 +23,9 @@ from groundstation.simulation.processes import damped_oscillation, gauss_markov
 DENSE_TOLERANCE = 1e-8  # relative: rounding of two ways to the same number
 
 
-def random_differences(rng: np.random.Generator, count: int = 60) -> Differences:
+def random_differences(rng: np.random.Generator, count: int = 60) -> HeadingDifferences:
     speed = rng.uniform(6.0, 9.0, count)
-    return Differences(
+    return HeadingDifferences(
         time_s=np.cumsum(rng.uniform(0.05, 0.5, count)),
         difference_deg=rng.normal(2.0, 1.0, count),
         direction_deg=rng.uniform(0.0, 360.0, count),
@@ -35,7 +35,7 @@ def random_differences(rng: np.random.Generator, count: int = 60) -> Differences
     )
 
 
-def dense_covariance(data: Differences, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def dense_covariance(data: HeadingDifferences, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Covariance of the differences, and what each GNSS component does to them, straight from autocovariances."""
     white, correlated, tau, sway, frequency, damping, heading_white, motion, own, wander, wander_s = np.exp(theta)
     natural = 2 * np.pi * frequency
@@ -155,7 +155,7 @@ def test_a_crosswind_there_and_back_is_no_disagreement_of_the_ins() -> None:
 
 def simulated(
     rng: np.random.Generator, seconds: float, correlated_mps: float
-) -> tuple[Differences, StandstillVelocities]:
+) -> tuple[HeadingDifferences, StandstillVelocities]:
     count, speed = round(seconds * 10), 8.0
     velocity = gauss_markov(rng, (2, 2000 + count), 0.1, correlated_mps, 3.0) + 0.05 * rng.standard_normal(
         (2, 2000 + count)
@@ -163,7 +163,7 @@ def simulated(
     sway = damped_oscillation(rng, (count,), 0.1, 0.5, 0.4, 0.1)
     time_s = 0.1 * np.arange(2000 + count)
     difference = sway - np.rad2deg(velocity[1, 2000:] / speed)
-    taxi = Differences(time_s[2000:], difference, np.zeros(count), np.full(count, speed))
+    taxi = HeadingDifferences(time_s[2000:], difference, np.zeros(count), np.full(count, speed))
     return taxi, StandstillVelocities(time_s[:1900], velocity[0, :1900], velocity[1, :1900], 0, 10.0)
 
 
@@ -198,7 +198,7 @@ def test_same_data_give_the_same_interval() -> None:
 def test_few_samples_and_no_standstill_give_a_wide_finite_interval(count: int, value: str) -> None:
     rng = np.random.default_rng(9)
     difference = np.full(count, 1.5) if value == "constant" else 1.5 + 0.5 * rng.standard_normal(count)
-    taxi = Differences(0.1 * np.arange(count), difference, np.zeros(count), np.full(count, 8.0))
+    taxi = HeadingDifferences(0.1 * np.arange(count), difference, np.zeros(count), np.full(count, 8.0))
     low, high = error_posterior(taxi).interval_deg()
     assert low < 1.5 < high
     assert 0.1 < high - low < 20.0

@@ -7,10 +7,10 @@ import numpy as np
 from groundstation.base.geodesy import curvature_radii_m
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
-from groundstation.simulation.inertial_family import ErrorBatch, FamilySettings, GnssNoise, simulate_family
+from groundstation.simulation.inertial_family import ErrorBatch, FamilySettings, GnssErrorModel, simulate_family
 from groundstation.tables.table import Flight, Table
 
-RECEIVER = GnssNoise(
+RECEIVER = GnssErrorModel(
     position_white_m=2.0, position_correlated_m=1.2, velocity_white_mps=0.03, velocity_correlated_mps=0.01
 )
 

@@ -7,13 +7,13 @@ import pytest
 
 from groundstation.methods.ins_noise import InsNoise
 from groundstation.results.roles import AzimuthEstimate
-from groundstation.simulation.inertial_family import FamilySettings, GnssNoise, simulate_family
+from groundstation.simulation.inertial_family import FamilySettings, GnssErrorModel, simulate_family
 from groundstation.simulation.ins_class import load_ins_class
 from groundstation.simulation.ins_errors import SensorErrors, TrueMotion, propagate
 from groundstation.systems.inertial import azimuth, velocity_changes
 from groundstation.systems.inertial.azimuth import estimate_azimuth
-from groundstation.systems.inertial.differences import Differences, drag_per_s
-from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, run_filter
+from groundstation.systems.inertial.differences import InsDifferences, drag_per_s
+from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs, run_filter
 from groundstation.systems.inertial.model import ChannelModel, FloatArray
 from groundstation.systems.inertial.settings import InertialSettings
 
@@ -33,17 +33,17 @@ def track_rad(seconds: int, turns: tuple[tuple[float, float], ...]) -> FloatArra
 TURNS = ((600.0, 90.0), (1200.0, -90.0), (1800.0, 180.0), (2400.0, 90.0))
 
 
-def flying(velocity: FloatArray, error_mps: FloatArray) -> Differences:
+def flying(velocity: FloatArray, error_mps: FloatArray) -> InsDifferences:
     """INS with these velocities (n, 2), whose difference from GNSS is ``error_mps``; no positions."""
     n = len(velocity)
     latitude, altitude = np.full(n, 50.0), np.zeros(n)
     time_s = np.arange(float(n))
     drag = drag_per_s(latitude, altitude, velocity)
     epochs = DifferenceEpochs(time_s, np.full((n, 2), np.nan), error_mps, drag, np.zeros(n, dtype=bool))
-    return Differences("ins", "gnss", epochs, latitude, np.zeros(n), altitude, velocity, 0.0, ())
+    return InsDifferences("ins", "gnss", epochs, latitude, np.zeros(n), altitude, velocity, 0.0, ())
 
 
-def of_track(track: FloatArray, azimuth_rad: float = 0.0, seed: int | None = None) -> Differences:
+def of_track(track: FloatArray, azimuth_rad: float = 0.0, seed: int | None = None) -> InsDifferences:
     velocity = SPEED * np.stack([np.cos(track), np.sin(track)], axis=1)
     error = azimuth_rad * np.stack([-velocity[:, 1], velocity[:, 0]], axis=1)
     error -= error[0]
@@ -52,12 +52,12 @@ def of_track(track: FloatArray, azimuth_rad: float = 0.0, seed: int | None = Non
     return flying(velocity, error)
 
 
-def filtered(differences: Differences) -> FilterRun:
+def filtered(differences: InsDifferences) -> ChannelsRun:
     noise = InsNoise()
     return run_filter(differences.epochs, ChannelModel.at(50.0, 0.0, noise.beta_per_s), noise)
 
 
-def estimated(differences: Differences, limit_deg: float = SETTINGS.azimuth_sigma_max_deg) -> AzimuthEstimate:
+def estimated(differences: InsDifferences, limit_deg: float = SETTINGS.azimuth_sigma_max_deg) -> AzimuthEstimate:
     settings = replace(SETTINGS, azimuth_sigma_max_deg=limit_deg)
     return estimate_azimuth(differences, filtered(differences), settings)
 
@@ -214,7 +214,7 @@ def test_an_ins_silent_for_a_while_is_no_trouble() -> None:
 # Honesty
 
 
-def standardised(runs: int, seed: int, ins: str, route: str, gnss: GnssNoise) -> tuple[FloatArray, int]:
+def standardised(runs: int, seed: int, ins: str, route: str, gnss: GnssErrorModel) -> tuple[FloatArray, int]:
     """Errors over sigma of the simulated flights on which it is offered, and how many those are not."""
     family = FamilySettings(ins=load_ins_class(ins), route=route, duration_s=9000.0, gnss=gnss)  # type: ignore[arg-type]
     out, refused = [], 0
@@ -233,7 +233,7 @@ def standardised(runs: int, seed: int, ins: str, route: str, gnss: GnssNoise) ->
     return np.array(out), refused
 
 
-GNSS = GnssNoise(3.0, 3.0, 300.0, 0.05, 0.03, 60.0)
+GNSS = GnssErrorModel(3.0, 3.0, 300.0, 0.05, 0.03, 60.0)
 
 
 def test_truth_is_within_the_claimed_sigma() -> None:
@@ -248,11 +248,11 @@ def test_truth_is_within_the_claimed_sigma() -> None:
     "ins, route, gnss",
     [
         ("navigation", "manoeuvring", GNSS),
-        ("navigation", "manoeuvring", GnssNoise(3.0, 0.0, 300.0, 0.02, 0.0, 60.0)),
+        ("navigation", "manoeuvring", GnssErrorModel(3.0, 0.0, 300.0, 0.02, 0.0, 60.0)),
         ("i-21", "norilsk_moscow", GNSS),
     ],
 )
-def test_95_per_cent_interval_holds_the_truth_as_often(ins: str, route: str, gnss: GnssNoise) -> None:
+def test_95_per_cent_interval_holds_the_truth_as_often(ins: str, route: str, gnss: GnssErrorModel) -> None:
     """200 flights each: 0.89 is the lower 99.9 % binomial bound of 0.95; an interval too wide is allowed."""
     errors, refused = standardised(200, 21, ins, route, gnss)
     assert refused < 40

@@ -11,7 +11,7 @@ from groundstation.methods.ins_noise import BankFactors, Calibration, GnssNoise,
 from groundstation.systems.inertial.bank import NoiseBank, run_bank
 from groundstation.systems.inertial.coarse import COARSE_S, Coarse
 from groundstation.systems.inertial.estimate import estimate_ins_errors
-from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, initial_of, run_filter
+from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs, initial_of, run_filter
 from groundstation.systems.inertial.hindcast import hindcast
 from groundstation.systems.inertial.leads import leads_of, past_mean, start_epochs
 from groundstation.systems.inertial.settings import InertialSettings
@@ -25,12 +25,12 @@ ROUNDING = 1e-9
 
 
 @pytest.fixture(scope="module")
-def run() -> FilterRun:
+def run() -> ChannelsRun:
     return estimate_ins_errors(flight_of(batch_of(duration_s=12_000.0, route="manoeuvring"))).run
 
 
 @pytest.fixture(scope="module")
-def bank(run: FilterRun) -> NoiseBank:
+def bank(run: ChannelsRun) -> NoiseBank:
     return run_bank(run, SETTINGS)
 
 
@@ -46,7 +46,7 @@ def test_sets_are_every_combination_and_random_drifts_go_with_their_times() -> N
         Calibration(bank_scale=(1.0,))
 
 
-def test_coarse_epochs_are_means_of_what_was_used(run: FilterRun) -> None:
+def test_coarse_epochs_are_means_of_what_was_used(run: ChannelsRun) -> None:
     found = Coarse.of(run)
     coarse, epochs = found.epochs, run.epochs
     assert found.samples == COARSE_S
@@ -82,7 +82,7 @@ def test_slow_gnss_and_a_reset_have_epochs_of_their_own() -> None:
     assert np.all(np.diff(coarse.time_s) > 0.0)
 
 
-def test_nothing_of_a_gap_is_in_the_epochs_that_are_blinded(run: FilterRun) -> None:
+def test_nothing_of_a_gap_is_in_the_epochs_that_are_blinded(run: ChannelsRun) -> None:
     begin_s, end_s = float(run.epochs.time_s[5405]), float(run.epochs.time_s[6013])
     cut = Coarse.of(run).blinded(5405, begin_s, end_s, end_s + 600.0)
     assert cut.time_s[0] == begin_s
@@ -91,7 +91,7 @@ def test_nothing_of_a_gap_is_in_the_epochs_that_are_blinded(run: FilterRun) -> N
     assert end_s + 580.0 < cut.time_s[-1] < end_s + 600.0
 
 
-def test_a_bank_of_the_class_alone_forecasts_as_the_last_estimate(run: FilterRun) -> None:
+def test_a_bank_of_the_class_alone_forecasts_as_the_last_estimate(run: ChannelsRun) -> None:
     """Ten-second means lose nothing: within 2 % of the claimed sigma, and that within 1 %."""
     one = replace(run, noise=replace(run.noise, bank=ALONE))
     at = start_epochs(run.epochs, 5400.0, 600.0)
@@ -112,7 +112,7 @@ def test_weights_sum_to_one_and_are_equal_before_any_outage_was_over(bank: Noise
     assert weight[:, 3].max() > 2.0 / len(bank.runs)
 
 
-def test_the_variance_is_that_of_a_mixture(run: FilterRun, bank: NoiseBank) -> None:
+def test_the_variance_is_that_of_a_mixture(run: ChannelsRun, bank: NoiseBank) -> None:
     at = start_epochs(run.epochs, 5400.0, 600.0)
     replay = hindcast(run, at, LEADS_S, ("noise_bank",), SETTINGS, bank)
     singles = [
@@ -128,7 +128,7 @@ def test_the_variance_is_that_of_a_mixture(run: FilterRun, bank: NoiseBank) -> N
     assert np.all(replay.variance_m2["noise_bank"] > spread)
 
 
-def test_nothing_later_than_a_start_is_used(run: FilterRun, bank: NoiseBank) -> None:
+def test_nothing_later_than_a_start_is_used(run: ChannelsRun, bank: NoiseBank) -> None:
     begin = float(run.epochs.time_s[9000])
     position = np.array(run.epochs.position_m)
     later = run.epochs.time_s > begin

@@ -21,7 +21,7 @@ from groundstation.systems.inertial.coupled import (
     CoupledRun,
 )
 from groundstation.systems.inertial.craft_motion import CraftMotion
-from groundstation.systems.inertial.differences import Differences, drag_per_s
+from groundstation.systems.inertial.differences import InsDifferences, drag_per_s
 from groundstation.systems.inertial.filter import DifferenceEpochs, run_filter
 from groundstation.systems.inertial.hindcast import hindcast
 from groundstation.systems.inertial.leads import built_up, start_epochs
@@ -58,17 +58,17 @@ def craft(latitude_deg: float, velocity: tuple[float, float], acceleration: tupl
     return CraftMotion(*place, np.array([velocity]), np.array([acceleration]), np.zeros(1))
 
 
-def differences_of(motion: TrueMotion, position: FloatArray, velocity: FloatArray) -> Differences:
+def differences_of(motion: TrueMotion, position: FloatArray, velocity: FloatArray) -> InsDifferences:
     """Of one flight whose INS has these errors against GNSS."""
     n = len(motion.time_s)
     speed = np.stack([motion.velocity_north_mps[0], motion.velocity_east_mps[0]], axis=1)
     latitude, altitude = motion.latitude_deg[0], motion.altitude_m[0]
     drag = drag_per_s(latitude, altitude, speed)
     epochs = DifferenceEpochs(motion.time_s, position, velocity, drag, np.zeros(n, dtype=bool))
-    return Differences("ins", "gnss", epochs, latitude, np.zeros(n), altitude, speed, 0.0, ())
+    return InsDifferences("ins", "gnss", epochs, latitude, np.zeros(n), altitude, speed, 0.0, ())
 
 
-def of_batch(batch: ErrorBatch, row: int = 0) -> Differences:
+def of_batch(batch: ErrorBatch, row: int = 0) -> InsDifferences:
     zero = np.zeros((1, len(batch.time_s)))
     motion = TrueMotion(
         time_s=batch.time_s,
@@ -425,7 +425,7 @@ def eastbound(latitude_deg: float = 50.0) -> tuple[TrueMotion, FloatArray, Float
     return motion, position, truth.velocity_mps[0] + 0.05 * rng.standard_normal(shape)
 
 
-def with_resets(plain: Differences, at: list[int]) -> Differences:
+def with_resets(plain: InsDifferences, at: list[int]) -> InsDifferences:
     marks = np.zeros(len(plain.epochs), dtype=bool)
     marks[at] = True
     return replace(plain, epochs=replace(plain.epochs, is_reset=marks))

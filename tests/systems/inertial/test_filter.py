@@ -15,8 +15,8 @@ from groundstation.methods.kalman import smoother
 from groundstation.simulation.channel_truth import RADIUS_M
 from groundstation.systems.inertial.channel_group import RESET_POSITION_M, RESET_VELOCITY_MPS
 from groundstation.systems.inertial.filter import (
+    ChannelsRun,
     DifferenceEpochs,
-    FilterRun,
     measurement_variances,
     run_filter,
     smooth,
@@ -98,7 +98,7 @@ class Textbook:
 
 
 @lru_cache(maxsize=1)
-def textbook_run() -> tuple[FilterRun, Textbook]:
+def textbook_run() -> tuple[ChannelsRun, Textbook]:
     """The same epochs filtered by ours and by the textbook's."""
     epochs = irregular_epochs()
     return run_filter(epochs, MODEL, NOISE, gate=NO_GATE), textbook(epochs, MODEL, NOISE)
@@ -158,7 +158,7 @@ def both(values: FloatArray) -> FloatArray:
     return np.stack([values[:, :SIZE], values[:, SIZE:]], axis=2)
 
 
-def sigmas_apart(run: FilterRun, x: FloatArray) -> float:
+def sigmas_apart(run: ChannelsRun, x: FloatArray) -> float:
     """Largest difference of states (n, 6, 2) from a run's, in its sigmas."""
     sigma = np.stack([run.sigma(0), run.sigma(1)], axis=2)
     return float(np.max(np.abs(run.x - x) / sigma))
@@ -279,7 +279,7 @@ def test_fixed_lag_is_smoothing_up_to_the_start() -> None:
             assert scaled(closed[row]) == pytest.approx(scaled(chained(run, begin, end)), rel=1e-7, abs=ROUNDING)
 
 
-def chained(run: FilterRun, begin: int, end: int) -> FloatArray:
+def chained(run: ChannelsRun, begin: int, end: int) -> FloatArray:
     """Error at ``end`` that an error at ``begin`` leaves, both channels sharing it."""
     out = np.eye(SIZE)
     for k in range(begin + 1, end + 1):

@@ -8,7 +8,7 @@ import pytest
 
 from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.systems.inertial.estimate import Estimation, estimate_ins_errors
-from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, initial_of, run_filter
+from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs, initial_of, run_filter
 from groundstation.systems.inertial.forecast import assess_forecast
 from groundstation.systems.inertial.forecast_answer import ForecastResult
 from groundstation.systems.inertial.hindcast import hindcast
@@ -43,7 +43,7 @@ def forecast(found: Estimation) -> ForecastResult:
     return assess_forecast(found, settings=SETTINGS)
 
 
-def cut(run: FilterRun, epoch: int) -> FilterRun:
+def cut(run: ChannelsRun, epoch: int) -> ChannelsRun:
     """The run of a flight that ended at an epoch."""
     part = slice(0, epoch + 1)
     epochs = run.epochs

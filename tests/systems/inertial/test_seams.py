@@ -10,7 +10,7 @@ from groundstation.simulation.inertial_family import ErrorBatch, simulate_family
 from groundstation.systems.inertial import coupled
 from groundstation.systems.inertial.channel_group import ChannelGroup
 from groundstation.systems.inertial.estimate import Estimation, estimate_ins_errors
-from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, Initial, run_filter, smooth
+from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs, Initial, run_filter, smooth
 from groundstation.systems.inertial.model import POSITION, FloatArray
 from groundstation.systems.inertial.seams import FACTOR_MAX, PATIENCE_S, factor_of, fixes_since, returns_of
 from groundstation.systems.inertial.settings import InertialSettings
@@ -35,13 +35,13 @@ def batch() -> ErrorBatch:
 
 
 @pytest.fixture(scope="module")
-def flown(batch: ErrorBatch) -> FilterRun:
+def flown(batch: ErrorBatch) -> ChannelsRun:
     return run_filter(epochs_of(CASE, batch, 0), model_of(CASE, batch, 0), CASE.noise)
 
 
 def replayed(
-    flown: FilterRun, start: int, gap_s: int = GAP_S, *, gate: float = 25.0, **changes: FloatArray
-) -> FilterRun:
+    flown: ChannelsRun, start: int, gap_s: int = GAP_S, *, gate: float = 25.0, **changes: FloatArray
+) -> ChannelsRun:
     """The filter from a start on without GNSS for a while; ``changes`` are added to what is measured behind it."""
     epochs, use = flown.epochs, slice(start, start + gap_s + BEHIND_S)
     columns = {name: np.array(getattr(epochs, name)[use]) for name in ("position_m", "velocity_mps")}
@@ -55,7 +55,7 @@ def replayed(
     return run_filter(cut, flown.model, flown.noise, gate=gate, initial=initial)
 
 
-def errors_of(run: FilterRun, batch: ErrorBatch, start: int) -> tuple[float, float]:
+def errors_of(run: ChannelsRun, batch: ErrorBatch, start: int) -> tuple[float, float]:
     """Largest radial error of the smoother in the outage, and the share of its errors within 1.96 of its sigmas."""
     truth, found = batch.position_error_m[0][start : start + GAP_S], smooth(run)
     error = found.x[:GAP_S, POSITION] - truth
@@ -63,14 +63,14 @@ def errors_of(run: FilterRun, batch: ErrorBatch, start: int) -> tuple[float, flo
     return float(np.hypot(*error.T).max()), float(inside.mean())
 
 
-def sigmas_off(run: FilterRun) -> float:
+def sigmas_off(run: ChannelsRun) -> float:
     """How far the forecast is from the first fix, in sigmas of the model, by the worse channel."""
     variance = run.covariance_beforehand(0)[GAP_S - 1, POSITION, POSITION] + 49.0  # of a fix, as the gate believes it
     return float(np.abs(run.epochs.position_m[GAP_S] - run.x[GAP_S - 1, POSITION]).max() / np.sqrt(variance))
 
 
 def test_the_smoother_crosses_a_seam_as_well_as_without_rejection(
-    batch: ErrorBatch, flown: FilterRun, monkeypatch: pytest.MonkeyPatch
+    batch: ErrorBatch, flown: ChannelsRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ours = [replayed(flown, start) for start in SEAMS_S]
     assert all(4.8 < sigmas_off(run) < 8.0 and len(run.seams) == 1 and not (run.used == -1).any() for run in ours)
@@ -87,7 +87,7 @@ def test_the_smoother_crosses_a_seam_as_well_as_without_rejection(
     assert np.mean([inside for _, inside in found[0]]) > COVERED > np.mean([inside for _, inside in found[1]])
 
 
-def test_the_sigma_of_an_outage_is_that_of_the_model_times_the_factor(flown: FilterRun) -> None:
+def test_the_sigma_of_an_outage_is_that_of_the_model_times_the_factor(flown: ChannelsRun) -> None:
     run = replayed(flown, SEAMS_S[0])
     (seam,) = run.seams
     assert (seam.last, seam.first, seam.back) == (0, GAP_S, GAP_S)
@@ -99,7 +99,7 @@ def test_the_sigma_of_an_outage_is_that_of_the_model_times_the_factor(flown: Fil
     assert np.isfinite(run.covariance_without_data).all()
 
 
-def test_a_receiver_that_agrees_with_itself_far_off_waits_for_patience(flown: FilterRun) -> None:
+def test_a_receiver_that_agrees_with_itself_far_off_waits_for_patience(flown: ChannelsRun) -> None:
     """Half a nautical mile after ten minutes, 14 sigma: rejected for a minute, then opened, which is told."""
     run = replayed(flown, 9000, position_m=np.array([926.0, 0.0]))
     assert run.seams == () and run.reopened == 1
@@ -107,7 +107,7 @@ def test_a_receiver_that_agrees_with_itself_far_off_waits_for_patience(flown: Fi
     assert rejected[GAP_S : GAP_S + round(PATIENCE_S)].all()
 
 
-def test_a_jump_without_an_outage_is_never_a_seam(flown: FilterRun) -> None:
+def test_a_jump_without_an_outage_is_never_a_seam(flown: ChannelsRun) -> None:
     epochs, at = flown.epochs, 8000
     position = np.array(epochs.position_m)
     position[at:] += 150.0
@@ -124,7 +124,7 @@ def test_position_alone_is_told_from_an_error_of_the_model_sooner() -> None:
     assert alone > 1.3 * as_model
 
 
-def test_fixes_that_disagree_do_not_open_the_filter_and_odd_ones_are_left_out(flown: FilterRun) -> None:
+def test_fixes_that_disagree_do_not_open_the_filter_and_odd_ones_are_left_out(flown: ChannelsRun) -> None:
     plain = replayed(flown, SEAMS_S[1])
     rng = np.random.default_rng(8)
     wild = np.zeros((BEHIND_S, 2))
@@ -138,7 +138,7 @@ def test_fixes_that_disagree_do_not_open_the_filter_and_odd_ones_are_left_out(fl
     assert never.seams == ()
 
 
-def test_a_gap_in_one_channel_alone_is_judged_by_that_channel(flown: FilterRun) -> None:
+def test_a_gap_in_one_channel_alone_is_judged_by_that_channel(flown: ChannelsRun) -> None:
     start, epochs = SEAMS_S[1], flown.epochs
     position, velocity = np.array(epochs.position_m), np.array(epochs.velocity_mps)
     for values in (position, velocity):
@@ -232,7 +232,7 @@ def test_a_seam_is_told_and_a_misled_receiver_is_told_louder(flight: Flight) -> 
     assert "inertial.seam" not in codes(misled) and codes(misled)["inertial.reopened"] == 1
 
 
-def test_an_outage_that_the_sigma_covers_is_no_seam(flown: FilterRun) -> None:
+def test_an_outage_that_the_sigma_covers_is_no_seam(flown: ChannelsRun) -> None:
     run = replayed(flown, 7500)
     assert sigmas_off(run) < 4.0
     assert run.seams == () and not (run.used == -1).any()

@@ -13,7 +13,7 @@ from groundstation.base.errors import NotAssessableError, SettingsError
 from groundstation.base.records import Column
 from groundstation.base.units import NS_PER_S
 from groundstation.methods.lag.settings import LatencySettings
-from groundstation.methods.lag.windows import Series
+from groundstation.methods.lag.windows import ReferenceSignals
 from groundstation.pipeline.one_flight.analyse import Answered, known_of, run_analyses
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.convert import convert_log
@@ -154,7 +154,7 @@ def test_wild_values_gaps_and_lost_samples_do_little() -> None:
 
 def test_series_knows_where_it_has_gaps() -> None:
     time_s = np.array([0.0, 1.0, 2.0, 8.0, 9.0, 10.0])
-    series = Series(time_s, time_s[:, None] ** 2, lambda base: base[..., None], 1.5)
+    series = ReferenceSignals(time_s, time_s[:, None] ** 2, lambda base: base[..., None], 1.5)
     assert series.covers(np.array([0.4, 1.0, 1.6, 5.0, 8.4, 9.0, 9.6]), 0.5).tolist() == [
         *(False, True, False, False, False, True, False)
     ]

@@ -530,7 +530,7 @@ def test_what_the_user_set_reaches_the_alignment() -> None:
     flight = simulate(load_scenario("magnetic-eight")).flight
     source = Source("flight.csv", "ab" * 32, 1, "flat-csv")
     given = Given("NOTIME_abababab", source, Ledger(), Clock(), (), has_lost_data=False)
-    run = configured.Interval(str(lift_off_s(flight) - 40.0), str(lift_off_s(flight)))
+    run = configured.WrittenInterval(str(lift_off_s(flight) - 40.0), str(lift_off_s(flight)))
     configuration = Configuration(
         {"magnetic": {"alignment_event": "alignment", "uses_slower_taxi": False}}, exclude=(run,)
     )

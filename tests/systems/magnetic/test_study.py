@@ -43,7 +43,7 @@ from groundstation.systems.magnetic.study.page import (
     refusal_text,
     residual_claim,
 )
-from groundstation.systems.magnetic.study.runs import RunOutcome, SeedJob, fly_job, run_jobs
+from groundstation.systems.magnetic.study.runs import SeedJob, SeedOutcome, fly_job, run_jobs
 from groundstation.systems.magnetic.study.tables import (
     BETTER,
     HELD_OUT,
@@ -51,7 +51,7 @@ from groundstation.systems.magnetic.study.tables import (
     TABLE,
     UNDECIDED,
     WORSE,
-    Sample,
+    OutcomeSample,
     finding,
     resampling,
     rows_where,
@@ -75,7 +75,7 @@ def job(run: int, flown: tuple[Setup, ...] = (), *, is_incomplete: bool = False,
 
 
 @pytest.fixture(scope="module")
-def claimed() -> tuple[RunOutcome, ...]:
+def claimed() -> tuple[SeedOutcome, ...]:
     return run_jobs([job(run, CLAIMED) for run in range(FEW)])
 
 
@@ -86,7 +86,7 @@ def of_method(outcome: JudgedAnswer, method: str, *, whole: bool = True) -> floa
 # Flights
 
 
-def test_iron_is_exact_without_noise_and_one_branch_is_worst(claimed: tuple[RunOutcome, ...]) -> None:
+def test_iron_is_exact_without_noise_and_one_branch_is_worst(claimed: tuple[SeedOutcome, ...]) -> None:
     for run in claimed:
         at20 = run.swept[2]
         assert of_method(at20, IRON) < EXACT_IRON_DEG
@@ -164,7 +164,7 @@ def test_incomplete_figures_are_not_accepted(kind: str) -> None:
 # The claim and its limit
 
 
-def test_claim_and_its_limit_hold_loosely(claimed: tuple[RunOutcome, ...]) -> None:
+def test_claim_and_its_limit_hold_loosely(claimed: tuple[SeedOutcome, ...]) -> None:
     samples = samples_of(claimed, CLAIMED, SEED)
     claim = magnetic_tables.claim_table(claimed, samples)
     assert (claim["left"] < 0.6).all()
@@ -202,8 +202,8 @@ def known(rms_deg: float, ratio: float, verdict: str = "accept", reason: str = "
                    IRON)  # fmt: skip
 
 
-def sample(outcomes: list[JudgedAnswer]) -> Sample:
-    return Sample(tuple(outcomes), resampling(len(outcomes), 1))
+def sample(outcomes: list[JudgedAnswer]) -> OutcomeSample:
+    return OutcomeSample(tuple(outcomes), resampling(len(outcomes), 1))
 
 
 def test_rms_and_limits_of_known_flights() -> None:
@@ -258,14 +258,14 @@ def test_words_of_refusals_follow_the_table() -> None:
     def told(verdict: str) -> str:
         half, right = known(1.0, 0.0, "reject", "too little"), known(1.0, 0.0, verdict, "none opposite")
         outcomes = {"half circles": half, "right turn": right}
-        run = RunOutcome(0, (), None, outcomes, formula_biases(MagnetometerSettings()))
+        run = SeedOutcome(0, (), None, outcomes, formula_biases(MagnetometerSettings()))
         return refusal_text(magnetic_tables.incomplete_table([run]))
 
     assert told(NOT_ASSESSABLE).startswith("All 2 flights")
     assert not missing_in(told("accept"), "1 of 2 flights", "accepted were 1: right turn")
 
 
-def test_words_of_the_claim_follow_the_table(claimed: tuple[RunOutcome, ...]) -> None:
+def test_words_of_the_claim_follow_the_table(claimed: tuple[SeedOutcome, ...]) -> None:
     samples = samples_of(claimed, CLAIMED, SEED)
     claim = magnetic_tables.claim_table(claimed, samples)
     assert claim_text(claim).startswith("The claim is confirmed with a limit")

@@ -14,7 +14,7 @@ from groundstation.systems.cooperative.settings import CooperativeSettings, InsB
 from groundstation.systems.planning.session.accuracy import AccuracyModel
 from groundstation.systems.planning.session.answer import UNCONTROLLED, ControlPlan
 from groundstation.systems.planning.session.descent import nearest_law
-from groundstation.systems.planning.session.laws import Law, Session, StepMeasure, integral_law, local_law
+from groundstation.systems.planning.session.laws import Law, PlannedSession, StepMeasure, integral_law, local_law
 from groundstation.systems.planning.session.measures import geometry_of
 from groundstation.systems.planning.session.plan import plan_session
 from groundstation.systems.planning.session.scenario import (
@@ -59,7 +59,7 @@ def answer_of(plan: SessionPlan) -> ControlPlan:
     return answer
 
 
-def wandering(session: Session, seed: int = 3) -> FloatArray:
+def wandering(session: PlannedSession, seed: int = 3) -> FloatArray:
     """Controls off the straight way, inside their bounds."""
     noise = np.random.default_rng(seed).normal(0.0, 1.0, session.motion.shape)
     return session.project(session.motion.uncontrolled + np.cumsum(noise, axis=1))
@@ -83,7 +83,7 @@ def assert_slopes_agree(exact: FloatArray, numeric: FloatArray) -> None:
 @pytest.mark.parametrize("weight_up", [0.0, 2.0])
 def test_the_gradient_of_the_variance_is_exact(is_two_way: bool, weight_up: float) -> None:
     ranging = Ranging(10.0, is_two_way=is_two_way)
-    session = Session(mixed(ranging=ranging, control=Control(weight_east=3.0, weight_up=weight_up)))
+    session = PlannedSession(mixed(ranging=ranging, control=Control(weight_east=3.0, weight_up=weight_up)))
     at = wandering(session)
     _, slope = session.variance(at)
     assert slope.shape == (3, 12)
@@ -93,7 +93,7 @@ def test_the_gradient_of_the_variance_is_exact(is_two_way: bool, weight_up: floa
 @pytest.mark.parametrize("criterion", LOCAL_CRITERIA)
 @pytest.mark.parametrize("axes", [("north", "east"), ("north", "east", "up"), ("north", "east", "up", "clock")])
 def test_the_gradient_of_every_measure_is_exact(criterion: LocalCriterion, axes: tuple[Axis, ...]) -> None:
-    session = Session(mixed(control=Control(axes=axes)))
+    session = PlannedSession(mixed(control=Control(axes=axes)))
     at = wandering(session)
     one_step = StepMeasure(session, criterion, at, 7)
     _, slope = one_step(at[:, 7])
@@ -101,7 +101,7 @@ def test_the_gradient_of_every_measure_is_exact(criterion: LocalCriterion, axes:
 
 
 def test_the_gradient_with_the_separation_is_exact() -> None:
-    session = Session(mixed(separation_m=9000.0))
+    session = PlannedSession(mixed(separation_m=9000.0))
     at = wandering(session)
     assert session.crowding(session.motion.paths(at).position_m)[0] > 1.0
 
@@ -128,7 +128,7 @@ def test_laws_keep_the_separation_that_they_would_break_without_it() -> None:
 
 
 def test_the_covariance_is_that_of_the_textbook() -> None:
-    session = Session(mixed())
+    session = PlannedSession(mixed())
     positions = session.motion.paths(wandering(session)).position_m
     found = session.model.accuracy(positions).covariance
     F, Q, P = _models(session.plan)
@@ -216,7 +216,7 @@ def test_the_nearest_law_is_the_least_squares_one(seed: int) -> None:
 
 def test_the_optimum_is_that_of_a_general_optimiser() -> None:
     plan = mixed(duration_s=24.0, step_s=2.0, control=Control(iterations=500, tolerance=1e-5))
-    session = Session(plan)
+    session = PlannedSession(plan)
     law = integral_law(session, [session.motion.uncontrolled])
     assert law.has_converged and law.gap <= 1e-5
     count, steps = session.motion.shape
@@ -246,7 +246,7 @@ def test_the_optimum_is_that_of_a_general_optimiser() -> None:
 @pytest.mark.parametrize("criterion", LOCAL_CRITERIA)
 def test_a_local_law_is_the_best_of_what_each_step_reaches(criterion: LocalCriterion) -> None:
     plan = mixed(aircraft=(replace(USER, control=("heading",)), *(replace(one, control=()) for one in NEIGHBOURS)))
-    session = Session(plan)
+    session = PlannedSession(plan)
     law = local_law(session, criterion)
     (bound,) = session.motion.bounds
     before = bound.start
@@ -259,7 +259,7 @@ def test_a_local_law_is_the_best_of_what_each_step_reaches(criterion: LocalCrite
 
 
 def test_laws_keep_their_bounds() -> None:
-    session = Session(mixed())
+    session = PlannedSession(mixed())
     for law in (local_law(session, "determinant"), integral_law(session, [session.motion.uncontrolled])):
         for bound, values in zip(session.motion.bounds, law.controls, strict=True):
             room = 1e-9 * bound.scale

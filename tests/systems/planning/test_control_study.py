@@ -5,7 +5,7 @@ import pytest
 
 from groundstation.chapters.markdown import escaped
 from groundstation.results.figures import FigureData
-from groundstation.systems.planning.session.laws import Session, integral_law
+from groundstation.systems.planning.session.laws import PlannedSession, integral_law
 from groundstation.systems.planning.session.study import control
 from groundstation.systems.planning.session.study.cases import CASES, SPEED, placements, scenario, with_fixed_point
 from groundstation.systems.planning.session.study.control import laws_table, page, placement_table, published_table
@@ -41,7 +41,7 @@ def test_control_raises_the_measure_and_lowers_the_dilution(published: FigureDat
 
 
 def test_flights_meet_the_accuracy_that_the_plan_computes() -> None:
-    session = Session(scenario(SPEED))
+    session = PlannedSession(scenario(SPEED))
     law = integral_law(session, [session.motion.uncontrolled])
     paths = session.motion.paths(law.controls)
     P = session.model.accuracy(paths.position_m).covariance[-1]

@@ -19,17 +19,17 @@ from groundstation.systems.planning.landing.moving_point import fly_moving_point
 from groundstation.systems.planning.landing.outcome import category_spans, range_landing
 from groundstation.systems.planning.landing.plan import _of_places
 from groundstation.systems.planning.landing.scenario import (
-    GroundPoint,
     MovingPoint,
     OwnErrors,
     RangeApproach,
     RangeNoise,
+    ReferencePoint,
     StraightPath,
 )
 from groundstation.systems.planning.landing.trials import draw_errors, fly_trials
 
-PAIR = (GroundPoint("left", 0.0, -1000.0), GroundPoint("right", 0.0, 1000.0))
-THIRD = (*PAIR, GroundPoint("third", 100.0, 0.0))
+PAIR = (ReferencePoint("left", 0.0, -1000.0), ReferencePoint("right", 0.0, 1000.0))
+THIRD = (*PAIR, ReferencePoint("third", 100.0, 0.0))
 COARSE = RangeNoise(interval_s=0.1, white_m=3.0 / np.sqrt(10.0))  # as much information a second as 3 m each 0.01 s
 FOUR = RangeApproach("four points", points=THIRD, moving=MovingPoint(), noise=COARSE, own=OwnErrors(baro_m=50.0))
 CURVED_M = 0.05  # what a start wrong by tens of metres leaves of the curvature of ranges
@@ -90,7 +90,7 @@ def test_information_a_second_counts_and_not_the_interval() -> None:
 
 def test_points_on_one_line_and_under_the_path_are_told() -> None:
     def codes(*places: tuple[float, float]) -> list[str]:
-        points = tuple(GroundPoint(f"P{n}", before_m, right_m) for n, (before_m, right_m) in enumerate(places))
+        points = tuple(ReferencePoint(f"P{n}", before_m, right_m) for n, (before_m, right_m) in enumerate(places))
         return [one.code for one in _of_places(RangeApproach("places", points=points))]
 
     assert codes((0.0, -1000.0), (0.0, 1000.0)) == []
@@ -101,8 +101,8 @@ def test_points_on_one_line_and_under_the_path_are_told() -> None:
 
 
 def test_left_and_right_are_alike() -> None:
-    offset = replace(FOUR, points=(*PAIR, GroundPoint("third", 500.0, 500.0)))
-    mirrored = replace(offset, points=(*PAIR, GroundPoint("third", 500.0, -500.0)))
+    offset = replace(FOUR, points=(*PAIR, ReferencePoint("third", 500.0, 500.0)))
+    mirrored = replace(offset, points=(*PAIR, ReferencePoint("third", 500.0, -500.0)))
     assert covariance_along(offset).sigma_m == pytest.approx(covariance_along(mirrored).sigma_m, abs=ROUNDING_M)
 
 
@@ -189,7 +189,7 @@ def test_spans_are_where_the_figures_meet_the_limits() -> None:
         (lambda: StraightPath(runway_length_m=150.0), "runway that the glide path meets"),
         (lambda: RangeApproach("", points=()), "one ground point"),
         (lambda: RangeApproach("", points=(PAIR[0], PAIR[0])), "given twice"),
-        (lambda: RangeApproach("", points=(GroundPoint("under", 0.0, 0.0, 15.0),)), "off the path"),
+        (lambda: RangeApproach("", points=(ReferencePoint("under", 0.0, 0.0, 15.0),)), "off the path"),
         (
             lambda: RangeApproach("", points=PAIR, noise=RangeNoise(interval_s=0.001), path=StraightPath(30_000.0)),
             "mea",

@@ -40,7 +40,7 @@ class Key(NamedTuple):
     parts: str = ""
 
 
-class Keys(Mapping[str, Key]):
+class FlightKeys(Mapping[str, Key]):
     """Keys of flights by flight id, in that order; kept as columns.
 
     Parameters
@@ -73,7 +73,7 @@ class Keys(Mapping[str, Key]):
         return self._ordered[1]
 
     @classmethod
-    def of(cls, keys: Iterable[Key]) -> "Keys":
+    def of(cls, keys: Iterable[Key]) -> "FlightKeys":
         """Keys from keys, in whatever order."""
         import pyarrow as pa
 
@@ -83,7 +83,7 @@ class Keys(Mapping[str, Key]):
         return cls(pa.table(dict(zip(Key._fields, arrays, strict=True))))
 
     @classmethod
-    def joined(cls, parts: Sequence["Keys"]) -> "Keys":
+    def joined(cls, parts: Sequence["FlightKeys"]) -> "FlightKeys":
         """Several of them as one."""
         import pyarrow as pa
 
@@ -119,24 +119,24 @@ class Keys(Mapping[str, Key]):
         """The stamps, in the order of the flights."""
         return self.column("stamp")
 
-    def only(self, names: Collection[str]) -> "Keys":
+    def only(self, names: Collection[str]) -> "FlightKeys":
         """Keys of some flights."""
         import pyarrow as pa
         import pyarrow.compute as pc
 
         is_named = pc.is_in(self.table.column("flight_id"), value_set=pa.array(names, pa.string()))
         found = self.table.filter(is_named)
-        return self if len(found) == len(self) else Keys(found)
+        return self if len(found) == len(self) else FlightKeys(found)
 
-    def without(self, values: Collection[str], field: str) -> "Keys":
+    def without(self, values: Collection[str], field: str) -> "FlightKeys":
         """Keys without some values of a field."""
         if not values:
             return self
         return self.only([name for name, one in zip(self, self.column(field), strict=True) if one not in values])
 
-    def at(self, places: NDArray[np.intp]) -> "Keys":
+    def at(self, places: NDArray[np.intp]) -> "FlightKeys":
         """Keys in some rows."""
-        return Keys(self.table.take(places))
+        return FlightKeys(self.table.take(places))
 
     def by_month(self) -> dict[str, NDArray[np.intp]]:
         """Places of the flights of each month, months and places in order."""
@@ -174,20 +174,20 @@ def key_path(out: Path, month: str) -> Path:
     return out / KEYS / f"{month}.parquet"
 
 
-def read_keys(out: Path, month: str) -> Keys:
+def read_keys(out: Path, month: str) -> FlightKeys:
     """Read the keys of the flights of a month; none when they cannot be read."""
     import pyarrow.parquet as pq
 
-    empty = Keys.of(())
+    empty = FlightKeys.of(())
     try:
         with pq.ParquetFile(key_path(out, month)) as file:
             table = file.read(use_threads=False)  # small files: threads take longer
-        return Keys(table) if table.schema.equals(empty.table.schema) else empty
+        return FlightKeys(table) if table.schema.equals(empty.table.schema) else empty
     except (OSError, ValueError):
         return empty
 
 
-def write_keys(out: Path, month: str, keys: Keys) -> None:
+def write_keys(out: Path, month: str, keys: FlightKeys) -> None:
     """Write what is known of the flights of a month."""
     path = key_path(out, month)
     path.parent.mkdir(exist_ok=True)

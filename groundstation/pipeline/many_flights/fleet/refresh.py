@@ -16,7 +16,7 @@ from typing import Any
 from groundstation.base.errors import GroundstationError
 from groundstation.base.units import NS_PER_S
 from groundstation.pipeline.many_flights.fleet.columns import FlightShare, dataset_schema
-from groundstation.pipeline.many_flights.fleet.keys import Key, Keys, key_path, month_of, read_keys, write_keys
+from groundstation.pipeline.many_flights.fleet.keys import FlightKeys, Key, key_path, month_of, read_keys, write_keys
 from groundstation.pipeline.many_flights.fleet.rows import share_of
 from groundstation.pipeline.many_flights.fleet.samples import SampleStore
 from groundstation.pipeline.many_flights.fleet.scan import FLIGHTS, Scan, month_path, rows_of, scan, stamp_of
@@ -82,19 +82,19 @@ def refresh(out: Path, crew: Crew | None = None) -> tuple[Scan, tuple[Outcome, .
     return after, ()
 
 
-def _after(before: Scan, fresh: Keys, jobs: Sequence[MonthJob]) -> Scan:
+def _after(before: Scan, fresh: FlightKeys, jobs: Sequence[MonthJob]) -> Scan:
     """The scan once some months are written: what is in none of them could not be read."""
     if not jobs:
         return replace(before, fresh=fresh)
     new = {job.month: read_keys(before.out, job.month) for job in jobs}
     unchanged = [places for month, places in fresh.by_month().items() if month not in new]
-    keys = Keys.joined([*map(fresh.at, unchanged), *new.values()])
+    keys = FlightKeys.joined([*map(fresh.at, unchanged), *new.values()])
     stale = sorted(name for job in jobs for name in (*job.kept, *job.read) if name not in new[job.month])
     months = {**before.months, **{month: len(found) for month, found in new.items()}}
     return replace(before, fresh=keys, stale=tuple(stale), months=months)
 
 
-def _jobs(before: Scan, fresh: Keys) -> Iterator[MonthJob]:
+def _jobs(before: Scan, fresh: FlightKeys) -> Iterator[MonthJob]:
     """Months to write: those with flights that changed or are gone."""
     lost = set(before.fresh).difference(fresh) if len(before.fresh) > len(fresh) else ()
     read: dict[str, list[str]] = {}
@@ -106,7 +106,7 @@ def _jobs(before: Scan, fresh: Keys) -> Iterator[MonthJob]:
         yield MonthJob(before.out, month, frozenset(kept.get(month, ())), tuple(read.get(month, ())))
 
 
-def _names_by_month(keys: Keys) -> dict[str, list[str]]:
+def _names_by_month(keys: FlightKeys) -> dict[str, list[str]]:
     return {month: keys.names_at(places) for month, places in keys.by_month().items()}
 
 
@@ -127,7 +127,7 @@ def restamp(out: Path, names: Iterable[str]) -> None:
             for name, stamp in zip(keys.names, keys.stamps(), strict=True)
         ]
         place = keys.table.schema.get_field_index("stamp")
-        write_keys(out, month, Keys(keys.table.set_column(place, "stamp", pa.array(stamps, pa.int64()))))
+        write_keys(out, month, FlightKeys(keys.table.set_column(place, "stamp", pa.array(stamps, pa.int64()))))
 
 
 def forget_month(out: Path, month: str) -> None:
@@ -165,10 +165,12 @@ def _write(job: MonthJob) -> None:
             continue
         shares.append(share)
         new.append(key_of(share, stamp or 0))
-    put_month(job.out, job.month, pa.concat_tables([old, to_arrow(shares)]), Keys.joined([keys, Keys.of(new)]))
+    put_month(
+        job.out, job.month, pa.concat_tables([old, to_arrow(shares)]), FlightKeys.joined([keys, FlightKeys.of(new)])
+    )
 
 
-def put_month(out: Path, month: str, table: Any, keys: Keys) -> None:
+def put_month(out: Path, month: str, table: Any, keys: FlightKeys) -> None:
     """Put a month of the dataset.
 
     It has the shares of the flights that have a key, in the order of their ids.

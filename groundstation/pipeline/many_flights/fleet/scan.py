@@ -19,7 +19,7 @@ from groundstation.base.errors import GroundstationError
 from groundstation.base.version import __version__
 from groundstation.pipeline.many_flights.fleet.columns import DETAILS, FLIGHT_COLUMNS, dataset_schema
 from groundstation.pipeline.many_flights.fleet.keys import (
-    Keys,
+    FlightKeys,
     read_keys,
 )
 from groundstation.pipeline.many_flights.inputs import is_flight, is_session
@@ -49,7 +49,7 @@ class Scan:
     Parameters
     ----------
     out : Path
-    fresh : Keys
+    fresh : FlightKeys
         Those that have not changed since the dataset was written.
     stale : tuple of str
         The others, in order.
@@ -60,7 +60,7 @@ class Scan:
     """
 
     out: Path
-    fresh: Keys
+    fresh: FlightKeys
     stale: tuple[str, ...]
     others: tuple[str, ...]
     months: Mapping[str, int]
@@ -141,7 +141,7 @@ def scan(out: Path) -> Scan:
     Of a known flight only times and sizes are asked for.
     """
     by_month = _keys_by_month(out)
-    keys = Keys.joined(list(by_month.values()))
+    keys = FlightKeys.joined(list(by_month.values()))
     stamps, root = dict(zip(keys.names, keys.stamps(), strict=True)), str(out)
     fresh: list[str] = []
     changed: list[str] = []
@@ -157,12 +157,12 @@ def scan(out: Path) -> Scan:
     return Scan(out, known, tuple(stale), tuple(others), months)
 
 
-def remembered(out: Path) -> Keys:
+def remembered(out: Path) -> FlightKeys:
     """Keys of the flights of an OUT, also of those that have changed since or are gone."""
-    return Keys.joined(list(_keys_by_month(out).values()))
+    return FlightKeys.joined(list(_keys_by_month(out).values()))
 
 
-def _keys_by_month(out: Path) -> dict[str, Keys]:
+def _keys_by_month(out: Path) -> dict[str, FlightKeys]:
     return {path.stem: read_keys(out, path.stem) for path in sorted((out / FLIGHTS).glob("*.parquet"))}
 
 

@@ -17,7 +17,7 @@ from typing import Any, Generic, TypeVar
 
 from groundstation.base.errors import UsageError
 from groundstation.base.serial import MismatchError, from_json
-from groundstation.pipeline.many_flights.processes.confined import Bounds, begin
+from groundstation.pipeline.many_flights.processes.confined import ProcessLimits, begin
 from groundstation.pipeline.many_flights.processes.workers import AnyJob, Work
 from groundstation.pipeline.one_flight.isolation import Isolation
 from groundstation.pipeline.one_flight.outcome import Outcome
@@ -30,7 +30,7 @@ DIED = "its process died (killed, or out of memory)"
 Found = TypeVar("Found")
 
 
-def bounds_of(isolation: Isolation | None, timeout_s: float = math.inf) -> Bounds:
+def bounds_of(isolation: Isolation | None, timeout_s: float = math.inf) -> ProcessLimits:
     """Limits of one log.
 
     The settings give them where it is read apart (``isolation``), else ``--timeout`` alone.
@@ -41,11 +41,11 @@ def bounds_of(isolation: Isolation | None, timeout_s: float = math.inf) -> Bound
         When this system cannot read a log apart.
     """
     if isolation is None:
-        return Bounds(timeout_s)
+        return ProcessLimits(timeout_s)
     if not hasattr(os, "fork"):
         raise UsageError("--isolate", "a system without limits for processes", "Linux or macOS")
     is_shorter = timeout_s <= isolation.time_s
-    return Bounds(
+    return ProcessLimits(
         min(timeout_s, isolation.time_s),
         "--timeout" if is_shorter else "isolation.time_s",
         round(isolation.memory_mb * 1e6),
@@ -60,7 +60,7 @@ def outcomes_apart(
     *,
     workers: int,
     listen: Listener,
-    bounds: Bounds,
+    bounds: ProcessLimits,
 ) -> Generator[tuple[int, Outcome]]:
     """Run jobs each in a process of its own, several side by side.
 
@@ -81,7 +81,7 @@ def each_apart(
     *,
     workers: int,
     listen: Listener,
-    bounds: Bounds,
+    bounds: ProcessLimits,
 ) -> Generator[tuple[int, Found]]:
     """Run jobs each in a process of its own; yields the number of each and what it found.
 
@@ -98,7 +98,7 @@ def each_apart(
         Processes side by side.
     listen : callable
         Is told the events of all of them.
-    bounds : Bounds
+    bounds : ProcessLimits
         What each may take.
     """
     waiting, running = iter(tasks), dict[Connection, _Running[AnyJob]]()
@@ -139,7 +139,7 @@ class _Running(Generic[AnyJob]):
     job: AnyJob
     process: BaseProcess
     receiver: Connection
-    bounds: Bounds
+    bounds: ProcessLimits
     deadline: float
     is_ended: bool = False
     found: Any = None
@@ -183,7 +183,9 @@ class _Running(Generic[AnyJob]):
             return failed(self.job, "its process told what cannot be understood")
 
 
-def _started(number: int, job: AnyJob, run: Callable[[AnyJob, Listener], Found], bounds: Bounds) -> _Running[AnyJob]:
+def _started(
+    number: int, job: AnyJob, run: Callable[[AnyJob, Listener], Found], bounds: ProcessLimits
+) -> _Running[AnyJob]:
     receiver, sender = _CONTEXT.Pipe(duplex=False)
     process = _CONTEXT.Process(target=begin, args=(sender, pickle.dumps((run, job)), bounds), name="log")
     process.start()

@@ -29,7 +29,7 @@ _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
 
 
 @dataclass(frozen=True)
-class Bounds:
+class ProcessLimits:
     """Limits of the process of one log.
 
     Parameters
@@ -56,7 +56,7 @@ class Bounds:
         return f"not done within {self.time_s:g} s ({self.time_from}), ended"
 
 
-def begin(sender: Connection, payload: bytes, bounds: Bounds) -> None:
+def begin(sender: Connection, payload: bytes, bounds: ProcessLimits) -> None:
     """Run a job that was handed over, in this process or in one below it.
 
     What comes of it goes to ``sender``.
@@ -93,7 +93,7 @@ def _work(sender: Connection, payload: bytes) -> None:
 # ------------------------------------------------------------------------------------------------ the one above
 
 
-def _keep(sender: Connection, payload: bytes, bounds: Bounds) -> None:
+def _keep(sender: Connection, payload: bytes, bounds: ProcessLimits) -> None:
     """Fork the process that does the work and watch it.
 
     Where it does not end by itself, the reason is told.
@@ -112,7 +112,7 @@ def _keep(sender: Connection, payload: bytes, bounds: Bounds) -> None:
         sender.send_bytes(json.dumps({"ended": reason}).encode())
 
 
-def _be_the_worker(sender: Connection, payload: bytes, bounds: Bounds) -> NoReturn:
+def _be_the_worker(sender: Connection, payload: bytes, bounds: ProcessLimits) -> NoReturn:
     code = 1
     try:
         os.setsid()
@@ -130,7 +130,7 @@ def _be_the_worker(sender: Connection, payload: bytes, bounds: Bounds) -> NoRetu
         os._exit(code)
 
 
-def _limit(bounds: Bounds) -> None:
+def _limit(bounds: ProcessLimits) -> None:
     """Let the system keep the limits, as far as it knows them."""
     import resource  # not on Windows
 
@@ -148,7 +148,7 @@ def _limit(bounds: Bounds) -> None:
             resource.setrlimit(kind, (most, most))
 
 
-def _watch(worker: int, above: int, bounds: Bounds, asked_to_end: list[int]) -> str:
+def _watch(worker: int, above: int, bounds: ProcessLimits, asked_to_end: list[int]) -> str:
     """Wait for the end of the worker; returns why it has to end now, if it has to.
 
     It has to at its limits, or where the run is gone.
@@ -170,7 +170,7 @@ def _watch(worker: int, above: int, bounds: Bounds, asked_to_end: list[int]) -> 
             time.sleep(LOOK_EVERY_S)
 
 
-def _why(status: int, bounds: Bounds) -> str:
+def _why(status: int, bounds: ProcessLimits) -> str:
     """Reason why a process ended; empty where it did what it was to do."""
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)

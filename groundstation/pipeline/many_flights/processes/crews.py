@@ -5,7 +5,7 @@ import os
 from functools import partial
 
 from groundstation.pipeline.many_flights.processes.apart import outcomes_apart
-from groundstation.pipeline.many_flights.processes.confined import Bounds
+from groundstation.pipeline.many_flights.processes.confined import ProcessLimits
 from groundstation.pipeline.many_flights.processes.workers import TASKS_PER_PROCESS, Crew, in_turn, side_by_side
 from groundstation.pipeline.one_flight.progress import Listener
 
@@ -16,7 +16,7 @@ def crew_for(
     logs: int,
     listen: Listener,
     timeout_s: float = math.inf,
-    bounds: Bounds | None = None,
+    bounds: ProcessLimits | None = None,
 ) -> Crew:
     """Choose who does the work: a cluster, processes, or this process alone.
 

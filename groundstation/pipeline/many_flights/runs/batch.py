@@ -39,7 +39,7 @@ from groundstation.pipeline.many_flights.runs.listed_logs import (
 )
 from groundstation.pipeline.many_flights.runs.out_folder import alone_in, clear_unfinished, prepare, refuse_foreign
 from groundstation.pipeline.many_flights.runs.strangers import Strangers
-from groundstation.pipeline.many_flights.sessions.found import Asked, find_sessions, sweep_sessions
+from groundstation.pipeline.many_flights.sessions.found import SessionOptions, find_sessions, sweep_sessions
 from groundstation.pipeline.many_flights.sessions.job import load_stations
 from groundstation.pipeline.many_flights.sessions.session import run_one
 from groundstation.pipeline.one_flight.configuration import Configuration
@@ -125,7 +125,7 @@ def run_many(
         with_pdf=with_pdf,
         only_results=only_results,
     )
-    asked = Asked(
+    asked = SessionOptions(
         Path(out),
         configuration,
         ground,
@@ -195,13 +195,13 @@ def run_together(
             url=named,
             only_results=only_results,
         )
-        asked = Asked(Path(out), configuration, None, fail_on, with_pdf, redo=True, only_results=only_results)
+        asked = SessionOptions(Path(out), configuration, None, fail_on, with_pdf, redo=True, only_results=only_results)
         return _run_here([job], asked, partial(in_turn, listen=listen), force, listen)
 
 
 def _run_here(
     work: Sequence[Job],
-    asked: Asked,
+    asked: SessionOptions,
     crew: Crew,
     force: bool,
     listen: Listener,
@@ -297,7 +297,7 @@ def _swept(destination: Destination, out: Path, crew: Crew | None = None) -> tup
 
 
 def _run_sessions(
-    destination: Destination, asked: Asked, among: Scan, crew: Crew, listen: Listener
+    destination: Destination, asked: SessionOptions, among: Scan, crew: Crew, listen: Listener
 ) -> tuple[Outcome, ...]:
     """Run the sessions among the flights that are in place.
 
@@ -321,7 +321,7 @@ def _run_sessions(
 
 
 def _run_remote(
-    work: Sequence[RemoteJob], asked: Asked, crew: Crew, force: bool, listen: Listener
+    work: Sequence[RemoteJob], asked: SessionOptions, crew: Crew, force: bool, listen: Listener
 ) -> tuple[Outcome, ...]:
     def suffixed(number: int) -> RemoteJob:
         one = work[number % len(work)]
@@ -379,7 +379,7 @@ def _once(
 
 
 def _run_remote_sessions(
-    destination: Destination, output: RemoteOutput, asked: Asked, among: Scan, listen: Listener
+    destination: Destination, output: RemoteOutput, asked: SessionOptions, among: Scan, listen: Listener
 ) -> tuple[Outcome, ...]:
     """Run the sessions in the copy of an OUT elsewhere.
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from groundstation.base.errors import GroundstationError
-from groundstation.pipeline.many_flights.fleet.keys import Keys
+from groundstation.pipeline.many_flights.fleet.keys import FlightKeys
 from groundstation.pipeline.many_flights.fleet.scan import Scan
 from groundstation.pipeline.many_flights.inputs import is_remote
 from groundstation.pipeline.one_flight.flight import place, remove
@@ -252,7 +252,7 @@ class Destination:
         return origin.path != _place_of(outcome)
 
 
-def _came_from(flights: Keys, digests: Collection[str], paths: Collection[str]) -> Iterator[str]:
+def _came_from(flights: FlightKeys, digests: Collection[str], paths: Collection[str]) -> Iterator[str]:
     """Flights that came from logs of some digests or at some places, as far as is remembered."""
     for name, path, sha256 in zip(flights, *map(flights.column, ("path", "sha256")), strict=True):
         if sha256 in digests or path in paths:

@@ -11,7 +11,12 @@ from groundstation.pipeline.many_flights.runs.known_flights import KnownFlights
 from groundstation.pipeline.many_flights.runs.listed_logs import inputs_of, skipped_files, with_steps, without_parts
 from groundstation.pipeline.many_flights.runs.out_folder import refuse_foreign
 from groundstation.pipeline.many_flights.runs.strangers import Strangers
-from groundstation.pipeline.many_flights.sessions.found import STATIONS_TOML, Asked, FoundSessions, find_sessions
+from groundstation.pipeline.many_flights.sessions.found import (
+    STATIONS_TOML,
+    FoundSessions,
+    SessionOptions,
+    find_sessions,
+)
 from groundstation.pipeline.many_flights.sessions.job import load_stations, planned_session
 from groundstation.pipeline.one_flight.configuration import Configuration
 from groundstation.pipeline.one_flight.flight import Job
@@ -58,7 +63,7 @@ def plan_many(
             found[number] = _planned(job)
     outcomes = [outcome for _, outcome in sorted(found.items())]
     ground = None if stations is None else load_stations(stations)
-    asked = Asked(out, configuration, ground, "none", with_pdf, redo, only_results=only_results)
+    asked = SessionOptions(out, configuration, ground, "none", with_pdf, redo, only_results=only_results)
     return (*outcomes, *_planned_sessions(asked, before, outcomes))
 
 
@@ -76,7 +81,7 @@ def _planned(job: Job) -> Outcome:
     return Outcome(job.log, "done", TO_DO[job.step])
 
 
-def _planned_sessions(asked: Asked, among: Scan, planned: Sequence[Outcome]) -> list[Outcome]:
+def _planned_sessions(asked: SessionOptions, among: Scan, planned: Sequence[Outcome]) -> list[Outcome]:
     """Sessions among the finished flights.
 
     Those of unread logs are looked for, where stations are given.

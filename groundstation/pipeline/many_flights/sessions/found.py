@@ -33,7 +33,7 @@ STATIONS_TOML = "stations.toml"  # beside the logs
 
 
 @dataclass(frozen=True)
-class Asked:
+class SessionOptions:
     """Options of a run for its sessions; the fields are those of :class:`SessionJob`.
 
     ``stations`` is None where no file was named: then there may be one beside the logs. ``mcap_in`` gives the MCAP of a
@@ -60,7 +60,7 @@ class FoundSessions:
     told: tuple[Outcome, ...] = ()
 
 
-def find_sessions(asked: Asked, found: Scan, flight_ids: AbstractSet[str]) -> FoundSessions:
+def find_sessions(asked: SessionOptions, found: Scan, flight_ids: AbstractSet[str]) -> FoundSessions:
     """Find the sessions in which one of these flights takes part.
 
     Any other flight of the folder may be in them.
@@ -95,7 +95,7 @@ def _heard(mcap_in: Callable[[Path], Path], folder: Path) -> Span | None:
         return None
 
 
-def _job(asked: Asked, group: Sequence[Member]) -> SessionJob:
+def _job(asked: SessionOptions, group: Sequence[Member]) -> SessionJob:
     logs = [open_log(asked.mcap_in(one.folder)) for one in group]
     stations, notes = (asked.stations, ()) if asked.stations is not None else _stations_beside(group)
     return SessionJob(

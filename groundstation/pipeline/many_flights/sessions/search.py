@@ -53,7 +53,7 @@ class Member:
 
 
 @dataclass(frozen=True)
-class Apart:
+class LoneFlight:
     """Flight that names others over the link, and is in no session with them.
 
     The reason is one line.
@@ -127,7 +127,7 @@ def _member(folder: Path) -> Member:
 
 def sessions_among(
     members: Sequence[Member], heard_span_ns: Callable[[Path], Span | None], told_of: Set[str] | None = None
-) -> tuple[list[tuple[Member, ...]], list[Apart]]:
+) -> tuple[list[tuple[Member, ...]], list[LoneFlight]]:
     """Put flights together that belong together.
 
     Parameters
@@ -154,7 +154,7 @@ def sessions_among(
     for one in members:
         named.setdefault(one.aircraft, []).append(one)
     apart = [
-        Apart(one.folder, _reason(one, named, grouped))
+        LoneFlight(one.folder, _reason(one, named, grouped))
         for one in members
         if one.folder not in grouped
         and (told_of is None or one.folder.name in told_of)

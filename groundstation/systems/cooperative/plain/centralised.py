@@ -13,8 +13,8 @@ from groundstation.systems.cooperative.events import Prepared
 from groundstation.systems.cooperative.joint import KNOWN_WRONG_SIGMAS
 from groundstation.systems.cooperative.judging import PATIENCE
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, POINT
-from groundstation.systems.cooperative.plain.observation import Row, rows_of
-from groundstation.systems.cooperative.plain.steps import Event, Recorder, steps
+from groundstation.systems.cooperative.plain.observation import LinearisedMeasurement, rows_of
+from groundstation.systems.cooperative.plain.steps import MeasurementEvent, RunRecorder, steps
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 
@@ -56,7 +56,7 @@ class _Joint:
         add_noise(self._states, rows, columns, block.reshape(1, -1), 0, self.P)
         self.times[who] = to_s
 
-    def rows(self, event: Event) -> list[tuple[Row, FloatArray]]:
+    def rows(self, event: MeasurementEvent) -> list[tuple[LinearisedMeasurement, FloatArray]]:
         """Return the rows of an event at the vehicles' own times.
 
         Each comes with its derivative by the whole state.
@@ -84,7 +84,7 @@ class _Joint:
             found.append((row, h))
         return found
 
-    def _reference_line(self, event: Event) -> FloatArray | None:
+    def _reference_line(self, event: MeasurementEvent) -> FloatArray | None:
         """Return the line between two aircraft about which their range is linearised.
 
         Its ends move when known to be wrong.
@@ -159,7 +159,7 @@ def run_centralised(
     innovates : bool
         False: measurements shrink the covariance and leave the state where it is, as if each were predicted exactly.
     """
-    joint, recorder = _Joint(prepared, settings), Recorder(prepared.vehicles)
+    joint, recorder = _Joint(prepared, settings), RunRecorder(prepared.vehicles)
     rejected = [0] * len(prepared.vehicles)
     together = settings.update == "simultaneous"
     for at_s, what in steps(prepared, settings, together=together):
@@ -181,19 +181,19 @@ def run_centralised(
     return recorder.finish("centralised" if uses_measurements else "dead_reckoning", settings.update)
 
 
-def _members(event: Event) -> tuple[int, ...]:
+def _members(event: MeasurementEvent) -> tuple[int, ...]:
     return (event.receiver, event.source) if event.kind == PEER else (event.receiver,)
 
 
 def _is_gated(
-    joint: _Joint, event: Event, row: Row, h: FloatArray, settings: CooperativeSettings
+    joint: _Joint, event: MeasurementEvent, row: LinearisedMeasurement, h: FloatArray, settings: CooperativeSettings
 ) -> tuple[bool, float]:
     total = float(h @ joint.P @ h) + row.variance * event.spread
     return settings.gate_sigma > 0.0 and row.innovation**2 > settings.gate_sigma**2 * total, total
 
 
 def _use_one(
-    joint: _Joint, event: Event, settings: CooperativeSettings, recorder: Recorder, rejected: list[int]
+    joint: _Joint, event: MeasurementEvent, settings: CooperativeSettings, recorder: RunRecorder, rejected: list[int]
 ) -> None:
     rows = joint.rows(event)
     if not rows:
@@ -210,7 +210,11 @@ def _use_one(
 
 
 def _use_together(
-    joint: _Joint, events: tuple[Event, ...], settings: CooperativeSettings, recorder: Recorder, rejected: list[int]
+    joint: _Joint,
+    events: tuple[MeasurementEvent, ...],
+    settings: CooperativeSettings,
+    recorder: RunRecorder,
+    rejected: list[int],
 ) -> None:
     kept = []
     for event in events:
@@ -231,7 +235,9 @@ def _use_together(
         )
 
 
-def _count_rejections(joint: _Joint, event: Event, gated: bool, rejected: list[int], recorder: Recorder) -> None:
+def _count_rejections(
+    joint: _Joint, event: MeasurementEvent, gated: bool, rejected: list[int], recorder: RunRecorder
+) -> None:
     """Open the states in doubt of a vehicle none of whose ranges fits any more."""
     for who in _members(event):
         rejected[who] = rejected[who] + 1 if gated else 0

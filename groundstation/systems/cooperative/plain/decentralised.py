@@ -17,10 +17,10 @@ from groundstation.systems.cooperative.judging import PATIENCE
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, POINT
 from groundstation.systems.cooperative.messages import Broadcast, decode
 from groundstation.systems.cooperative.plain.error_map import Other, corrected_rows, unit_rows
-from groundstation.systems.cooperative.plain.observation import Row, rows_of
+from groundstation.systems.cooperative.plain.observation import LinearisedMeasurement, rows_of
 from groundstation.systems.cooperative.plain.sighting import Sighting, sighting_of
 from groundstation.systems.cooperative.plain.split_covariance import fuse
-from groundstation.systems.cooperative.plain.steps import Event, Recorder, steps
+from groundstation.systems.cooperative.plain.steps import MeasurementEvent, RunRecorder, steps
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 from groundstation.tables.session import NO_SLOT
@@ -29,7 +29,7 @@ RANKED = ("ranked", "modified")
 
 
 @dataclass(frozen=True, slots=True)
-class Own:
+class OwnFilter:
     """One vehicle's filter: state, covariance, independent part (split), error map rows.
 
     Also the covariance with the points.
@@ -44,7 +44,7 @@ class Own:
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class HeardBroadcast:
     """A broadcast and a square root of its covariance.
 
     For the error map alone: derivative and rows of its sender.
@@ -57,15 +57,15 @@ class Heard:
 
 
 @dataclass(frozen=True, slots=True)
-class Offer:
+class OfferedMeasurement:
     """A measurement for one vehicle.
 
     It is its own with what the source broadcast, or where another has seen it.
     """
 
     who: int
-    event: Event
-    heard: Heard | None
+    event: MeasurementEvent
+    heard: HeardBroadcast | None
     sighting: Sighting | None = None
 
 
@@ -76,8 +76,8 @@ class Used:
     The derivatives are by the state now and by the shared errors.
     """
 
-    offer: Offer
-    row: Row
+    offer: OfferedMeasurement
+    row: LinearisedMeasurement
     h: FloatArray
     by_shared: FloatArray
 
@@ -103,15 +103,15 @@ class Decentralised:
         sigmas = [points[i].position_sigma_m for i in self._uncertain for _ in range(2)]
         self._Pc = np.diag(np.square(sigmas)) if sigmas else np.zeros((0, 0))
         self._inverse_Pc = np.diag(1.0 / np.square(sigmas)) if sigmas else np.zeros((0, 0))
-        self.recorder = Recorder(prepared.vehicles)
+        self.recorder = RunRecorder(prepared.vehicles)
         self._unit_map = unit_rows([vehicle.size for vehicle in prepared.vehicles], settings.map_window_s)
         self._window_end_s = float("-inf")
-        self._own: list[Own] = []
+        self._own: list[OwnFilter] = []
         for rows, vehicle in zip(self._unit_map, prepared.vehicles, strict=True):
             x, P = vehicle.start()
-            self._own.append(Own(vehicle.first_s, x, P, P.copy(), np.zeros((vehicle.size, len(sigmas))), rows))
-        self._history: deque[tuple[int, list[Own]]] = deque(maxlen=settings.latency_slots + 1)
-        self._heard: dict[tuple[int, int], Heard] = {}
+            self._own.append(OwnFilter(vehicle.first_s, x, P, P.copy(), np.zeros((vehicle.size, len(sigmas))), rows))
+        self._history: deque[tuple[int, list[OwnFilter]]] = deque(maxlen=settings.latency_slots + 1)
+        self._heard: dict[tuple[int, int], HeardBroadcast] = {}
         self._rejected = [0] * len(prepared.vehicles)
 
     def run(self) -> AlgorithmRun:
@@ -140,14 +140,14 @@ class Decentralised:
         self._history.clear()
         self._heard.clear()
 
-    def _moved(self, who: int, own: Own, to_s: float) -> Own:
+    def _moved(self, who: int, own: OwnFilter, to_s: float) -> OwnFilter:
         """Return a vehicle's filter at another time."""
         if abs(to_s - own.time_s) < 1e-12:
             return own
         x, phi, noise = self._prepared.vehicles[who].step(own.x, own.time_s, to_s)
         if to_s < own.time_s:
             noise = np.zeros_like(noise)
-        return Own(
+        return OwnFilter(
             to_s,
             x,
             phi @ own.P @ phi.T + noise,
@@ -156,12 +156,15 @@ class Decentralised:
             phi @ own.map_rows,
         )
 
-    def _use(self, events: tuple[Event, ...], at_s: float) -> None:
+    def _use(self, events: tuple[MeasurementEvent, ...], at_s: float) -> None:
         """Use one measurement, or all of a frame, vehicle by vehicle.
 
         What is told is what was known before.
         """
-        offers = [Offer(event.receiver, event, self._listen(event) if event.kind == PEER else None) for event in events]
+        offers = [
+            OfferedMeasurement(event.receiver, event, self._listen(event) if event.kind == PEER else None)
+            for event in events
+        ]
         offers = [offer for offer in offers if self._is_used(offer)]
         offers += [told for event in events if event.kind == PEER and (told := self._tell(event)) is not None]
         for who in dict.fromkeys(offer.who for offer in offers):
@@ -179,7 +182,7 @@ class Decentralised:
         """Tell whether the algorithm lets a vehicle use what another tells."""
         return self._algorithm not in RANKED or self._prepared.ranks[source] < self._prepared.ranks[who]
 
-    def _is_used(self, offer: Offer) -> bool:
+    def _is_used(self, offer: OfferedMeasurement) -> bool:
         event = offer.event
         if event.kind != PEER:
             return True
@@ -190,7 +193,7 @@ class Decentralised:
             self.recorder.counts["lost"] += 1
         return offer.heard is not None
 
-    def _tell(self, event: Event) -> Offer | None:
+    def _tell(self, event: MeasurementEvent) -> OfferedMeasurement | None:
         """Return the place where the receiver of a range with bearing saw its source.
 
         It is a message to the source.
@@ -204,9 +207,9 @@ class Decentralised:
             return None
         told = np.concatenate([sighting.derivative, np.zeros((1, len(own.x)))])
         heard = self._send(observer, event.slot, sighting.place_m, 0.0, own, told)
-        return Offer(event.source, event, heard, sighting)
+        return OfferedMeasurement(event.source, event, heard, sighting)
 
-    def _listen(self, event: Event) -> Heard | None:
+    def _listen(self, event: MeasurementEvent) -> HeardBroadcast | None:
         """Return the broadcast of a range's source in its slot.
 
         It holds what the source knew some slots ago, at the time of transmission.
@@ -232,7 +235,9 @@ class Decentralised:
             self._heard[key] = heard
         return heard
 
-    def _send(self, who: int, slot: int, place_m: FloatArray, clock_m: float, own: Own, told: FloatArray) -> Heard:
+    def _send(
+        self, who: int, slot: int, place_m: FloatArray, clock_m: float, own: OwnFilter, told: FloatArray
+    ) -> HeardBroadcast:
         """Return a message as it arrives.
 
         ``told`` is the derivative of place and clock by the sender's state ``own``.
@@ -252,9 +257,9 @@ class Decentralised:
         mine = self._own[who]
         self._own[who] = replace(mine, independent=np.zeros_like(mine.independent))  # all may be known now
         heard = decode(sent, algorithm)
-        return Heard(heard, _root(heard.covariance), told, own.map_rows)
+        return HeardBroadcast(heard, _root(heard.covariance), told, own.map_rows)
 
-    def _rows(self, offer: Offer) -> list[Used]:
+    def _rows(self, offer: OfferedMeasurement) -> list[Used]:
         """Linearised measurements of an offer, referred to the vehicle's state now."""
         who, event, heard = offer.who, offer.event, offer.heard
         own, vehicle = self._own[who], self._prepared.vehicles[who]
@@ -322,7 +327,7 @@ class Decentralised:
             self._own[who] = replace(own, P=P)
         return passes
 
-    def _update(self, own: Own, rows: list[Used]) -> Own:
+    def _update(self, own: OwnFilter, rows: list[Used]) -> OwnFilter:
         """Run the Kalman update with the noise of the algorithm.
 
         Shared errors are considered, not estimated.
@@ -343,7 +348,7 @@ class Decentralised:
         P = own.P - gain @ S @ gain.T
         if self._algorithm == "modified":
             shared = shared - gain @ (H @ shared + Hc @ self._Pc + told)
-        return Own(own.time_s, x, 0.5 * (P + P.T), own.independent, shared, self._mixed(own, gain, H, rows))
+        return OwnFilter(own.time_s, x, 0.5 * (P + P.T), own.independent, shared, self._mixed(own, gain, H, rows))
 
     def _through_what_they_share(self, rows: list[Used], told: FloatArray) -> FloatArray:
         """Return the covariance of the noise of different neighbours and points.
@@ -358,7 +363,7 @@ class Decentralised:
                     between[i, j] = 0.0
         return between
 
-    def _split_update(self, own: Own, rows: list[Used], about: FloatArray) -> Own:
+    def _split_update(self, own: OwnFilter, rows: list[Used], about: FloatArray) -> OwnFilter:
         """Fuse the rows of one measurement by split covariance intersection.
 
         They are linearised about the state ``about``.
@@ -371,10 +376,10 @@ class Decentralised:
         is_common = any(used.offer.sighting is not None for used in rows)  # its noise is in the observer's state too
         independent = np.zeros_like(fused.independent) if is_common else fused.independent
         mixed = self._mixed(own, fused.gain, H, rows)
-        return Own(own.time_s, own.x + fused.gain @ innovation, fused.P, independent, own.shared, mixed)
+        return OwnFilter(own.time_s, own.x + fused.gain @ innovation, fused.P, independent, own.shared, mixed)
 
     @staticmethod
-    def _mixed(own: Own, gain: FloatArray, H: FloatArray, rows: list[Used]) -> FloatArray:
+    def _mixed(own: OwnFilter, gain: FloatArray, H: FloatArray, rows: list[Used]) -> FloatArray:
         """Rows of the error map after an update."""
         others: list[Other | None] = []
         for used in rows:

@@ -8,12 +8,12 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.geodesy import EARTH_RATE_RADPS
 from groundstation.systems.cooperative.loop_types import HEIGHT, PEER, POINT, SATELLITE
 from groundstation.systems.cooperative.observation import LIGHT_MPS, NEAREST_M
-from groundstation.systems.cooperative.plain.steps import Event
+from groundstation.systems.cooperative.plain.steps import MeasurementEvent
 from groundstation.systems.cooperative.vehicles import Vehicle, View
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class LinearisedMeasurement:
     """One scalar measurement, linearised.
 
     innovation = h (receiver) + place (source) + clock (source) + noise.
@@ -47,18 +47,18 @@ class Row:
 
 
 def rows_of(
-    event: Event,
+    event: MeasurementEvent,
     vehicle: Vehicle,
     x: FloatArray,
     source_m: FloatArray | None,
     source_clock_m: float,
     about_m: FloatArray | None = None,
-) -> list[Row]:
+) -> list[LinearisedMeasurement]:
     """Linearise one event about the receiver's state and what is known of the source.
 
     Parameters
     ----------
-    event : Event
+    event : MeasurementEvent
     vehicle : Vehicle
         The receiver.
     x : ndarray, shape (n,)
@@ -79,7 +79,7 @@ def rows_of(
         h = np.zeros(vehicle.size)
         h[vehicle.height] = -1.0
         predicted = vehicle.height_m(event.time_s) - float(x[vehicle.height])
-        return [Row(event.value_m - predicted, h, np.zeros(3), 0.0, event.variance_m2)]
+        return [LinearisedMeasurement(event.value_m - predicted, h, np.zeros(3), 0.0, event.variance_m2)]
     source = (event.place_m if source_m is None else source_m) - event.arm_m
     view = vehicle.view(x, event.time_s)
     line = view.place_m - source
@@ -100,7 +100,7 @@ def rows_of(
 
 
 def _range_row(
-    event: Event,
+    event: MeasurementEvent,
     vehicle: Vehicle,
     x: FloatArray,
     view: View,
@@ -108,7 +108,7 @@ def _range_row(
     source_clock_m: float,
     direction: FloatArray,
     distance: float,
-) -> Row:
+) -> LinearisedMeasurement:
     if event.kind == SATELLITE:
         direction, distance = _while_the_earth_turns(view.place_m, source, distance)
     predicted = distance
@@ -124,7 +124,7 @@ def _range_row(
         predicted += error
         h = (1.0 + scale) * h + by_error if scale else h + by_error
         by_source = (1.0 + scale) * by_source
-    return Row(event.value_m - predicted, h, by_source, by_clock, event.variance_m2)
+    return LinearisedMeasurement(event.value_m - predicted, h, by_source, by_clock, event.variance_m2)
 
 
 def _while_the_earth_turns(place: FloatArray, source: FloatArray, distance: float) -> tuple[FloatArray, float]:
@@ -142,7 +142,7 @@ def _while_the_earth_turns(place: FloatArray, source: FloatArray, distance: floa
     return line / distance, distance
 
 
-def _bearing_row(event: Event, view: View, line: FloatArray) -> Row:
+def _bearing_row(event: MeasurementEvent, view: View, line: FloatArray) -> LinearisedMeasurement:
     """Return the row of a bearing off the sensor's heading.
 
     The bearing is the direction to the source less the heading; ``line`` leads from the sensor to the source.
@@ -153,4 +153,4 @@ def _bearing_row(event: Event, view: View, line: FloatArray) -> Row:
     h = -by_line @ view.derivative - view.by_heading
     innovation = event.bearing_rad - (np.arctan2(east, north) - view.heading_rad)
     wrapped = float((innovation + np.pi) % (2.0 * np.pi) - np.pi)
-    return Row(wrapped, h, by_line, 0.0, event.bearing_variance_rad2)
+    return LinearisedMeasurement(wrapped, h, by_line, 0.0, event.bearing_variance_rad2)

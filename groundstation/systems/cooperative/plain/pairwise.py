@@ -12,8 +12,8 @@ from groundstation.systems.cooperative.judging import PATIENCE
 from groundstation.systems.cooperative.loop_types import PEER, POINT
 from groundstation.systems.cooperative.messages import pairwise_bytes
 from groundstation.systems.cooperative.plain.error_map import unit_rows
-from groundstation.systems.cooperative.plain.observation import Row, rows_of
-from groundstation.systems.cooperative.plain.steps import Event, Recorder, steps
+from groundstation.systems.cooperative.plain.observation import LinearisedMeasurement, rows_of
+from groundstation.systems.cooperative.plain.steps import MeasurementEvent, RunRecorder, steps
 from groundstation.systems.cooperative.settings import CooperativeSettings
 from groundstation.systems.cooperative.tracks import AlgorithmRun
 
@@ -31,7 +31,7 @@ class Pairwise:
 
     def __init__(self, prepared: Prepared, settings: CooperativeSettings) -> None:
         self._prepared, self._settings = prepared, settings
-        self.recorder = Recorder(prepared.vehicles)
+        self.recorder = RunRecorder(prepared.vehicles)
         self._unit_map = unit_rows([vehicle.size for vehicle in prepared.vehicles], settings.map_window_s)
         self._window_end_s = float("-inf")
         self._members = [
@@ -69,7 +69,7 @@ class Pairwise:
         one.factors = {other: phi @ factor for other, factor in one.factors.items()}
         one.map_rows, one.time_s = phi @ one.map_rows, to_s
 
-    def _use(self, event: Event) -> None:
+    def _use(self, event: MeasurementEvent) -> None:
         self._advance(event.receiver, event.time_s)
         if event.kind == PEER:
             self._advance(event.source, event.time_s)
@@ -85,7 +85,7 @@ class Pairwise:
             if not (self._relative if event.kind == PEER else self._private)(event, rows[number]):
                 break
 
-    def _rows(self, event: Event) -> list[Row]:
+    def _rows(self, event: MeasurementEvent) -> list[LinearisedMeasurement]:
         one = self._members[event.receiver]
         source_m, clock_m = None, 0.0
         if event.kind == PEER:
@@ -94,7 +94,7 @@ class Pairwise:
             clock_m = float(other.x[vehicle.clock]) if vehicle.clock >= 0 else 0.0
         return rows_of(event, self._prepared.vehicles[event.receiver], one.x, source_m, clock_m)
 
-    def _passes(self, event: Event, row: Row, total: float) -> bool:
+    def _passes(self, event: MeasurementEvent, row: LinearisedMeasurement, total: float) -> bool:
         total -= row.variance * (1.0 - event.spread)
         passes = self._settings.gate_sigma <= 0.0 or row.innovation**2 <= self._settings.gate_sigma**2 * total
         self.recorder.judge(event, row.innovation, total, passes)
@@ -108,7 +108,7 @@ class Pairwise:
                     self._members[who].P[state, state] += variance
         return passes
 
-    def _private(self, event: Event, row: Row) -> bool:
+    def _private(self, event: MeasurementEvent, row: LinearisedMeasurement) -> bool:
         """Use a range to a point or satellite; no other vehicle is told."""
         one, variance = self._members[event.receiver], row.variance
         if event.kind == POINT:
@@ -126,7 +126,7 @@ class Pairwise:
         one.map_rows = kept @ one.map_rows
         return True
 
-    def _relative(self, event: Event, row: Row) -> bool:
+    def _relative(self, event: MeasurementEvent, row: LinearisedMeasurement) -> bool:
         """Use a range between two vehicles: both are updated as one filter."""
         i, j = event.receiver, event.source
         one, other = self._members[i], self._members[j]

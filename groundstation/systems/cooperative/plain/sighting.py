@@ -11,8 +11,8 @@ import numpy as np
 from groundstation.base.angles import FloatArray
 from groundstation.systems.cooperative.loop_types import PEER
 from groundstation.systems.cooperative.observation import NEAREST_M
-from groundstation.systems.cooperative.plain.observation import Row
-from groundstation.systems.cooperative.plain.steps import Event
+from groundstation.systems.cooperative.plain.observation import LinearisedMeasurement
+from groundstation.systems.cooperative.plain.steps import MeasurementEvent
 from groundstation.systems.cooperative.vehicles import Vehicle
 
 
@@ -29,7 +29,7 @@ class Sighting(NamedTuple):
     along_m2: float
     across_m2: float
 
-    def rows(self, seen: Vehicle, x: FloatArray, at_s: float, told_m: FloatArray) -> list[Row]:
+    def rows(self, seen: Vehicle, x: FloatArray, at_s: float, told_m: FloatArray) -> list[LinearisedMeasurement]:
         """Return the fix as two scalar measurements of the vehicle that was seen.
 
         ``told_m`` is the place as it arrived.
@@ -37,12 +37,12 @@ class Sighting(NamedTuple):
         place, derivative = seen.place(x, at_s)
         across = np.array([-self.line[1], self.line[0], 0.0])
         return [
-            Row(float(axis @ (told_m - place)), axis @ derivative, -axis, 0.0, variance)
+            LinearisedMeasurement(float(axis @ (told_m - place)), axis @ derivative, -axis, 0.0, variance)
             for axis, variance in ((self.line, self.along_m2), (across, self.across_m2))
         ]
 
 
-def sighting_of(event: Event, observer: Vehicle, x: FloatArray) -> Sighting | None:
+def sighting_of(event: MeasurementEvent, observer: Vehicle, x: FloatArray) -> Sighting | None:
     """Return the fix that an observer with state ``x`` can tell; None without one.
 
     ``x`` is the state at the time of the event; range and bearing are both needed.

@@ -15,12 +15,12 @@ from groundstation.systems.cooperative.timeline import timeline
 from groundstation.systems.cooperative.tracks import AlgorithmRun, JudgedMeasurements, VehicleTrack
 from groundstation.systems.cooperative.vehicles import Vehicle
 
-Group = tuple[float, tuple["Event", ...]]
+Group = tuple[float, tuple["MeasurementEvent", ...]]
 Output = tuple[float, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class MeasurementEvent:
     """One measurement: a row of ``loop_types.Events``, and its number there."""
 
     time_s: float
@@ -44,12 +44,12 @@ def steps(prepared: Prepared, settings: CooperativeSettings, *, together: bool) 
     items = timeline(prepared, settings, together=together)
     columns: list[list[Any]] = [column.tolist() if column.ndim == 1 else list(column) for column in prepared.events]
     columns.append(list(range(len(prepared.events.time_s))))
-    events = [Event(*row) for row in zip(*columns, strict=True)]
+    events = [MeasurementEvent(*row) for row in zip(*columns, strict=True)]
     for at_s, who, first, last in zip(*(column.tolist() for column in items), strict=True):
         yield (at_s, who) if who >= 0 else (at_s, tuple(events[first:last]))
 
 
-class Recorder:
+class RunRecorder:
     """Collects what becomes an :class:`AlgorithmRun`."""
 
     def __init__(self, vehicles: tuple[Vehicle, ...]) -> None:
@@ -66,7 +66,7 @@ class Recorder:
         position, _ = self.vehicles[who].place(x, time_s)
         self._rows[who].append((time_s, position, x.copy(), P.copy()))
 
-    def judge(self, event: Event, innovation: float, variance: float, passes: bool) -> None:
+    def judge(self, event: MeasurementEvent, innovation: float, variance: float, passes: bool) -> None:
         """Count a measurement and keep how it was judged."""
         self.counts["used" if passes else "gated"] += 1
         self._judged.append((event.number, innovation, float(np.sqrt(variance)), USED if passes else GATED))

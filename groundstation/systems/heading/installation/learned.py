@@ -7,7 +7,7 @@ from groundstation.results.installations import Installation, Lesson
 from groundstation.systems.heading.installation.analysis import sentence_of
 from groundstation.systems.heading.installation.chapter import parts, sentence
 from groundstation.systems.heading.installation.lesson import lesson_of_flight
-from groundstation.systems.heading.installation.series import Series, installation_of, series_of
+from groundstation.systems.heading.installation.series import UnitFlights, installation_of, series_of
 from groundstation.systems.heading.installation.settings import InstallationSettings
 from groundstation.systems.learning import LearnStep
 
@@ -27,7 +27,7 @@ def installations_of(lessons: Iterable[Lesson], known: Sequence[Installation]) -
     return tuple(before.get(_key(one)) or installation_of(one, settings) for one in series_of(lessons))
 
 
-def _key(one: Series | Installation) -> tuple[str, str, tuple[Lesson, ...]]:
+def _key(one: UnitFlights | Installation) -> tuple[str, str, tuple[Lesson, ...]]:
     return one.ins_serial, one.aircraft, one.lessons
 
 

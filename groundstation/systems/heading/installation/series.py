@@ -15,7 +15,7 @@ FIRST = "no earlier flight of this serial in this aircraft taught anything"
 
 
 @dataclass(frozen=True)
-class Series:
+class UnitFlights:
     """The flights of one unit in one aircraft until it flies in another one, in order of time."""
 
     ins_serial: str
@@ -23,7 +23,7 @@ class Series:
     lessons: tuple[Lesson, ...]
 
 
-def series_of(lessons: Iterable[Lesson]) -> tuple[Series, ...]:
+def series_of(lessons: Iterable[Lesson]) -> tuple[UnitFlights, ...]:
     """Lessons by installation; those without serial, aircraft or UTC are in none.
 
     A unit that flies in another aircraft begins anew there, and anew when it comes back. Flights of one serial that
@@ -33,7 +33,7 @@ def series_of(lessons: Iterable[Lesson]) -> tuple[Series, ...]:
     for one in lessons:
         if one.ins_serial and one.aircraft and one.start_utc:
             by_serial[one.ins_serial].append(one)
-    found: list[Series] = []
+    found: list[UnitFlights] = []
     for serial in sorted(by_serial):
         ordered = sorted(by_serial[serial], key=lambda one: one.place)
         times = Counter(one.start_utc for one in ordered)
@@ -42,19 +42,21 @@ def series_of(lessons: Iterable[Lesson]) -> tuple[Series, ...]:
             if times[one.start_utc] > 1:
                 one = replace(one, not_taught=one.not_taught or SAME_TIME)
             if stretch and stretch[-1].aircraft != one.aircraft:
-                found.append(Series(serial, stretch[-1].aircraft, tuple(stretch)))
+                found.append(UnitFlights(serial, stretch[-1].aircraft, tuple(stretch)))
                 stretch = []
             stretch.append(one)
-        found.append(Series(serial, stretch[-1].aircraft, tuple(stretch)))
+        found.append(UnitFlights(serial, stretch[-1].aircraft, tuple(stretch)))
     return tuple(found)
 
 
-def answers_of(series: Series, settings: InstallationSettings) -> Iterator[tuple[Lesson, InstallationResult | None]]:
+def answers_of(
+    series: UnitFlights, settings: InstallationSettings
+) -> Iterator[tuple[Lesson, InstallationResult | None]]:
     """Every flight with its learned answer; None where there is no heading error to improve."""
     return _answered(series, _Teacher(settings))
 
 
-def _answered(series: Series, teacher: "_Teacher") -> Iterator[tuple[Lesson, InstallationResult | None]]:
+def _answered(series: UnitFlights, teacher: "_Teacher") -> Iterator[tuple[Lesson, InstallationResult | None]]:
     """Flights with their answers; the teacher then has been taught by all of them."""
     for lesson in series.lessons:  # of those that begin at one time none teaches
         yield lesson, teacher.answer(lesson)
@@ -76,7 +78,7 @@ def answer_from(lesson: Lesson, earlier: Sequence[Lesson], settings: Installatio
     return teacher.answer(lesson) or alone_answer(lesson, lesson.not_taught)
 
 
-def installation_of(series: Series, settings: InstallationSettings) -> Installation:
+def installation_of(series: UnitFlights, settings: InstallationSettings) -> Installation:
     """Return an installation with the answer of each flight, and the outlook for the next one."""
     teacher = _Teacher(settings)
     flights = tuple(InstalledFlight(*one) for one in _answered(series, teacher))
@@ -94,7 +96,7 @@ def installation_of(series: Series, settings: InstallationSettings) -> Installat
     )
 
 
-def pooled_of(series: Series, settings: InstallationSettings) -> tuple[Pooled, ...]:
+def pooled_of(series: UnitFlights, settings: InstallationSettings) -> tuple[Pooled, ...]:
     """Return figures of other sensors from all flights of an installation.
 
     They follow the rule of the mounting. Each is a mounting that every flight sees as a reference does: changes and odd

@@ -9,10 +9,10 @@ from groundstation.base.units import MPS2_PER_G
 from groundstation.methods.ins_noise import GnssNoise, InsNoise, load_class
 from groundstation.simulation.channel_truth import RADIUS_M
 from groundstation.simulation.inertial_family import ErrorBatch, FamilySettings
-from groundstation.simulation.inertial_family import GnssNoise as SimulatedGnss
+from groundstation.simulation.inertial_family import GnssErrorModel as SimulatedGnss
 from groundstation.simulation.ins_class import InsClass, load_ins_class
 from groundstation.simulation.routes import RouteKind
-from groundstation.systems.inertial.differences import Differences, drag_per_s
+from groundstation.systems.inertial.differences import InsDifferences, drag_per_s
 from groundstation.systems.inertial.filter import STANDARD_GATE, DifferenceEpochs
 from groundstation.systems.inertial.model import ChannelModel
 
@@ -140,11 +140,11 @@ def own_case(name: str, route: RouteKind, seed: int) -> FilterCase:
     return replace(case, family=replace(case.family, each_its_own=True), is_new=True)
 
 
-def differences_of(batch: ErrorBatch, row: int, epochs: DifferenceEpochs) -> Differences:
+def differences_of(batch: ErrorBatch, row: int, epochs: DifferenceEpochs) -> InsDifferences:
     """Return epochs of one simulated flight with the motion of its INS."""
     velocity = np.stack([batch.velocity_north_mps[row], batch.velocity_east_mps[row]], axis=1)
     place = (batch.latitude_deg[row], batch.longitude_deg[row], batch.altitude_m[row])
-    return Differences("ins", "gnss", epochs, *place, velocity, 0.0, (), batch.heading_deg[row])
+    return InsDifferences("ins", "gnss", epochs, *place, velocity, 0.0, (), batch.heading_deg[row])
 
 
 def matched_noise(ins: InsClass, gnss: GnssNoise) -> InsNoise:

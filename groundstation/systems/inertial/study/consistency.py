@@ -14,7 +14,7 @@ from groundstation.methods.ins_noise import GnssNoise
 from groundstation.results.figures import FigureData
 from groundstation.simulation.channel_truth import POSITION, RADIUS_M, VELOCITY, channel_truth
 from groundstation.simulation.ins_class import load_ins_class
-from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, run_filter
+from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs, run_filter
 from groundstation.systems.inertial.model import SIZE, ChannelModel
 from groundstation.systems.inertial.study.cases import matched_noise
 
@@ -29,7 +29,7 @@ TAIL = 0.005
 class MatchedRun:
     """A filter run and the states that were true, shape (n, 6, c)."""
 
-    run: FilterRun
+    run: ChannelsRun
     truth: FloatArray
 
     def nees(self, epoch: int) -> float:

@@ -31,8 +31,8 @@ from groundstation.systems.inertial.coupled import (
 )
 from groundstation.systems.inertial.coupled_forecast import coupled_variance, hindcast_coupled
 from groundstation.systems.inertial.craft_motion import CraftMotion
-from groundstation.systems.inertial.differences import Differences
-from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, run_filter
+from groundstation.systems.inertial.differences import InsDifferences
+from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs, run_filter
 from groundstation.systems.inertial.hindcast import Hindcast
 from groundstation.systems.inertial.leads import PAST_FROM_S, built_up, past_mean, start_epochs
 from groundstation.systems.inertial.model import POSITION, RANDOM_DRIFT
@@ -84,7 +84,7 @@ class SetForecasts:
         return np.asarray(weight / weight.sum(axis=0))
 
 
-def coarse_differences(differences: Differences, coarse: Coarse) -> Differences:
+def coarse_differences(differences: InsDifferences, coarse: Coarse) -> InsDifferences:
     """Return the differences over coarse epochs, with the motion of the INS there."""
     time_s, own_s = coarse.epochs.time_s, differences.epochs.time_s
     latitude, altitude, north, east = (np.interp(time_s, own_s, part) for part in differences.motion_known)
@@ -100,7 +100,7 @@ def coarse_differences(differences: Differences, coarse: Coarse) -> Differences:
 
 
 def set_forecasts(
-    differences: Differences, flown: FilterRun, replay: Hindcast, settings: InertialSettings
+    differences: InsDifferences, flown: ChannelsRun, replay: Hindcast, settings: InertialSettings
 ) -> SetForecasts:
     """Forecast with the coupled model and every noise set from the starts of a replay.
 
@@ -129,12 +129,14 @@ def set_forecasts(
     return SetForecasts(mean, variance)
 
 
-def _values(differences: Differences, time_s: FloatArray, flown: FilterRun) -> FloatArray:
+def _values(differences: InsDifferences, time_s: FloatArray, flown: ChannelsRun) -> FloatArray:
     motion = CraftMotion.between(differences, time_s, is_strapdown=flown.noise.is_strapdown)
     return np.array(coupled_values(motion, flown.noise.beta_per_s))
 
 
-def _at_start(run: CoupledRun, differences: Differences, epoch: int, start_s: float) -> tuple[FloatArray, FloatArray]:
+def _at_start(
+    run: CoupledRun, differences: InsDifferences, epoch: int, start_s: float
+) -> tuple[FloatArray, FloatArray]:
     """Return the state of a set at an epoch, carried to a start.
 
     The start is less than a coarse epoch later.
@@ -186,7 +188,7 @@ METHODS = ("coupled", ALONE, WITH_CLASS)
 
 
 def judge_bank(
-    differences: Differences, flown: FilterRun, truth: DifferenceEpochs, settings: InertialSettings
+    differences: InsDifferences, flown: ChannelsRun, truth: DifferenceEpochs, settings: InertialSettings
 ) -> BankOutcome:
     """Replay outages of a flight by the three methods.
 

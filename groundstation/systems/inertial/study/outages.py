@@ -17,7 +17,7 @@ from groundstation.results.figures import FigureData
 from groundstation.simulation.inertial_family import simulate_family
 from groundstation.systems.inertial.coupled import CoupledRun, run_coupled
 from groundstation.systems.inertial.coupled_forecast import coupled_variance, hindcast_coupled
-from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, run_filter, smooth
+from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs, run_filter, smooth
 from groundstation.systems.inertial.hindcast import hindcast
 from groundstation.systems.inertial.leads import built_up, leads_of, start_epochs
 from groundstation.systems.inertial.model import POSITION
@@ -119,7 +119,7 @@ def _to_the_nearer_end(time_s: FloatArray, gaps: Sequence[tuple[float, float]]) 
 
 
 def _through(
-    flown: FilterRun,
+    flown: ChannelsRun,
     coupled: CoupledRun,
     gaps: Sequence[tuple[float, float]],
     whole: DifferenceEpochs,
@@ -139,7 +139,7 @@ def _through(
 
 
 def _after(
-    flown: FilterRun, coupled: CoupledRun, at: Int64Array, whole: DifferenceEpochs, settings: InertialSettings
+    flown: ChannelsRun, coupled: CoupledRun, at: Int64Array, whole: DifferenceEpochs, settings: InertialSettings
 ) -> FloatArray:
     """Return the coverage of the default's 95 % band from the starts ``at``, by horizon.
 

@@ -16,7 +16,7 @@ from groundstation.results.forecast_methods import FORECAST_METHODS
 from groundstation.simulation.inertial_family import ErrorBatch, simulate_family
 from groundstation.systems.inertial.coupled import run_coupled
 from groundstation.systems.inertial.coupled_forecast import coupled_variance, hindcast_coupled
-from groundstation.systems.inertial.filter import DifferenceEpochs, FilterRun, run_filter
+from groundstation.systems.inertial.filter import ChannelsRun, DifferenceEpochs, run_filter
 from groundstation.systems.inertial.hindcast import Hindcast, hindcast
 from groundstation.systems.inertial.leads import MEMORY_S, built_up
 from groundstation.systems.inertial.replay import plan_replay
@@ -178,7 +178,7 @@ def _with_coupled(
     )
 
 
-def _claimed(method: str, run: FilterRun, replay: Hindcast, settings: InertialSettings) -> Claimed:
+def _claimed(method: str, run: ChannelsRun, replay: Hindcast, settings: InertialSettings) -> Claimed:
     """Return the sigma that a method claims.
 
     The coupled last estimate claims what it does where the settings choose the coupled model.
@@ -214,7 +214,7 @@ def leads_at(replay: Hindcast) -> list[int]:
     return [int(np.argmin(np.abs(replay.lead_s - 60.0 * horizon))) for horizon in STUDY_HORIZONS_MIN]
 
 
-def _honesty(run: FilterRun, replay: Hindcast, since: slice, settings: InertialSettings) -> Honesty:
+def _honesty(run: ChannelsRun, replay: Hindcast, since: slice, settings: InertialSettings) -> Honesty:
     """Return errors over sigmas; GNSS is the reference, its error at both ends is claimed."""
     leads = leads_at(replay)
     parts: list[list[FloatArray]] = []

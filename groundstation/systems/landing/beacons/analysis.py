@@ -16,8 +16,8 @@ from groundstation.systems.analysis import Analysis, Found
 from groundstation.systems.known import Beacon, Known, Runway, SiteData
 from groundstation.systems.landing.beacons.answer import BeaconLanding, DeviationRow
 from groundstation.systems.landing.beacons.approach import (
-    Belief,
     Deviations,
+    PlaceEvidence,
     Sampled,
     approaches_in,
     belief,
@@ -49,7 +49,7 @@ def _run(flight: "Flight", known: Known, settings: LandingBeaconsSettings) -> Fo
         what = f"no flight of {settings.shortest_s:g} s below {settings.highest_m:g} m with bearings of all beacons"
         raise NotAssessableError(NAME, what)
     places = np.array([(-beacon.before_threshold_m, beacon.right_m) for beacon in beacons])
-    kept: list[tuple[Sampled, Deviations, Belief]] = []
+    kept: list[tuple[Sampled, Deviations, PlaceEvidence]] = []
     findings: list[Finding] = []
     for span in spans:
         part = sampled.part(span)
@@ -150,7 +150,7 @@ def _why_not(speed_mps: float) -> str:
 
 
 def _doubts(
-    part: Sampled, found: Deviations, told: Belief, runway: Runway, settings: LandingBeaconsSettings
+    part: Sampled, found: Deviations, told: PlaceEvidence, runway: Runway, settings: LandingBeaconsSettings
 ) -> list[tuple[str, str, str]]:
     """Severity, kind and text of what speaks against an approach."""
     doubts = []

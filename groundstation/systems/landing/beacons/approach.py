@@ -130,7 +130,7 @@ def ground_m(before_m: FloatArray, runway: Runway) -> FloatArray:
     return np.asarray(np.interp(before_m, places, heights, left=np.nan, right=np.nan))
 
 
-def unknown_rise_m(sampled: Sampled, told: "Belief", runway: Runway) -> FloatArray:
+def unknown_rise_m(sampled: Sampled, told: "PlaceEvidence", runway: Runway) -> FloatArray:
     """Return the rise of the ground above that under the approach's end, less the profile.
 
     NaN where no altitude tells it. Altitude less radio altitude is the ground; what altitude errs by for the whole
@@ -157,7 +157,7 @@ def over_known_ground(found: Deviations, rise_m: FloatArray, most_m: float) -> D
 
 
 @dataclass(frozen=True)
-class Belief:
+class PlaceEvidence:
     """Evidence for or against the places of one approach; NaN where the log does not say.
 
     ``threshold_s`` is when the straight flight that ``speed_mps`` belongs to crosses the threshold.
@@ -170,7 +170,7 @@ class Belief:
     terrain_m: float
 
 
-def belief(sampled: Sampled, found: Deviations, runway: Runway) -> Belief:
+def belief(sampled: Sampled, found: Deviations, runway: Runway) -> PlaceEvidence:
     """Return the speed at which the distance shrinks, and what else speaks for the places.
 
     That is the heading against the INS, and the ground under the approach.
@@ -189,7 +189,7 @@ def belief(sampled: Sampled, found: Deviations, runway: Runway) -> Belief:
     middle = float(wrap_180(mean_heading(difference[known]))) if known.any() else float("nan")
     known_speed = sampled.ground_speed_mps[np.isfinite(sampled.ground_speed_mps)]
     median_mps = float(np.median(known_speed)) if len(known_speed) else float("nan")
-    told = Belief(speed, threshold_s, median_mps, middle, float("nan"))
+    told = PlaceEvidence(speed, threshold_s, median_mps, middle, float("nan"))
     rise = unknown_rise_m(sampled, told, runway)
     rise = rise[np.isfinite(rise)]
     return replace(told, terrain_m=float(np.ptp(np.quantile(rise, [0.02, 0.98]))) if len(rise) else float("nan"))

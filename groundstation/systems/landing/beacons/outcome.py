@@ -10,13 +10,13 @@ from groundstation.results.landing_categories import ACCURACY_ONLY, LINEAR_95, a
 from groundstation.systems.known import Beacon, Runway
 from groundstation.systems.landing.arrays import BeaconsPath
 from groundstation.systems.landing.beacons.answer import BeaconApproachRow, BeaconLanding, BeaconRow, DeviationRow
-from groundstation.systems.landing.beacons.approach import WELL_KNOWN_M, Belief, Deviations, Sampled
+from groundstation.systems.landing.beacons.approach import WELL_KNOWN_M, Deviations, PlaceEvidence, Sampled
 from groundstation.systems.landing.beacons.settings import LandingBeaconsSettings
 
 DISTANCES_M = (5000.0, 3000.0, 2000.0, 1500.0, 750.0, 500.0, 320.0, 100.0, 0.0)
 MEAN_S = 1.0  # a row is the mean over so long
 
-Flown = tuple[Sampled, Deviations, Belief]
+Flown = tuple[Sampled, Deviations, PlaceEvidence]
 
 
 def beacon_landing(
@@ -44,7 +44,7 @@ def _known(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def _approach(number: int, part: Sampled, found: Deviations, told: Belief) -> BeaconApproachRow:
+def _approach(number: int, part: Sampled, found: Deviations, told: PlaceEvidence) -> BeaconApproachRow:
     before = found.before_m[found.found & (found.distance_sigma_m < WELL_KNOWN_M)]
     return BeaconApproachRow(
         approach=number,

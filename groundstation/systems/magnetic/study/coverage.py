@@ -12,14 +12,16 @@ from groundstation.results.figures import FigureData
 from groundstation.results.roles import LETTERS
 from groundstation.systems.magnetic.study.cases import Setup, Sweep
 from groundstation.systems.magnetic.study.judge import METHODS, JudgedAnswer, JudgedMethod
-from groundstation.systems.magnetic.study.tables import IRON, TABLE, Sample
+from groundstation.systems.magnetic.study.tables import IRON, TABLE, OutcomeSample
 
 FIRST, SECOND = "first", "wide"
 D = LETTERS.index("D")
 Cell = tuple[str, str, Sequence[JudgedAnswer]]
 
 
-def first_cells(judged: Sample, sweeps: Sequence[Sweep], samples: Mapping[Setup, Sample]) -> Iterable[Cell]:
+def first_cells(
+    judged: OutcomeSample, sweeps: Sequence[Sweep], samples: Mapping[Setup, OutcomeSample]
+) -> Iterable[Cell]:
     """Return the whole flights of the first family, and the points of its sweeps."""
     yield FIRST, "whole flights", judged.outcomes
     for sweep in sweeps:

@@ -51,7 +51,7 @@ class SeedJob:
 
 
 @dataclass(frozen=True)
-class RunOutcome:
+class SeedOutcome:
     """All flights of one seed.
 
     Parameters
@@ -97,7 +97,7 @@ def jobs_of(runs: int, seed: int, swept_setups: tuple[Setup, ...]) -> list[SeedJ
     ]
 
 
-def run_jobs(jobs: Sequence[SeedJob], progress: Progress | None = None) -> tuple[RunOutcome, ...]:
+def run_jobs(jobs: Sequence[SeedJob], progress: Progress | None = None) -> tuple[SeedOutcome, ...]:
     """Fly all jobs, on as many processes as there are cores.
 
     The outcomes are in the order of the jobs.
@@ -111,13 +111,13 @@ def run_jobs(jobs: Sequence[SeedJob], progress: Progress | None = None) -> tuple
     return tuple(found)
 
 
-def fly_job(job: SeedJob) -> RunOutcome:
+def fly_job(job: SeedJob) -> SeedOutcome:
     """Fly everything of one seed."""
     hangar = Hangar(job.seed)
     iron = draw_magnetic_scenario(EXACT, job.seed).magnetometer
     assert iron is not None
     figures = {kind: make(BANK_DEG) for kind, make in INCOMPLETE.items()} if job.is_incomplete else {}
-    return RunOutcome(
+    return SeedOutcome(
         job.run,
         tuple(hangar.outcome(setup) for setup in job.setups),
         judged_outcome(job.judged, job.seed) if job.judged else None,
@@ -128,7 +128,7 @@ def fly_job(job: SeedJob) -> RunOutcome:
     )
 
 
-def _told(outcome: RunOutcome) -> str:
+def _told(outcome: SeedOutcome) -> str:
     flights = [
         *outcome.swept,
         *outcome.incomplete.values(),
@@ -142,7 +142,7 @@ def _told(outcome: RunOutcome) -> str:
 @contextmanager
 def _mapped(
     jobs: int,
-) -> Iterator[Callable[[Callable[[SeedJob], RunOutcome], Sequence[SeedJob]], Iterator[RunOutcome]]]:
+) -> Iterator[Callable[[Callable[[SeedJob], SeedOutcome], Sequence[SeedJob]], Iterator[SeedOutcome]]]:
     """Return a map over jobs: in this process for a few, else in single-threaded processes."""
     workers = min(jobs, os.cpu_count() or 1)
     if jobs < POOLED_FROM or workers < 2:

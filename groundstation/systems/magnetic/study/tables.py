@@ -25,7 +25,7 @@ from groundstation.systems.magnetic.study.judge import (
     JudgedAnswer,
     JudgedMethod,
 )
-from groundstation.systems.magnetic.study.runs import RunOutcome
+from groundstation.systems.magnetic.study.runs import SeedOutcome
 
 DRAWS = 1000  # of the bootstrap: 95 % limits are good to 2 % of their distance
 TAIL = 0.025
@@ -40,7 +40,7 @@ _PLACE = re.compile(r": at # s # deg at # deg of bank")
 
 
 @dataclass(frozen=True)
-class Sample:
+class OutcomeSample:
     """Outcomes of one point, run by run, and bootstrap weights, shape (1 + draws, runs).
 
     The first row of weights counts every run once. Runs are the independent units; the weights are the same at every
@@ -93,28 +93,30 @@ def interval(values: FloatArray) -> tuple[float, float, float]:
     return float(values[0]), float(low), float(high)
 
 
-def samples_of(runs: Sequence[RunOutcome], setups: Sequence[Setup], seed: int) -> dict[Setup, Sample]:
+def samples_of(runs: Sequence[SeedOutcome], setups: Sequence[Setup], seed: int) -> dict[Setup, OutcomeSample]:
     """Return the outcomes of every setup."""
     weights = resampling(len(runs), seed)
-    return {setup: Sample(tuple(run.swept[place] for run in runs), weights) for place, setup in enumerate(setups)}
+    return {
+        setup: OutcomeSample(tuple(run.swept[place] for run in runs), weights) for place, setup in enumerate(setups)
+    }
 
 
-def judged_sample(runs: Sequence[RunOutcome], seed: int) -> Sample:
+def judged_sample(runs: Sequence[SeedOutcome], seed: int) -> OutcomeSample:
     """Return the whole flights of the judged family."""
     flown = tuple(run.judged for run in runs if run.judged is not None)
-    return Sample(flown, resampling(len(flown), seed))
+    return OutcomeSample(flown, resampling(len(flown), seed))
 
 
-def accepted(sample: Sample, seed: int) -> Sample:
+def accepted(sample: OutcomeSample, seed: int) -> OutcomeSample:
     """Return the sample of the runs that the estimator accepted."""
     kept = tuple(outcome for outcome in sample.outcomes if outcome.verdict == "accept")
-    return Sample(kept, resampling(len(kept), seed) if kept else np.zeros((1 + DRAWS, 0)))
+    return OutcomeSample(kept, resampling(len(kept), seed) if kept else np.zeros((1 + DRAWS, 0)))
 
 
 # Errors of the methods
 
 
-def sweep_table(sweep: Sweep, samples: dict[Setup, Sample]) -> FigureData:
+def sweep_table(sweep: Sweep, samples: dict[Setup, OutcomeSample]) -> FigureData:
     """Tabulate the RMS error of every method over the points of a sweep.
 
     Whole and without A, with 95 % limits over flights. ``fitted`` flights count; ``inside2`` is the share of the
@@ -140,7 +142,7 @@ def sweep_table(sweep: Sweep, samples: dict[Setup, Sample]) -> FigureData:
     )
 
 
-def ratio_table(sweeps: Sequence[Sweep], samples: dict[Setup, Sample]) -> FigureData:
+def ratio_table(sweeps: Sequence[Sweep], samples: dict[Setup, OutcomeSample]) -> FigureData:
     """Tabulate errors of the iron fit and of one branch over that of the branch table.
 
     The errors are without A; the flights are the same.
@@ -167,7 +169,7 @@ def finding(low: float, high: float) -> str:
     return BETTER if high < 1.0 else WORSE if low > 1.0 else UNDECIDED
 
 
-def residual_table(sample: Sample) -> FigureData:
+def residual_table(sample: OutcomeSample) -> FigureData:
     """Tabulate the error that every method leaves on whole flights.
 
     Columns: every heading, and the held-out part against truth and INS.
@@ -191,7 +193,7 @@ def residual_table(sample: Sample) -> FigureData:
 # The published claim and its limit
 
 
-def claim_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> FigureData:
+def claim_table(runs: Sequence[SeedOutcome], samples: dict[Setup, OutcomeSample]) -> FigureData:
     """Tabulate the bank error of one branch and of the average, by formula and flown.
 
     The average is that of opposite branches; the flights have no noise. ``left`` is the share of one branch's error
@@ -216,7 +218,7 @@ def claim_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> Fig
     return _table("magnetic_claim", names, rows, {"bank_deg": 0} | dict.fromkeys(names[3:], 3))
 
 
-def power_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> FigureData:
+def power_table(runs: Sequence[SeedOutcome], samples: dict[Setup, OutcomeSample]) -> FigureData:
     """Tabulate the exponent of the bank with which the average's bias grows.
 
     The table also has the bank at which the bias passes the limit.
@@ -249,7 +251,7 @@ def power_table(runs: Sequence[RunOutcome], samples: dict[Setup, Sample]) -> Fig
 # Honesty
 
 
-def honesty_table(sample: Sample) -> FigureData:
+def honesty_table(sample: OutcomeSample) -> FigureData:
     """Tabulate the shares of the flights with an error within 1, 2, 3 stated sigma.
 
     Errors are against the truth; with 95 % limits.
@@ -301,12 +303,12 @@ def _inside(ratio: FloatArray) -> tuple[float, ...]:
 # Verdicts and refusals
 
 
-def verdict_table(judged: Sample, sweeps: Sequence[Sweep], samples: dict[Setup, Sample]) -> FigureData:
+def verdict_table(judged: OutcomeSample, sweeps: Sequence[Sweep], samples: dict[Setup, OutcomeSample]) -> FigureData:
     """Tabulate the verdicts at every point, and the commonest reason against acceptance.
 
     ``modulus_refused`` counts assessable flights on which the estimator's limits refuse the modulus fit.
     """
-    points: list[tuple[str, float, Sample]] = [("whole flights", float("nan"), judged)]
+    points: list[tuple[str, float, OutcomeSample]] = [("whole flights", float("nan"), judged)]
     points += [(sweep.name, value, samples[setup]) for sweep in sweeps for value, setup in sweep.points]
     rows = []
     for name, value, sample in points:
@@ -323,7 +325,7 @@ def verdict_table(judged: Sample, sweeps: Sequence[Sweep], samples: dict[Setup, 
     return _table("magnetic_verdicts", names, rows, {"value": 3, "accepted_share": 3, "low": 3, "high": 3})
 
 
-def incomplete_table(runs: Sequence[RunOutcome]) -> FigureData:
+def incomplete_table(runs: Sequence[SeedOutcome]) -> FigureData:
     """Tabulate how many incomplete figures were refused or accepted, by reason.
 
     In a reason, # stands for a number.

@@ -61,7 +61,7 @@ class StraightPath:
 
 
 @dataclass(frozen=True)
-class GroundPoint:
+class ReferencePoint:
     """A reference point on the ground, its place known exactly."""
 
     name: str
@@ -154,7 +154,7 @@ class RangeApproach:
     Parameters
     ----------
     title : str
-    points : tuple of GroundPoint
+    points : tuple of ReferencePoint
     moving : MovingPoint, optional
     trials, seed : int
         Simulated approaches that judge the filter, and their seed.
@@ -162,7 +162,7 @@ class RangeApproach:
 
     title: str = ""
     path: StraightPath = field(default_factory=StraightPath)
-    points: tuple[GroundPoint, ...] = ()
+    points: tuple[ReferencePoint, ...] = ()
     moving: MovingPoint | None = None
     noise: RangeNoise = field(default_factory=RangeNoise)
     own: OwnErrors = field(default_factory=OwnErrors)

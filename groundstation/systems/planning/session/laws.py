@@ -15,7 +15,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.records import frozen
 from groundstation.systems.planning.session.accuracy import PLACE, AccuracyModel
 from groundstation.systems.planning.session.descent import Minimum, minimise, nearest_law
-from groundstation.systems.planning.session.measures import Geometry, geometry_of, loss, loss_by_direction
+from groundstation.systems.planning.session.measures import InformationModes, geometry_of, loss, loss_by_direction
 from groundstation.systems.planning.session.motion import SessionMotion
 from groundstation.systems.planning.session.scenario import NEAREST_M, LocalCriterion, SessionPlan
 
@@ -51,7 +51,7 @@ class Law:
         object.__setattr__(self, "controls", frozen(self.controls))
 
 
-class Session:
+class PlannedSession:
     """Session with the motion and accuracy that the criteria ask for."""
 
     def __init__(self, plan: SessionPlan) -> None:
@@ -78,7 +78,7 @@ class Session:
         reach = [min(one.high - one.low, one.change * self.plan.steps) for one in self.motion.bounds]
         return max([*reach, 1e-9])
 
-    def geometry(self, position_m: FloatArray) -> Geometry:
+    def geometry(self, position_m: FloatArray) -> InformationModes:
         """Geometry of the judged aircraft at every epoch but the first."""
         links = self.model.links(position_m)
         mine = links.receiver == self.model.user
@@ -125,7 +125,7 @@ class Session:
 class StepMeasure:
     """Loss at the end of one step as a function of its controls, those before it being given."""
 
-    def __init__(self, session: Session, criterion: LocalCriterion, controls: FloatArray, step: int) -> None:
+    def __init__(self, session: PlannedSession, criterion: LocalCriterion, controls: FloatArray, step: int) -> None:
         self._session, self._criterion, self._controls, self._step = session, criterion, controls, step
 
     def __call__(self, values: FloatArray) -> tuple[float, FloatArray]:
@@ -148,7 +148,7 @@ class StepMeasure:
         return float(loss(geometry, self._criterion)[0]) + LAST_WEIGHT * crowding, by_controls
 
 
-def local_law(session: Session, criterion: LocalCriterion) -> Law:
+def local_law(session: PlannedSession, criterion: LocalCriterion) -> Law:
     """The law that makes a measure of geometry best at each step in its turn.
 
     Each step is searched from the control before it and from both ends of what may be reached; the least loss is taken.
@@ -168,7 +168,7 @@ def local_law(session: Session, criterion: LocalCriterion) -> Law:
 
 
 def _best_step(
-    session: Session,
+    session: PlannedSession,
     criterion: LocalCriterion,
     controls: FloatArray,
     step: int,
@@ -191,7 +191,7 @@ def _best_step(
     return min(found, key=lambda one: one.loss)
 
 
-def integral_law(session: Session, starts: Sequence[FloatArray]) -> Law:
+def integral_law(session: PlannedSession, starts: Sequence[FloatArray]) -> Law:
     """The law with the least tr(Theta P) at the end, the best of descents from several starts.
 
     Where it brings aircraft nearer to each other than the separation, descents with a weight on that follow from all
@@ -215,7 +215,7 @@ def integral_law(session: Session, starts: Sequence[FloatArray]) -> Law:
     )
 
 
-def _descents(session: Session, starts: Sequence[FloatArray], weight: float) -> list[Minimum]:
+def _descents(session: PlannedSession, starts: Sequence[FloatArray], weight: float) -> list[Minimum]:
     settings = session.plan.control
     return [
         minimise(
@@ -230,7 +230,7 @@ def _descents(session: Session, starts: Sequence[FloatArray], weight: float) -> 
     ]
 
 
-def random_starts(session: Session, count: int, seed: int) -> list[FloatArray]:
+def random_starts(session: PlannedSession, count: int, seed: int) -> list[FloatArray]:
     """Draw controls that wander within the bounds.
 
     They are straight lines between random knots.

@@ -20,7 +20,7 @@ SINGULAR = 1e-12  # of the least eigenvalue over the number of sources: less is 
 
 
 @dataclass(frozen=True)
-class Geometry:
+class InformationModes:
     """Eigenvalues (epochs, a), ascending, and vectors (epochs, a, a) of H'H at each epoch.
 
     ``H`` has shape (epochs, l, a).
@@ -57,7 +57,7 @@ class Geometry:
         return np.asarray(np.sqrt((shares * inverse).sum(axis=1)))
 
 
-def geometry_of(direction: FloatArray, axes: Sequence[Axis]) -> Geometry:
+def geometry_of(direction: FloatArray, axes: Sequence[Axis]) -> InformationModes:
     """Geometry from the directions (epochs, l, 3) to the sources of one aircraft.
 
     Examples
@@ -69,10 +69,10 @@ def geometry_of(direction: FloatArray, axes: Sequence[Axis]) -> Geometry:
     full = np.concatenate([direction, np.ones((*direction.shape[:2], 1))], axis=2)
     H = full[:, :, [COLUMN[axis] for axis in axes]]
     eigenvalues, vectors = np.linalg.eigh(np.swapaxes(H, 1, 2) @ H)
-    return Geometry(H, np.maximum(eigenvalues, 0.0), vectors)
+    return InformationModes(H, np.maximum(eigenvalues, 0.0), vectors)
 
 
-def loss(geometry: Geometry, criterion: LocalCriterion) -> FloatArray:
+def loss(geometry: InformationModes, criterion: LocalCriterion) -> FloatArray:
     """Return the quantity that a local criterion minimises at each epoch, shape (epochs,).
 
     Minus the determinant, minus the least eigenvalue, or the dilution; that is infinite where H'H is singular.
@@ -84,7 +84,7 @@ def loss(geometry: Geometry, criterion: LocalCriterion) -> FloatArray:
     return np.nan_to_num(geometry.dilution(), nan=np.inf)
 
 
-def loss_by_direction(geometry: Geometry, criterion: LocalCriterion, axes: Sequence[Axis]) -> FloatArray:
+def loss_by_direction(geometry: InformationModes, criterion: LocalCriterion, axes: Sequence[Axis]) -> FloatArray:
     """Derivative of the loss by the directions, shape (epochs, l, 3); of a singular H'H zero.
 
     With A = H'H the derivative by H is 2 H times that by A: adj(A) of the determinant, n n' of the least eigenvalue

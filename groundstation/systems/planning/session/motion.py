@@ -16,7 +16,7 @@ from groundstation.systems.planning.session.scenario import Controlled, SessionP
 
 
 @dataclass(frozen=True)
-class Bounds:
+class ControlBounds:
     """One control with its bounds: which aircraft, range of values, change per step; in m/s.
 
     Parameters
@@ -60,18 +60,20 @@ class SessionMotion:
     plan: SessionPlan
 
     @cached_property
-    def bounds(self) -> tuple[Bounds, ...]:
+    def bounds(self) -> tuple[ControlBounds, ...]:
         """Every control, in the order of the aircraft."""
         found = []
         for number, one in enumerate(self.plan.aircraft):
             if "speed" in one.control:
                 change = one.acceleration_mps2 * self.plan.step_s
-                found.append(Bounds(number, "speed", one.speed_mps, one.speed_low_mps, one.speed_high_mps, change, 1.0))
+                found.append(
+                    ControlBounds(number, "speed", one.speed_mps, one.speed_low_mps, one.speed_high_mps, change, 1.0)
+                )
             if "heading" in one.control:
                 scale = one.speed_mps
                 start, swing = (scale * np.deg2rad(value) for value in (one.track_deg, one.heading_swing_deg))
                 change = scale * np.deg2rad(one.turn_rate_dps) * self.plan.step_s
-                found.append(Bounds(number, "heading", start, start - swing, start + swing, change, scale))
+                found.append(ControlBounds(number, "heading", start, start - swing, start + swing, change, scale))
         return tuple(found)
 
     @cached_property

@@ -8,7 +8,7 @@ from groundstation.base.angles import FloatArray
 from groundstation.base.findings import Finding
 from groundstation.results.figures import FigureData
 from groundstation.systems.planning.session.accuracy import PLACE, AccuracyModel
-from groundstation.systems.planning.session.measures import Geometry, geometry_of
+from groundstation.systems.planning.session.measures import InformationModes, geometry_of
 from groundstation.systems.planning.session.placement_answer import GIVEN, DesignRow, PlacementPlan, PlaceRow
 from groundstation.systems.planning.session.placement_arrays import (
     PlacementAccuracy,
@@ -71,7 +71,7 @@ def _designed(site: Site, criterion: Criterion, over: Over) -> Design:
     return Design(f"{criterion}_{over}", best.x, *work, tuple(losses))
 
 
-def _geometry(site: Site, model: AccuracyModel, position_m: FloatArray) -> Geometry:
+def _geometry(site: Site, model: AccuracyModel, position_m: FloatArray) -> InformationModes:
     links = model.links(position_m)
     return geometry_of(links.direction[:, links.receiver == model.user], site.plan.placement.axes)
 

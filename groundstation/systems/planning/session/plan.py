@@ -13,8 +13,8 @@ from groundstation.systems.plan import Planned
 from groundstation.systems.planning.session.accuracy import PLACE, Accuracy
 from groundstation.systems.planning.session.answer import UNCONTROLLED, ControlPlan, ControlRow, Horizon, LawRow
 from groundstation.systems.planning.session.arrays import ControlMeasures, ControlPaths, ControlPoints
-from groundstation.systems.planning.session.laws import Law, Session, integral_law, local_law, random_starts
-from groundstation.systems.planning.session.measures import Geometry
+from groundstation.systems.planning.session.laws import Law, PlannedSession, integral_law, local_law, random_starts
+from groundstation.systems.planning.session.measures import InformationModes
 from groundstation.systems.planning.session.motion import Paths
 from groundstation.systems.planning.session.placement import plan_placement
 from groundstation.systems.planning.session.scenario import LOCAL_CRITERIA, NEAREST_M, SessionPlan
@@ -35,7 +35,7 @@ class LawResult:
     law: Law
     paths: Paths
     accuracy: Accuracy
-    geometry: Geometry
+    geometry: InformationModes
 
     @property
     def horizon(self) -> Horizon:
@@ -59,7 +59,7 @@ def plan_session(plan: SessionPlan) -> Planned:
 
 
 def _control(plan: SessionPlan) -> tuple[ControlPlan, tuple[Finding, ...]]:
-    session = Session(plan)
+    session = PlannedSession(plan)
     _require_distance(session)
     flown = {UNCONTROLLED: _flown(session, UNCONTROLLED, Law(session.motion.uncontrolled))}
     if session.motion.bounds:
@@ -74,13 +74,13 @@ def _control(plan: SessionPlan) -> tuple[ControlPlan, tuple[Finding, ...]]:
     return answer, _findings(session, flown, answer)
 
 
-def _flown(session: Session, name: str, law: Law) -> LawResult:
+def _flown(session: PlannedSession, name: str, law: Law) -> LawResult:
     paths = session.motion.paths(law.controls)
     accuracy = session.model.accuracy(paths.position_m)
     return LawResult(name, law, paths, accuracy, session.geometry(paths.position_m))
 
 
-def _require_distance(session: Session) -> None:
+def _require_distance(session: PlannedSession) -> None:
     """Refuse a session in which an aircraft without control meets a source."""
     plan, links = session.plan, session.model.links(session.motion.paths(session.motion.uncontrolled).position_m)
     epoch, link = (int(place) for place in np.unravel_index(np.argmin(links.range_m), links.range_m.shape))
@@ -95,7 +95,7 @@ def _require_distance(session: Session) -> None:
         )
 
 
-def _answer(session: Session, flown: dict[str, LawResult], recommended: str) -> ControlPlan:
+def _answer(session: PlannedSession, flown: dict[str, LawResult], recommended: str) -> ControlPlan:
     plan, nominal, best = session.plan, flown[UNCONTROLLED], flown[recommended]
     variances = [float((session.theta * one.accuracy.covariance[-1]).sum()) for one in (nominal, best)]
     return ControlPlan(
@@ -113,14 +113,14 @@ def _answer(session: Session, flown: dict[str, LawResult], recommended: str) -> 
     )
 
 
-def _two_sigma(session: Session, accuracy: Accuracy) -> FloatArray:
+def _two_sigma(session: PlannedSession, accuracy: Accuracy) -> FloatArray:
     """Twice the sigmas of the judged aircraft: north, east, up, r; shape (epochs, 4)."""
     own = session.model.first_of(session.model.user) + PLACE
     variance = accuracy.covariance[:, own, own]
     return np.asarray(2.0 * np.sqrt(np.column_stack([variance, variance[:, :2].sum(axis=1)])))
 
 
-def _row(session: Session, one: LawResult) -> LawRow:
+def _row(session: PlannedSession, one: LawResult) -> LawRow:
     links, law, geometry = one.accuracy.links, one.law, one.geometry
     north, east, up, both = _two_sigma(session, one.accuracy)[-1].tolist()
     dop = geometry.dilution()
@@ -150,7 +150,7 @@ def _row(session: Session, one: LawResult) -> LawRow:
     )
 
 
-def _separation_m(session: Session, paths: Paths) -> float | None:
+def _separation_m(session: PlannedSession, paths: Paths) -> float | None:
     """Least distance between any two aircraft; None for a single one."""
     places = paths.position_m[:, : len(session.plan.aircraft)]
     pairs = [
@@ -161,7 +161,7 @@ def _separation_m(session: Session, paths: Paths) -> float | None:
     return float(min(pairs)) if pairs else None
 
 
-def _bounded_share(session: Session, law: Law) -> float:
+def _bounded_share(session: PlannedSession, law: Law) -> float:
     at = []
     for bound, values in zip(session.motion.bounds, law.controls, strict=True):
         room = AT_BOUND * max(bound.high - bound.low, bound.change)
@@ -170,7 +170,7 @@ def _bounded_share(session: Session, law: Law) -> float:
     return float(np.mean(at)) if at else 0.0
 
 
-def _controls(session: Session, best: LawResult) -> tuple[ControlRow, ...]:
+def _controls(session: PlannedSession, best: LawResult) -> tuple[ControlRow, ...]:
     rows = []
     for bound, values in zip(session.motion.bounds, best.law.controls, strict=True):
         speed = bound.kind == "speed"
@@ -191,7 +191,7 @@ def _settings(plan: SessionPlan) -> dict[str, float | str | bool]:
     return flat
 
 
-def _figures(session: Session, flown: dict[str, LawResult]) -> tuple[FigureData, ...]:
+def _figures(session: PlannedSession, flown: dict[str, LawResult]) -> tuple[FigureData, ...]:
     plan, time_s = session.plan, session.plan.step_s * np.arange(session.plan.steps + 1)
     names, count = [one.name for one in plan.aircraft], len(plan.aircraft)
     laws, places = list(flown), np.stack([one.paths.position_m[:, :count] for one in flown.values()])
@@ -241,7 +241,7 @@ def _figures(session: Session, flown: dict[str, LawResult]) -> tuple[FigureData,
     return tuple(found)
 
 
-def _findings(session: Session, flown: dict[str, LawResult], answer: ControlPlan) -> tuple[Finding, ...]:
+def _findings(session: PlannedSession, flown: dict[str, LawResult], answer: ControlPlan) -> tuple[Finding, ...]:
     best, row = flown[answer.recommended], answer.law(answer.recommended)
     found: list[Finding] = []
     if not session.motion.bounds:

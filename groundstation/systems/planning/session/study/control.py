@@ -11,7 +11,7 @@ from groundstation.chapters.parts import Section
 from groundstation.methods.intervals import nees_limits
 from groundstation.results.figures import FigureData
 from groundstation.systems.planning.session.answer import UNCONTROLLED, ControlPlan
-from groundstation.systems.planning.session.laws import Session, integral_law, local_law
+from groundstation.systems.planning.session.laws import PlannedSession, integral_law, local_law
 from groundstation.systems.planning.session.placement import plan_placement
 from groundstation.systems.planning.session.placement_answer import PlacementPlan
 from groundstation.systems.planning.session.plan import plan_session
@@ -83,7 +83,7 @@ def laws_table(plan: SessionPlan, runs: int, seed: int, tell: Progress) -> Figur
 
     Computed sigma, errors of simulated flights, NEES with its limits.
     """
-    session = Session(plan)
+    session = PlannedSession(plan)
     laws = {UNCONTROLLED: session.motion.uncontrolled}
     laws |= {name: local_law(session, name).controls for name in LOCAL_CRITERIA}
     laws["covariance"] = integral_law(session, list(laws.values())).controls

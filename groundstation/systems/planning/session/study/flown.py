@@ -11,7 +11,7 @@ import numpy as np
 
 from groundstation.base.angles import FloatArray
 from groundstation.systems.planning.session.accuracy import CLOCK, EAST, NORTH, AccuracyModel
-from groundstation.systems.planning.session.laws import Session
+from groundstation.systems.planning.session.laws import PlannedSession
 from groundstation.systems.planning.session.motion import Paths
 
 PASSES = 3  # linearisations of each epoch: one is not enough 300 m off at ranges of 1 km
@@ -30,7 +30,7 @@ class EndErrors:
     runs: int
 
 
-def fly(session: Session, paths: Paths, runs: int, rng: np.random.Generator) -> EndErrors:
+def fly(session: PlannedSession, paths: Paths, runs: int, rng: np.random.Generator) -> EndErrors:
     """Fly one law many times; only the judged aircraft is estimated, all others are exact.
 
     The filter is an iterated extended one (Bell and Cathey, 1993): at each epoch the ranges are taken anew about the
