@@ -79,7 +79,7 @@ def told(names: Iterable[str], units: Iterable[str] = ()) -> ColumnFacts:
     Examples
     --------
     >>> told(["GPS Ground Track (deg true)"])
-    Told(unit=('deg', 1.0), north='true', height='')
+    ColumnFacts(unit=('deg', 1.0), north='true', height='')
     >>> told(["AltMSL"], ["ft msl"]).height, told(["HDG", "Magnetic Heading (deg)"]).north
     ('msl', 'magnetic')
     """

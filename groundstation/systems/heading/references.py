@@ -116,7 +116,7 @@ def logged_reference(flight_metadata: Mapping[str, str]) -> ParkedHeading | None
     Examples
     --------
     >>> logged_reference({"reference.parking_heading_deg": "-10", "reference.parking_heading_sigma_deg": "0.02"})
-    Reference(heading_deg=350.0, sigma_deg=0.02, origin='log')
+    ParkedHeading(heading_deg=350.0, sigma_deg=0.02, origin='log')
     >>> logged_reference({"reference.parking_heading_deg": "nan"}) is None
     True
     """
