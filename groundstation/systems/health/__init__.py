@@ -1,0 +1,1 @@
+"""Health of an autopilot in flight: filter, GNSS, vibration, magnetometer, power, links, control."""
