@@ -29,6 +29,8 @@ class Measure:
         Worst value in the air (of the log where it is not logged there) and its flight time.
     median : float or None
         Of the samples in the air.
+    mean : float or None
+        Over the time in the air.
     amber_share, red_share : float or None
         Shares of the time in the air in which it is logged; amber includes red.
     amber_share_log, red_share_log : float or None
@@ -57,6 +59,7 @@ class Measure:
     worst: float
     worst_at_s: float
     median: float | None
+    mean: float | None
     amber_share: float | None
     red_share: float | None
     amber_share_log: float | None

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from groundstation.base.records import Int64Array
 from groundstation.base.units import NS_PER_S
 from groundstation.systems.health.answer import Check, Measure, Verdict
 from groundstation.systems.health.evidence import Event, Evidence, FloatArray, Spans
@@ -32,6 +33,7 @@ CHECKS: Mapping[str, str] = {  # in the order they are told
 ORDER: tuple[Verdict, ...] = ("not_logged", "pass", "warn", "fail")
 HOLD_STEPS, SHORTEST_HOLD_S, LONGEST_HOLD_S = 3.0, 0.2, 10.0
 EVENTS_TOLD = 3
+ONLY_FLOWN = ("tracking", "saturation")  # on the ground nothing follows its setpoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +73,15 @@ def judge(
     judged : tuple of Judged
         The evidence behind them.
     """
-    judged = [one for each in evidence if (one := _judged(flight, each, air, limits[each.quantity])) is not None]
+    clocks: dict[int, _Clock] = {}  # several quantities share the rows of a topic
+    judged = []
+    for each in evidence:
+        if each.check in ONLY_FLOWN and not air.is_flown:
+            continue
+        if id(each.time_ns) not in clocks:
+            clocks[id(each.time_ns)] = _clock(each.time_ns, air)
+        one = _judged(flight, each, air, limits[each.quantity], clocks[id(each.time_ns)])
+        judged += [] if one is None else [one]
     checks = []
     for key, title in CHECKS.items():
         measures = tuple(one.measure for one in judged if one.measure.check == key)
@@ -79,21 +89,35 @@ def judge(
     return tuple(checks), tuple(judged)
 
 
-def _judged(flight: Flight, evidence: Evidence, air: Spans, limit: Threshold) -> Judged | None:
+@dataclass(frozen=True, eq=False)
+class _Clock:
+    """Rows of a topic: until when each speaks, and for how many seconds, in all and of the judged spans."""
+
+    time_ns: Int64Array
+    until_ns: Int64Array
+    seconds: FloatArray
+    all_s: FloatArray
+
+
+def _clock(time_ns: Int64Array, air: Spans) -> _Clock:
+    steps = np.diff(time_ns)
+    step_ns = float(np.median(steps)) if len(steps) else 0.0
+    hold_ns = int(np.clip(HOLD_STEPS * step_ns, SHORTEST_HOLD_S * NS_PER_S, LONGEST_HOLD_S * NS_PER_S))
+    last_ns = time_ns[-1] + min(int(step_ns), hold_ns)
+    until_ns = np.minimum(np.append(time_ns[1:], last_ns), time_ns + hold_ns)
+    return _Clock(time_ns, until_ns, air.until(until_ns) - air.until(time_ns), (until_ns - time_ns) / NS_PER_S)
+
+
+def _judged(flight: Flight, evidence: Evidence, air: Spans, limit: Threshold, clock: _Clock) -> Judged | None:
     """Judge one quantity; None where nothing of it is logged."""
     known = np.isfinite(evidence.value)
     if not known.any():
         return None
-    time_ns, value = evidence.time_ns, evidence.value
-    step_ns = float(np.median(np.diff(time_ns))) if len(time_ns) > 1 else 0.0
-    hold_ns = int(np.clip(HOLD_STEPS * step_ns, SHORTEST_HOLD_S * NS_PER_S, LONGEST_HOLD_S * NS_PER_S))
-    last_ns = time_ns[-1] + min(int(step_ns), hold_ns)
-    until_ns = np.minimum(np.append(time_ns[1:], last_ns), time_ns + hold_ns)
-    grade = np.where(known, _grades(value, limit), -1)
+    time_ns, until_ns = clock.time_ns, clock.until_ns
+    grade = np.where(known, _grades(evidence.value, limit), -1)
     if limit.hold_s > 0.0:
         grade = _lasting(time_ns, until_ns, grade, round(limit.hold_s * NS_PER_S))
-    seconds = np.where(known, air.until(until_ns) - air.until(time_ns), 0.0)
-    all_s = np.where(known, (until_ns - time_ns) / NS_PER_S, 0.0)
+    seconds, all_s = np.where(known, clock.seconds, 0.0), np.where(known, clock.all_s, 0.0)
     measure = _measure(flight, evidence, limit, grade, seconds, all_s, until_ns, air)
     return Judged(evidence, measure, flight.seconds(time_ns), flight.seconds(until_ns), grade)
 
@@ -155,10 +179,13 @@ def _measure(
             ("red_share_log", 2, all_s, whole_s),
         )
     }
+    mean = _mean(value, seconds, flown)
     figure = _figure(value, seconds, flown, limit)
     verdict: Verdict = "not_logged"
     if logged_s > 0.0 and figure is not None:
         verdict = _verdict(figure, shares["amber_share"] or 0.0, shares["red_share"] or 0.0, limit)
+        if verdict == "pass" and limit.amber_mean is not None and mean is not None and mean > limit.amber_mean:
+            verdict = "warn"
     worst_row = _worst_row(value, flown if flown.any() else np.isfinite(value), limit)
     start, end = _worst_span(time_ns, until_ns, grade, seconds)
     return Measure(
@@ -174,6 +201,7 @@ def _measure(
         worst=float(value[worst_row]),
         worst_at_s=float(flight.seconds(time_ns[worst_row : worst_row + 1])[0]),
         median=float(np.median(value[flown])) if flown.any() else None,
+        mean=mean,
         **shares,
         logged_share=min(logged_s / air.seconds, 1.0) if air.seconds > 0.0 else 0.0,
         span_start_s=None if start is None else float(flight.seconds(time_ns[start : start + 1])[0]),
@@ -192,10 +220,15 @@ def _figure(value: FloatArray, seconds: FloatArray, flown: np.ndarray, limit: Th
     if limit.rule == "median":
         return float(np.median(value[flown]))
     if limit.rule == "mean":
-        return float(np.sum(value[flown] * seconds[flown]) / np.sum(seconds[flown]))
+        return _mean(value, seconds, flown)
     if limit.rule == "rise":
         return rise(value, flown)
     return float(value[_worst_row(value, flown, limit)])
+
+
+def _mean(value: FloatArray, seconds: FloatArray, flown: np.ndarray) -> float | None:
+    """Return the mean over time of the rows that were flown."""
+    return float(value[flown] @ seconds[flown] / seconds[flown].sum()) if flown.any() else None
 
 
 def rise(value: FloatArray, flown: np.ndarray) -> float:

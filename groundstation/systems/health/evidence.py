@@ -17,6 +17,7 @@ FloatArray = NDArray[np.float64]
 Grade = Literal["info", "warn", "fail"]
 SHORTEST_FLIGHT_S = 2.0  # a shorter span off the ground is a flag that bounces
 NS = int(NS_PER_S)
+WHOLE_LOG = "in the whole log"
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +80,11 @@ class Spans:
     words: str = "in the air"
 
     @property
+    def is_flown(self) -> bool:
+        """Tell whether anything says that it flew, or was armed, in these spans."""
+        return self.words != WHOLE_LOG
+
+    @property
     def seconds(self) -> float:
         """Length of all spans together."""
         return float(np.sum(self.end_ns - self.start_ns)) / NS_PER_S
@@ -116,7 +122,7 @@ def in_the_air(flight: Flight, known: Known) -> Spans:
 def whole_log(flight: Flight) -> Spans:
     """Return the whole log as one span."""
     end_ns = flight.start_ns + round(flight.duration_s * NS_PER_S)
-    return Spans(np.array([flight.start_ns]), np.array([end_ns]), "nothing says when it flew", "in the whole log")
+    return Spans(np.array([flight.start_ns]), np.array([end_ns]), "nothing says that it flew", WHOLE_LOG)
 
 
 def _by_landed_flag(flight: Flight) -> Spans:

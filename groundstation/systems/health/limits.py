@@ -27,6 +27,8 @@ class Threshold:
         A value above is amber, red.
     amber_below, red_below : float, optional
         A value below is amber, red.
+    amber_mean : float, optional
+        A mean over the time in the air above it warns as well.
     rule : {'share', 'median', 'mean', 'rise'}
         ``share``: the share of time that is amber or red decides. ``median`` and ``mean`` over the flight are compared
         with the limits: amber warns, red fails. ``rise``: a counter; how far it rose is compared with them.
@@ -45,6 +47,7 @@ class Threshold:
     red: float | None = None
     amber_below: float | None = None
     red_below: float | None = None
+    amber_mean: float | None = None
     rule: Rule = "share"
     hold_s: float = number(0.0, 0.0, 3600.0)
     warn_amber: float | None = number(0.05, 0.0, 1.0)
@@ -69,6 +72,7 @@ class Limit:
     red: float | None = None
     amber_below: float | None = None
     red_below: float | None = None
+    amber_mean: float | None = None
     hold_s: float | None = number(None, 0.0, 3600.0)
     warn_amber: float | None = number(None, 0.0, 1.0)
     fail_amber: float | None = number(None, 0.0, 1.0)
