@@ -45,6 +45,8 @@ class Measure:
         Values below the limits are bad, not those above.
     threshold_source : str
         Where the limits come from.
+    is_flag : bool
+        It is set or not, or one of a few states: its number says nothing to people.
     """
 
     check: str
@@ -71,16 +73,28 @@ class Measure:
     red: float | None
     is_below: bool
     threshold_source: str
+    is_flag: bool = False
+
+    @property
+    def name(self) -> str:
+        """What it is and of which: ``vibration (IMU 0)``."""
+        return f"{self.title} ({self.sensor})" if self.sensor else self.title
 
     @property
     def told(self) -> str:
-        """The figure in words: ``vibration of IMU 0 up to 42 m/s2``."""
+        """The figure in words: ``vibration (IMU 0) up to 42 m/s2, above 30 m/s2 for 12 % of the time``."""
         unit = f" {self.unit}" if self.unit else ""
-        name = f"{self.title} of {self.sensor}" if self.sensor else self.title
+        share = self.red_share if self.red_share else self.amber_share
+        limit = self.red if self.red_share else self.amber
         if self.figure is None:
-            return name
-        how = {"share": "down to" if self.is_below else "up to", "median": "median", "mean": "mean", "rise": "rose by"}
-        return f"{name} {how[self.rule]} {self.figure:.3g}{unit}"
+            return self.name
+        if self.rule != "share":
+            how = {"median": "median", "mean": "mean", "rise": "rose by"}[self.rule]
+            return f"{self.name} {how} {self.figure:.3g}{unit}"
+        if self.is_flag:
+            return f"{self.name} for {share:.1%} of the time" if share else self.name
+        over = f", {'below' if self.is_below else 'above'} {limit:g}{unit} for {share:.0%} of the time" if share else ""
+        return f"{self.name} {'down to' if self.is_below else 'up to'} {self.figure:.3g}{unit}{over}"
 
 
 @dataclass(frozen=True)
@@ -133,6 +147,11 @@ class AutopilotHealth(Answer):
     happenings_left_out: int = 0
     settings: dict[str, Any] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
+
+    @property
+    def measures(self) -> tuple[Measure, ...]:
+        """The quantities of all checks, in their order."""
+        return tuple(measure for one in self.checks for measure in one.measures)
 
     def check(self, key: str) -> Check:
         """Return the check of that key."""

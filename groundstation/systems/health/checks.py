@@ -45,6 +45,7 @@ class Judged:
     time_s: FloatArray
     until_s: FloatArray
     grade: np.ndarray
+    is_drawn: bool = True
 
 
 def judge(
@@ -82,6 +83,8 @@ def judge(
             clocks[id(each.time_ns)] = _clock(each.time_ns, air)
         one = _judged(flight, each, air, limits[each.quantity], clocks[id(each.time_ns)])
         judged += [] if one is None else [one]
+    order = {key: place for place, key in enumerate(CHECKS)}
+    judged.sort(key=lambda one: order[one.measure.check])  # as the measures of the checks
     checks = []
     for key, title in CHECKS.items():
         measures = tuple(one.measure for one in judged if one.measure.check == key)
@@ -119,7 +122,7 @@ def _judged(flight: Flight, evidence: Evidence, air: Spans, limit: Threshold, cl
         grade = _lasting(time_ns, until_ns, grade, round(limit.hold_s * NS_PER_S))
     seconds, all_s = np.where(known, clock.seconds, 0.0), np.where(known, clock.all_s, 0.0)
     measure = _measure(flight, evidence, limit, grade, seconds, all_s, until_ns, air)
-    return Judged(evidence, measure, flight.seconds(time_ns), flight.seconds(until_ns), grade)
+    return Judged(evidence, measure, flight.seconds(time_ns), flight.seconds(until_ns), grade, limit.is_drawn)
 
 
 def _grades(value: FloatArray, limit: Threshold) -> np.ndarray:
@@ -210,6 +213,7 @@ def _measure(
         red=limit.red if limit.red is not None else limit.red_below,
         is_below=limit.amber is None and limit.red is None,
         threshold_source=limit.source,
+        is_flag=not limit.is_drawn and limit.rule == "share",
     )
 
 

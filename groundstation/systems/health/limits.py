@@ -36,6 +36,8 @@ class Threshold:
         Amber and red count where they last so long.
     warn_amber, fail_amber, warn_red, fail_red : float, optional
         Shares of time above which the check warns or fails; amber includes red. None: it never does.
+    is_drawn : bool
+        Whether it has a curve; a flag or counter shows in the lanes alone.
     source : str
         Where the limits come from, with its date.
     """
@@ -54,6 +56,7 @@ class Threshold:
     fail_amber: float | None = number(None, 0.0, 1.0)
     warn_red: float | None = number(0.0, 0.0, 1.0)
     fail_red: float | None = number(0.05, 0.0, 1.0)
+    is_drawn: bool = True
     source: str = ""
 
     def __post_init__(self) -> None:

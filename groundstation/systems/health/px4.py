@@ -14,6 +14,7 @@ from groundstation.systems.health.px4_sensors import sensor_evidence
 from groundstation.systems.health.px4_topics import Topic, counted, estimators, topic
 from groundstation.tables.table import Flight
 
+MODULE = re.compile(r"\[(\w+)\]\s+")  # of the autopilot, which wrote a text
 OWN = (
     "raw.vehicle_status",
     "raw.estimator_status",
@@ -76,7 +77,10 @@ def _texts(flight: Flight) -> Iterator[Event]:
         grade = GRADES.get(str(severity), "info")
         if grade == "info" and "failsafe" in str(text).lower():
             grade = "warn"  # a failsafe is not information
-        yield Event("faults", int(time_ns), grade, printable(COLOURS.sub("", str(text))).strip(), TEXT)
+        shown = printable(COLOURS.sub("", str(text))).strip()
+        module = MODULE.match(shown)
+        source = f"{TEXT} {module[1]}" if module else TEXT
+        yield Event("faults", int(time_ns), grade, shown[module.end() :] if module else shown, source)
 
 
 def _modes(flight: Flight) -> Iterator[Event]:

@@ -1,0 +1,119 @@
+"""The flight in one sentence, as a person would say it: GNSS good, filter healthy, vibration high 12:03 to 12:09."""
+
+from collections.abc import Mapping, Sequence
+
+from groundstation.systems.health.answer import Check, Measure, Verdict
+
+FIRST = ("gnss", "innovations", "vibration")  # always told
+MOST_OTHERS = 3
+MOSTLY = 0.8  # of the time: a longer span is "throughout"
+LONGEST = 50  # characters of a message that the sentence quotes
+GOOD: Mapping[str, str] = {"gnss": "GNSS good", "innovations": "filter healthy", "vibration": "vibration low"}
+WARN: Mapping[str, str] = {
+    "gnss": "GNSS weak",
+    "interference": "GNSS disturbed",
+    "innovations": "filter doubts its sensors",
+    "resets": "filter reset",
+    "switches": "sensor or estimator switched",
+    "vibration": "vibration raised",
+    "clipping": "accelerometer clipped",
+    "imu": "IMU doubtful",
+    "magnetometer": "magnetic field changes",
+    "faults": "warnings logged",
+    "timing": "timing or log with losses",
+    "battery": "battery low",
+    "link": "link lost",
+    "tracking": "setpoints followed poorly",
+    "saturation": "actuators at their limit",
+    "settings": "settings differ from what was found",
+}
+FAIL: Mapping[str, str] = {
+    **WARN,
+    "gnss": "GNSS bad",
+    "interference": "GNSS jammed or spoofed",
+    "innovations": "filter rejects its sensors",
+    "vibration": "vibration high",
+    "imu": "IMU bad",
+    "magnetometer": "magnetic field wrong",
+    "faults": "faults logged",
+    "battery": "battery critical",
+    "tracking": "setpoints not followed",
+}
+
+
+def told(checks: Sequence[Check]) -> str:
+    """Return the sentence: GNSS, filter and vibration, then what else warns or fails, the worst first."""
+    known = {one.key: one for one in checks}
+    parts = [_part(known[key]) for key in FIRST if key in known]
+    others = sorted((one for one in checks if one.key not in FIRST and is_bad(one.verdict)), key=_gravity)
+    parts += [_part(one) for one in others[:MOST_OTHERS]]
+    if len(others) > MOST_OTHERS:
+        parts.append(f"and {len(others) - MOST_OTHERS} more")
+    shown = ", ".join(filter(None, parts))
+    return shown[:1].upper() + shown[1:]
+
+
+def is_bad(verdict: Verdict) -> bool:
+    """Tell whether a verdict warns or fails."""
+    return verdict in ("warn", "fail")
+
+
+def _gravity(check: Check) -> bool:
+    return check.verdict != "fail"
+
+
+def _part(check: Check) -> str:
+    if check.verdict == "pass":
+        return GOOD.get(check.key, "")
+    if not is_bad(check.verdict):
+        return {"gnss": "GNSS not logged", "innovations": "filter not logged", "vibration": "vibration not logged"}.get(
+            check.key, ""
+        )
+    special = _special(check)
+    if special.endswith("fix"):
+        return special
+    return f"{special or (FAIL if check.verdict == 'fail' else WARN)[check.key]}{when(check)}"
+
+
+def _special(check: Check) -> str:
+    """Return what a person would say of this one, where it is more than the general word."""
+    if check.key == "gnss":
+        fix = next((one for one in check.measures if one.quantity == "fix_type"), None)
+        if fix is not None and fix.red_share == 1.0:
+            return "GNSS never had a fix"
+    if check.key == "faults" and check.first_event_s is not None:
+        first = check.reason.partition("; ")[0]
+        return f"“{first}”" if len(first) <= LONGEST else ""
+    return ""
+
+
+def when(check: Check) -> str:
+    """Return the worst span or the first event of a check: `` 12:03-12:09``; empty where it is most of the flight."""
+    measure = decisive(check)
+    if check.first_event_s is not None:
+        return f" at {clock(check.first_event_s)}"
+    if measure is None or measure.span_start_s is None or measure.span_end_s is None:
+        return ""
+    share = measure.red_share if check.verdict == "fail" and measure.red_share else measure.amber_share
+    if share is not None and share > MOSTLY:
+        return " throughout"
+    start, end = clock(measure.span_start_s), clock(measure.span_end_s)
+    return f" at {start}" if start == end else f" {start}-{end}"
+
+
+def decisive(check: Check) -> Measure | None:
+    """Return the quantity that decided the verdict of a check; the first of them where nothing is wrong."""
+    return next((one for one in check.measures if one.verdict == check.verdict), None)
+
+
+def clock(seconds: float) -> str:
+    """Return flight time as minutes and seconds.
+
+    Examples
+    --------
+    >>> clock(723.4), clock(3725.0)
+    ('12:03', '1:02:05')
+    """
+    hours, rest = divmod(int(max(seconds, 0.0)), 3600)
+    tail = f"{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
+    return f"{hours}:{tail}" if hours else tail

@@ -1,0 +1,67 @@
+"""Tab on autopilot health: a lane for each check, the quantities of each, messages in time, the chapter."""
+
+import numpy as np
+import rerun.blueprint as rrb
+
+from groundstation.chapters.markdown import markdown
+from groundstation.results.flight import FlightResults
+from groundstation.systems.health.answer import AutopilotHealth
+from groundstation.systems.health.arrays import HealthLanes
+from groundstation.systems.health.chapter import health as chapter
+from groundstation.viewer import colours
+from groundstation.viewer.names import path_parts
+from groundstation.viewer.plot_views import panels_of, plot_of
+from groundstation.viewer.recorder import Recorder
+from groundstation.viewer.views import document, lanes
+
+PALETTE = {"good": colours.GREEN, "amber": colours.ORANGE, "red": colours.VERMILION}
+
+
+def health(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
+    """Log the tab; None for a log without an autopilot."""
+    answer, section = results.answer(AutopilotHealth), chapter(results)
+    if answer is None or section is None:
+        return None
+    recorder.document("health/answer", markdown(section))
+    left: list[rrb.View | rrb.Container] = []
+    shown = _lanes(recorder, answer, results.rows_of(HealthLanes))
+    if shown is not None:
+        left.append(shown)
+    checks = []
+    for one in sorted(answer.checks, key=lambda check: ("fail", "warn", "pass", "not_logged").index(check.verdict)):
+        views = panels_of(recorder, plot_of(recorder, "health.panels", results, one.key))
+        if views:
+            checks.append(rrb.Vertical(contents=views, name=one.title[:1].upper() + one.title[1:]))
+    if checks:
+        left.append(rrb.Tabs(contents=checks, active_tab=0))
+    right: list[rrb.View] = [document("What was found", "health/answer")]
+    if _messages(recorder, answer):
+        columns = rrb.TextLogColumns(text_log_columns=["loglevel", "body"])
+        right.append(rrb.TextLogView(name="Messages and modes", origin="/health/messages", columns=columns))
+    contents: list[rrb.View | rrb.Container] = [rrb.Vertical(contents=right, row_shares=[3.0, 2.0][: len(right)])]
+    if left:
+        contents.insert(0, rrb.Vertical(contents=left, row_shares=[2.0, 3.0][: len(left)]))
+    return rrb.Horizontal(contents=contents, column_shares=[3.0, 2.0][: len(contents)], name="Autopilot health")
+
+
+def _lanes(recorder: Recorder, answer: AutopilotHealth, data: HealthLanes | None) -> rrb.View | None:
+    """Log a lane for each check, whose state is its grade."""
+    if data is None:
+        return None
+    titles = [one.title for one in answer.checks if np.any(data.check == one.title)]
+    paths = [f"health/lanes/{place:02d} {part}" for place, part in enumerate(path_parts(titles))]
+    for title, path in zip(titles, paths, strict=True):
+        own = data.where(data.check == title)
+        order = np.argsort(own.start_s, kind="stable")
+        recorder.spans(path, own.start_s[order], own.end_s[order], own.grade[order], PALETTE)
+    return lanes("Checks: green within limits, orange amber, red beyond", paths) if paths else None
+
+
+def _messages(recorder: Recorder, answer: AutopilotHealth) -> bool:
+    """Log what happened as lines in time; False where nothing did."""
+    if not answer.happenings:
+        return False
+    ordered = sorted(answer.happenings, key=lambda one: one.time_s)
+    time_ns = recorder.time_ns(np.array([one.time_s for one in ordered]))
+    recorder.texts("health/messages", time_ns, [one.text for one in ordered], [one.grade for one in ordered])
+    return True
