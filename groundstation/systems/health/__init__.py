@@ -1,1 +1,4 @@
-"""Health of an autopilot in flight: filter, GNSS, vibration, magnetometer, power, links, control."""
+"""Health of an autopilot in flight.
+
+Filter, GNSS, vibration, magnetometer, power, links, control.
+"""

@@ -1,4 +1,7 @@
-"""Autopilot health as an analysis: every check of the log's own record, and the flight in a sentence."""
+"""Autopilot health as an analysis.
+
+Every check of the log's own record, and the flight in a sentence.
+"""
 
 from dataclasses import asdict
 from typing import TYPE_CHECKING, NamedTuple
@@ -25,7 +28,7 @@ CODE = "health"
 
 
 class _Checked(NamedTuple):
-    """What the checks found."""
+    """Result of the checks."""
 
     autopilot: str
     air: "Spans"
@@ -58,7 +61,7 @@ def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[Auto
             series_figure(found.judged),
         ),
     )
-    return Found(answer, tuple(_finding(one) for one in found.checks if one.verdict in ("warn", "fail")))
+    return Found(answer, tuple(_finding(one) for one in found.checks if one.is_bad))
 
 
 def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Checked:
@@ -86,7 +89,10 @@ def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Check
 
 
 def _examine(flight: "Flight", known: Known, settings: HealthSettings) -> tuple[Shortfall, ...]:
-    """Report the checks that cannot be judged, and what the verdicts rest on where nothing says that it flew."""
+    """Report the checks that cannot be judged.
+
+    Also that the whole log was judged, where nothing says that it flew.
+    """
     found = _checked(flight, known, settings)
     missing = [one.title for one in found.checks if one.verdict == "not_logged"]
     told = [] if found.air.is_flown else [Shortfall("nothing says that it flew: judged over the whole log")]
@@ -102,7 +108,7 @@ def _happenings(flight: "Flight", events: "Sequence[Event]", air: "Spans") -> tu
 
 
 def _listed(happenings: tuple[Happening, ...], most: int) -> tuple[Happening, ...]:
-    """Return the happenings that are listed: warnings and failures first, then as many others as there is room."""
+    """Return the happenings that are listed, warnings and failures before others."""
     if len(happenings) <= most:
         return happenings
     order = sorted(range(len(happenings)), key=lambda row: happenings[row].grade == "info")[:most]
@@ -119,9 +125,7 @@ def _stated(settings: HealthSettings) -> dict[str, object]:
 
 
 def _finding(check: Check) -> Finding:
-    from groundstation.systems.health.sentence import decisive
-
-    measure = decisive(check)
+    measure = check.decisive
     place = topic = ""
     if check.first_event_s is not None:
         place = f"at {check.first_event_s:.1f} s"

@@ -9,6 +9,7 @@ from groundstation.results.figures import FigureData
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
 Verdict = Literal["pass", "warn", "fail", "not_logged"]
+FIRST = ("gnss", "innovations", "vibration")  # checks that a flight's sentence and chapter always tell
 
 
 @dataclass(frozen=True)
@@ -77,12 +78,12 @@ class Measure:
 
     @property
     def name(self) -> str:
-        """What it is and of which: ``vibration (IMU 0)``."""
+        """Title and which of several: ``vibration (IMU 0)``."""
         return f"{self.title} ({self.sensor})" if self.sensor else self.title
 
     @property
     def told(self) -> str:
-        """The figure in words: ``vibration (IMU 0) up to 42 m/s2, above 30 m/s2 for 12 % of the time``."""
+        """The figure in words, with its limit and share of the time."""
         unit = f" {self.unit}" if self.unit else ""
         share = self.red_share if self.red_share else self.amber_share
         limit = self.red if self.red_share else self.amber
@@ -112,6 +113,16 @@ class Check:
     measures: tuple[Measure, ...]
     events_in_air: int = 0
     first_event_s: float | None = None
+
+    @property
+    def is_bad(self) -> bool:
+        """Tell whether it warns or fails."""
+        return self.verdict in ("warn", "fail")
+
+    @property
+    def decisive(self) -> Measure | None:
+        """The quantity that decided the verdict; the first with it where several did."""
+        return next((one for one in self.measures if one.verdict == self.verdict), None)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Arrays of autopilot health: grades of each check over time, and the quantities behind them."""
+"""Arrays of autopilot health: grades over time, and the quantities behind."""
 
 from groundstation.results.arrays.typed import Arrays, Counts, Floats, Texts
 

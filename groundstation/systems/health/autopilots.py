@@ -1,4 +1,4 @@
-"""Autopilots whose logs are known: how each is recognised, and where its evidence comes from."""
+"""Autopilots whose logs are known, each with the source of its evidence."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,7 @@
-"""Chapter on autopilot health: the flight in a sentence, a table of checks, lanes, panels, what was logged."""
+"""Chapter on autopilot health.
+
+The flight in a sentence, a table of checks, lanes, panels, what was logged.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -6,9 +9,8 @@ from groundstation.chapters.assessed import without_answer
 from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, Tone
 from groundstation.chapters.wording import ABSENT, clean, clock, number, percent, significant, typeset
 from groundstation.results.flight import FlightResults
-from groundstation.systems.health.answer import AutopilotHealth, Check, Happening, Measure, Verdict
+from groundstation.systems.health.answer import FIRST, AutopilotHealth, Check, Happening, Measure, Verdict
 from groundstation.systems.health.plots import SIGNS
-from groundstation.systems.health.sentence import FIRST, decisive, is_bad
 
 TITLE = "Autopilot health"
 LEAD = "Was GNSS good, was the filter healthy, and what went wrong when."
@@ -26,7 +28,7 @@ def health(results: FlightResults) -> Section | None:
         return without_answer(results, "health", TITLE, LEAD)
     told = [one for one in answer.checks if one.verdict != "not_logged"]
     missing = [one.title for one in answer.checks if one.verdict == "not_logged"]
-    shown = [one.key for one in told if is_bad(one.verdict) or one.key in FIRST]
+    shown = [one.key for one in told if one.is_bad or one.key in FIRST]
     parts: list[Part] = [
         _checks(told),
         *([Note(f"Not logged: {', '.join(missing)}.", "unknown")] if missing else []),
@@ -43,7 +45,7 @@ def health(results: FlightResults) -> Section | None:
 
 
 def _claim(answer: AutopilotHealth) -> Claim:
-    bad = [one for one in answer.checks if is_bad(one.verdict)]
+    bad = [one for one in answer.checks if one.is_bad]
     bad.sort(key=lambda one: one.verdict != "fail")
     figures = tuple((one.title, WORDS[one.verdict], typeset(one.reason)) for one in bad[:4])
     mark = Mark(TONES[answer.verdict], HEADLINES[answer.verdict])
@@ -63,7 +65,7 @@ def _checks(checks: Sequence[Check]) -> Grid:
 
 
 def _check(check: Check) -> tuple[Cell, ...]:
-    measure = decisive(check)
+    measure = check.decisive
     mark = Mark(TONES[check.verdict], WORDS[check.verdict])
     what = typeset(check.reason or ("" if measure is None else measure.told)) or ABSENT
     if measure is None:

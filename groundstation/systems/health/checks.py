@@ -1,4 +1,7 @@
-"""Verdict of each check, from its evidence: shares of time in the air, worst span, and the threshold behind it."""
+"""Verdict of each check, from its evidence.
+
+Shares of time in the air, worst span, and the threshold behind it.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -94,7 +97,10 @@ def judge(
 
 @dataclass(frozen=True, eq=False)
 class _Clock:
-    """Rows of a topic: until when each speaks, and for how many seconds, in all and of the judged spans."""
+    """Rows of a topic: until when each speaks, and for how many seconds.
+
+    ``seconds`` are those of the judged spans, ``all_s`` all.
+    """
 
     time_ns: Int64Array
     until_ns: Int64Array
@@ -218,7 +224,10 @@ def _measure(
 
 
 def _figure(value: FloatArray, seconds: FloatArray, flown: np.ndarray, limit: Threshold) -> float | None:
-    """Return the number that the limits judge: worst value, median, mean over time, or the rise of a counter."""
+    """Return the number that the limits judge.
+
+    Worst value, median, mean over time, or the rise of a counter.
+    """
     if not flown.any():
         return None
     if limit.rule == "median":
@@ -260,7 +269,10 @@ def _worst_row(value: FloatArray, among: np.ndarray, limit: Threshold) -> int:
 def _worst_span(
     time_ns: np.ndarray, until_ns: np.ndarray, grade: np.ndarray, seconds: FloatArray
 ) -> tuple[int | None, int | None]:
-    """Return first and last row of the longest red stretch in the air, else of the longest amber one."""
+    """Return first and last row of the longest red stretch in the air.
+
+    Of the longest amber one where none is red.
+    """
     for level in (2, 1):
         first, last = _runs(time_ns, until_ns, (grade >= level) & (seconds > 0.0))
         if len(first):
@@ -297,7 +309,10 @@ def worst_of(verdicts: Iterable[Verdict]) -> Verdict:
 def _check(
     flight: Flight, key: str, title: str, measures: tuple[Measure, ...], events: Sequence[Event], air: Spans
 ) -> Check:
-    """Put the measures and events of one check together: the worst verdict is that of the check."""
+    """Put the measures and events of one check together.
+
+    The worst verdict is that of the check.
+    """
     time_ns = np.array([one.time_ns for one in events], dtype=np.int64)
     flown = air.hold(time_ns) if len(events) else np.zeros(0, dtype=bool)
     graded: dict[str, Verdict] = {"info": "pass", "warn": "warn", "fail": "fail"}

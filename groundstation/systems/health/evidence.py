@@ -1,4 +1,4 @@
-"""Evidence of an autopilot's health: logged quantities, what happened when, and when it flew."""
+"""Evidence of an autopilot's health: quantities, events, and when it flew."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -156,7 +156,10 @@ def _by_armed(flight: Flight) -> Spans:
 def spans_where(
     time_ns: Int64Array, is_true: NDArray[np.bool_], hold_ns: int, method: str = "", words: str = "in the air"
 ) -> Spans:
-    """Return the spans in which samples say yes, each until the next sample but no longer than ``hold_ns``."""
+    """Return the spans in which samples say yes.
+
+    Each sample speaks until the next one, but no longer than ``hold_ns``.
+    """
     if not len(time_ns):
         return _none()
     until = np.minimum(np.append(time_ns[1:], time_ns[-1]), time_ns + hold_ns)

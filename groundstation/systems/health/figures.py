@@ -1,4 +1,4 @@
-"""Figures of autopilot health: lanes of the checks, and each quantity thinned to its worst values."""
+"""Figures of autopilot health: lanes of checks, quantities thinned."""
 
 from collections.abc import Sequence
 
@@ -100,7 +100,10 @@ def series_figure(judged: Sequence[Judged]) -> HealthSeries:
 
 
 def _worst_of_each(time_s: FloatArray, value: FloatArray, *, is_below: bool) -> tuple[FloatArray, FloatArray]:
-    """Return the worst known value of each stretch of rows, at its time; all rows where they are few."""
+    """Return the worst known value of each stretch of rows, at its time.
+
+    All rows where they are few.
+    """
     if len(value) <= MOST_POINTS:
         return time_s, value
     width = -(-len(value) // MOST_POINTS)

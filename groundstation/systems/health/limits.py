@@ -69,7 +69,7 @@ class Threshold:
 
 @dataclass(frozen=True)
 class Limit:
-    """What a user states of one quantity; what is left out stays as it is shipped."""
+    """Limits that a user states of one quantity; the others stay as shipped."""
 
     amber: float | None = None
     red: float | None = None

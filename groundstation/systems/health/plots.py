@@ -1,4 +1,4 @@
-"""Plots of autopilot health: lanes of the checks, and the quantities of one check against their limits."""
+"""Plots of autopilot health: lanes of the checks, quantities against limits."""
 
 from collections.abc import Iterator, Mapping
 
@@ -48,7 +48,10 @@ def _whole(results: FlightResults, data: HealthLanes) -> tuple[float, float]:
 
 
 def panels(results: FlightResults, key: str) -> Plot | None:
-    """Return the quantities of a check against their limits, a panel each; None where none is a curve."""
+    """Return the quantities of a check against their limits, a panel each.
+
+    None where none is a curve.
+    """
     answer, data = results.answer(AutopilotHealth), results.rows_of(HealthSeries)
     if answer is None or data is None:
         return None

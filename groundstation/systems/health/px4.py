@@ -64,7 +64,10 @@ def evidence(flight: Flight) -> tuple[Evidence, ...]:
 
 
 def events(flight: Flight) -> tuple[Event, ...]:
-    """Return messages graded by their own level, changes of mode and arming, resets and switches, by time."""
+    """Return what happened, by time.
+
+    Messages are graded by their own level; then changes of mode and arming, resets and switches.
+    """
     found = chain(_texts(flight), _modes(flight), _resets(flight), _switches(flight))
     return tuple(sorted(found, key=lambda one: one.time_ns))
 

@@ -1,4 +1,7 @@
-"""Evidence of PX4's control and supplies: battery, links, tracking of setpoints, saturation, switches, faults, CPU."""
+"""Evidence of PX4's control and supplies.
+
+Battery, links, tracking of setpoints, saturation, switches, faults, CPU.
+"""
 
 from collections.abc import Iterator, Mapping
 
@@ -92,7 +95,10 @@ def _links(flight: Flight) -> Iterator[Evidence]:
 
 
 def _down(quaternion: FloatArray) -> FloatArray:
-    """Return the direction of down in the body, shape (n, 3): it has roll and pitch, and no heading."""
+    """Return the direction of down in the body, shape (n, 3).
+
+    It has roll and pitch, and no heading.
+    """
     w, x, y, z = quaternion.T
     with np.errstate(invalid="ignore", divide="ignore"):
         down = np.column_stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)])
@@ -127,7 +133,10 @@ def _attitude(flight: Flight) -> Iterator[Evidence]:
 
 
 def _rates(flight: Flight) -> Iterator[Evidence]:
-    """Yield the difference between rates and their setpoints, meaned over a quarter of a second."""
+    """Yield the difference between rates and their setpoints.
+
+    It is a mean over a quarter of a second: their noise is no error.
+    """
     wanted = topic(flight, "vehicle_rates_setpoint")
     found, fields = topic(flight, "vehicle_angular_velocity"), ("xyz[0]", "xyz[1]", "xyz[2]")
     if found is None or not found.has(*fields):

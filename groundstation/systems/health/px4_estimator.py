@@ -1,4 +1,7 @@
-"""Evidence of PX4's estimator: test ratios, rejections, resets, biases, faults, and one estimator against another."""
+"""Evidence of PX4's estimator.
+
+Test ratios, rejections, resets, biases, faults, and one estimator against another.
+"""
 
 from collections.abc import Iterator, Mapping
 
@@ -104,7 +107,10 @@ OUTPUT = (("output_angle_rad", "rad"), ("output_velocity_mps", "m/s"), ("output_
 
 
 def estimator_evidence(flight: Flight) -> Iterator[Evidence]:
-    """Yield what the estimator logs of itself; of several, the one that flew the aircraft at the time."""
+    """Yield what the estimator logs of itself.
+
+    Of several it is the one that flew the aircraft at the time.
+    """
     yield from _ratios(flight)
     yield from _rejected(flight)
     yield from _gnss_checks(flight)
@@ -116,7 +122,10 @@ def estimator_evidence(flight: Flight) -> Iterator[Evidence]:
 
 
 def is_aligned(flight: Flight) -> bool:
-    """Tell whether the filter ever ran: a log in which its flags stay zero is of one that did not."""
+    """Tell whether the filter ever ran.
+
+    A log in which its flags stay zero is of one that did not.
+    """
     found = [one for one in topics(flight, "estimator_status") if one.has("control_mode_flags")]
     return not found or any(bool((one.values("control_mode_flags") > 0.0).any()) for one in found)
 

@@ -1,4 +1,7 @@
-"""Evidence of PX4's sensors: GNSS, interference, vibration, clipping, magnetometer, IMU against IMU."""
+"""Evidence of PX4's sensors.
+
+GNSS, interference, vibration, clipping, magnetometer, IMU against IMU.
+"""
 
 from collections.abc import Iterator
 
@@ -32,7 +35,10 @@ def sensor_evidence(flight: Flight) -> Iterator[Evidence]:
 
 
 def _gnss(one: Topic) -> Iterator[Evidence]:
-    """Yield what a receiver claims; what it claims without a fix is none, and zero is what it does not know."""
+    """Yield what a receiver claims.
+
+    Without a fix it claims nothing, and zero is what it does not know.
+    """
     name = f"GNSS {one.instance + 1}" if one.instance else "GNSS"
     fix = one.values("fix_type")
     is_fixed = ~(fix < LEAST_FIX)

@@ -1,4 +1,7 @@
-"""Reading of PX4's own topics: columns that may be missing, estimators of several, counters that wrap."""
+"""Reading of PX4's own topics.
+
+Columns may be missing, estimators several, and counters wrap.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -51,7 +54,10 @@ class Topic:
 
 
 def topics(flight: Flight, name: str) -> Iterator[Topic]:
-    """Yield the instances of a topic that have rows: ``vehicle_imu_status``, ``vehicle_imu_status.1``."""
+    """Yield the instances of a topic that have rows.
+
+    ``vehicle_imu_status``, ``vehicle_imu_status.1`` ...
+    """
     for instance in range(MOST_INSTANCES):
         full = f"{RAW}{name}" if instance == 0 else f"{RAW}{name}.{instance}"
         if full in flight and len(flight[full]):
@@ -64,7 +70,9 @@ def topic(flight: Flight, *names: str) -> Topic | None:
 
 
 def estimators(flight: Flight, name: str) -> list[tuple[Topic, BoolArray]]:
-    """Return the instances of an estimator's topic, and the rows in which each was the one that flew the aircraft.
+    """Return the instances of an estimator's topic.
+
+    With each the rows in which it was the one that flew the aircraft.
 
     Without ``estimator_selector_status`` it is the first.
     """
@@ -98,7 +106,9 @@ def largest(one: Topic, fields: Sequence[str]) -> FloatArray:
 
 
 def counted(value: FloatArray, modulus: int = 256) -> FloatArray:
-    """Return a counter that wraps as one that only rises from zero; a jump beyond half its range is a new start.
+    """Return a counter that wraps as one that only rises from zero.
+
+    A jump beyond half its range is a new start.
 
     Examples
     --------
@@ -114,7 +124,9 @@ def counted(value: FloatArray, modulus: int = 256) -> FloatArray:
 
 
 def newest(one: Topic, value: NDArray[np.float64], at_ns: Int64Array, oldest_s: float = NEWEST_OLD_S) -> FloatArray:
-    """Return the newest row of a topic at given times, NaN where there is none or it is too old.
+    """Return the newest row of a topic at given times.
+
+    NaN where there is none or it is too old.
 
     ``value`` has shape (n,) or (n, k).
     """

@@ -1,10 +1,12 @@
-"""The flight in one sentence, as a person would say it: GNSS good, filter healthy, vibration high 12:03 to 12:09."""
+"""The flight in one sentence, as a person would say it.
+
+GNSS good, filter healthy, vibration high 12:03-12:09.
+"""
 
 from collections.abc import Mapping, Sequence
 
-from groundstation.systems.health.answer import Check, Measure, Verdict
+from groundstation.systems.health.answer import FIRST, Check
 
-FIRST = ("gnss", "innovations", "vibration")  # always told
 MOST_OTHERS = 3
 MOSTLY = 0.8  # of the time: a longer span is "throughout"
 LONGEST = 50  # characters of a message that the sentence quotes
@@ -42,20 +44,18 @@ FAIL: Mapping[str, str] = {
 
 
 def told(checks: Sequence[Check]) -> str:
-    """Return the sentence: GNSS, filter and vibration, then what else warns or fails, the worst first."""
+    """Return the sentence.
+
+    GNSS, filter and vibration, then what else warns or fails, the worst first.
+    """
     known = {one.key: one for one in checks}
     parts = [_part(known[key]) for key in FIRST if key in known]
-    others = sorted((one for one in checks if one.key not in FIRST and is_bad(one.verdict)), key=_gravity)
+    others = sorted((one for one in checks if one.key not in FIRST and one.is_bad), key=_gravity)
     parts += [_part(one) for one in others[:MOST_OTHERS]]
     if len(others) > MOST_OTHERS:
         parts.append(f"and {len(others) - MOST_OTHERS} more")
     shown = ", ".join(filter(None, parts))
     return shown[:1].upper() + shown[1:]
-
-
-def is_bad(verdict: Verdict) -> bool:
-    """Tell whether a verdict warns or fails."""
-    return verdict in ("warn", "fail")
 
 
 def _gravity(check: Check) -> bool:
@@ -65,7 +65,7 @@ def _gravity(check: Check) -> bool:
 def _part(check: Check) -> str:
     if check.verdict == "pass":
         return GOOD.get(check.key, "")
-    if not is_bad(check.verdict):
+    if not check.is_bad:
         return {"gnss": "GNSS not logged", "innovations": "filter not logged", "vibration": "vibration not logged"}.get(
             check.key, ""
         )
@@ -88,8 +88,8 @@ def _special(check: Check) -> str:
 
 
 def when(check: Check) -> str:
-    """Return the worst span or the first event of a check: `` 12:03-12:09``; empty where it is most of the flight."""
-    measure = decisive(check)
+    """Return the worst span or the first event of a check: `` 12:03-12:09``."""
+    measure = check.decisive
     if check.first_event_s is not None:
         return f" at {clock(check.first_event_s)}"
     if measure is None or measure.span_start_s is None or measure.span_end_s is None:
@@ -99,11 +99,6 @@ def when(check: Check) -> str:
         return " throughout"
     start, end = clock(measure.span_start_s), clock(measure.span_end_s)
     return f" at {start}" if start == end else f" {start}-{end}"
-
-
-def decisive(check: Check) -> Measure | None:
-    """Return the quantity that decided the verdict of a check; the first of them where nothing is wrong."""
-    return next((one for one in check.measures if one.verdict == check.verdict), None)
 
 
 def clock(seconds: float) -> str:

@@ -1,4 +1,4 @@
-"""Tab on autopilot health: a lane for each check, the quantities of each, messages in time, the chapter."""
+"""Tab on autopilot health: checks, quantities, messages, the chapter."""
 
 import numpy as np
 import rerun.blueprint as rrb
