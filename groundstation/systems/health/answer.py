@@ -12,6 +12,13 @@ Verdict = Literal["pass", "warn", "fail", "not_logged"]
 FIRST = ("gnss", "innovations", "vibration")  # checks that a flight's sentence and chapter always tell
 
 
+def _percent(share: float) -> str:
+    """Return a share that is not zero: ``12 %``, ``under 0.1 %``."""
+    if share < 0.001:
+        return "under 0.1 %"
+    return f"{100.0 * share:.0f} %" if share >= 0.0995 else f"{100.0 * share:.1f} %"
+
+
 @dataclass(frozen=True)
 class Measure:
     """One logged quantity as it was judged.
@@ -93,8 +100,12 @@ class Measure:
             how = {"median": "median", "mean": "mean", "rise": "rose by"}[self.rule]
             return f"{self.name} {how} {self.figure:.3g}{unit}"
         if self.is_flag:
-            return f"{self.name} for {share:.1%} of the time" if share else self.name
-        over = f", {'below' if self.is_below else 'above'} {limit:g}{unit} for {share:.0%} of the time" if share else ""
+            return f"{self.name} for {_percent(share)} of the time" if share else self.name
+        over = (
+            f", {'below' if self.is_below else 'above'} {limit:g}{unit} for {_percent(share)} of the time"
+            if share
+            else ""
+        )
         return f"{self.name} {'down to' if self.is_below else 'up to'} {self.figure:.3g}{unit}{over}"
 
 

@@ -34,7 +34,7 @@ CHECKS: Mapping[str, str] = {  # in the order they are told
     "settings": "settings against what was found",
 }
 ORDER: tuple[Verdict, ...] = ("not_logged", "pass", "warn", "fail")
-HOLD_STEPS, SHORTEST_HOLD_S, LONGEST_HOLD_S = 3.0, 0.2, 10.0
+HOLD_STEPS, SHORTEST_HOLD_S, LONGEST_HOLD_S = 3.0, 2.0, 10.0  # how long a sample speaks
 EVENTS_TOLD = 3
 ONLY_FLOWN = ("tracking", "saturation")  # on the ground nothing follows its setpoints
 
@@ -99,13 +99,14 @@ def judge(
 class _Clock:
     """Rows of a topic: until when each speaks, and for how many seconds.
 
-    ``seconds`` are those of the judged spans, ``all_s`` all.
+    ``seconds`` are those of the judged spans, ``all_s`` all; ``in_air`` are the rows that lie in the spans.
     """
 
     time_ns: Int64Array
     until_ns: Int64Array
     seconds: FloatArray
     all_s: FloatArray
+    in_air: np.ndarray
 
 
 def _clock(time_ns: Int64Array, air: Spans) -> _Clock:
@@ -114,7 +115,8 @@ def _clock(time_ns: Int64Array, air: Spans) -> _Clock:
     hold_ns = int(np.clip(HOLD_STEPS * step_ns, SHORTEST_HOLD_S * NS_PER_S, LONGEST_HOLD_S * NS_PER_S))
     last_ns = time_ns[-1] + min(int(step_ns), hold_ns)
     until_ns = np.minimum(np.append(time_ns[1:], last_ns), time_ns + hold_ns)
-    return _Clock(time_ns, until_ns, air.until(until_ns) - air.until(time_ns), (until_ns - time_ns) / NS_PER_S)
+    seconds = air.until(until_ns) - air.until(time_ns)
+    return _Clock(time_ns, until_ns, seconds, (until_ns - time_ns) / NS_PER_S, air.hold(time_ns))
 
 
 def _judged(flight: Flight, evidence: Evidence, air: Spans, limit: Threshold, clock: _Clock) -> Judged | None:
@@ -126,8 +128,7 @@ def _judged(flight: Flight, evidence: Evidence, air: Spans, limit: Threshold, cl
     grade = np.where(known, _grades(evidence.value, limit), -1)
     if limit.hold_s > 0.0:
         grade = _lasting(time_ns, until_ns, grade, round(limit.hold_s * NS_PER_S))
-    seconds, all_s = np.where(known, clock.seconds, 0.0), np.where(known, clock.all_s, 0.0)
-    measure = _measure(flight, evidence, limit, grade, seconds, all_s, until_ns, air)
+    measure = _measure(flight, evidence, limit, grade, clock, air)
     return Judged(evidence, measure, flight.seconds(time_ns), flight.seconds(until_ns), grade, limit.is_drawn)
 
 
@@ -167,18 +168,13 @@ def _runs(time_ns: np.ndarray, until_ns: np.ndarray, is_true: np.ndarray) -> tup
 
 
 def _measure(
-    flight: Flight,
-    evidence: Evidence,
-    limit: Threshold,
-    grade: np.ndarray,
-    seconds: FloatArray,
-    all_s: FloatArray,
-    until_ns: np.ndarray,
-    air: Spans,
+    flight: Flight, evidence: Evidence, limit: Threshold, grade: np.ndarray, clock: _Clock, air: Spans
 ) -> Measure:
-    value, time_ns = evidence.value, evidence.time_ns
+    value, time_ns, until_ns = evidence.value, clock.time_ns, clock.until_ns
+    known = np.isfinite(value)
+    seconds, all_s = np.where(known, clock.seconds, 0.0), np.where(known, clock.all_s, 0.0)
     logged_s, whole_s = float(seconds.sum()), float(all_s.sum())
-    flown = seconds > 0.0
+    flown = known & clock.in_air
     shares = {
         name: float(weight[grade >= level].sum() / total) if total > 0.0 else None
         for name, level, weight, total in (
@@ -195,7 +191,7 @@ def _measure(
         verdict = _verdict(figure, shares["amber_share"] or 0.0, shares["red_share"] or 0.0, limit)
         if verdict == "pass" and limit.amber_mean is not None and mean is not None and mean > limit.amber_mean:
             verdict = "warn"
-    worst_row = _worst_row(value, flown if flown.any() else np.isfinite(value), limit)
+    worst_row = _worst_row(value, flown if flown.any() else known, limit)
     start, end = _worst_span(time_ns, until_ns, grade, seconds)
     return Measure(
         check=evidence.check,
@@ -241,7 +237,8 @@ def _figure(value: FloatArray, seconds: FloatArray, flown: np.ndarray, limit: Th
 
 def _mean(value: FloatArray, seconds: FloatArray, flown: np.ndarray) -> float | None:
     """Return the mean over time of the rows that were flown."""
-    return float(value[flown] @ seconds[flown] / seconds[flown].sum()) if flown.any() else None
+    total = float(seconds[flown].sum())
+    return float(value[flown] @ seconds[flown]) / total if total > 0.0 else None
 
 
 def rise(value: FloatArray, flown: np.ndarray) -> float:

@@ -121,7 +121,7 @@ def in_the_air(flight: Flight, known: Known) -> Spans:
 
 def whole_log(flight: Flight) -> Spans:
     """Return the whole log as one span."""
-    end_ns = flight.start_ns + round(flight.duration_s * NS_PER_S)
+    end_ns = flight.start_ns + round(flight.duration_s * NS_PER_S) + 1  # its last sample belongs to it
     return Spans(np.array([flight.start_ns]), np.array([end_ns]), "nothing says that it flew", WHOLE_LOG)
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from groundstation.base.printable import printable
 from groundstation.systems.health.evidence import Event, Evidence, Grade
 from groundstation.systems.health.px4_control import CHANGED, control_evidence
-from groundstation.systems.health.px4_estimator import RESETS, RESETS_OF_OUTPUT, estimator_evidence
+from groundstation.systems.health.px4_estimator import RESETS, RESETS_OF_OUTPUT, estimator_evidence, resets_of
 from groundstation.systems.health.px4_sensors import sensor_evidence
-from groundstation.systems.health.px4_topics import Topic, counted, estimators, topic
+from groundstation.systems.health.px4_topics import Topic, estimators, topic
 from groundstation.tables.table import Flight
 
 MODULE = re.compile(r"\[(\w+)\]\s+")  # of the autopilot, which wrote a text
@@ -115,10 +115,10 @@ def _resets(flight: Flight) -> Iterator[Event]:
         places = [(position, RESETS_OF_OUTPUT)]
     for one, fields in places:
         for field, what in fields.items():
-            value = counted(one.values(field))
-            known = np.flatnonzero(np.isfinite(value))
-            for row in known[1:][np.diff(value[known]) > 0.0]:
-                yield Event("resets", int(one.time_ns[row]), "warn", f"{what} reset", one.source(field))
+            for row, is_by_design in zip(*resets_of(one, field), strict=True):
+                grade: Grade = "info" if is_by_design else "warn"
+                text = "heading aligned in flight" if is_by_design else f"{what} reset"
+                yield Event("resets", int(one.time_ns[row]), grade, text, one.source(field))
 
 
 def _switches(flight: Flight) -> Iterator[Event]:

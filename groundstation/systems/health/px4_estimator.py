@@ -103,6 +103,8 @@ RESETS_OF_OUTPUT: Mapping[str, str] = {
     "z_reset_counter": "height",
     "heading_reset_counter": "attitude and heading",
 }
+OF_HEADING = ("reset_count_quat",)
+ALIGNED_IN_FLIGHT, ALIGNED_NS = 23, 1_000_000_000  # bit of control_mode_flags, and how near a reset of that is
 OUTPUT = (("output_angle_rad", "rad"), ("output_velocity_mps", "m/s"), ("output_position_m", "m"))
 
 
@@ -183,13 +185,37 @@ def _gnss_checks(flight: Flight) -> Iterator[Evidence]:
                 yield evidence_of("gnss", "gnss_checks_failed", sensor, one, "gps_check_fail_flags", value)
 
 
+def resets_of(one: Topic, field: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows in which a counter of resets rises, and which of them the filter makes by design.
+
+    PX4 aligns heading and magnetic field once in flight (bit 23 of control_mode_flags): that is no fault.
+    """
+    value = counted(one.values(field))
+    known = np.flatnonzero(np.isfinite(value))
+    rows = known[1:][np.diff(value[known]) > 0.0]
+    if field not in OF_HEADING or not one.has("control_mode_flags"):
+        return rows, np.zeros(len(rows), dtype=bool)
+    aligned = _bit(one.values("control_mode_flags"), ALIGNED_IN_FLIGHT)
+    begun = one.time_ns[1:][np.diff(aligned) > 0.0]
+    near = np.abs(one.time_ns[rows][:, None] - begun[None, :]) <= ALIGNED_NS
+    return rows, near.any(axis=1)
+
+
+def _resets_counted(one: Topic, field: str) -> FloatArray:
+    """Return how many resets there were so far that are not by design."""
+    rows, is_by_design = resets_of(one, field)
+    steps = np.zeros(len(one.table))
+    steps[rows[~is_by_design]] = np.diff(counted(one.values(field)), prepend=0.0)[rows[~is_by_design]]
+    return np.where(np.isfinite(one.values(field)), np.cumsum(np.nan_to_num(steps, nan=1.0)), np.nan)
+
+
 def _resets(flight: Flight) -> Iterator[Evidence]:
     counted_any = False
     for one, rows in estimators(flight, "estimator_status"):
         for field, sensor in RESETS.items():
             if one.has(field):
                 counted_any = True
-                value = _shown(one, rows, counted(one.values(field)))
+                value = _shown(one, rows, _resets_counted(one, field))
                 yield evidence_of("resets", "resets", sensor, one, field, value)
     position = topic(flight, "vehicle_local_position")
     if counted_any or position is None or not is_aligned(flight):

@@ -75,6 +75,8 @@ def _vibration(flight: Flight) -> Iterator[Evidence]:
     found = False
     for one in topics(flight, "vehicle_imu_status"):
         imu, is_new = f"IMU {one.instance}", "delta_angle_coning_metric" in one.table.columns
+        if not is_new and "gyro_coning_vibration" not in one.table.columns:
+            continue  # of neither era: the unit is not known
         for field, quantity, unit in (
             ("accel_vibration_metric", "accel_vibration_mps2" if is_new else "delta_velocity_vibration_mps", ""),
             ("gyro_vibration_metric", "gyro_vibration_radps" if is_new else "delta_angle_vibration_rad", ""),

@@ -16,6 +16,7 @@ from groundstation.tables.table import Flight, Table
 RAW = "raw."
 MOST_INSTANCES = 9
 SELECTOR = "raw.estimator_selector_status"
+BEYOND_REASON = 1e15  # an integer up to here is exact, and no field of an autopilot is larger
 NEWEST_OLD_S = 1.0  # a value of another topic that is older says nothing
 
 
@@ -34,10 +35,11 @@ class Topic:
         )
 
     def values(self, field: str) -> FloatArray:
-        """Return a field, NaN where it is absent or not in the log."""
+        """Return a field, NaN where it is absent, not in the log, or no number of this world."""
         if field not in self.table.columns:
             return np.full(len(self.table), np.nan)
-        return self.table.values(field)
+        value = self.table.values(field)
+        return np.where(np.abs(value) < BEYOND_REASON, value, np.nan)
 
     def vector(self, field: str, size: int = 3) -> FloatArray:
         """Return the elements of an array field, shape (n, size)."""
