@@ -12,6 +12,7 @@ from groundstation.systems.health.limits import Limit, shipped, thresholds
 from groundstation.systems.health.settings import HealthSettings
 from groundstation.tables.table import Flight
 from tests.systems.health.made import KNOWN, NS, flight, seconds, table
+from tests.systems.health.thresholds_table import PAGE, page
 
 AIR = Spans(np.array([10 * NS]), np.array([90 * NS]), "made")
 
@@ -158,3 +159,8 @@ def test_spans_tell_time_before_and_within() -> None:
     spans = Spans(np.array([10, 50]) * NS, np.array([20, 60]) * NS)
     assert spans.until(np.array([0, 15, 30, 55, 99]) * NS).tolist() == [0.0, 5.0, 10.0, 15.0, 20.0]
     assert spans.hold(np.array([9, 10, 19, 20, 55]) * NS).tolist() == [False, True, True, False, True]
+
+
+def test_page_has_the_shipped_thresholds() -> None:
+    """Written by ``python -m tests.systems.health.thresholds_table``."""
+    assert PAGE.read_text(encoding="utf-8") == page()
