@@ -9,6 +9,7 @@ from groundstation.results.figures import FigureData
 NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
 
 Verdict = Literal["pass", "warn", "fail", "not_logged"]
+WHOLE_LOG = "in the whole log"  # what is judged where nothing says that it flew
 FIRST = ("gnss", "innovations", "vibration")  # checks that a flight's sentence and chapter always tell
 
 
@@ -169,6 +170,11 @@ class AutopilotHealth(Answer):
     happenings_left_out: int = 0
     settings: dict[str, Any] = field(default_factory=dict)
     figures: tuple[FigureData, ...] = ()
+
+    @property
+    def is_flown(self) -> bool:
+        """Tell whether anything says that it flew, or was armed."""
+        return self.judged_over != WHOLE_LOG
 
     @property
     def measures(self) -> tuple[Measure, ...]:

@@ -52,7 +52,8 @@ def _claim(answer: AutopilotHealth) -> Claim:
     passed = sum(one.verdict == "pass" for one in answer.checks)
     logged = sum(one.verdict != "not_logged" for one in answer.checks)
     sentences = [f"{number(passed, 0)} of {number(logged, 0)} checks pass, {answer.judged_over}."]
-    return Claim(Rank.OTHER, mark, typeset(answer.sentence), "", "", sentences, figures)
+    is_danger = answer.verdict == "fail" and answer.is_flown
+    return Claim(Rank.HEALTH, mark, typeset(answer.sentence), "", "", sentences, figures, is_danger=is_danger)
 
 
 def _checks(checks: Sequence[Check]) -> Grid:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from groundstation.base.records import Int64Array, frozen
 from groundstation.base.units import NS_PER_S
+from groundstation.systems.health.answer import WHOLE_LOG
 from groundstation.systems.known import Known
 from groundstation.tables.phases import Phases
 from groundstation.tables.table import Flight
@@ -17,7 +18,6 @@ FloatArray = NDArray[np.float64]
 Grade = Literal["info", "warn", "fail"]
 SHORTEST_FLIGHT_S = 2.0  # a shorter span off the ground is a flag that bounces
 NS = int(NS_PER_S)
-WHOLE_LOG = "in the whole log"
 
 
 @dataclass(frozen=True, eq=False)
