@@ -90,6 +90,15 @@ class Measure:
         return f"{self.title} ({self.sensor})" if self.sensor else self.title
 
     @property
+    def gravity(self) -> tuple[float, float, float]:
+        """Shares that are red and amber, then how much of its first limit the figure is."""
+        limit = self.amber if self.amber is not None else self.red
+        near = 0.0
+        if self.figure is not None and limit is not None and self.figure * limit > 0.0:
+            near = limit / self.figure if self.is_below else self.figure / limit
+        return self.red_share or 0.0, self.amber_share or 0.0, near
+
+    @property
     def told(self) -> str:
         """The figure in words, with its limit and share of the time."""
         unit = f" {self.unit}" if self.unit else ""
@@ -97,11 +106,13 @@ class Measure:
         limit = self.red if self.red_share else self.amber
         if self.figure is None:
             return self.name
+        if self.rule == "rise" and self.figure == 0.0:
+            return f"{self.name}: none"
         if self.rule != "share":
             how = {"median": "median", "mean": "mean", "rise": "rose by"}[self.rule]
             return f"{self.name} {how} {self.figure:.3g}{unit}"
         if self.is_flag:
-            return f"{self.name} for {_percent(share)} of the time" if share else self.name
+            return f"{self.name} for {_percent(share)} of the time" if share else f"{self.name}: never"
         over = (
             f", {'below' if self.is_below else 'above'} {limit:g}{unit} for {_percent(share)} of the time"
             if share
@@ -133,8 +144,9 @@ class Check:
 
     @property
     def decisive(self) -> Measure | None:
-        """The quantity that decided the verdict; the first with it where several did."""
-        return next((one for one in self.measures if one.verdict == self.verdict), None)
+        """The quantity that decided the verdict; where several did, the one farthest beyond its limits."""
+        own = [one for one in self.measures if one.verdict == self.verdict]
+        return max(own, key=lambda one: one.gravity, default=None)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head,
 from groundstation.chapters.wording import ABSENT, clean, clock, number, percent, significant, typeset
 from groundstation.results.flight import FlightResults
 from groundstation.systems.health.answer import FIRST, AutopilotHealth, Check, Happening, Measure, Verdict
-from groundstation.systems.health.plots import SIGNS
+from groundstation.systems.health.plots import SIGNS, sign_of
 
 TITLE = "Autopilot health"
 LEAD = "Was GNSS good, was the filter healthy, and what went wrong when."
@@ -47,11 +47,11 @@ def health(results: FlightResults) -> Section | None:
 def _claim(answer: AutopilotHealth) -> Claim:
     bad = [one for one in answer.checks if one.is_bad]
     bad.sort(key=lambda one: one.verdict != "fail")
-    figures = tuple((one.title, WORDS[one.verdict], typeset(one.reason)) for one in bad[:4])
+    figures = tuple((one.title, WORDS[one.verdict], with_signs(one.reason)) for one in bad[:4])
     mark = Mark(TONES[answer.verdict], HEADLINES[answer.verdict])
     passed = sum(one.verdict == "pass" for one in answer.checks)
     logged = sum(one.verdict != "not_logged" for one in answer.checks)
-    sentences = [f"{number(passed, 0)} of {number(logged, 0)} checks pass, {answer.judged_over}."]
+    sentences = [f"{number(passed, 0)} of {number(logged, 0)} checks pass {answer.judged_over}."]
     is_danger = answer.verdict == "fail" and answer.is_flown
     return Claim(Rank.HEALTH, mark, typeset(answer.sentence), "", "", sentences, figures, is_danger=is_danger)
 
@@ -68,7 +68,7 @@ def _checks(checks: Sequence[Check]) -> Grid:
 def _check(check: Check) -> tuple[Cell, ...]:
     measure = check.decisive
     mark = Mark(TONES[check.verdict], WORDS[check.verdict])
-    what = typeset(check.reason or ("" if measure is None else measure.told)) or ABSENT
+    what = with_signs(check.reason or ("" if measure is None else measure.told)) or ABSENT
     if measure is None:
         when = ABSENT if check.first_event_s is None else clock(check.first_event_s)
         return (check.title, mark, what, ABSENT, ABSENT, when, ABSENT, "level of the message")
@@ -82,6 +82,20 @@ def _check(check: Check) -> tuple[Cell, ...]:
         _limits(measure),
         measure.threshold_source,
     )
+
+
+def with_signs(text: str) -> str:
+    """Return text of the terminal with the signs of a page.
+
+    Examples
+    --------
+    >>> with_signs("vibration up to 42 m/s2")
+    'vibration up to 42 m/s²'
+    """
+    told = typeset(text)
+    for unit, sign in SIGNS.items():
+        told = told.replace(f" {unit}", f" {sign}")
+    return told
 
 
 def _share(measure: Measure, share: float | None) -> str:
@@ -98,7 +112,7 @@ def _limits(measure: Measure) -> str:
     if measure.is_flag:
         return "set"
     sign = "<" if measure.is_below else ">"
-    unit = SIGNS.get(measure.unit, measure.unit)
+    unit = sign_of(measure.unit)
     levels = [significant(level) for level in (measure.amber, measure.red) if level is not None]
     return f"{sign} {' / '.join(levels)} {unit}".strip() if levels else ABSENT
 
@@ -123,7 +137,7 @@ def _measures(answer: AutopilotHealth) -> Grid:
         (
             one.name,
             Mark(TONES[one.verdict], WORDS[one.verdict]),
-            f"{significant(one.worst)} {SIGNS.get(one.unit, one.unit)}".strip(),
+            f"{significant(one.worst)} {sign_of(one.unit)}".strip(),
             clock(one.worst_at_s),
             significant(one.median),
             f"{percent(one.amber_share, 1)} / {percent(one.amber_share_log, 1)}",

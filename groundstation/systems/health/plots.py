@@ -62,8 +62,8 @@ def panels(results: FlightResults, key: str) -> Plot | None:
     lane = results.rows_of(HealthLanes)
     axis = time_axis(*span(data.time_s)) if lane is None else time_axis(*_whole(results, lane))
     rows = tuple(
-        Row((Panel(marks, axis, Axis(title)),), PANEL_MM, shares_x=place + 1 < len(drawn))
-        for place, (title, marks) in enumerate(drawn)
+        Row((Panel(marks, axis, y, title=title),), PANEL_MM, shares_x=place + 1 < len(drawn))
+        for place, (title, y, marks) in enumerate(drawn)
     )
     return Plot(
         f"health.panels.{key}",
@@ -75,8 +75,13 @@ def panels(results: FlightResults, key: str) -> Plot | None:
     )
 
 
-def _panels(answer: AutopilotHealth, check: Check, data: HealthSeries) -> Iterator[tuple[str, list[AnyMark]]]:
-    """Yield title and marks of each quantity of a check."""
+def sign_of(unit: str) -> str:
+    """Return the sign of a unit."""
+    return SIGNS.get(unit) or unit_sign(unit)
+
+
+def _panels(answer: AutopilotHealth, check: Check, data: HealthSeries) -> Iterator[tuple[str, Axis, list[AnyMark]]]:
+    """Yield title, upright axis and marks of each quantity of a check."""
     places = {id(one): place for place, one in enumerate(answer.measures)}
     for quantity in dict.fromkeys(one.quantity for one in check.measures):
         own = [one for one in check.measures if one.quantity == quantity]
@@ -87,9 +92,18 @@ def _panels(answer: AutopilotHealth, check: Check, data: HealthSeries) -> Iterat
                 x, y = broken_at_gaps(rows.time_s, rows.value)
                 marks.append(Curve(x=x, y=y, role=series(number), name=label(one.sensor or one.title)))
         if marks:
-            marks += list(_limits(own[0], data.value[np.isin(data.measure, [places[id(one)] for one in own])]))
-            unit = SIGNS.get(own[0].unit, unit_sign(own[0].unit))
-            yield ", ".join(filter(None, (own[0].title, unit))), marks
+            shown = data.value[np.isin(data.measure, [places[id(one)] for one in own])]
+            limits = list(_limits(own[0], shown))
+            title = own[0].title[:1].upper() + own[0].title[1:]
+            yield title, _upright(shown, limits, sign_of(own[0].unit)), [*marks, *limits]
+
+
+def _upright(value: np.ndarray, limits: list[Limit], unit: str) -> Axis:
+    """Return the upright axis: from zero where nothing is negative."""
+    top = max([float(np.nanmax(value)), *(one.value for one in limits)])
+    if float(np.nanmin(value)) < 0.0:
+        return Axis(unit)
+    return Axis(unit, low=0.0, high=1.08 * top if top > 0.0 else 1.0)
 
 
 def _limits(measure: Measure, value: np.ndarray) -> Iterator[Limit]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from groundstation.systems.health.answer import FIRST, Check
 
-MOST_OTHERS = 3
+MOST_OTHERS = 2
 MOSTLY = 0.8  # of the time: a longer span is "throughout"
 LONGEST = 50  # characters of a message that the sentence quotes
 GOOD: Mapping[str, str] = {"gnss": "GNSS good", "innovations": "filter healthy", "vibration": "vibration low"}
@@ -28,6 +28,26 @@ WARN: Mapping[str, str] = {
     "tracking": "setpoints followed poorly",
     "saturation": "actuators at their limit",
     "settings": "settings differ from what was found",
+}
+OF_QUANTITY: Mapping[str, str] = {  # what a person says where this quantity decided
+    "attitude_difference_deg": "estimators disagree",
+    "position_difference_m": "estimators disagree",
+    "output_angle_rad": "output predictor off",
+    "output_velocity_mps": "output predictor off",
+    "output_position_m": "output predictor off",
+    "dropouts_ms": "log with gaps",
+    "cpu_load": "CPU overloaded",
+    "slow_loops": "loops too slow",
+    "time_slip_s": "filter's clock slipped",
+    "supply_v": "supply of the board off",
+    "supply_swing_v": "supply of the board swings",
+    "rc_lost": "remote control lost",
+    "data_link_lost": "data link lost",
+    "gyro_bias_radps": "gyro bias large",
+    "accel_bias_mps2": "accelerometer bias large",
+    "gyro_difference_radps": "gyros disagree",
+    "accel_difference_mps2": "accelerometers disagree",
+    "sensor_errors": "sensor errors counted",
 }
 FAIL: Mapping[str, str] = {
     **WARN,
@@ -81,6 +101,9 @@ def _special(check: Check) -> str:
         fix = next((one for one in check.measures if one.quantity == "fix_type"), None)
         if fix is not None and fix.red_share == 1.0:
             return "GNSS never had a fix"
+    measure = check.decisive
+    if measure is not None and measure.quantity in OF_QUANTITY:
+        return OF_QUANTITY[measure.quantity]
     if check.key == "faults" and check.first_event_s is not None:
         first = check.reason.partition("; ")[0]
         return f"“{first}”" if len(first) <= LONGEST else ""
