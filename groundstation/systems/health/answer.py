@@ -144,7 +144,7 @@ class Check:
 
     @property
     def decisive(self) -> Measure | None:
-        """The quantity that decided the verdict; where several did, the one farthest beyond its limits."""
+        """The quantity that decided: of several the one farthest beyond its limits."""
         own = [one for one in self.measures if one.verdict == self.verdict]
         return max(own, key=lambda one: one.gravity, default=None)
 

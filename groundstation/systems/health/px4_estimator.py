@@ -186,7 +186,7 @@ def _gnss_checks(flight: Flight) -> Iterator[Evidence]:
 
 
 def resets_of(one: Topic, field: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows in which a counter of resets rises, and which of them the filter makes by design.
+    """Return the rows in which a counter of resets rises, and those by design.
 
     PX4 aligns heading and magnetic field once in flight (bit 23 of control_mode_flags): that is no fault.
     """

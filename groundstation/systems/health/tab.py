@@ -1,11 +1,13 @@
 """Tab on autopilot health: checks, quantities, messages, the chapter."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import rerun.blueprint as rrb
 
 from groundstation.chapters.markdown import markdown
 from groundstation.results.flight import FlightResults
-from groundstation.systems.health.answer import AutopilotHealth
+from groundstation.systems.health.answer import AutopilotHealth, Verdict
 from groundstation.systems.health.arrays import HealthLanes
 from groundstation.systems.health.chapter import health as chapter
 from groundstation.viewer import colours
@@ -14,6 +16,7 @@ from groundstation.viewer.plot_views import panels_of, plot_of
 from groundstation.viewer.recorder import Recorder
 from groundstation.viewer.views import document, lanes
 
+ORDER: tuple[Verdict, ...] = ("fail", "warn", "pass", "not_logged")
 PALETTE = {"good": colours.GREEN, "amber": colours.ORANGE, "red": colours.VERMILION}
 
 
@@ -27,21 +30,25 @@ def health(recorder: Recorder, results: FlightResults) -> rrb.Container | None:
     shown = _lanes(recorder, answer, results.rows_of(HealthLanes))
     if shown is not None:
         left.append(shown)
-    checks = []
-    for one in sorted(answer.checks, key=lambda check: ("fail", "warn", "pass", "not_logged").index(check.verdict)):
-        views = panels_of(recorder, plot_of(recorder, "health.panels", results, one.key))
-        if views:
-            checks.append(rrb.Vertical(contents=views, name=one.title[:1].upper() + one.title[1:]))
+    checks: list[rrb.View | rrb.Container] = []
+    for one in sorted(answer.checks, key=lambda check: ORDER.index(check.verdict)):
+        told = plot_of(recorder, "health.panels", results, one.key)
+        title = one.title[:1].upper() + one.title[1:]
+        views = panels_of(recorder, told, of=title if told is not None and len(told.panels) == 1 else "")
+        checks += views if len(views) == 1 else [rrb.Vertical(contents=views, name=title)] if views else []
     if checks:
-        left.append(rrb.Tabs(contents=checks, active_tab=0))
-    right: list[rrb.View] = [document("What was found", "health/answer")]
+        left.append(rrb.Tabs(contents=checks, active_tab=0) if len(checks) > 1 else checks[0])
+    right: list[rrb.View | rrb.Container] = [document("What was found", "health/answer")]
     if _messages(recorder, answer):
-        columns = rrb.TextLogColumns(text_log_columns=["loglevel", "body"])
-        right.append(rrb.TextLogView(name="Messages and modes", origin="/health/messages", columns=columns))
-    contents: list[rrb.View | rrb.Container] = [rrb.Vertical(contents=right, row_shares=[3.0, 2.0][: len(right)])]
-    if left:
-        contents.insert(0, rrb.Vertical(contents=left, row_shares=[2.0, 3.0][: len(left)]))
-    return rrb.Horizontal(contents=contents, column_shares=[3.0, 2.0][: len(contents)], name="Autopilot health")
+        parts = rrb.TextLogColumns(text_log_columns=["loglevel", "body"])
+        right.append(rrb.TextLogView(name="Messages and modes", origin="/health/messages", columns=parts))
+    columns: list[rrb.View | rrb.Container] = [_above(one) for one in (left, right) if one]
+    return rrb.Horizontal(contents=columns, column_shares=[3.0, 2.0][: len(columns)], name="Autopilot health")
+
+
+def _above(views: Sequence[rrb.View | rrb.Container]) -> rrb.View | rrb.Container:
+    """Return views above each other; one alone as it is, as the viewer would make of it."""
+    return views[0] if len(views) == 1 else rrb.Vertical(contents=views, row_shares=[2.0, 3.0])
 
 
 def _lanes(recorder: Recorder, answer: AutopilotHealth, data: HealthLanes | None) -> rrb.View | None:
