@@ -17,6 +17,7 @@ OURS = (  # in the order they are shown
     "groundstation.systems.latency.system",
     "groundstation.systems.magnetic.system",
     "groundstation.systems.landing.system",
+    "groundstation.systems.health.system",
     "groundstation.systems.several_logs.system",
     "groundstation.systems.reference.system",
     "groundstation.systems.cooperative.system",

@@ -1,0 +1,165 @@
+"""Autopilot health as an analysis.
+
+Every check of the log's own record, and the flight in a sentence.
+"""
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from groundstation.base.errors import NotAssessableError
+from groundstation.base.findings import Finding
+from groundstation.results.answer import Answers, answer_of
+from groundstation.systems.analysis import Analysis, Found, Shortfall
+from groundstation.systems.health.answer import AutopilotHealth, Check, Happening
+from groundstation.systems.health.columns import COLUMNS
+from groundstation.systems.health.settings import HealthSettings
+from groundstation.systems.known import Known
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from groundstation.systems.health.checks import Judged
+    from groundstation.systems.health.evidence import Event, Spans
+    from groundstation.tables.table import Flight
+
+CODE = "health"
+
+
+class _Checked(NamedTuple):
+    """Result of the checks."""
+
+    autopilot: str
+    air: "Spans"
+    checks: tuple[Check, ...]
+    judged: "tuple[Judged, ...]"
+    events: "tuple[Event, ...]"
+
+
+def _run(flight: "Flight", known: Known, settings: HealthSettings) -> Found[AutopilotHealth]:
+    from groundstation.systems.health.checks import worst_of
+    from groundstation.systems.health.figures import lanes_figure, series_figure
+    from groundstation.systems.health.sentence import told
+
+    found = _checked(flight, known, settings)
+    happenings = _happenings(flight, found.events, found.air)
+    listed = _listed(happenings, settings.most_messages)
+    answer = AutopilotHealth(
+        verdict=worst_of(one.verdict for one in found.checks),
+        sentence=told(found.checks),
+        autopilot=found.autopilot,
+        judged_over=found.air.words,
+        judged_by=found.air.method,
+        judged_s=found.air.seconds,
+        checks=found.checks,
+        happenings=listed,
+        happenings_left_out=len(happenings) - len(listed),
+        settings=_stated(settings),
+        figures=(
+            lanes_figure(found.judged, happenings, flight.duration_s),
+            series_figure(found.judged),
+        ),
+    )
+    return Found(answer, tuple(_finding(one) for one in found.checks if one.is_bad))
+
+
+def _checked(flight: "Flight", known: Known, settings: HealthSettings) -> _Checked:
+    """Judge the flight.
+
+    Raises
+    ------
+    NotAssessableError
+        Where the log holds nothing that a check judges.
+    """
+    from groundstation.systems.health.autopilots import autopilot_of
+    from groundstation.systems.health.checks import judge
+    from groundstation.systems.health.evidence import in_the_air
+    from groundstation.systems.health.limits import thresholds
+
+    autopilot = autopilot_of(flight)
+    if autopilot is None:
+        raise NotAssessableError(CODE, "the log is of no autopilot whose messages are known")
+    air = in_the_air(flight, known)
+    evidence, events = autopilot.evidence(flight), autopilot.events(flight)
+    checks, judged = judge(flight, evidence, events, air, thresholds(settings.thresholds))
+    if not judged and not events:
+        raise NotAssessableError(CODE, "the log holds no field that a check of the autopilot judges")
+    return _Checked(autopilot.name, air, checks, judged, events)
+
+
+def _examine(flight: "Flight", known: Known, settings: HealthSettings) -> tuple[Shortfall, ...]:
+    """Report the checks that cannot be judged.
+
+    Also that the whole log was judged, where nothing says that it flew.
+    """
+    found = _checked(flight, known, settings)
+    missing = [one.title for one in found.checks if one.verdict == "not_logged"]
+    told = [] if found.air.is_flown else [Shortfall("nothing says that it flew: judged over the whole log")]
+    return (*told, *([Shortfall(f"not logged: {', '.join(missing)}")] if missing else []))
+
+
+def _happenings(flight: "Flight", events: "Sequence[Event]", air: "Spans") -> tuple[Happening, ...]:
+    time_ns = np.array([one.time_ns for one in events], dtype=np.int64)
+    rows = zip(events, flight.seconds(time_ns).tolist(), air.hold(time_ns).tolist(), strict=True)
+    return tuple(
+        Happening(time_s, one.check, one.grade, one.text, one.source, in_the_air) for one, time_s, in_the_air in rows
+    )
+
+
+def _listed(happenings: tuple[Happening, ...], most: int) -> tuple[Happening, ...]:
+    """Return the happenings that are listed, warnings and failures before others."""
+    if len(happenings) <= most:
+        return happenings
+    order = sorted(range(len(happenings)), key=lambda row: happenings[row].grade == "info")[:most]
+    return tuple(happenings[row] for row in sorted(order))
+
+
+def _stated(settings: HealthSettings) -> dict[str, object]:
+    """Return the settings as an answer keeps them: what the user left out stays out."""
+    stated = {
+        name: {key: value for key, value in asdict(limit).items() if value is not None}
+        for name, limit in settings.thresholds.items()
+    }
+    return {"thresholds": stated, "most_messages": settings.most_messages}
+
+
+def _finding(check: Check) -> Finding:
+    measure = check.decisive
+    place = topic = ""
+    if check.first_event_s is not None:
+        place = f"at {check.first_event_s:.1f} s"
+    elif measure is not None:
+        topic = measure.source.rpartition(".")[0]
+        if measure.span_start_s is not None and measure.span_end_s is not None:
+            place = f"{measure.span_start_s:.1f} to {measure.span_end_s:.1f} s"
+        else:
+            place = f"at {measure.worst_at_s:.1f} s"
+    return Finding("warn", f"{CODE}.{check.key}", f"{check.title}: {check.verdict}, {check.reason}", topic, place)
+
+
+def _applies(flight: "Flight", _known: Known) -> bool:
+    from groundstation.systems.health.autopilots import autopilot_of
+
+    return autopilot_of(flight) is not None
+
+
+def _sentence(answers: Answers) -> str:
+    answer = answer_of(answers, AutopilotHealth)
+    return "" if answer is None else f"autopilot health {answer.verdict}: {answer.sentence}"
+
+
+HEALTH = Analysis(
+    name="health",
+    title="health of the autopilot: GNSS, filter, vibration, magnetometer, faults, battery, links, control",
+    subject="autopilot health",
+    page_title="Autopilot health",
+    needs="the autopilot's own messages: PX4 ULog, ArduPilot DataFlash or tlog",
+    settings=HealthSettings,
+    answer=AutopilotHealth,
+    run=_run,
+    applies=_applies,
+    sentence=_sentence,
+    columns=COLUMNS,
+    examine=_examine,
+)

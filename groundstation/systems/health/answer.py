@@ -1,0 +1,198 @@
+"""Answer of autopilot health: verdict of each check and of the flight."""
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+from groundstation.results.answer import Answer
+from groundstation.results.figures import FigureData
+
+NUMBERS_ARE_KNOWN = True  # in the schema of summary.json: a float that is not optional is never null
+
+Verdict = Literal["pass", "warn", "fail", "not_logged"]
+WHOLE_LOG = "in the whole log"  # what is judged where nothing says that it flew
+FIRST = ("gnss", "innovations", "vibration")  # checks that a flight's sentence and chapter always tell
+
+
+def _percent(share: float) -> str:
+    """Return a share that is not zero: ``12 %``, ``under 0.1 %``."""
+    if share < 0.001:
+        return "under 0.1 %"
+    return f"{100.0 * share:.0f} %" if share >= 0.0995 else f"{100.0 * share:.1f} %"
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One logged quantity as it was judged.
+
+    Parameters
+    ----------
+    check, quantity, title, sensor, source, unit : str
+        Keys of check and threshold, what it is and which of several, topic and field.
+    verdict : {'pass', 'warn', 'fail', 'not_logged'}
+        ``not_logged`` where it is logged, but not in the air.
+    rule : {'share', 'median', 'mean', 'rise'}
+        What of it the limits judge.
+    figure : float or None
+        Worst value in the air, median, mean over time, or rise of a counter.
+    worst, worst_at_s : float
+        Worst value in the air (of the log where it is not logged there) and its flight time.
+    median : float or None
+        Of the samples in the air.
+    mean : float or None
+        Over the time in the air.
+    amber_share, red_share : float or None
+        Shares of the time in the air in which it is logged; amber includes red.
+    amber_share_log, red_share_log : float or None
+        The same of the whole log.
+    logged_share : float
+        Share of the time in the air in which it is logged.
+    span_start_s, span_end_s : float or None
+        Longest red span in the air, else the longest amber one, flight seconds.
+    amber, red : float or None
+        Limits.
+    is_below : bool
+        Values below the limits are bad, not those above.
+    threshold_source : str
+        Where the limits come from.
+    is_flag : bool
+        It is set or not, or one of a few states: its number says nothing to people.
+    """
+
+    check: str
+    quantity: str
+    title: str
+    sensor: str
+    source: str
+    unit: str
+    verdict: Verdict
+    rule: Literal["share", "median", "mean", "rise"]
+    figure: float | None
+    worst: float
+    worst_at_s: float
+    median: float | None
+    mean: float | None
+    amber_share: float | None
+    red_share: float | None
+    amber_share_log: float | None
+    red_share_log: float | None
+    logged_share: float
+    span_start_s: float | None
+    span_end_s: float | None
+    amber: float | None
+    red: float | None
+    is_below: bool
+    threshold_source: str
+    is_flag: bool = False
+
+    @property
+    def name(self) -> str:
+        """Title and which of several: ``vibration (IMU 0)``."""
+        return f"{self.title} ({self.sensor})" if self.sensor else self.title
+
+    @property
+    def gravity(self) -> tuple[float, float, float]:
+        """Shares that are red and amber, then how much of its first limit the figure is."""
+        limit = self.amber if self.amber is not None else self.red
+        near = 0.0
+        if self.figure is not None and limit is not None and self.figure * limit > 0.0:
+            near = limit / self.figure if self.is_below else self.figure / limit
+        return self.red_share or 0.0, self.amber_share or 0.0, near
+
+    @property
+    def told(self) -> str:
+        """The figure in words, with its limit and share of the time."""
+        unit = f" {self.unit}" if self.unit else ""
+        share = self.red_share if self.red_share else self.amber_share
+        limit = self.red if self.red_share else self.amber
+        if self.figure is None:
+            return self.name
+        if self.rule == "rise" and self.figure == 0.0:
+            return f"{self.name}: none"
+        if self.rule != "share":
+            how = {"median": "median", "mean": "mean", "rise": "rose by"}[self.rule]
+            return f"{self.name} {how} {self.figure:.3g}{unit}"
+        if self.is_flag:
+            return f"{self.name} for {_percent(share)} of the time" if share else f"{self.name}: never"
+        over = (
+            f", {'below' if self.is_below else 'above'} {limit:g}{unit} for {_percent(share)} of the time"
+            if share
+            else ""
+        )
+        return f"{self.name} {'down to' if self.is_below else 'up to'} {self.figure:.3g}{unit}{over}"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check: its verdict, why, and the quantities behind it.
+
+    ``events_in_air`` counts warnings and failures that were logged in the air; ``first_event_s`` is the flight time of
+    the first one that decided.
+    """
+
+    key: str
+    title: str
+    verdict: Verdict
+    reason: str
+    measures: tuple[Measure, ...]
+    events_in_air: int = 0
+    first_event_s: float | None = None
+
+    @property
+    def is_bad(self) -> bool:
+        """Tell whether it warns or fails."""
+        return self.verdict in ("warn", "fail")
+
+    @property
+    def decisive(self) -> Measure | None:
+        """The quantity that decided: of several the one farthest beyond its limits."""
+        own = [one for one in self.measures if one.verdict == self.verdict]
+        return max(own, key=lambda one: one.gravity, default=None)
+
+
+@dataclass(frozen=True)
+class Happening:
+    """Something that the autopilot logged or did, flight seconds, with its grade."""
+
+    time_s: float
+    check: str
+    grade: Literal["info", "warn", "fail"]
+    text: str
+    source: str
+    in_the_air: bool
+
+
+@dataclass(frozen=True)
+class AutopilotHealth(Answer):
+    """Health of the autopilot of a flight.
+
+    ``verdict`` is the worst of the checks, ``sentence`` a person's summary; ``judged_over`` says over which time
+    (in the air, while armed, in the whole log) and ``judged_by`` what showed it, ``judged_s`` its length.
+    """
+
+    analysis: ClassVar[str] = "health"
+
+    verdict: Verdict
+    sentence: str
+    autopilot: str
+    judged_over: str
+    judged_by: str
+    judged_s: float
+    checks: tuple[Check, ...]
+    happenings: tuple[Happening, ...] = ()
+    happenings_left_out: int = 0
+    settings: dict[str, Any] = field(default_factory=dict)
+    figures: tuple[FigureData, ...] = ()
+
+    @property
+    def is_flown(self) -> bool:
+        """Tell whether anything says that it flew, or was armed."""
+        return self.judged_over != WHOLE_LOG
+
+    @property
+    def measures(self) -> tuple[Measure, ...]:
+        """The quantities of all checks, in their order."""
+        return tuple(measure for one in self.checks for measure in one.measures)
+
+    def check(self, key: str) -> Check:
+        """Return the check of that key."""
+        return next(one for one in self.checks if one.key == key)

@@ -1,0 +1,161 @@
+"""Chapter on autopilot health.
+
+The flight in a sentence, a table of checks, lanes, panels, what was logged.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from groundstation.chapters.assessed import without_answer
+from groundstation.chapters.parts import Cell, Claim, Facts, Figure, Grid, Head, Mark, Note, Part, Rank, Section, Tone
+from groundstation.chapters.wording import ABSENT, clean, clock, number, percent, significant, typeset
+from groundstation.results.flight import FlightResults
+from groundstation.systems.health.answer import FIRST, AutopilotHealth, Check, Happening, Measure, Verdict
+from groundstation.systems.health.plots import SIGNS, sign_of
+
+TITLE = "Autopilot health"
+LEAD = "Was GNSS good, was the filter healthy, and what went wrong when."
+TONES: Mapping[Verdict, Tone] = {"pass": "good", "warn": "warn", "fail": "bad", "not_logged": "unknown"}
+WORDS: Mapping[Verdict, str] = {"pass": "pass", "warn": "warn", "fail": "fail", "not_logged": "not logged"}
+HEADLINES: Mapping[Verdict, str] = {"pass": "Healthy", "warn": "Warnings", "fail": "Failed", "not_logged": "Not logged"}
+GRADES: Mapping[str, Mark] = {"info": Mark("plain", "info"), "warn": Mark("warn", "warn"), "fail": Mark("bad", "fail")}
+MOST_LISTED = 40
+
+
+def health(results: FlightResults) -> Section | None:
+    """Return the chapter; None when the flight was not assessed and no reason is known."""
+    answer = results.answer(AutopilotHealth)
+    if answer is None:
+        return without_answer(results, "health", TITLE, LEAD)
+    told = [one for one in answer.checks if one.verdict != "not_logged"]
+    missing = [one.title for one in answer.checks if one.verdict == "not_logged"]
+    shown = [one.key for one in told if one.is_bad or one.key in FIRST]
+    parts: list[Part] = [
+        _checks(told),
+        *([Note(f"Not logged: {', '.join(missing)}.", "unknown")] if missing else []),
+        Figure("health.lanes"),
+        *(Figure("health.panels", key) for key in shown),
+    ]
+    listed = _happenings([one for one in answer.happenings if one.grade != "info"], "Warnings and errors logged")
+    parts += [] if listed is None else [listed]
+    others = [Figure("health.panels", one.key) for one in told if one.key not in shown]
+    rest = _happenings([one for one in answer.happenings if one.grade == "info"], "Modes and remarks logged")
+    appendix = (*others, *([] if rest is None else [rest]), _measures(answer), _basis(answer))
+    headline = typeset(answer.sentence)
+    return Section("health", TITLE, LEAD, tuple(parts), headline, claim=_claim(answer), appendix=appendix)
+
+
+def _claim(answer: AutopilotHealth) -> Claim:
+    bad = [one for one in answer.checks if one.is_bad]
+    bad.sort(key=lambda one: one.verdict != "fail")
+    figures = tuple((one.title, WORDS[one.verdict], with_signs(one.reason)) for one in bad[:4])
+    mark = Mark(TONES[answer.verdict], HEADLINES[answer.verdict])
+    passed = sum(one.verdict == "pass" for one in answer.checks)
+    logged = sum(one.verdict != "not_logged" for one in answer.checks)
+    sentences = [f"{number(passed, 0)} of {number(logged, 0)} checks pass {answer.judged_over}."]
+    is_danger = answer.verdict == "fail" and answer.is_flown
+    return Claim(Rank.HEALTH, mark, typeset(answer.sentence), "", "", sentences, figures, is_danger=is_danger)
+
+
+def _checks(checks: Sequence[Check]) -> Grid:
+    heads = (
+        *(Head("Check"), Head("Verdict"), Head("What decided"), Head("Amber", True), Head("Red", True)),
+        *(Head("Worst span, or when"), Head("Limits"), Head("Source of the limits")),
+    )
+    caption = "Amber and red: share of the time in the air in which the quantity is logged; amber includes red."
+    return Grid("Checks", heads, [_check(one) for one in checks], caption, ("health_lanes",))
+
+
+def _check(check: Check) -> tuple[Cell, ...]:
+    measure = check.decisive
+    mark = Mark(TONES[check.verdict], WORDS[check.verdict])
+    what = with_signs(check.reason or ("" if measure is None else measure.told)) or ABSENT
+    if measure is None:
+        when = ABSENT if check.first_event_s is None else clock(check.first_event_s)
+        return (check.title, mark, what, ABSENT, ABSENT, when, ABSENT, "level of the message")
+    return (
+        check.title,
+        mark,
+        what,
+        _share(measure, measure.amber_share),
+        _share(measure, measure.red_share),
+        _when(check, measure),
+        _limits(measure),
+        measure.threshold_source,
+    )
+
+
+def with_signs(text: str) -> str:
+    """Return text of the terminal with the signs of a page.
+
+    Examples
+    --------
+    >>> with_signs("vibration up to 42 m/s2")
+    'vibration up to 42 m/s²'
+    """
+    told = typeset(text)
+    for unit, sign in SIGNS.items():
+        told = told.replace(f" {unit}", f" {sign}")
+    return told
+
+
+def _share(measure: Measure, share: float | None) -> str:
+    return percent(share, 1) if measure.rule == "share" else ABSENT
+
+
+def _when(check: Check, measure: Measure) -> str:
+    if measure.span_start_s is not None and measure.span_end_s is not None:
+        return f"{clock(measure.span_start_s)} … {clock(measure.span_end_s)}"
+    return ABSENT if check.first_event_s is None else clock(check.first_event_s)
+
+
+def _limits(measure: Measure) -> str:
+    if measure.is_flag:
+        return "set"
+    sign = "<" if measure.is_below else ">"
+    unit = sign_of(measure.unit)
+    levels = [significant(level) for level in (measure.amber, measure.red) if level is not None]
+    return f"{sign} {' / '.join(levels)} {unit}".strip() if levels else ABSENT
+
+
+def _happenings(happenings: Sequence[Happening], title: str) -> Grid | None:
+    if not happenings:
+        return None
+    rows = [
+        (clock(one.time_s), GRADES[one.grade], clean(one.text), "yes" if one.in_the_air else "no")
+        for one in happenings[:MOST_LISTED]
+    ]
+    more = f"The first {MOST_LISTED} of {number(len(happenings), 0)}." if len(happenings) > MOST_LISTED else ""
+    return Grid(title, (Head("Time"), Head("Grade"), Head("What"), Head("In the air")), rows, more)
+
+
+def _measures(answer: AutopilotHealth) -> Grid:
+    heads = (
+        *(Head("Quantity"), Head("Verdict"), Head("Worst", True), Head("At", True), Head("Median", True)),
+        *(Head("Amber, air / log", True), Head("Red, air / log", True), Head("Logged", True), Head("Field")),
+    )
+    rows = [
+        (
+            one.name,
+            Mark(TONES[one.verdict], WORDS[one.verdict]),
+            f"{significant(one.worst)} {sign_of(one.unit)}".strip(),
+            clock(one.worst_at_s),
+            significant(one.median),
+            f"{percent(one.amber_share, 1)} / {percent(one.amber_share_log, 1)}",
+            f"{percent(one.red_share, 1)} / {percent(one.red_share_log, 1)}",
+            percent(one.logged_share),
+            one.source,
+        )
+        for one in answer.measures
+    ]
+    return Grid("Every quantity", heads, rows, "Logged: share of the time in the air.")
+
+
+def _basis(answer: AutopilotHealth) -> Facts:
+    pairs = [
+        ("Autopilot", answer.autopilot, ""),
+        ("Judged", answer.judged_over, typeset(answer.judged_by)),
+        ("Time judged", clock(answer.judged_s), "min:s"),
+    ]
+    if answer.happenings_left_out:
+        pairs.append(("Messages not listed", number(answer.happenings_left_out, 0), ""))
+    return Facts("What it rests on", pairs)

@@ -1,0 +1,340 @@
+"""Verdict of each check, from its evidence.
+
+Shares of time in the air, worst span, and the threshold behind it.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.base.records import Int64Array
+from groundstation.base.units import NS_PER_S
+from groundstation.systems.health.answer import Check, Measure, Verdict
+from groundstation.systems.health.evidence import Event, Evidence, FloatArray, Spans
+from groundstation.systems.health.limits import Threshold
+from groundstation.tables.table import Flight
+
+CHECKS: Mapping[str, str] = {  # in the order they are told
+    "gnss": "GNSS quality",
+    "interference": "jamming and spoofing",
+    "innovations": "filter innovations",
+    "resets": "resets and estimators against each other",
+    "switches": "switches of estimator or sensor",
+    "vibration": "vibration",
+    "clipping": "accelerometer clipping",
+    "imu": "IMU bias, IMU against IMU",
+    "magnetometer": "magnetometer",
+    "faults": "faults and failsafes",
+    "timing": "timing and log",
+    "battery": "battery and supply",
+    "link": "remote control and data link",
+    "tracking": "attitude and rate against setpoint",
+    "saturation": "actuator saturation",
+    "settings": "settings against what was found",
+}
+ORDER: tuple[Verdict, ...] = ("not_logged", "pass", "warn", "fail")
+HOLD_STEPS, SHORTEST_HOLD_S, LONGEST_HOLD_S = 3.0, 2.0, 10.0  # how long a sample speaks
+EVENTS_TOLD = 3
+ONLY_FLOWN = ("tracking", "saturation")  # on the ground nothing follows its setpoints
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Evidence with its grade over time: 0 fine, 1 amber, 2 red, -1 absent. Shapes (n,)."""
+
+    evidence: Evidence
+    measure: Measure
+    time_s: FloatArray
+    until_s: FloatArray
+    grade: np.ndarray
+    is_drawn: bool = True
+
+
+def judge(
+    flight: Flight,
+    evidence: Iterable[Evidence],
+    events: Sequence[Event],
+    air: Spans,
+    limits: Mapping[str, Threshold],
+) -> tuple[tuple[Check, ...], tuple[Judged, ...]]:
+    """Judge a flight.
+
+    Parameters
+    ----------
+    flight : Flight
+    evidence, events
+        Of one autopilot, in any order.
+    air : Spans
+        What counts for the verdicts.
+    limits : mapping
+        Thresholds by quantity.
+
+    Returns
+    -------
+    checks : tuple of Check
+        One of each key of :data:`CHECKS`; one without anything logged in the spans is ``not_logged``.
+    judged : tuple of Judged
+        The evidence behind them.
+    """
+    clocks: dict[int, _Clock] = {}  # several quantities share the rows of a topic
+    judged = []
+    for each in evidence:
+        if each.check in ONLY_FLOWN and not air.is_flown:
+            continue
+        if id(each.time_ns) not in clocks:
+            clocks[id(each.time_ns)] = _clock(each.time_ns, air)
+        one = _judged(flight, each, air, limits[each.quantity], clocks[id(each.time_ns)])
+        judged += [] if one is None else [one]
+    order = {key: place for place, key in enumerate(CHECKS)}
+    judged.sort(key=lambda one: order[one.measure.check])  # as the measures of the checks
+    checks = []
+    for key, title in CHECKS.items():
+        measures = tuple(one.measure for one in judged if one.measure.check == key)
+        checks.append(_check(flight, key, title, measures, [one for one in events if one.check == key], air))
+    return tuple(checks), tuple(judged)
+
+
+@dataclass(frozen=True, eq=False)
+class _Clock:
+    """Rows of a topic: until when each speaks, and for how many seconds.
+
+    ``seconds`` are those of the judged spans, ``all_s`` all; ``in_air`` are the rows that lie in the spans.
+    """
+
+    time_ns: Int64Array
+    until_ns: Int64Array
+    seconds: FloatArray
+    all_s: FloatArray
+    in_air: np.ndarray
+
+
+def _clock(time_ns: Int64Array, air: Spans) -> _Clock:
+    steps = np.diff(time_ns)
+    step_ns = float(np.median(steps)) if len(steps) else 0.0
+    hold_ns = int(np.clip(HOLD_STEPS * step_ns, SHORTEST_HOLD_S * NS_PER_S, LONGEST_HOLD_S * NS_PER_S))
+    last_ns = time_ns[-1] + min(int(step_ns), hold_ns)
+    until_ns = np.minimum(np.append(time_ns[1:], last_ns), time_ns + hold_ns)
+    seconds = air.until(until_ns) - air.until(time_ns)
+    return _Clock(time_ns, until_ns, seconds, (until_ns - time_ns) / NS_PER_S, air.hold(time_ns))
+
+
+def _judged(flight: Flight, evidence: Evidence, air: Spans, limit: Threshold, clock: _Clock) -> Judged | None:
+    """Judge one quantity; None where nothing of it is logged."""
+    known = np.isfinite(evidence.value)
+    if not known.any():
+        return None
+    time_ns, until_ns = clock.time_ns, clock.until_ns
+    grade = np.where(known, _grades(evidence.value, limit), -1)
+    if limit.hold_s > 0.0:
+        grade = _lasting(time_ns, until_ns, grade, round(limit.hold_s * NS_PER_S))
+    measure = _measure(flight, evidence, limit, grade, clock, air)
+    return Judged(evidence, measure, flight.seconds(time_ns), flight.seconds(until_ns), grade, limit.is_drawn)
+
+
+def _grades(value: FloatArray, limit: Threshold) -> np.ndarray:
+    grade = np.zeros(len(value), dtype=np.int8)
+    if limit.rule != "share":
+        return grade
+    with np.errstate(invalid="ignore"):
+        for level, above, below in ((1, limit.amber, limit.amber_below), (2, limit.red, limit.red_below)):
+            if above is not None:
+                grade[value > above] = level
+            if below is not None:
+                grade[value < below] = level
+    return grade
+
+
+def _lasting(time_ns: np.ndarray, until_ns: np.ndarray, grade: np.ndarray, hold_ns: int) -> np.ndarray:
+    """Lower the grade where it does not last ``hold_ns``."""
+    out = np.where(grade > 0, 0, grade)
+    for level in (1, 2):
+        first, last = _runs(time_ns, until_ns, grade >= level)
+        for start, end in zip(first, last, strict=True):
+            if until_ns[end] - time_ns[start] >= hold_ns:
+                out[start : end + 1] = np.where(out[start : end + 1] >= 0, level, -1)
+    return out
+
+
+def _runs(time_ns: np.ndarray, until_ns: np.ndarray, is_true: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return first and last row of each stretch of true rows without a gap in time."""
+    rows = np.flatnonzero(is_true)
+    if not rows.size:
+        return rows, rows
+    breaks = (np.diff(rows) > 1) | (time_ns[rows[1:]] > until_ns[rows[:-1]])
+    starts = np.concatenate([[0], np.flatnonzero(breaks) + 1])
+    ends = np.append(starts[1:], len(rows)) - 1
+    return rows[starts], rows[ends]
+
+
+def _measure(
+    flight: Flight, evidence: Evidence, limit: Threshold, grade: np.ndarray, clock: _Clock, air: Spans
+) -> Measure:
+    value, time_ns, until_ns = evidence.value, clock.time_ns, clock.until_ns
+    known = np.isfinite(value)
+    seconds, all_s = np.where(known, clock.seconds, 0.0), np.where(known, clock.all_s, 0.0)
+    logged_s, whole_s = float(seconds.sum()), float(all_s.sum())
+    flown = known & clock.in_air
+    shares = {
+        name: float(weight[grade >= level].sum() / total) if total > 0.0 else None
+        for name, level, weight, total in (
+            ("amber_share", 1, seconds, logged_s),
+            ("red_share", 2, seconds, logged_s),
+            ("amber_share_log", 1, all_s, whole_s),
+            ("red_share_log", 2, all_s, whole_s),
+        )
+    }
+    mean = _mean(value, seconds, flown)
+    figure = _figure(value, seconds, flown, limit)
+    verdict: Verdict = "not_logged"
+    if logged_s > 0.0 and figure is not None:
+        verdict = _verdict(figure, shares["amber_share"] or 0.0, shares["red_share"] or 0.0, limit)
+        if verdict == "pass" and limit.amber_mean is not None and mean is not None and mean > limit.amber_mean:
+            verdict = "warn"
+    worst_row = _worst_row(value, flown if flown.any() else known, limit)
+    start, end = _worst_span(time_ns, until_ns, grade, seconds)
+    return Measure(
+        check=evidence.check,
+        quantity=evidence.quantity,
+        title=limit.title,
+        sensor=evidence.sensor,
+        source=evidence.source,
+        unit=evidence.unit or limit.unit,
+        verdict=verdict,
+        rule=limit.rule,
+        figure=figure,
+        worst=float(value[worst_row]),
+        worst_at_s=float(flight.seconds(time_ns[worst_row : worst_row + 1])[0]),
+        median=float(np.median(value[flown])) if flown.any() else None,
+        mean=mean,
+        **shares,
+        logged_share=min(logged_s / air.seconds, 1.0) if air.seconds > 0.0 else 0.0,
+        span_start_s=None if start is None else float(flight.seconds(time_ns[start : start + 1])[0]),
+        span_end_s=None if end is None else float(flight.seconds(until_ns[end : end + 1])[0]),
+        amber=limit.amber if limit.amber is not None else limit.amber_below,
+        red=limit.red if limit.red is not None else limit.red_below,
+        is_below=limit.amber is None and limit.red is None,
+        threshold_source=limit.source,
+        is_flag=not limit.is_drawn and limit.rule == "share",
+    )
+
+
+def _figure(value: FloatArray, seconds: FloatArray, flown: np.ndarray, limit: Threshold) -> float | None:
+    """Return the number that the limits judge.
+
+    Worst value, median, mean over time, or the rise of a counter.
+    """
+    if not flown.any():
+        return None
+    if limit.rule == "median":
+        return float(np.median(value[flown]))
+    if limit.rule == "mean":
+        return _mean(value, seconds, flown)
+    if limit.rule == "rise":
+        return rise(value, flown)
+    return float(value[_worst_row(value, flown, limit)])
+
+
+def _mean(value: FloatArray, seconds: FloatArray, flown: np.ndarray) -> float | None:
+    """Return the mean over time of the rows that were flown."""
+    total = float(seconds[flown].sum())
+    return float(value[flown] @ seconds[flown]) / total if total > 0.0 else None
+
+
+def rise(value: FloatArray, flown: np.ndarray) -> float:
+    """Return how far a counter rose in the rows that were flown.
+
+    A step counts where both its ends are known and it ends in the air; one backwards is a counter that began again.
+
+    Examples
+    --------
+    >>> rise(np.array([5.0, 5.0, 7.0, 1.0, np.nan, 2.0]), np.array([False, True, True, True, False, True]))
+    4.0
+    """
+    known = np.flatnonzero(np.isfinite(value))
+    steps = np.diff(value[known])
+    begun_again = np.where(steps < 0.0, value[known][1:], steps)
+    return float(begun_again[flown[known][1:]].sum())
+
+
+def _worst_row(value: FloatArray, among: np.ndarray, limit: Threshold) -> int:
+    rows = np.flatnonzero(among & np.isfinite(value))
+    is_low = limit.amber is None and limit.red is None and limit.rule != "rise"
+    return int(rows[np.argmin(value[rows]) if is_low else np.argmax(value[rows])])
+
+
+def _worst_span(
+    time_ns: np.ndarray, until_ns: np.ndarray, grade: np.ndarray, seconds: FloatArray
+) -> tuple[int | None, int | None]:
+    """Return first and last row of the longest red stretch in the air.
+
+    Of the longest amber one where none is red.
+    """
+    for level in (2, 1):
+        first, last = _runs(time_ns, until_ns, (grade >= level) & (seconds > 0.0))
+        if len(first):
+            longest = int(np.argmax(until_ns[last] - time_ns[first]))
+            return int(first[longest]), int(last[longest])
+    return None, None
+
+
+def _verdict(figure: float, amber_share: float, red_share: float, limit: Threshold) -> Verdict:
+    if limit.rule != "share":
+        over = (limit.amber, limit.red)
+        is_over = [one is not None and figure > one for one in over]
+        return "fail" if is_over[1] else "warn" if is_over[0] else "pass"
+    if _beyond(amber_share, limit.fail_amber) or _beyond(red_share, limit.fail_red):
+        return "fail"
+    return "warn" if _beyond(amber_share, limit.warn_amber) or _beyond(red_share, limit.warn_red) else "pass"
+
+
+def _beyond(share: float, limit: float | None) -> bool:
+    return limit is not None and share > limit
+
+
+def worst_of(verdicts: Iterable[Verdict]) -> Verdict:
+    """Return the worst verdict; ``not_logged`` where there is none.
+
+    Examples
+    --------
+    >>> worst_of(("pass", "not_logged", "warn")), worst_of(())
+    ('warn', 'not_logged')
+    """
+    return max(verdicts, key=ORDER.index, default="not_logged")
+
+
+def _check(
+    flight: Flight, key: str, title: str, measures: tuple[Measure, ...], events: Sequence[Event], air: Spans
+) -> Check:
+    """Put the measures and events of one check together.
+
+    The worst verdict is that of the check.
+    """
+    time_ns = np.array([one.time_ns for one in events], dtype=np.int64)
+    flown = air.hold(time_ns) if len(events) else np.zeros(0, dtype=bool)
+    graded: dict[str, Verdict] = {"info": "pass", "warn": "warn", "fail": "fail"}
+    told = [(graded[one.grade], one) for one, in_air in zip(events, flown, strict=True) if in_air]
+    verdict = worst_of([*(one.verdict for one in measures), *(grade for grade, _ in told)])
+    decisive = next((one for one in measures if one.verdict == verdict), None) if verdict != "not_logged" else None
+    texts = [one.text for grade, one in told if grade == verdict and verdict != "pass"]
+    return Check(
+        key=key,
+        title=title,
+        verdict=verdict,
+        reason=_reason(verdict, decisive, texts, measures),
+        measures=measures,
+        events_in_air=sum(grade != "pass" for grade, _ in told),
+        first_event_s=next(
+            (float(flight.seconds(np.array([one.time_ns]))[0]) for grade, one in told if grade == verdict != "pass"),
+            None,
+        ),
+    )
+
+
+def _reason(verdict: Verdict, decisive: Measure | None, texts: Sequence[str], measures: Sequence[Measure]) -> str:
+    if verdict == "not_logged":
+        return "logged, but not in the air" if measures else ""
+    if texts:
+        more = f" and {len(texts) - EVENTS_TOLD} more" if len(texts) > EVENTS_TOLD else ""
+        return "; ".join(dict.fromkeys(texts[:EVENTS_TOLD])) + more
+    return "" if decisive is None or verdict == "pass" else decisive.told

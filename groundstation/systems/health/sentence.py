@@ -1,0 +1,137 @@
+"""The flight in one sentence, as a person would say it.
+
+GNSS good, filter healthy, vibration high 12:03-12:09.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from groundstation.systems.health.answer import FIRST, Check
+
+MOST_OTHERS = 2
+MOSTLY = 0.8  # of the time: a longer span is "throughout"
+LONGEST = 50  # characters of a message that the sentence quotes
+GOOD: Mapping[str, str] = {"gnss": "GNSS good", "innovations": "filter healthy", "vibration": "vibration low"}
+WARN: Mapping[str, str] = {
+    "gnss": "GNSS weak",
+    "interference": "GNSS disturbed",
+    "innovations": "filter doubts its sensors",
+    "resets": "filter reset",
+    "switches": "sensor or estimator switched",
+    "vibration": "vibration raised",
+    "clipping": "accelerometer clipped",
+    "imu": "IMU doubtful",
+    "magnetometer": "magnetic field changes",
+    "faults": "warnings logged",
+    "timing": "timing or log with losses",
+    "battery": "battery low",
+    "link": "link lost",
+    "tracking": "setpoints followed poorly",
+    "saturation": "actuators at their limit",
+    "settings": "settings differ from what was found",
+}
+OF_QUANTITY: Mapping[str, str] = {  # what a person says where this quantity decided
+    "attitude_difference_deg": "estimators disagree",
+    "position_difference_m": "estimators disagree",
+    "output_angle_rad": "output predictor off",
+    "output_velocity_mps": "output predictor off",
+    "output_position_m": "output predictor off",
+    "dropouts_ms": "log with gaps",
+    "cpu_load": "CPU overloaded",
+    "slow_loops": "loops too slow",
+    "time_slip_s": "filter's clock slipped",
+    "supply_v": "supply of the board off",
+    "supply_swing_v": "supply of the board swings",
+    "rc_lost": "remote control lost",
+    "data_link_lost": "data link lost",
+    "gyro_bias_radps": "gyro bias large",
+    "accel_bias_mps2": "accelerometer bias large",
+    "gyro_difference_radps": "gyros disagree",
+    "accel_difference_mps2": "accelerometers disagree",
+    "sensor_errors": "sensor errors counted",
+}
+FAIL: Mapping[str, str] = {
+    **WARN,
+    "gnss": "GNSS bad",
+    "interference": "GNSS jammed or spoofed",
+    "innovations": "filter rejects its sensors",
+    "vibration": "vibration high",
+    "imu": "IMU bad",
+    "magnetometer": "magnetic field wrong",
+    "faults": "faults logged",
+    "battery": "battery critical",
+    "tracking": "setpoints not followed",
+}
+
+
+def told(checks: Sequence[Check]) -> str:
+    """Return the sentence.
+
+    GNSS, filter and vibration, then what else warns or fails, the worst first.
+    """
+    known = {one.key: one for one in checks}
+    parts = [_part(known[key]) for key in FIRST if key in known]
+    others = sorted((one for one in checks if one.key not in FIRST and one.is_bad), key=_gravity)
+    parts += [_part(one) for one in others[:MOST_OTHERS]]
+    if len(others) > MOST_OTHERS:
+        parts.append(f"and {len(others) - MOST_OTHERS} more")
+    shown = ", ".join(filter(None, parts))
+    return shown[:1].upper() + shown[1:]
+
+
+def _gravity(check: Check) -> bool:
+    return check.verdict != "fail"
+
+
+def _part(check: Check) -> str:
+    if check.verdict == "pass":
+        return GOOD.get(check.key, "")
+    if not check.is_bad:
+        return {"gnss": "GNSS not logged", "innovations": "filter not logged", "vibration": "vibration not logged"}.get(
+            check.key, ""
+        )
+    special = _special(check)
+    if special.endswith("fix"):
+        return special
+    return f"{special or (FAIL if check.verdict == 'fail' else WARN)[check.key]}{when(check)}"
+
+
+def _special(check: Check) -> str:
+    """Return what a person would say of this one, where it is more than the general word."""
+    if check.key == "gnss":
+        fix = next((one for one in check.measures if one.quantity == "fix_type"), None)
+        if fix is not None and fix.red_share == 1.0:
+            return "GNSS never had a fix"
+    measure = check.decisive
+    if measure is not None and measure.quantity in OF_QUANTITY:
+        return OF_QUANTITY[measure.quantity]
+    if check.key == "faults" and check.first_event_s is not None:
+        first = check.reason.partition("; ")[0]
+        return f"“{first}”" if len(first) <= LONGEST else ""
+    return ""
+
+
+def when(check: Check) -> str:
+    """Return the worst span or the first event of a check: `` 12:03-12:09``."""
+    measure = check.decisive
+    if check.first_event_s is not None:
+        return f" at {clock(check.first_event_s)}"
+    if measure is None or measure.span_start_s is None or measure.span_end_s is None:
+        return ""
+    share = measure.red_share if check.verdict == "fail" and measure.red_share else measure.amber_share
+    if share is not None and share > MOSTLY:
+        return " throughout"
+    start, end = clock(measure.span_start_s), clock(measure.span_end_s)
+    return f" at {start}" if start == end else f" {start}-{end}"
+
+
+def clock(seconds: float) -> str:
+    """Return flight time as minutes and seconds.
+
+    Examples
+    --------
+    >>> clock(723.4), clock(3725.0)
+    ('12:03', '1:02:05')
+    """
+    hours, rest = divmod(int(max(seconds, 0.0)), 3600)
+    tail = f"{rest // 60:02d}:{rest % 60:02d}" if hours else f"{rest // 60}:{rest % 60:02d}"
+    return f"{hours}:{tail}" if hours else tail

@@ -1,0 +1,22 @@
+"""Settings of autopilot health: what differs from thresholds.toml."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from groundstation.base.toml_settings import check_ranges, number
+from groundstation.systems.health.limits import Limit, thresholds
+
+
+@dataclass(frozen=True)
+class HealthSettings:
+    """Thresholds that the user sets, by quantity, and how much is told.
+
+    ``[health.thresholds.hdop]`` with ``amber = 2`` changes that limit alone.
+    """
+
+    thresholds: Mapping[str, Limit] = field(default_factory=dict)
+    most_messages: int = number(200, 0, 100_000)  # infos beyond are counted, not listed
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+        thresholds(self.thresholds)
