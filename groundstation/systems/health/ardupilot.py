@@ -9,6 +9,7 @@ _EVIDENCE = (
     ardupilot_filter.evidence,
     ardupilot_sensors.gnss,
     ardupilot_sensors.receivers,
+    ardupilot_sensors.receiver_switches,
     ardupilot_sensors.vibration,
     ardupilot_sensors.magnetometers,
     ardupilot_sensors.inertial,

@@ -12,6 +12,7 @@ import numpy as np
 from groundstation.base.angles import wrap_180
 from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.units import NS_PER_S
+from groundstation.systems.health.ardupilot_sensors import supply
 from groundstation.systems.health.evidence import Evidence
 from groundstation.systems.health.logged import (
     FloatArray,
@@ -25,9 +26,10 @@ from groundstation.systems.health.logged import (
     named,
 )
 from groundstation.tables.parameters import Parameters, parameters_of
-from groundstation.tables.table import Flight, Table
+from groundstation.tables.table import Flight
 
 LOW_AFTER_S = 10.0  # BATT_LOW_TIMER
+LEAST_VOLT = 2.0  # a battery that is never above it is none
 STEPS_PER_DB = 1.9
 # Modes without a setpoint of attitude: MANUAL, TRAINING, ACRO, INITIALISING, QACRO of planes; ACRO, FLIP of copters.
 FREE = {"plane": (0.0, 3.0, 4.0, 16.0, 23.0), "copter": (1.0, 14.0)}
@@ -43,7 +45,8 @@ def battery(flight: Flight) -> Iterator[Evidence]:
     for table, instance in instances(flight, "BAT", "BAT2") or instances(flight, "CURR", "CUR2"):
         field = named(table, "Volt")
         if field:
-            yield from _voltage(table, instance, parameters)
+            volt = table.values(field) * (0.01 if is_integer(table, field) else 1.0)
+            yield from voltage(f"{table.topic}.{field}", table.time_ns, volt, instance, parameters)
         if is_number(table, "RemPct") and parameters.value(_prefix(instance) + "CAPACITY") != DEFAULT_CAPACITY_MAH:
             left = table.values("RemPct")
             left = np.where(left <= 100.0, left / 100.0, np.nan)
@@ -53,10 +56,10 @@ def battery(flight: Flight) -> Iterator[Evidence]:
         topic = f"raw.{name}"
         if topic in flight and is_number(flight[topic], "Vcc"):
             table = flight[topic]
-            supply = table.values("Vcc")
-            supply = np.where(supply > 0.0, supply * (0.001 if np.nanmedian(supply) > 100.0 else 1.0), np.nan)
-            if np.isfinite(supply).any():
-                yield Evidence("battery", "supply_v", "board", f"{topic}.Vcc", "V", table.time_ns, supply)
+            volt = table.values("Vcc")
+            volt = np.where(volt > 0.0, volt * (0.001 if np.nanmedian(volt) > 100.0 else 1.0), np.nan)
+            if np.isfinite(volt).any():
+                yield from supply(f"{topic}.Vcc", table.time_ns, volt)
                 return
 
 
@@ -64,24 +67,26 @@ def _prefix(instance: int) -> str:
     return "BATT_" if instance == 0 else f"BATT{instance + 1}_"
 
 
-def _voltage(table: Table, instance: int, parameters: Parameters) -> Iterator[Evidence]:
+def voltage(
+    source: str, time_ns: Int64Array, volt: FloatArray, instance: int, parameters: Parameters
+) -> Iterator[Evidence]:
     """Yield 1 where the voltage is below the low limit for ten seconds, 2 below the critical one.
 
-    Without a limit in the log nothing is said: the number of cells is not known.
+    Without a limit in the log nothing is said: the number of cells is not known. A battery that is below its limit all
+    the time, at a few volts, is none: the aircraft was on another supply.
     """
-    volt = table.values("Volt") * (0.01 if is_integer(table, "Volt") else 1.0)
     names = (f"{_prefix(instance)}LOW_VOLT", *(("FS_BATT_VOLTAGE", "LOW_VOLT") if instance == 0 else ()))
     low, critical = parameters.value(*names), parameters.value(f"{_prefix(instance)}CRT_VOLT")
-    if not low or not np.any(volt > 0.0):
+    if not low or not np.any(volt > LEAST_VOLT):
         return
-    time_s = (table.time_ns - table.time_ns[0]) / NS_PER_S
+    time_s = (time_ns - time_ns[0]) / NS_PER_S
     after_s = parameters.value("BATT_LOW_TIMER") or LOW_AFTER_S
     state = lasting(time_s, volt < low, after_s).astype(np.float64)
     if critical:
         state += lasting(time_s, volt < critical, after_s)
     state = np.where(np.isfinite(volt), state, np.nan)
-    source = f"{table.topic}.Volt below {low:g} V" + (f" and {critical:g} V" if critical else "")
-    yield Evidence("battery", "battery_warning", f"battery {instance + 1}", source, "", table.time_ns, state, instance)
+    told = f"{source} below {low:g} V" + (f" and {critical:g} V" if critical else "")
+    yield Evidence("battery", "battery_warning", f"battery {instance + 1}", told, "", time_ns, state, instance)
 
 
 def link(flight: Flight) -> Iterator[Evidence]:
@@ -149,7 +154,9 @@ def _is_held(flight: Flight, time_ns: Int64Array) -> BoolArray:
     if not field:
         return np.ones(len(time_ns), dtype=bool)
     mode = latest(Series(table.time_ns, table.values(field)), time_ns)
-    return np.isfinite(mode) & ~np.isin(mode, FREE["copter" if "Copter" in flight.metadata.get("vehicle", "") else "plane"])
+    return np.isfinite(mode) & ~np.isin(
+        mode, FREE["copter" if "Copter" in flight.metadata.get("vehicle", "") else "plane"]
+    )
 
 
 def saturation(flight: Flight) -> Iterator[Evidence]:
@@ -181,7 +188,7 @@ def saturation(flight: Flight) -> Iterator[Evidence]:
         if each:
             value = _any(np.stack(each))
             source = f"raw.RCOU.{', '.join(sources[name])}"
-            yield Evidence("saturation", "saturation", name, source, "", table.time_ns, value)
+            yield Evidence("saturation", "output_full", name, source, "", table.time_ns, value)
 
 
 def _any(values: FloatArray) -> FloatArray:

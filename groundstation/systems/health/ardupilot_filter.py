@@ -25,6 +25,7 @@ from groundstation.systems.health.logged import (
     at,
     bit,
     changes,
+    counted,
     instances,
     is_integer,
     is_number,
@@ -63,6 +64,7 @@ _FAULTS = {
 _WRAP = 655.36
 _STEP_M = 2.0  # a position that leaves its own velocity by more was reset
 _LARGEST_STEP_S = 0.25
+FILTER_WARNING = "filter_warning"
 UNUSED = "_unused"  # of the quantities of a filter that did not fly the aircraft
 
 
@@ -78,11 +80,48 @@ def evidence(flight: Flight) -> Iterator[Evidence]:
         for quantity, sensor, series, source in _ratios(lanes, used, name):
             yield Evidence("innovations", quantity + suffix, sensor + words, source, "", series.time_ns, series.value)
         for sensor, series, source in _states(lanes, used, name):
-            grade = "filter_fault" if source.endswith(".FS") else "filter_warning"
-            check = "faults" if source.endswith(".FS") else "innovations"
-            yield Evidence(check, grade + suffix, f"{name} {sensor}", source, "", series.time_ns, series.value)
-        yield from _biases(flight, name, (state, bias), lanes, suffix, words)
+            is_fault = source.endswith(".FS")
+            check, grade = (
+                ("faults", "fault" if is_used else "caution") if is_fault else ("innovations", FILTER_WARNING)
+            )
+            if is_used or is_fault:
+                yield Evidence(check, grade, f"{name} {sensor}", source, "", series.time_ns, series.value)
+        if is_used:
+            yield from _biases(flight, name, (state, bias), lanes)
+        if is_used:
+            yield from _switches(flight, name, lanes)
+    yield from _not_the_one_set(flight, used)
     yield from _differences(flight, used)
+
+
+def _switches(flight: Flight, name: str, lanes: tuple[Logged, ...]) -> Iterator[Evidence]:
+    """Yield how often the lane has changed, and how often the position was reset."""
+    lane_of = primary_lane(flight, name)
+    if len(lane_of.time_ns):
+        source = f"{lanes[0].table.topic}.PI"
+        yield Evidence("switches", "switches", f"{name} lane", source, "", lane_of.time_ns, counted(lane_of))
+    for table, lane in lanes:
+        if is_number(table, "OFN", "OFE") and name != "EKF1" and _is_primary(table, lane).any():
+            count = np.zeros(len(table))
+            count[_reset_rows(table)] = 1.0
+            source = f"{table.topic}.OFN, OFE"
+            yield Evidence("resets", "resets", f"{name} position", source, "", table.time_ns, np.cumsum(count), lane)
+
+
+def _not_the_one_set(flight: Flight, used: EstimatorInUse | None) -> Iterator[Evidence]:
+    """Yield when another estimator flew than the one that is set, as DCM does while the filter is not ready."""
+    wanted = _wanted(flight)
+    if used is None or "AEKF" not in used.source or not wanted:
+        return
+    table = flight["raw.ATT"]
+    other = (~used.at(wanted, table.time_ns)).astype(np.float64)
+    sensor = f"{wanted} is set, {used.name} flew" if not used.flew(wanted) else f"{wanted} is set"
+    yield Evidence("innovations", "not_the_one_set", sensor, "raw.ATT.AEKF", "", table.time_ns, other)
+
+
+def _wanted(flight: Flight) -> str:
+    kind = parameters_of(flight).value("AHRS_EKF_TYPE")
+    return ARDUPILOT.get(int(kind), "") if kind is not None else ""
 
 
 def _ratios(
@@ -165,7 +204,7 @@ def primary_lane(flight: Flight, name: str) -> Series:
 
 
 def _biases(
-    flight: Flight, name: str, types: tuple[tuple[str, ...], ...], lanes: tuple[Logged, ...], suffix: str, words: str
+    flight: Flight, name: str, types: tuple[tuple[str, ...], ...], lanes: tuple[Logged, ...]
 ) -> Iterator[Evidence]:
     lane_of = primary_lane(flight, name)
     state, bias = types
@@ -190,7 +229,7 @@ def _biases(
                 continue
             if np.any(value > 0.0):
                 source = f"{table.topic}.{fields}"
-                yield Evidence("imu", quantity + suffix, sensor + words, source, unit, table.time_ns, value, lane)
+                yield Evidence("imu", quantity, sensor, source, unit, table.time_ns, value, lane)
 
 
 def _differences(flight: Flight, used: EstimatorInUse | None) -> Iterator[Evidence]:
@@ -200,6 +239,12 @@ def _differences(flight: Flight, used: EstimatorInUse | None) -> Iterator[Eviden
     second, first = flight["raw.AHR2"], flight["raw.ATT"]
     beside = " and ".join(used.others) if used is not None and used.others and used.name == "DCM" else ""
     suffix, words = (UNUSED, f"{beside}, not in use") if beside else ("", "second estimate")
+    other, names = _position(flight)
+    if other is not None and is_number(second, "Lat", "Lng"):
+        value = _distance_m(second, other, names)
+        if np.isfinite(value).any():
+            source = f"raw.AHR2 against {other.topic}"
+            yield Evidence("resets", "position_difference_m" + suffix, words, source, "m", second.time_ns, value)
     angles = [name for name in ("Roll", "Pitch") if is_number(second, name) and is_number(first, name)]
     if angles:
         apart = [
@@ -209,16 +254,6 @@ def _differences(flight: Flight, used: EstimatorInUse | None) -> Iterator[Eviden
         value = np.max(np.stack(apart), axis=0)
         source = "raw.AHR2 against raw.ATT"
         yield Evidence("resets", "attitude_difference_deg" + suffix, words, source, "deg", second.time_ns, value)
-    place = ("Lat", "Lng")
-    if not is_number(second, *place):
-        return
-    other, names = _position(flight)
-    if other is None or not has_position(second.values("Lat"), second.values("Lng")).any():
-        return
-    value = _distance_m(second, other, names)
-    if np.isfinite(value).any():
-        source = f"raw.AHR2 against {other.topic}"
-        yield Evidence("resets", "position_difference_m" + suffix, words, source, "m", second.time_ns, value)
 
 
 def _position(flight: Flight) -> tuple[Table | None, tuple[str, str]]:
@@ -243,7 +278,7 @@ def _distance_m(table: Table, other: Table, names: tuple[str, str]) -> FloatArra
 
 
 def events(flight: Flight) -> Iterator[Event]:
-    """Yield resets of position, switches of lane and estimator, and an estimator that is not the one set."""
+    """Yield resets of position, and switches of lane and of estimator."""
     used = estimator_in_use(flight)
     for name, (status, state, _) in FILTERS.items():
         if used is not None and not used.flew(name):
@@ -310,14 +345,9 @@ def _selections(flight: Flight, name: str, lane_of: Series) -> Iterator[Event]:
 
 
 def _estimators(flight: Flight, used: EstimatorInUse | None) -> Iterator[Event]:
-    """Yield changes of the estimator that flies, and one that is not the one set from the start."""
+    """Yield changes of the estimator that flies."""
     if used is None or "AEKF" not in used.source:
         return
     for time_ns, before, name in zip(used.times_ns[1:], used.names[:-1], used.names[1:], strict=True):
         text = f"{name} took over from {before}"
         yield Event("switches", time_ns, "fail" if name == "DCM" else "warn", text, "raw.ATT.AEKF")
-    kind = parameters_of(flight).value("AHRS_EKF_TYPE")
-    wanted = ARDUPILOT.get(int(kind), "") if kind is not None else ""
-    if wanted and not used.flew(wanted):
-        text = f"{used.name} flew throughout, {wanted} is set (AHRS_EKF_TYPE = {kind:g})"
-        yield Event("faults", int(flight["raw.ATT"].time_ns[0]), "warn", text, "raw.ATT.AEKF")

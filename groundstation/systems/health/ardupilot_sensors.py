@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.base.records import BoolArray
+from groundstation.base.records import BoolArray, Int64Array
 from groundstation.base.signals import topics_of_kind
 from groundstation.base.units import NS_PER_S, NT_PER_GAUSS
 from groundstation.systems.health.evidence import Event, Evidence
@@ -18,6 +18,7 @@ from groundstation.systems.health.logged import (
     Logged,
     Series,
     changes,
+    counted,
     instances,
     is_integer,
     is_number,
@@ -28,9 +29,10 @@ from groundstation.systems.health.logged import (
     named,
     nearest,
 )
-from groundstation.tables.parameters import parameters_of
+from groundstation.tables.parameters import Parameters, parameters_of
 from groundstation.tables.table import Flight, Table
 
+UNKNOWN_ACCURACY_M = 655.0  # the largest that fits: the receiver tells none
 UNKNOWN_HDOP = 99.0  # 99.99: the receiver tells none
 GYRO, ACCEL = ("GyrX", "GyrY", "GyrZ"), ("AccX", "AccY", "AccZ")
 FORWARD = ("field_forward_nt", "field_right_nt", "field_down_nt")
@@ -64,7 +66,9 @@ def receivers(flight: Flight) -> Iterator[Evidence]:
     for table, instance in instances(flight, "GPA", "GPA2"):
         for field, quantity in (("HAcc", "eph_m"), ("VAcc", "epv_m")):
             if is_number(table, field) and np.any(table.values(field) > 0.0):
-                yield _of("gnss", quantity, f"GNSS {instance + 1}", table, field, "m", instance)
+                value = np.where(table.values(field) < UNKNOWN_ACCURACY_M, table.values(field), np.nan)
+                source, sensor = f"{table.topic}.{field}", f"GNSS {instance + 1}"
+                yield Evidence("gnss", quantity, sensor, source, "m", table.time_ns, value, instance)
     for table, instance in instances(flight, "UBX3"):  # of 2014; GPA holds them since
         for field, quantity, unit in (
             ("hAcc", "eph_m", "m"),
@@ -80,6 +84,15 @@ def receivers(flight: Flight) -> Iterator[Evidence]:
             yield _of("interference", "jamming_indicator", f"GNSS {instance + 1}", table, "jamInd", "", instance)
 
 
+def receiver_switches(flight: Flight) -> Iterator[Evidence]:
+    """Yield how often the receiver in use has changed, where there are several."""
+    used = [one for one in instances(flight, "GPS", "GPS2") if is_number(one.table, "U")]
+    if len(used) > 1:
+        table = used[0].table
+        count = counted(Series(table.time_ns, table.values("U")))
+        yield Evidence("switches", "switches", "GNSS receiver", f"{table.topic}.U", "", table.time_ns, count)
+
+
 def receiver_events(flight: Flight) -> Iterator[Event]:
     """Yield changes of the receiver in use (GPS.U)."""
     for table, instance in instances(flight, "GPS", "GPS2"):
@@ -93,7 +106,10 @@ def receiver_events(flight: Flight) -> Iterator[Event]:
 
 def vibration(flight: Flight) -> Iterator[Evidence]:
     """Yield vibration of each axis, and the counters of clipped samples."""
+    parameters = parameters_of(flight)
     for table, instance in instances(flight, "VIBE"):
+        if is_off(parameters, "INS_USE", instance):
+            continue
         for axis in "XYZ":
             if is_number(table, f"Vibe{axis}"):
                 sensor = f"IMU {instance + 1} {axis.lower()}"
@@ -101,16 +117,17 @@ def vibration(flight: Flight) -> Iterator[Evidence]:
         if is_number(table, "Clip"):
             yield _of("clipping", "clipping", f"IMU {instance + 1}", table, "Clip", "", instance)
         for other in range(3):
-            if is_number(table, f"Clip{other}"):
+            if is_number(table, f"Clip{other}") and not is_off(parameters, "INS_USE", other):
                 yield _of("clipping", "clipping", f"IMU {other + 1}", table, f"Clip{other}", "", other)
 
 
 def magnetometers(flight: Flight) -> Iterator[Evidence]:
     """Yield length and change of the field, offsets, and the share of the field that the throttle makes."""
     power, name, full = throttle(flight)
+    parameters = parameters_of(flight)
     for number, topic in enumerate(topics_of_kind("magnetometer", flight.topics()), start=1):
         table, sensor = flight[topic], f"magnetometer {number}"
-        if not table.has(*FORWARD):
+        if not table.has(*FORWARD) or is_off(parameters, "COMPASS_USE", number - 1):
             continue
         field = length(table, FORWARD) / NT_PER_GAUSS
         field = np.where(field > 0.0, field, np.nan)
@@ -127,11 +144,16 @@ def magnetometers(flight: Flight) -> Iterator[Evidence]:
             yield Evidence("magnetometer", "field_with_throttle", sensor, source, "", table.time_ns, made, number - 1)
     for table, instance in instances(flight, "MAG", "MAG2", "MAG3"):
         offsets = ("OfsX", "OfsY", "OfsZ")
-        if is_number(table, *offsets):
+        if is_number(table, *offsets) and not is_off(parameters, "COMPASS_USE", instance):
             source = f"{table.topic}.{', '.join(offsets)}"
             value = length(table, offsets) * _milligauss(table)
             sensor = f"magnetometer {instance + 1}"
             yield Evidence("magnetometer", "compass_offset", sensor, source, "mgauss", table.time_ns, value, instance)
+
+
+def is_off(parameters: Parameters, name: str, instance: int) -> bool:
+    """Tell whether a sensor is switched off in the parameters: what it shows is nobody's concern."""
+    return parameters.value(name + ("" if instance == 0 else f"{instance + 1}")) == 0.0
 
 
 def _milligauss(table: Table) -> float:
@@ -157,6 +179,9 @@ def throttle(flight: Flight) -> tuple[Series, str, float]:
             most = float(np.nanmax(value, initial=0.0))
             full = 1.0 if most <= 1.5 and not is_integer(table, field) else 100.0 if most <= 150.0 else 1000.0
             return Series(table.time_ns, value), f"{name}.{field}", full
+    if "raw.VFR_HUD" in flight and is_number(flight["raw.VFR_HUD"], "throttle"):
+        table = flight["raw.VFR_HUD"]
+        return Series(table.time_ns, table.values("throttle")), "VFR_HUD.throttle", 100.0
     for table, _ in instances(flight, "BAT", "BAT2"):
         if is_number(table, "Curr") and np.any(table.values("Curr") > 0.0):
             value = table.values("Curr")
@@ -165,7 +190,7 @@ def throttle(flight: Flight) -> tuple[Series, str, float]:
 
 
 def _by_throttle(field: Series, power: Series, full: float, usual: float) -> FloatArray | None:
-    """Return the share of the field that a straight line through throttle explains, along time.
+    """Return what throttle adds to the field by a straight line, as a share of the field at idle, along time.
 
     None where the throttle hardly moved, or where the line explains less than a tenth of the variance: then nothing is
     said, neither good nor bad, of a field that something else changed.
@@ -184,12 +209,15 @@ def _by_throttle(field: Series, power: Series, full: float, usual: float) -> Flo
     explained = slope * float(x @ y) / max(float(y @ y), 1e-30)
     if explained < 0.1 and np.std(y) > 0.05 * usual:
         return None
-    return np.asarray(np.abs(slope * (share - low)) / usual)
+    idle = float(field.value[known].mean() + slope * (low - share[known].mean()))
+    return np.asarray(np.abs(slope * (share - low)) / max(idle, 0.1 * usual))
 
 
 def inertial(flight: Flight) -> Iterator[Evidence]:
     """Yield differences of gyros and accelerometers, and units that call themselves unhealthy."""
-    every = instances(flight, "IMU", "IMU2", "IMU3")
+    parameters = parameters_of(flight)
+    logged = instances(flight, "IMU", "IMU2", "IMU3")
+    every = [one for one in logged if not is_off(parameters, "INS_USE", one.instance)]
     for table, instance in every:
         health = [name for name in ("GH", "AH", "GyHlt", "AcHlt") if is_number(table, name)]
         if health:
@@ -199,7 +227,7 @@ def inertial(flight: Flight) -> Iterator[Evidence]:
         for fields, sensor in ((("EG", "ErrG"), "gyro"), (("EA", "ErrA"), "accelerometer")):
             field = named(table, *fields)
             if field:
-                yield _of("imu", "imu_errors", f"IMU {instance + 1} {sensor}", table, field, "", instance)
+                yield _of("imu", "sensor_errors", f"IMU {instance + 1} {sensor}", table, field, "", instance)
     for other in every[1:]:
         yield from _against(every[0], other)
 
@@ -243,7 +271,7 @@ def timing(flight: Flight) -> Iterator[Evidence]:
             yield Evidence("timing", "cpu_load", "processor", f"{table.topic}.Load", "", table.time_ns, load)
         for field, sensor in (("I2CErr", "I2C bus"), ("INSErr", "inertial sensors")):
             if is_number(table, field):
-                yield _of("timing", "bus_errors", sensor, table, field)
+                yield _of("imu", "sensor_errors", sensor, table, field)
         field = named(table, "IntE", "IntErr", "InE")
         if field:
             is_set = (table.values(field) != 0.0).astype(np.float64)
@@ -253,9 +281,11 @@ def timing(flight: Flight) -> Iterator[Evidence]:
             yield _of("timing", "dropped_records", "log", table, "Dp")
 
 
-def compass_limit(flight: Flight) -> float | None:
-    """Return the firmware's own limit of a compass offset, in milligauss; None where it is not logged."""
-    return parameters_of(flight).value("COMPASS_OFFS_MAX")
+def supply(source: str, time_ns: Int64Array, volt: FloatArray) -> Iterator[Evidence]:
+    """Yield the supply of the board, and how far it has swung so far."""
+    yield Evidence("battery", "supply_v", "board", source, "V", time_ns, volt)
+    swing = np.fmax.accumulate(volt) - np.fmin.accumulate(volt)
+    yield Evidence("battery", "supply_swing_v", "board", source, "V", time_ns, swing)
 
 
 def _of(

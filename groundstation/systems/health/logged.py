@@ -63,8 +63,16 @@ def _apart(table: Table, otherwise: int) -> Iterator[tuple[int, Table]]:
 
 
 def is_number(table: Table, *names: str) -> bool:
-    """Tell whether fields are there, with numbers: a field that became text in some firmware is not."""
-    return all(table.has(name) and table.columns[name].values.dtype.kind in "fiub" for name in names)
+    """Tell whether fields are there with numbers.
+
+    A field that became text in some firmware is not, nor one that is not a number throughout.
+    """
+    return all(table.has(name) and _is_number(table, name) for name in names)
+
+
+def _is_number(table: Table, name: str) -> bool:
+    kind = table.columns[name].values.dtype.kind
+    return kind in "iub" or (kind == "f" and bool(np.isfinite(table.values(name)).any()))
 
 
 def named(table: Table, *names: str) -> str:
@@ -127,6 +135,13 @@ def changes(series: Series) -> NDArray[np.intp]:
     """Return the places at which a value differs from the last known one before."""
     known = np.flatnonzero(np.isfinite(series.value))
     return np.asarray(known[1:][np.diff(series.value[known]) != 0.0])
+
+
+def counted(series: Series) -> FloatArray:
+    """Return how often a value has changed so far, shape (n,); NaN where it is absent."""
+    step = np.zeros(len(series.value))
+    step[changes(series)] = 1.0
+    return np.where(np.isfinite(series.value), np.cumsum(step), np.nan)
 
 
 def low_pass(time_s: FloatArray, value: FloatArray, constant_s: float, longest_step_s: float) -> FloatArray:

@@ -29,6 +29,12 @@ _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
 _GRAVE_EVENTS, _LIGHT_EVENTS = (19, 51, 54), (34, 35, 59, 60, 62)  # EV that are a failure, and a warning
 _ESTIMATOR_EVENTS = (60, 62)
 _SWITCH_EVENTS = (67, 90)
+_OF_CHECK = (
+    ("switches", re.compile(r"lane switch|switch(?:ed|ing) to (?:compass|lane|imu|gps|primary)", re.I)),
+    ("resets", re.compile(r"(?:yaw|position|velocity|height) re-?(?:set|align)", re.I)),
+    ("gnss", re.compile(r"\b(?:gps|gnss)\b.*(?:glitch|lost|no fix|jamm|spoof|unhealthy)", re.I)),
+    ("battery", re.compile(r"battery", re.I)),
+)
 LANE_SWITCH = 24
 MOST_TOLD = 12  # kinds of messages that are a finding each
 
@@ -74,11 +80,22 @@ def _levels(table: Table, field: str) -> list[int | str | None]:
 
 def events(flight: Flight) -> Iterator[Event]:
     """Yield text, error codes, events and changes of mode as events of the checks they concern."""
-    for message in messages(flight):
-        yield Event("faults", message.time_ns, message.grade, message.text, message.source)
+    yield from texts(flight)
     yield from _errors(flight)
     yield from _plain_events(flight)
     yield from _modes(flight)
+
+
+def texts(flight: Flight) -> Iterator[Event]:
+    """Yield logged text as events of the checks it speaks of.
+
+    A sensor or lane that was switched is worth a warning, whatever its level.
+    """
+    for one in messages(flight):
+        is_switch = bool(_OF_CHECK[0][1].search(one.text))
+        grade: Grade = "warn" if is_switch and one.grade == "info" else one.grade
+        check = next((check for check, words in _OF_CHECK if grade != "info" and words.search(one.text)), "faults")
+        yield Event(check, one.time_ns, grade, one.text, one.source)
 
 
 def _errors(flight: Flight) -> Iterator[Event]:
@@ -140,7 +157,7 @@ def _modes(flight: Flight) -> Iterator[Event]:
         told = f", reason: {MODE_REASONS[known]}" if known in MODE_REASONS else ""
         name = names.get(int(mode), f"{mode:.0f}")
         grade: Grade = "fail" if known in BAD_MODE_REASONS else "info"
-        yield Event("faults", time_ns, grade, f"mode {name}{told}", "raw.MODE")
+        yield Event("modes" if grade == "info" else "faults", time_ns, grade, f"mode {name}{told}", "raw.MODE")
 
 
 def _mode_names(flight: Flight) -> dict[int, str]:
